@@ -82,7 +82,7 @@ class FormulaLaw:
         """Largest force, degree, units of force and speed, and whether there is a potential, and a reversal."""
         degree = np.nan if self.degree is None else self.degree
         numbers = self.largest, degree, self.unit, self.speed_unit, float(self.associated), float(self.reversible)
-        return KernelLaw(numbers, ("OWN_LAW",), own_law_header(*self.formulas))
+        return KernelLaw(numbers, own_law_header(*self.formulas))
 
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         fs, fn = (each(self._at(vs, vn, delta)) / self.unit for each in self._read[:2])

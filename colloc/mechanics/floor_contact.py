@@ -301,7 +301,7 @@ class FloorContact:
         first = np.searchsorted(self.links, np.arange(len(self._scatter) + 1))
         parts = np.hstack([self.along, self.offset, self.cos, self.sin, self.length, self.pressure, numbers])
         head = len(self._scatter), len(self.parts), law.largest, float(law.associated), degree, unit, speed_unit
-        return KernelLaw((*head, *first, *parts.ravel()), stated.defines, stated.own_law)
+        return KernelLaw((*head, *first, *parts.ravel()), stated.own_law)
 
     def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
         """Of what is drawn as sticking or sliding, and what it is called: of the middles of links; of feet, and of pads where

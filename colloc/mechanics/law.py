@@ -21,10 +21,8 @@ class KernelLaw(NamedTuple):
 
     numbers: tuple[float, ...] = ()
     """Empty where it does not know the law."""
-    defines: tuple[str, ...] = ()
-    """What the kernel is compiled with; nothing for the usual one."""
     own_law: str = ""
-    """C of the law (own_law.h); empty where the kernel has it in closed form."""
+    """C of the law (own_law.h); empty where the kernel has the law in closed form."""
 
 
 @runtime_checkable

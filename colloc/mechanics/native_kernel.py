@@ -1,8 +1,8 @@
 """The compiled kernel of chains: C sources of this package as a shared library, or none, and its calls. No CasADi.
 
-The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled when first needed, in under
-half a second, and kept (`colloc.numerics.c_compiler`). Without a compiler, or a folder to keep the library in, everything is
-done by NumPy, the reference (docs/developers/kernel.md says why C, and why then).
+The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are built with the package (setup.py). A
+kernel with the law of a user, and one that was not built or whose sources were changed since, is compiled for the process that
+needs it, in half a second. Without a compiler everything is done by NumPy, the reference (docs/developers/kernel.md).
 Calls release the interpreter's lock, so that large batches are shared by threads; an instant's answer depends on
 nothing but its own data, so it is the same in any batch and on any number of threads.
 """
@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import hashlib
 import multiprocessing
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +28,13 @@ from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
-from colloc.numerics.c_compiler import kept_library, lack
+from colloc.numerics.c_compiler import compiled_library
 from colloc.system.errors import SlowWarning, StoreError
 from colloc.system.processors import available_threads
 
-FLAGS: tuple[str, ...] = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
+SOURCES = resources.files("colloc.mechanics") / "native"
+FLAGS = tuple((SOURCES / "flags.txt").read_text("ascii").split())
 """Nothing that reorders arithmetic. -O3 takes three times as long to compile and gains 5 to 10 %."""
-_MAIN = "kernel.c"
 _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
 
@@ -52,7 +54,7 @@ _switched_off = False
 def native_kernel(body: Links = _ANY, friction: Law = _USUAL) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
     law = body.contact.kernel_law(friction)
-    return library(law.defines, law.own_law) if body.in_series and law.numbers and not _switched_off else None
+    return library(law.own_law) if body.in_series and law.numbers and not _switched_off else None
 
 
 @contextlib.contextmanager
@@ -67,29 +69,37 @@ def numpy_instead() -> Iterator[None]:
 
 
 @cache
-def library(defines: tuple[str, ...] = (), own_law: str = "") -> ctypes.CDLL | None:
-    """The kernel, loaded, and compiled before if need be, by itself or with a law's own C; None if that
-    cannot be, with a `SlowWarning` unless nobody wants it."""
-    flags = (*FLAGS, *(f"-D{name}" for name in defines))
-    headers = {"own_law.h": own_law} if own_law else {}
+def library(own_law: str = "") -> ctypes.CDLL | None:
+    """The kernel as it was built, or else compiled now, by itself or with a law's own C; None, with a `SlowWarning`, if that
+    cannot be."""
     try:
-        with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
-            file = kept_library("kernel", sources, _MAIN, flags, headers)
-            why = "" if file else lack()
-            found = None if file is None else _loaded(file)
+        with resources.as_file(SOURCES) as sources:
+            found = None if own_law else built_kernel(sources)
+            if found is None:
+                own = {"own_law.h": own_law} if own_law else {}
+                found = compiled_library(sources / "kernel.c", [*FLAGS, *(["-DOWN_LAW"] if own else [])], own)
     except (OSError, StoreError) as error:
-        why, found = str(error).rstrip("."), None
-    if why and multiprocessing.parent_process() is None:  # workers leave it to their parent
-        warnings.warn(f"the balance is solved by NumPy, 10 to 60 times more slowly: {why}.", SlowWarning, stacklevel=2)
+        if multiprocessing.parent_process() is None:  # workers leave it to their parent
+            slow = f"the balance is solved by NumPy, 10 to 60 times more slowly: {str(error).rstrip('.')}."
+            warnings.warn(slow, SlowWarning, stacklevel=2)
+        return None
+    for name, arguments in _SIGNATURES.items():
+        getattr(found, name).argtypes = arguments
     return found
 
 
-def _loaded(file: Path) -> ctypes.CDLL:
-    """The library with its functions declared."""
-    loaded = ctypes.CDLL(str(file))
-    for name, arguments in _SIGNATURES.items():
-        getattr(loaded, name).argtypes = arguments
-    return loaded
+def built_kernel(sources: Path) -> ctypes.CDLL | None:
+    """The library that was built of these very sources with the package, if there is one."""
+    spec = find_spec("colloc.mechanics._kernel")
+    if spec is None or spec.origin is None:
+        return None
+    now = hashlib.sha256(b"".join(file.read_bytes() for file in sorted(sources.glob("*.[ch]"))))
+    try:
+        found = ctypes.CDLL(spec.origin)
+        made_of = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(found, "colloc_sources")))
+    except (OSError, ValueError):  # of another machine, or of something else
+        return None
+    return found if made_of.decode("ascii") == now.hexdigest() else None
 
 
 def address(array: np.ndarray | None) -> int | None:

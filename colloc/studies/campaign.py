@@ -112,7 +112,7 @@ def run_starts(
     """
     if not problem.gait.free:
         raise ProblemError("a prescribed motion is the same from every start; colloc solve measures it.")
-    native_kernel()  # compiled before the workers begin, or missed once for all of them
+    native_kernel()  # missed once for all workers, or there
     waiting = iter(starts)
 
     def ready() -> Task | None:

@@ -125,7 +125,7 @@ class StudyRun:
 
         Arguments are those of `colloc.system.task_pool.completed`; `ahead` is a quarter of the workers, and one, by default.
         """
-        native_kernel()  # compiled before the workers begin, or missed once for all of them
+        native_kernel()  # missed once for all workers, or there
         ahead = 1 + workers // 4 if ahead is None else ahead
         number, chunks = 0, self._first_chunks()
         while number == 0 or chunks:

@@ -1,10 +1,9 @@
-"""The guarantee's own C (folder `native`) compiled at first use with the library's headers, and its calls."""
+"""The guarantee's own C (folder `native`), compiled for the process with the library's headers, and its calls."""
 
 from __future__ import annotations
 
 import ctypes
 from functools import cache
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from colloc.mechanics import native_kernel
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 from colloc.mechanics.native_kernel import BODY, address, call_for_all
-from colloc.numerics.c_compiler import kept_library
+from colloc.numerics.c_compiler import c_compiler, compiled_library
 
 _SOURCES = Path(__file__).with_name("native")
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
@@ -24,19 +23,14 @@ _SIGNATURES = {
 
 
 def guarantee_kernel(body: Links) -> ctypes.CDLL | None:
-    """The compiled functions, or None where the library's own kernel is missing too. `StoreError` if the compiler fails."""
-    return None if native_kernel.native_kernel(body) is None else _library()
+    """The compiled functions, or None without a compiler, or where NumPy has to do. `StoreError` if the compiler fails."""
+    return None if c_compiler() is None or native_kernel.native_kernel(body) is None else _library()
 
 
 @cache
-def _library() -> ctypes.CDLL | None:
-    """Loaded, and compiled before if need be; None without a compiler, or where nothing can be kept."""
-    shared = resources.files("colloc.mechanics").joinpath("native").iterdir()
-    headers = {header.name: header.read_text("ascii") for header in shared if header.name.endswith(".h")}
-    file = kept_library("guarantee", _SOURCES, "guarantee.c", native_kernel.FLAGS, dict(sorted(headers.items())))
-    if file is None:
-        return None
-    found = ctypes.CDLL(str(file))
+def _library() -> ctypes.CDLL:
+    headers = {each.name: each.read_text("ascii") for each in native_kernel.SOURCES.iterdir() if each.name.endswith(".h")}
+    found = compiled_library(_SOURCES / "guarantee.c", native_kernel.FLAGS, headers)
     for name, arguments in _SIGNATURES.items():
         getattr(found, name).argtypes = arguments
     return found

@@ -32,8 +32,8 @@ def place(tmp_path):
 
 
 NO_LANGUAGE = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-NO_CACHE = {"XDG_CACHE_HOME": "/proc/nowhere", "MPLCONFIGDIR": "/proc/nowhere", "COLLOC_CODE": ""}
-OF_A_USER = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "LANG", "COLLOC_CODE")
+NO_CACHE = {"XDG_CACHE_HOME": "/proc/nowhere", "MPLCONFIGDIR": "/proc/nowhere"}
+OF_A_USER = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "LANG")
 
 
 def solved_and_verified(place, words, without, environment):

@@ -1,10 +1,8 @@
 """The compiled kernel: the same bits on any number of threads and in any batch; whatever is wrong with it costs speed only."""
 
-import os
 import shutil
 import subprocess
 import sys
-import warnings
 
 import numpy as np
 import pytest
@@ -12,8 +10,9 @@ from shared.address_sanitizer import stays_within_its_arrays
 from shared.instants import random_instants
 
 from colloc import Chain, Friction, solve_balance
+from colloc.mechanics import native_kernel as native_kernel_module
 from colloc.mechanics.native_kernel import library, native_kernel
-from colloc.numerics.c_compiler import FOLDER, OFF, c_compiler
+from colloc.numerics.c_compiler import c_compiler
 from colloc.system.errors import SlowWarning
 from colloc.system.processors import available_threads
 
@@ -65,48 +64,25 @@ def test_threads_are_those_asked_for(monkeypatch):
 
 
 @pytest.mark.skipif(c_compiler() is None, reason="no C compiler")
-def test_it_is_compiled_once_a_damaged_one_again_and_one_that_others_could_have_written_is_not_run(fresh, tmp_path):
-    fresh.setenv(FOLDER, str(tmp_path / "code"))
+def test_a_library_of_other_sources_is_compiled_anew_to_the_same_bits(fresh, tmp_path):
+    known = solve_balance(Chain(), Friction(), *random_instants(50), 1e-3).z
+    changed = tmp_path / "native"
+    shutil.copytree(native_kernel_module.SOURCES, changed)
+    (changed / "vectors.h").write_text((changed / "vectors.h").read_text() + "/* changed */")
+    assert native_kernel_module.built_kernel(changed) is None
+    fresh.setattr(native_kernel_module, "SOURCES", changed)
     assert native_kernel() is not None
-    (compiled,) = (tmp_path / "code").glob("kernel-*.so")
-    made = compiled.stat().st_mtime_ns
-    library.cache_clear()
-    assert native_kernel() is not None
-    assert compiled.stat().st_mtime_ns == made
-    if hasattr(os, "geteuid"):  # POSIX permissions
-        assert compiled.stat().st_mode & 0o777 == 0o600
-        for mode, found in ((0o777, False), (0o720, False), (0o702, False), (0o755, True)):
-            (tmp_path / "code").chmod(mode)
-            library.cache_clear()
-            with warnings.catch_warnings() if found else pytest.warns(SlowWarning, match="can be written by others"):
-                assert (native_kernel() is not None) == found
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / compiled.name).write_bytes(compiled.read_bytes()[:1000])
-    fresh.setenv(FOLDER, str(other))
-    library.cache_clear()
-    assert native_kernel() is not None
-    assert (other / compiled.name).stat().st_size == compiled.stat().st_size
+    np.testing.assert_array_equal(solve_balance(Chain(), Friction(), *random_instants(50), 1e-3).z, known)
 
 
-@pytest.mark.parametrize("missing", ["compiler", "folder", "working compiler", "permission"])
-def test_without_it_numpy_gives_the_answer(fresh, tmp_path, missing):
+@pytest.mark.parametrize(("compiler", "why"), [("", "there is no C compiler"), (shutil.which("false"), "failed .no message")])
+def test_without_it_numpy_gives_the_answer(fresh, compiler, why):
     known = solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z
-    a_file = tmp_path / "file"
-    a_file.write_text("")
-    fresh.setenv(FOLDER, str(tmp_path / "code"))
-    match missing:
-        case "compiler":
-            fresh.setenv("PATH", "")
-            fresh.delenv("CC", raising=False)
-        case "folder":
-            fresh.setenv(FOLDER, str(a_file / "below"))
-        case "working compiler":
-            fresh.setenv("CC", shutil.which("false"))
-        case "permission":
-            fresh.setenv(FOLDER, OFF)
+    fresh.setenv("PATH", "")
+    fresh.setenv("CC", compiler)
+    fresh.setattr(native_kernel_module, "built_kernel", lambda sources: None)
     library.cache_clear()
-    with warnings.catch_warnings() if missing == "permission" else pytest.warns(SlowWarning, match="by NumPy"):
+    with pytest.warns(SlowWarning, match=f"by NumPy.*{why}"):
         assert native_kernel() is None
     assert native_kernel() is None  # said once
     np.testing.assert_allclose(solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z, known, rtol=0, atol=1e-9)
@@ -128,6 +104,7 @@ from colloc.mechanics import native_kernel
 from colloc.mechanics.chain_motion import chain_slopes
 
 native_kernel.FLAGS += ("-O1", "-fsanitize=address")
+native_kernel.built_kernel = lambda sources: None
 assert native_kernel.library() is not None
 rng = np.random.default_rng(0)
 for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
@@ -142,5 +119,5 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
 
 
 @needs_kernel
-def test_it_reads_and_writes_nothing_beyond_its_arrays(tmp_path):
-    stays_within_its_arrays(WITHIN_ITS_ARRAYS, tmp_path)
+def test_it_reads_and_writes_nothing_beyond_its_arrays():
+    stays_within_its_arrays(WITHIN_ITS_ARRAYS)

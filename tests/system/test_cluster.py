@@ -76,17 +76,15 @@ def study_file(folder, cells):
 
 
 def test_a_worker_on_a_full_disk_finds_what_others_find(tmp_path):
-    """It cannot keep compiled code either, and does everything in NumPy."""
     plain = subprocess.run([*study_file(tmp_path, 3), "--json"], capture_output=True, text=True)
     assert plain.returncode == 0, plain.stderr
     expected = load_study(tmp_path / "out" / "tiny.nc").variables["efficiency"]
     with DaskProcesses() as dask:
-        worker = dask.worker(COLLOC_CODE=str(tmp_path / "code"))
+        worker = dask.worker()
         resource.prlimit(worker.pid, resource.RLIMIT_FSIZE, (0, 0))  # from now on
         other = [*study_file(tmp_path, 3)[:-1], str(tmp_path / "starved"), "--dask", dask.address, "--json"]
         done = subprocess.run(other, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
-        assert not list((tmp_path / "code").glob("*.so"))
     found = load_study(tmp_path / "starved" / "tiny.nc").variables["efficiency"]
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 

@@ -8,6 +8,13 @@
 
 #include "momenta.h"
 
+#ifdef COLLOC_SOURCES
+#define TEXT_OF(name) #name
+#define TEXT(name) TEXT_OF(name)
+/* What these sources were when they were built: whoever has changed them since does not use the library. */
+const char colloc_sources[] = TEXT(COLLOC_SOURCES);
+#endif
+
 /* Or `least`, if it is larger: under a load the body creeps at the speed delta, though its joints rest. */
 static inline double largest_rate_of(const int n, const double *rate, ptrdiff_t stride, double least)
 {
