@@ -175,12 +175,10 @@ def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
     if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
         raise ProblemError(f"only a Chain, whose joints are its own, can be put on a slope, not {type(body).__name__}.")
     _checked_grade(grade)
-    if body.feet:
-        raise ProblemError("a body on feet cannot be put on a slope yet: leave out feet or grade.")
-    if rate_independent(friction) and grade >= friction.largest:
+    if rate_independent(body.law(friction)) and grade >= (most := body.contact.most_held(friction)):
         raise ProblemError(
-            f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most {friction.largest:g} times "
-            "the force that presses it on the ground."
+            f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most {most:g} times the force "
+            "that presses it on the ground."
         )
     return body
 

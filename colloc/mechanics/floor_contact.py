@@ -266,6 +266,10 @@ class FloorContact:
         found *= self.pressure
         return np.concatenate([found[0], found[1], found[2, self._pads]])
 
+    def most_held(self, friction: Law) -> float:
+        """The largest pull on the body that friction may hold, over its weight."""
+        return float(self.weight[:, 0] @ [law.largest for law in self._each(friction)])
+
     def slowest(self, velocity: LinkVelocities) -> np.ndarray:
         """How fast the slowest part of each link moves, ``(n_link, n_time)``; infinite for a carried link."""
         vs, vn, w = map(np.abs, self.velocities(velocity))

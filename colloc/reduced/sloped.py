@@ -9,18 +9,26 @@ from colloc.motion.kinds import kind_of_motion
 from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.motion import ReducedMotion
 
+_TURNS = 0.25 * np.pi * np.array([0, 1, -1, 2, -2, 3, -3])
+"""By which a body is turned that slides down as it points."""
+
 
 class SlopeSpace(LinearSpace):
     """Members of a class of harmonics on a slope; a gait that does not say where it points is pointed to where it would go,
-    on the level, in the direction that counts."""
+    on the level, in the direction that counts, or as little aside of it as it needs not to slide down."""
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         v = super().parameters(gait)
         if np.isnan(v[-1]):
-            dynamics, v[-1] = self.control.dynamics, 0.0
+            dynamics, delta, v[-1] = self.control.dynamics, self.control.delta_start, 0.0
             assert dynamics.slope is not None
-            level = ReducedMotion(kind_of_motion(dynamics._replace(slope=None)), self.mesh, self)
-            v[-1] = dynamics.slope.ahead - np.angle(level.at(v, self.control.delta_start).pose.place[-1])
+            level, here = (
+                ReducedMotion(kind_of_motion(dynamics._replace(slope=slope)), self.mesh, self)
+                for slope in (None, dynamics.slope)
+            )
+            v[-1] = dynamics.slope.ahead - np.angle(level.at(v, delta).pose.place[-1])
+            beside = (np.append(v[:-1], v[-1] + turn) for turn in _TURNS)
+            v = next((each for each in beside if np.isfinite(here.values(each, delta)["work"])), v)
         return v
 
     laid = parameters

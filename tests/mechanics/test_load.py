@@ -4,14 +4,20 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from shared.instants import random_instants
-from shared.loaded_chain import left_over
+from shared.loaded_chain import left_over, lying, standing
 
-from colloc import Chain, Elliptic, Friction, OwnLaw, PowerLaw, ProblemError, Viscous, solve_balance
+from colloc import Chain, Elliptic, Foot, Friction, OwnLaw, PowerLaw, ProblemError, Viscous, Wheel, solve_balance
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
 
 BODY = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
+ON_FEET = Chain(
+    (0.2, 0.5, 0.3), masses=(0.3, 0.3, 0.4),
+    feet=(Wheel(0, 0.2, rolling=0.5, weight=0.3), Foot(1, 0.6, 0.1, 0.05), Foot(1, 0.6, 0.1, -0.05), Foot(2, 0.9, 0.5)),
+)  # fmt: skip
+HELD = {BODY: 1.0, ON_FEET: 0.4}
+"""What friction of coefficient 1 holds in every shape, about."""
 LAWS = [Friction(), Friction(1.7, 1, 1.3), Friction(10, 1, 3), Elliptic(2, 1, 1.5), OwnLaw("-vs/speed", "-2*vn/speed")]
 
 
@@ -25,13 +31,15 @@ def rows(motion):
     return np.vstack([motion.z, motion.centre, motion.power])
 
 
+@pytest.mark.parametrize("body", [BODY, ON_FEET], ids=["lying", "standing"])
 @pytest.mark.parametrize("mu", [(1, 1, 1), (1.7, 1, 1.3)], ids=str)
-def test_the_velocities_are_those_of_a_quadrature_along_the_links(mu):
+def test_the_velocities_are_those_of_a_program_of_points(mu, body):
     angles, rates = random_instants(12)
-    load, delta = random_loads(12, 0.6), 0.2
-    solved = solve_balance(BODY, Friction(*mu), angles, rates, delta, load=load).require()
+    load, delta = random_loads(12, 0.6 * HELD[body]), 0.2
+    points = standing(body.feet, mu) if body.feet else lying(body.weights, mu)
+    solved = solve_balance(body, Friction(*mu), angles, rates, delta, load=load).require()
     for t in range(12):
-        at = BODY.lengths, BODY.weights, mu, angles[:, t], rates[:, t], load[:, t], delta
+        at = body.lengths, body.mass_column()[:, 0], points, angles[:, t], rates[:, t], load[:, t], delta
         theirs = least_squares(left_over, np.zeros(3), args=at, xtol=1e-14, ftol=1e-14, gtol=1e-14)
         assert np.abs(theirs.fun).max() < 1e-9
         np.testing.assert_allclose(solved.z[:, t], theirs.x, atol=1e-6)
@@ -49,21 +57,22 @@ def test_joints_do_the_work_of_friction_less_that_of_the_load(law, size):
     assert np.abs((load * now.centre).sum(axis=0)).max() > 1e-3
 
 
+@pytest.mark.parametrize("body", [BODY, ON_FEET], ids=["lying", "standing"])
 @pytest.mark.parametrize("law", LAWS[:4], ids=lambda law: law.label)
-def test_slopes_along_shapes_rates_and_load_are_the_limit_of_differences(law):
+def test_slopes_along_shapes_rates_and_load_are_the_limit_of_differences(law, body):
     delta, step = 0.05, 1e-5
     angles, rates = random_instants(40)
-    y = np.concatenate([angles, rates, random_loads(40, 0.6)])
+    y = np.concatenate([angles, rates, random_loads(40, 0.6 * HELD[body])])
 
     def moved(y):
         q, r, load = np.split(y, 3)
-        solved = solve_balance(BODY, law, q, r, delta, load=load, tolerance=1e-13)
-        return chain_slopes(BODY, law, q, r, delta, solved, load)
+        solved = solve_balance(body, law, q, r, delta, load=load, tolerance=1e-13)
+        return chain_slopes(body, law, q, r, delta, solved, load)
 
     motion, slopes = moved(y)
     assert slopes.shape == (6, 6, 40)
     # where a link changes its sense of sliding within the step, a directional law has no derivative
-    smooth = (BODY.slowness(law, angles, rates, delta, motion.z) > 1e-3).all(axis=0)
+    smooth = (body.slowness(law, angles, rates, delta, motion.z) > 1e-3).all(axis=0)
     assert smooth.mean() > 0.7
     for k in range(6):
         there, back = (rows(moved(y + side * step * np.eye(6)[:, k : k + 1])[0]) for side in (1, -1))
@@ -71,12 +80,12 @@ def test_slopes_along_shapes_rates_and_load_are_the_limit_of_differences(law):
 
 
 @pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.label)
-def test_compiled_balances_and_slopes_are_those_of_numpy(law):
+@pytest.mark.parametrize(("body", "law"), [*((BODY, law) for law in LAWS), (ON_FEET, LAWS[1])])
+def test_compiled_balances_and_slopes_are_those_of_numpy(body, law):
     angles, rates = random_instants(100)
     for delta, size in ((1e-2, 0.9), (1e-8, 0.4)):
-        load = random_loads(100, size)
-        at = BODY, law, angles, rates, delta
+        load = random_loads(100, size * HELD[body])
+        at = body, law, angles, rates, delta
         solved = solve_balance(*at, load=load).require()
         motion, slopes = chain_slopes(*at, solved, load)
         with numpy_instead():

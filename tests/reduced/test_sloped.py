@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ellipse
+from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Wheel, ellipse
 from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver
@@ -14,6 +14,11 @@ LEVEL = Problem("bilateral", gait=Harmonic(1, "bilateral"), grade=0.4, intervals
 SKEW = Problem(
     "skew", body=Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)), friction=Friction(1.7, 1, 1.3), gait=Harmonic(2), grade=0.4,
     intervals=60,
+)  # fmt: skip
+FEET = SKEW.with_(
+    name="feet",
+    body=Chain((0.2, 0.5, 0.3), masses=(0.4, 0.3, 0.3), feet=(Foot(0), Pad(1, 0.1, 0.6), Wheel(2, rolling=0.5))),
+    grade=0.2,
 )  # fmt: skip
 
 
@@ -26,16 +31,16 @@ def program_at(problem, delta):
     return program, v
 
 
-@pytest.mark.parametrize("problem", [LEVEL, SKEW], ids=lambda p: p.name)
+@pytest.mark.parametrize("problem", [LEVEL, SKEW, FEET], ids=lambda p: p.name)
 def test_the_mesh_has_the_motion_of_the_differential_equation(problem):
     program, v = program_at(problem.with_(intervals=120), 0.1)
-    ran = slope_motion(problem.body, problem.friction, program.space.member(v), 0.1, 0.4)
+    ran = slope_motion(problem.body, problem.friction, program.space.member(v), 0.1, problem.grade)
     found = program.motion.values(v, 0.1)
     for name, exact in (("distance", ran.climb), ("work", ran.joint_work), ("rotation", ran.turn), ("across", ran.aside)):
         assert found[name] == pytest.approx(float(np.squeeze(exact)), abs=1e-5), name
 
 
-@pytest.mark.parametrize("problem", [LEVEL, SKEW], ids=lambda p: p.name)
+@pytest.mark.parametrize("problem", [LEVEL, SKEW, FEET], ids=lambda p: p.name)
 @pytest.mark.parametrize(("towards", "objective"), [(None, "efficiency"), (2.0, "distance / (work + 0.01 * length)")])
 def test_gradients_are_the_limit_of_differences(problem, towards, objective):
     program, v = program_at(problem.with_(towards=towards, objective=objective), 0.05)
@@ -50,10 +55,10 @@ def test_gradients_are_the_limit_of_differences(problem, towards, objective):
         np.testing.assert_allclose(rows[:, k], (program.rows(v + step) - program.rows(v - step)) / 2e-5, atol=3e-5)
 
 
-@pytest.mark.parametrize("towards", [None, 2.0])
-def test_the_full_program_holds_where_the_reduced_one_is_evaluated(towards):
+@pytest.mark.parametrize(("problem", "towards"), [(SKEW, None), (SKEW, 2.0), (FEET, 2.0)])
+def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towards):
     """Every equation but those that the gait has still to be found for: no turn, no way across."""
-    program, v = program_at(SKEW.with_(towards=towards), 0.05)
+    program, v = program_at(problem.with_(towards=towards), 0.05)
     full = transcribed(program.space.control.problem, program.space.member(v))
     x = feasible_point(full, program.space.full_parameters(v), 0.05)
     found = Solver(full).measured(x, 0.05, np.zeros_like(x), np.zeros(full.constraint_lower.size))
@@ -64,5 +69,5 @@ def test_the_full_program_holds_where_the_reduced_one_is_evaluated(towards):
 
 
 def test_what_friction_does_not_hold_has_no_value():
-    program, v = program_at(LEVEL.with_(friction=Friction(10, 0.1, 0.1), grade=5.0), 1e-3)
+    program, v = program_at(LEVEL.with_(friction=Friction(10, 0.1, 0.1), grade=5.0, intervals=12), 1e-3)
     assert np.isnan(program.objective(v))

@@ -15,6 +15,7 @@ from colloc import (
     Problem,
     ProblemError,
     Viscous,
+    Wheel,
     ellipse,
     load,
     save,
@@ -54,6 +55,22 @@ def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
     assert uphill.certificate.distance == pytest.approx(ran.climb[0], abs=1e-5)
     assert uphill.certificate.work == pytest.approx(ran.joint_work[0], abs=1e-5)
     assert uphill.certificate.work == pytest.approx(ran.friction_work[0] + 0.1 * ran.climb[0], abs=1e-5)
+
+
+@pytest.mark.slow
+def test_a_body_on_wheels_climbs_three_times_as_steep_a_slope_as_they_hold_by_rolling():
+    body = Chain(feet=tuple(Wheel(link, rolling=0.05) for link in range(3)))
+    found = solve(Problem("wheels", body=body, gait=PROBLEM.gait, delta=1e-2, grade=0.15), 2)
+    assert found.status == "solved", found.message
+    assert run(body, found.gait, 0.15) == pytest.approx(found.certificate.value, rel=1e-4)
+    assert found.certificate.value > 1.0
+
+
+@pytest.mark.slow
+def test_a_body_on_feet_climbs_a_slope_that_is_too_steep_for_one_that_lies():
+    found = solve(Problem("feet", body=Chain(feet=1), gait=PROBLEM.gait, grade=0.2))
+    assert found.status == "solved", found.message
+    assert found.certificate.value > 0.4
 
 
 def test_no_gait_and_no_heading_beside_it_climbs_better(uphill):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from scipy.optimize import root
-from shared.loaded_chain import left_over
+from shared.loaded_chain import left_over, lying, standing
 
-from colloc import Chain, CrawlerBody, Fourier, Friction, NotConvergedError, ProblemError, ellipse, replay
+from colloc import Chain, CrawlerBody, Foot, Fourier, Friction, NotConvergedError, Pad, ProblemError, Wheel, ellipse, replay
 from colloc.verification.heading_map import heading_map
 from colloc.verification.slope import gait_on_slope, slope_motion
 
@@ -14,6 +14,12 @@ SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 ANTIPODAL = Fourier([0.0, 0.0], [[1.5], [0.0]], [[0.0], [1.0]])
 REVERSIBLE = ellipse(A0=0.4, A1=1.5, B1=1.0)
 LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
+ON_FEET = Chain(
+    (0.2, 0.5, 0.3), masses=(0.3, 0.3, 0.4),
+    feet=(Wheel(0, 0.2, rolling=0.5, weight=0.3), Foot(1, 0.6, 0.1, 0.05), Foot(1, 0.6, 0.1, -0.05), Foot(2, 0.9, 0.5)),
+)  # fmt: skip
+"""Wheel, feet beside each other and a foot, whose weights press beside the centre of mass."""
+PADS = Chain((0.2, 0.5, 0.3), feet=(Pad(0, 0.5, 1.0), Wheel(1, 0.3), Pad(2, 0.2, 0.6)))
 
 
 class Belt(Chain):
@@ -30,26 +36,28 @@ def still(t):
     return np.tile([[0.4], [-0.7]], np.size(t)), np.zeros((2, np.size(t)))
 
 
-def test_the_motion_is_that_of_a_program_of_its_own():
-    """Runge and Kutta's rule on balances by quadrature; delta is large, so that both are smooth and few steps do."""
-    mu, delta, grade, steps = (1.7, 1.0, 1.3), 0.3, 0.5, 20
-    ours = slope_motion(LOPSIDED, Friction(*mu), SKEW, delta, grade, heading=1.0)
-    near = np.zeros(3)
+@pytest.mark.parametrize(("body", "grade"), [(LOPSIDED, 0.5), (ON_FEET, 0.25)], ids=["lying", "standing"])
+def test_the_motion_is_that_of_a_program_of_its_own(body, grade):
+    """Runge and Kutta's rule on balances point by point; delta is large, so that both are smooth and few steps do."""
+    mu, delta, steps = (1.7, 1.0, 1.3), 0.3, 20
+    ours = slope_motion(body, Friction(*mu), SKEW, delta, grade, heading=1.0)
+    points = standing(body.feet, mu) if body.feet else lying(body.weights, mu)
+    masses, near = body.mass_column()[:, 0], np.zeros(3)
 
     def rates(t, state):
         nonlocal near
         (angles, rates), turn = SKEW(np.array([t])), np.exp(1j * state[0])
         pull = -grade * np.conj(turn)
-        at = LOPSIDED.lengths, LOPSIDED.weights, mu, angles[:, 0], rates[:, 0], (pull.real, pull.imag), delta
+        at = body.lengths, masses, points, angles[:, 0], rates[:, 0], (pull.real, pull.imag), delta
         near = root(left_over, near, args=at, tol=1e-11).x
-        place, heading, centre, swing = 0j, 0.0, 0j, 0j
-        for i, (length, weight) in enumerate(zip(LOPSIDED.lengths, LOPSIDED.weights, strict=True)):
+        heading, centre, swing = 0.0, 0j, 0j
+        for i, (length, mass) in enumerate(zip(body.lengths, masses, strict=True)):
             if i:
                 heading += angles[i - 1, 0]
             along = length * np.exp(1j * heading)
             spin = near[2] + rates[:i, 0].sum()
-            centre += weight * (complex(*near[:2]) + swing + 0.5j * spin * along)
-            place, swing = place + along, swing + 1j * spin * along
+            centre += mass * (complex(*near[:2]) + swing + 0.5j * spin * along)
+            swing = swing + 1j * spin * along
         moved = turn * centre
         return np.array([near[2], moved.real, moved.imag])
 
@@ -74,23 +82,25 @@ def test_on_the_level_it_is_the_replay():
     assert ran.steering[0] == 1.0
 
 
-def test_a_gentle_slope_changes_little_and_in_proportion():
-    gentle, level = (slope_motion(Chain(), Friction(), SKEW, 0.1, g, tolerance=1e-8) for g in (2e-4, 0.0))
-    twice = slope_motion(Chain(), Friction(), SKEW, 0.1, 4e-4, tolerance=1e-8)
+@pytest.mark.parametrize("body", [Chain(), PADS], ids=["lying", "pads"])
+def test_a_gentle_slope_changes_little_and_in_proportion(body):
+    level, gentle, twice = (slope_motion(body, Friction(), SKEW, 0.1, g, tolerance=1e-8) for g in (0.0, 2e-4, 4e-4))
     assert twice.turn - level.turn == pytest.approx(2 * (gentle.turn - level.turn), rel=1e-2)
     assert twice.climb[0] - level.climb[0] == pytest.approx(2 * (gentle.climb[0] - level.climb[0]), rel=1e-2)
 
 
-def test_joints_pay_for_friction_and_for_the_climb():
-    ran = slope_motion(LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-3, 0.4, heading=2.0, periods=3)
-    lifted = 0.4 * ran.climb
-    assert np.abs(lifted).min() > 1e-2
+@pytest.mark.parametrize(("body", "grade"), [(LOPSIDED, 0.4), (ON_FEET, 0.25)], ids=["lying", "standing"])
+def test_joints_pay_for_friction_and_for_the_climb(body, grade):
+    ran = slope_motion(body, Friction(1.7, 1, 1.3), SKEW, 1e-2, grade, heading=1.0, periods=2)
+    lifted = grade * ran.climb
+    assert np.abs(lifted).min() > 1e-3
     np.testing.assert_allclose(ran.joint_work, ran.friction_work + lifted, atol=1e-9)
 
 
-def test_a_mirrored_gait_drifts_to_the_other_side():
-    ran = slope_motion(Chain(), Friction(), SKEW, 1e-2, 0.3, heading=0.9)
-    mirrored = slope_motion(Chain(), Friction(), lambda t: tuple(-a for a in SKEW(t)), 1e-2, 0.3, heading=-0.9)
+@pytest.mark.parametrize("body", [Chain(), ON_FEET], ids=["lying", "standing"])
+def test_a_mirrored_gait_drifts_to_the_other_side(body):
+    ran = slope_motion(body, Friction(), SKEW, 1e-2, 0.2, heading=0.9)
+    mirrored = slope_motion(body, Friction(), lambda t: tuple(-a for a in SKEW(t)), 1e-2, 0.2, heading=-0.9)
     assert mirrored.climb == pytest.approx(ran.climb, abs=1e-5)
     assert mirrored.aside == pytest.approx(-ran.aside, abs=1e-5)
     assert mirrored.turn == pytest.approx(-ran.turn, abs=1e-5)
@@ -102,8 +112,10 @@ def test_joints_at_rest_rest_on_any_slope_that_friction_holds():
         ran = slope_motion(Chain(), Friction(1.2, 1.2, 1.2), still, 1e-6, grade)
         assert ran.climb[0] == pytest.approx(-1e-6 * grade / np.sqrt(1.2**2 - grade**2), rel=1e-4)
         assert abs(ran.turn) < 1e-9
-    with pytest.raises(ProblemError, match="slides down for ever"):
-        slope_motion(Chain(), Friction(1.2, 1.2, 1.2), still, 1e-6, 1.2)
+    wheels = Chain(feet=tuple(Wheel(link, sideways=0.9) for link in range(3)))
+    for body, grade in ((Chain(), 1.2), (wheels, 0.9)):
+        with pytest.raises(ProblemError, match=f"slides down for ever: friction holds at most {grade} times"):
+            slope_motion(body, Friction(1.2, 1.2, 1.2), still, 1e-6, grade)
 
 
 def test_skates_hold_across_the_slope_and_not_along():
