@@ -27,6 +27,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("referee", "Check the best gaits that are known, from the gaits alone; take in better ones.", _EPILOG)
     parser.add_argument("--table", metavar="FILE.json", help="another table than the one that comes with colloc")
     parser.add_argument("--only", metavar="NAME", help="rows of the problem of this name")
+    parser.add_argument("--dry", action="store_true", help="check bounds under dry friction as well")
     parser.add_argument("--add", metavar="FILE.h5", help="a result to take in")
     parser.add_argument("--by", metavar="COMMAND", help="with --add: the command that anyone can find it with")
     add_printing(parser)
@@ -56,7 +57,7 @@ def _checked(options: argparse.Namespace, rows: Sequence) -> int:
             name = row.statement["name"]
             progress.say(f"{name}: replaying, {number + 1} of {len(chosen)}")
             try:
-                complaint = row.complaint(row.certificate())
+                complaint = row.complaint(row.certificate()) or (row.dry_complaint() if options.dry else "")
             except CollocError as error:
                 complaint = str(error)
             told.append({"name": name, "value": row.value, "value_error": row.value_error, "complaint": complaint})

@@ -63,6 +63,7 @@ def _parser() -> argparse.ArgumentParser:
         "program at every level of delta, from the guess alone",
     )
     add_bound(parser)
+    parser.add_argument("--dry", action="store_true", help="certify it also under dry friction, with no delta (a second)")
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png")
     parser.add_argument("--pdf", action="store_true", help="draw NAME.pdf too")
     add_printing(parser)
@@ -105,6 +106,11 @@ def _solve(options: argparse.Namespace) -> int:
             progress=lambda news: line.say(f"{problem.name}: {news}", news.left),
         )
     bound, complaints, saved, kept = None, [], [], []
+    if options.dry and solution.certificate.replayed:
+        try:
+            solution.certify_dry()
+        except CollocError as error:  # what is solved is not lost for it
+            complaints.append(f"no bounds under dry friction: {error}")
     try:
         kept = save_end(solution, path)
         path = kept[0].path

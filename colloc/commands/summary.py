@@ -82,6 +82,8 @@ def _besides(solution: Solution) -> list[str]:
     found, problem, lines = solution.certificate, solution.problem, []
     if problem.objective != EFFICIENCY:
         lines.append(f"  {EFFICIENCY.label:<15s} {found.efficiency:.6f} +- {found.efficiency_error:.0e}")
+    if found.dry is not None:
+        lines.append(f"  dry friction    between {found.dry[0]:.8f} and {found.dry[1]:.8f}, with no delta")
     if problem.uses("length"):
         lines.append(f"  path length L   {found.length:.6f} rad")
     if problem.uses("driven_work"):

@@ -10,6 +10,8 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from colloc.commands.ending import FAILED, OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, tell
 from colloc.results.checks import Certificate
@@ -90,6 +92,13 @@ def _other_checks(recorded: Certificate, now: Certificate) -> str:
     return ""
 
 
+def _dry_disagreement(recorded: tuple[float, float] | None, now: tuple[float, float]) -> str:
+    """A sentence if a file states other bounds under dry friction than there are; empty if it states none."""
+    if recorded is None or np.allclose(recorded, now, rtol=_TOLERANCE, atol=0):
+        return ""
+    return f"the file certifies between {recorded[0]:.8f} and {recorded[1]:.8f} under dry friction, which is not what is found."
+
+
 def check_trusted(solution: Solution, file: str) -> None:
     """A `ProblemError` for a result that another program changed, unless its certificate still says what a new replay does."""
     if solution.changed and (why := disagreement(solution.certificate, rechecked(solution).certificate)):
@@ -139,6 +148,11 @@ def _verify(options: argparse.Namespace) -> int:
         "file": options.result, "objective": solution.problem.objective.name, "name": solution.problem.name,
         "certified": good, "complaint": complaint, "changed": solution.changed, "gaits": gaits,
     }  # fmt: skip
+    dry = solution.dry() if options.dry or solution.certificate.dry is not None else None
+    if dry is not None:
+        complaint = complaint or _dry_disagreement(solution.certificate.dry, dry.efficiency)
+        good = good and not complaint
+        facts |= {"dry": dry.facts(), "certified": good, "complaint": complaint}
     lines = [
         f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}",
         f"  {solution.problem.objective.label:<15s} {certificate.value:.8f} +- {certificate.value_error:.0e} by replay "
@@ -159,9 +173,7 @@ def _verify(options: argparse.Namespace) -> int:
         lines.append(f"  {complaint}")
     if solution.status != "solved" and certificate.passed:
         lines.append(f"  the solve itself ended as: {solution.status}. {solution.message}")
-    if options.dry:
-        dry = solution.dry()
-        facts["dry"] = dry.facts()
+    if dry is not None:
         lines.append(f"  dry friction: {dry}")
     tell(options, {**facts, **certificate.facts()}, lines)
     return OK if good else FAILED

@@ -179,7 +179,9 @@ def _pace(solution: Solution) -> str:
 
 
 def _dry(solution: Solution) -> str:
-    """Bounds of the efficiency under dry friction, where there are any."""
+    """Bounds of the efficiency under dry friction, where there are any: those of the certificate, or made now."""
+    if solution.certificate.dry is not None:
+        return "d/W between {:.8f} and {:.8f}".format(*solution.certificate.dry)
     try:
         return str(solution.dry())
     except (ProblemError, NotConvergedError):

@@ -51,6 +51,9 @@ class Certificate(Period):
         (`colloc.results.measured.extrapolated_limit`).
     value, value_error, value_at_zero_delta, value_error_at_zero_delta : float
         The same of the problem's objective.
+    dry : (float, float), optional
+        Between what the efficiency lies under dry friction, with no delta (`colloc.verification.dry_friction`), if that was
+        asked for.
     """
 
     checks: tuple[Check, ...]
@@ -62,6 +65,7 @@ class Certificate(Period):
     value_error: float
     value_at_zero_delta: float
     value_error_at_zero_delta: float
+    dry: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
         if not self.replayed:
@@ -91,7 +95,8 @@ class Certificate(Period):
     def facts(self) -> dict[str, Any]:
         """All of it as plain numbers (JSON)."""
         listed = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in self.checks}
-        return self.numbers | {"passed": self.passed, "checks": listed}
+        dry = {} if self.dry is None else {"dry_efficiency": list(self.dry)}
+        return self.numbers | dry | {"passed": self.passed, "checks": listed}
 
     @property
     def failures(self) -> list[Check]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -220,6 +220,10 @@ class Solution:
         if p.slope is not None or p.froude:
             raise ProblemError("bounds for dry friction are there for slow gaits on the level.")
         return dry_friction(p.body, p.law, self.gait, breaks=self.gait.corner_phases)
+
+    def certify_dry(self) -> None:
+        """Put the efficiency under dry friction into the certificate, which is saved with it; raises what `dry` does."""
+        self.certificate = replace(self.certificate, dry=tuple(self.dry().efficiency))
 
     @property
     def standing(self) -> list[str]:

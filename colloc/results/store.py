@@ -251,6 +251,8 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
     for name, number in certificate.numbers.items():
         if name != "efficiency":  # which is the distance over the work
             put_attribute(group, name, number)
+    if certificate.dry is not None:
+        put_attribute(group, "dry_efficiency", list(certificate.dry))
     for name in ("name", "value", "threshold", "passed", "meaning"):
         put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
@@ -262,7 +264,8 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     stated = [name for name in QUANTITIES if name != "driven_work" or name in group.attrs]  # which is only known if asked for
     values = {name: attribute(group, name) for name in stated}
     errors = {name: attribute(group, f"{name}_error") for name in ("distance", "work")}
-    return Certificate(values, errors, {}, checks, **{name: attribute(group, name) for name in NUMBERS})
+    dry = tuple(attribute(group, "dry_efficiency")) if "dry_efficiency" in group.attrs else None
+    return Certificate(values, errors, {}, checks, **{name: attribute(group, name) for name in NUMBERS}, dry=dry)
 
 
 def _read(file: h5py.File) -> Solution:

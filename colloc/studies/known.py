@@ -24,12 +24,15 @@ from colloc.search.certify import gait_certificate
 from colloc.system.errors import ProblemError, StoreError
 from colloc.system.replaced_file import replaced_file
 from colloc.system.versions import version_of
+from colloc.verification.dry_friction import dry_friction
 
 _HOW = ("name", "guess", "delta_start", "intervals", "scheme", "formulation", "mesh_tolerance", "shrinking")
 """Of a problem: how its answer is sought. The rest is the question."""
 _AGREEMENT = 3.0
 """A replay may differ from a row by so many times the sum of their estimated errors, and by `_ROUNDING`."""
 _ROUNDING = 1e-9
+_DRY_AGREEMENT = 1e-6
+"""Relative: bounds under dry friction are made on the same instants, and differ by rounding alone."""
 _NUMBERS = "value", "value_error", "value_at_zero_delta", "value_error_at_zero_delta"
 
 
@@ -47,6 +50,8 @@ class Known:
         The problem's objective at its delta.
     value_at_zero_delta, value_error_at_zero_delta : float
         The same for delta -> 0.
+    dry : (float, float) or None
+        Between what the efficiency lies under dry friction, with no delta, where the result stated it (``colloc solve --dry``).
     command, version : str
         What found it, with which version of colloc.
 
@@ -65,6 +70,7 @@ class Known:
     value_error: float
     value_at_zero_delta: float
     value_error_at_zero_delta: float
+    dry: tuple[float, float] | None
     command: str
     version: str
 
@@ -97,6 +103,16 @@ class Known:
             return f"the table says {self.value:.8f}, the replay {certificate.value:.8f} +- {certificate.value_error:.0e}"
         return ""
 
+    def dry_complaint(self) -> str:
+        """What bounds made anew have against those in the row; empty if they hold, or if there are none."""
+        if self.dry is None:
+            return ""
+        problem, gait = self.problem, self.gait
+        now = dry_friction(problem.body, problem.law, gait, breaks=gait.corner_phases).efficiency
+        if np.allclose(self.dry, now, rtol=_DRY_AGREEMENT, atol=0):
+            return ""
+        return f"dry friction: the table says {self.dry[0]:.8f} to {self.dry[1]:.8f}, and it is {now[0]:.8f} to {now[1]:.8f}"
+
     def __repr__(self) -> str:
         return f"<Known {self.statement['name']}: {self.value:.8g} +- {self.value_error:.0e}, by {self.command}>"
 
@@ -124,7 +140,8 @@ def known(table: str | os.PathLike[str] | None = None) -> tuple[Known, ...]:
     path = resources.files("colloc.studies") / "known.json" if table is None else Path(table)
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
-        return tuple(Known(**row | {name: tuple(row[name]) for name in ("parameters", "edges")}) for row in rows)
+        listed = ("parameters", "edges", "dry")
+        return tuple(Known(**row | {name: None if row[name] is None else tuple(row[name]) for name in listed}) for row in rows)
     except OSError as error:
         raise StoreError(f"cannot read {path}: {error.strerror or error}.") from None
     except (KeyError, TypeError, ValueError) as error:
@@ -148,6 +165,7 @@ def row_of(solution: Solution, command: str) -> Known:
         tuple(answer.x[answer.layout.parameters[:, 0]].tolist()),
         tuple(np.asarray(edges).tolist()) if problem.gait.unit_speed else (),
         **{name: float(getattr(solution.certificate, name)) for name in _NUMBERS},
+        dry=solution.certificate.dry,
         command=command,
         version=version_of("colloc"),
     )
@@ -183,12 +201,13 @@ def save_known(rows: Iterable[Known], table: str | os.PathLike[str]) -> None:
 
 def markdown(rows: Iterable[Known]) -> str:
     """The table as people read it."""
-    heads = "| problem | what is asked | best known | for delta → 0 | found by |\n|---|---|---|---|---|\n"
+    heads = "| problem | what is asked | best known | under dry friction | found by |\n|---|---|---|---|---|\n"
 
     def line(row: Known) -> str:
         problem = row.problem
         told = f"{row.value:.6f} ± {row.value_error:.0e}"
         limit = f"{row.value_at_zero_delta:.6f} ± {row.value_error_at_zero_delta:.0e}" if problem.law.regularised else ""
+        limit = limit if row.dry is None else "between {:.6f} and {:.6f}".format(*row.dry)
         return f"| {problem.name} | {problem.asked} | {told} | {limit} | `{row.command}` |\n"
 
     return heads + "".join(map(line, rows))

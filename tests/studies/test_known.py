@@ -94,3 +94,24 @@ def test_the_referee_takes_a_result_and_holds_it(best, tmp_path, capsys):
         known(table)
     with pytest.raises(StoreError, match="cannot read"):
         known(tmp_path / "none.json")
+
+
+def test_bounds_under_dry_friction_are_saved_and_checked_again(tmp_path, capsys):
+    result, table = tmp_path / "quick.h5", tmp_path / "known.json"
+    solution = colloc.solve(PROBLEM, starts=1)
+    solution.certify_dry()
+    colloc.save(solution, result)
+    again = colloc.load(result).certificate
+    assert again == solution.certificate
+    assert again.dry[0] < again.efficiency_at_zero_delta + again.error_at_zero_delta
+    assert again.dry[1] > again.efficiency_at_zero_delta - again.error_at_zero_delta
+    row = row_of(solution, "colloc solve quick.py --dry")
+    save_known([row], table)
+    assert main(["referee", "--table", str(table), "--dry"]) == 0
+    save_known([replace(row, dry=(row.dry[0], row.dry[1] - 1e-4))], table)
+    assert main(["referee", "--table", str(table), "--dry"]) == 4
+    assert main(["verify", str(result)]) == 0
+    solution.certificate = replace(solution.certificate, dry=(0.1, 0.2))
+    colloc.save(solution, result)
+    assert main(["verify", str(result)]) == 4
+    assert "under dry friction, which is not what is found" in capsys.readouterr().out
