@@ -223,7 +223,8 @@ class Solution:
 
     def certify_dry(self) -> None:
         """Put the efficiency under dry friction into the certificate, which is saved with it; raises what `dry` does."""
-        self.certificate = replace(self.certificate, dry=tuple(self.dry().efficiency))
+        least, most = self.dry().efficiency
+        self.certificate = replace(self.certificate, dry=(least, most))
 
     @property
     def standing(self) -> list[str]:
