@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +21,8 @@ from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
-from colloc.search.converge import NEXT_RADIUS, converged
-from colloc.search.effort import ROUGH
+from colloc.search.converge import converged
+from colloc.search.effort import Effort
 from colloc.search.optimum import Optimum
 from colloc.search.relaxed import realised_solution
 
@@ -34,7 +33,6 @@ _FEWER = 0.7
 """Part of the corners that is left when a polygon is optimised again."""
 _LAST, _TRIED = 2, 4
 """Sides that the last steps save, and how many of them are tried."""
-_ROUNDS = 4
 
 
 class _Step(NamedTuple):
@@ -98,7 +96,7 @@ def _optimised(problem: Problem, like: Mixture, loops: list[np.ndarray], sense: 
     """The polygon with all its corners free; its loops and itself."""
     start = _polygon(loops, like, sense)
     space = MixtureSpace(control_problem(problem), len(start.durations))
-    found = converged(space, space.parameters(start), problem.delta, NEXT_RADIUS, replace(ROUGH, rounds=_ROUNDS))
+    found = converged(space, space.parameters(start), problem.delta, Effort(1e-2))
     gait, ends = found.gait, np.cumsum([len(loop) for loop in loops])[:-1]
     return _used(np.split(gait.durations * gait.directions[:, 0], ends)), found
 

@@ -29,7 +29,7 @@ from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
 from colloc.search.certify import EXACT, VIOLATION
 from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
 from colloc.search.diagnosis import explanation
-from colloc.search.effort import ROUGH
+from colloc.search.effort import ROUGH, SKETCH
 from colloc.search.ipopt import NlpResult, Solver
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
@@ -38,11 +38,6 @@ from colloc.search.spaces import heading, space_near, transcribed, with_far
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
 _OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60}
-_ROUNDS = 4
-"""Times that the shape checks are moved after IPOPT. What may be beyond them is what SQP allows; at the end, where the worst
-instant swings between two, what a certificate lets pass."""
-_MOST_PARAMETERS = 150
-"""Curvature is measured for so many parameters at most: it takes two gradients for each."""
 
 
 class Verdict(Enum):
@@ -119,7 +114,8 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
         return _Outcome(Verdict.ON_KINK, program, here)
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
-    for allowed in (*_ROUNDS * (VIOLATION,), EXACT):
+    # beyond its checks it may be by what SQP allows; at last, where the worst instant swings, by what a certificate lets pass
+    for allowed in (*SKETCH.rounds * (VIOLATION,), EXACT):
         if not result.optimal:
             break
         if reduced.place_rows(result.x[own]) <= allowed:
@@ -129,7 +125,7 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
         result = solver.solve_within(result.x, delta, (result.lam_x, result.lam_g), RADIUS).accumulated(result)
     ended = f"IPOPT, begun there, ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
     if result.optimal:
-        ended = f"IPOPT, begun there, moved the gait beyond its limits {_ROUNDS} times"
+        ended = f"IPOPT, begun there, moved the gait beyond its limits {SKETCH.rounds} times"
     if before.optimal:
         return _Outcome(Verdict.STATIONARY_ON_FULL, program, replace(before, status=STATIONARY), ended)
     if optimum.optimal and before.violation < VIOLATION:
@@ -219,8 +215,6 @@ def second_order(answer: Answer) -> SecondOrder:
     """The curvature of the Lagrangian at an answer, with all pairs of links kept apart."""
     problem = answer.problem
     space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
-    if v.size > _MOST_PARAMETERS:
-        return replace(NOT_MEASURED, why_not=f"not measured, for {v.size} parameters")
     program = ReducedProgram(with_far(space, problem.body.far_pairs), answer.delta)
     program.place_rows(v)
     found, size = curvature(program, v), abs(answer.value / program.stated(-1.0))

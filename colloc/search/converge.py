@@ -30,17 +30,16 @@ from colloc.search.run import this_run
 from colloc.search.spaces import with_far
 from colloc.system.errors import NotConvergedError
 
-FIRST_RADIUS, NEXT_RADIUS = 1.0, 0.5
-"""Boxes round the last gait [rad], at the first level and later: far enough for an optimum to move, not so far that a step ends
-in another world. A gait that ends on the edge of its box goes on from there."""
+BOX = 1.0
+"""How far a parameter may go in one round [rad]: as far as an optimum moves, not so far that a step ends in another world. A
+gait that ends on the edge of its box goes on from there."""
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
 _SLOW = 0.1
 """A round that changes the violation by less than this part of it, or ends nearer than this part of its way to where the one
 before began, is the last: the rows contradict each other, or the gait goes to and fro between two worst instants of a cell."""
-KINK_RADIUS, _WIDEST = 1e-6, 1e-5
-"""Radius [rad] of the ball in which gradients are sampled at a suspected kink: an optimum without a kink may be missed by as
-much. It is larger, up to the second, where the slopes are so small that the objective is missed by less than an equation may be
-violated."""
+_WIDEST = 1e-5
+"""Radius [rad] of the ball in which gradients are sampled at a suspected kink, at most: where the slopes are so small that the
+objective is missed by less than an equation may be violated. It is as exact as a gait has to be elsewhere."""
 PHASES = 1000
 """Phases of the solved part of the period at which all pairs of links are checked; the certificate checks 20000 a period."""
 _FRACTIONS = np.linspace(1.0, 0.0, 21)
@@ -73,7 +72,6 @@ class Rested(NamedTuple):
 def at_rest(
     program: Placed,
     v: np.ndarray,
-    radius: float,
     effort: Effort,
     curvature: np.ndarray | None = None,
 ) -> Rested:
@@ -90,7 +88,7 @@ def at_rest(
             program.follow_worst()
         if fresh and effort.accuracy < SKETCH.accuracy:
             curvature = program.space.metric(v)
-        result = minimised(program, v, radius, effort.accuracy, curvature=curvature)
+        result = minimised(program, v, BOX, effort.accuracy, curvature=curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
         admissible = program.place_rows(v) <= VIOLATION
         conditions = stationarity(program, v)
@@ -159,7 +157,6 @@ def converged(
     space: SearchSpace,
     v: np.ndarray,
     delta: float,
-    radius: float,
     effort: Effort,
     curvature: np.ndarray | None = None,
 ) -> Optimum:
@@ -173,8 +170,6 @@ def converged(
         Where it begins; need not be a member of the class.
     delta : float
         In the units of the class.
-    radius : float
-        How far a parameter may go in one round [rad].
     effort : Effort
     curvature : (n, n), optional
         What is known of the Lagrangian's second derivatives.
@@ -184,15 +179,15 @@ def converged(
     NotConvergedError
         If friction does not hold the body on its slope all the way.
     """
-    given = (space.control.problem, space.given, v, delta, radius, effort, curvature)
+    given = (space.control.problem, space.given, v, delta, effort, curvature)
 
     def compute() -> Optimum:
         begin, here = time.perf_counter(), space
-        rested, program = _rested(here, v, delta, radius, effort, curvature)
+        rested, program = _rested(here, v, delta, effort, curvature)
         while new := tuple(p for p in crossing_pairs(here, rested.v) if p not in here.given.far):
             free = last_free(here, v, rested.v)
             here = with_far(here, here.given.far + new)
-            rested, program = _rested(here, free, delta, radius, effort, None)
+            rested, program = _rested(here, free, delta, effort, None)
         return optimum_at(
             program,
             rested.v,
@@ -207,18 +202,18 @@ def converged(
 
 
 def _rested(
-    space: SearchSpace, v: np.ndarray, delta: float, radius: float, effort: Effort, curvature: np.ndarray | None
+    space: SearchSpace, v: np.ndarray, delta: float, effort: Effort, curvature: np.ndarray | None
 ) -> tuple[Rested, ReducedProgram]:
     program = ReducedProgram(space, delta)
     if np.isnan(program.objective(v)):
         raise NotConvergedError(f"there is no motion to begin with: {program.motion.kind.lack}.")
-    return at_rest(program, v, radius, effort, curvature), program
+    return at_rest(program, v, effort, curvature), program
 
 
 def conditions_on_kink(program: NonlinearProgram, v: np.ndarray, effort: Effort) -> Stationarity | None:
     """First-order conditions that hold by the gradients around v, where they do not hold by that at v: it lies on a kink."""
     conditions = stationarity(program, v)
-    radius = min(max(KINK_RADIUS, VIOLATION / conditions.kkt_error), _WIDEST)
+    radius = min(max(EXACT, VIOLATION / conditions.kkt_error), _WIDEST)
     around = stationarity_around(program, v, conditions, radius, enough=effort.kkt_error)
     holds = max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < EXACT
     return around if holds else None

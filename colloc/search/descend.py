@@ -13,7 +13,7 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import Lagrangian, curvature
-from colloc.search.converge import NEXT_RADIUS, converged
+from colloc.search.converge import converged
 from colloc.search.effort import ROUGH, Effort
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
@@ -65,7 +65,7 @@ def descend(optimum: Optimum, effort: Effort = ROUGH) -> Optimum:
     for done, delta in enumerate(below):
         run.told("descend", done, len(below), optimum)
         history = optimum.history
-        optimum = converged(optimum.space, optimum.v, delta, NEXT_RADIUS, effort, optimum.curvature).after(*history)
+        optimum = converged(optimum.space, optimum.v, delta, effort, optimum.curvature).after(*history)
     return optimum
 
 
@@ -82,7 +82,7 @@ def below_saddle(optimum: Optimum) -> Optimum | None:
             beside = optimum.v + side * step * length * here.direction
             if lagrangian.value(beside) >= value:
                 continue
-            other = converged(optimum.space, beside, optimum.delta, NEXT_RADIUS, ROUGH)
+            other = converged(optimum.space, beside, optimum.delta, ROUGH)
             if other.objective < optimum.objective - ROUGH.accuracy * abs(optimum.objective):
                 return other.after(*optimum.history)
     return None

@@ -27,7 +27,7 @@ from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Alternative
 from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
 from colloc.search.closure import closed_gait
-from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, as_it_is, converged
+from colloc.search.converge import as_it_is, converged
 from colloc.search.descend import FACTOR, descend, is_viscous, levels
 from colloc.search.effort import ROUGH, SKETCH
 from colloc.search.optimum import Optimum
@@ -96,7 +96,7 @@ def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
     space, v = space_near(problem, closed_gait(problem, gait, problem.delta_start))
     this_run().told("explore", 0, 1, as_it_is(space, v, problem.delta_start))
     for delta in levels(problem, problem.delta_start):
-        found = converged(space, v, delta, FIRST_RADIUS, ROUGH)
+        found = converged(space, v, delta, ROUGH)
         if not is_viscous(found):
             break
     return found
@@ -231,12 +231,12 @@ def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
 def _follow(space: SearchSpace, v: np.ndarray, deltas: list[float], known: list[list[Candidate]]) -> None:
     """Follow a start through the deltas until it comes through a known gait; what it finds is added to the known ones."""
     problem = space.control.problem
-    before, radius = None, FIRST_RADIUS
+    before = None
     for delta, here in zip(deltas, known, strict=True):
-        found = converged(space, v, delta, radius, SKETCH)
+        found = converged(space, v, delta, SKETCH)
         if is_viscous(found):
             continue  # as far as this delta goes, the start is as it was
-        space, v, radius = found.space, found.v, NEXT_RADIUS
+        space, v = found.space, found.v
         if found.violation > SKETCH.kkt_error:
             continue  # no member of the class yet, whatever its value
         at = next((c for c in here if same_gait(problem, c.optimum, found)), None)
@@ -283,7 +283,7 @@ def _followed_to_the_end(
     for k, (optimum, candidate) in enumerate(ends):
         if optimum.objective <= close[0] or (is_finite(optimum) and optimum.objective <= close[1]):
             with suppress(CollocError):
-                whole = converged(*space_near(problem, optimum.gait), optimum.delta, NEXT_RADIUS, ROUGH)
+                whole = converged(*space_near(problem, optimum.gait), optimum.delta, ROUGH)
                 ends[k] = whole.after(*optimum.history), candidate
     return ends
 
@@ -293,7 +293,7 @@ def _followed(problem: Problem, optimum: Optimum) -> Optimum:
     edges = optimum.space.phase_mesh(optimum.gait).edges
     finer = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
     space, v = space_near(problem, optimum.gait, finer)
-    return descend(converged(space, v, optimum.delta, NEXT_RADIUS, ROUGH))
+    return descend(converged(space, v, optimum.delta, ROUGH))
 
 
 def _alternative(problem: Problem, optimum: Optimum, starts: int) -> Alternative:

@@ -15,7 +15,7 @@ from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer, Step
 from colloc.search.confirm import answer_of, second_order
-from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS
+from colloc.search.converge import BOX
 from colloc.search.descend import levels
 from colloc.search.diagnosis import explanation, redundant_equations
 from colloc.search.ipopt import NlpResult, Solver
@@ -49,15 +49,15 @@ def literal_answer(problem: Problem) -> Answer:
     if problem.gait.mixes:
         raise ProblemError("relaxed gaits have no full program; leave --search full out.")
     program = transcribed(problem)
-    parameters, radius, history = nearest_parameters(program, problem.guess), FIRST_RADIUS, tuple[Step, ...]()
+    parameters, history = nearest_parameters(program, problem.guess), tuple[Step, ...]()
     below = levels(problem, problem.delta_start)
     for done, delta in enumerate(below):
         this_run().told("descend", done, len(below))
-        answer = _solved(program, parameters, delta, radius)
+        answer = _solved(program, parameters, delta)
         history = (*history, answer.step)
         if not answer.optimal:
             return replace(answer, history=history)
-        parameters, radius = answer.x[program.layout.parameters[:, 0]], NEXT_RADIUS
+        parameters = answer.x[program.layout.parameters[:, 0]]
     kept = np.empty(0)
     for done in range(MESHES if problem.mesh_tolerance > 0 else 0):
         this_run().told("refine", done, MESHES)
@@ -68,7 +68,7 @@ def literal_answer(problem: Problem) -> Answer:
             break
         kept = np.concatenate([kept, plan.kept])
         program = transcribed(problem, gait, plan.edges, plan.scheme)
-        answer = _solved(program, nearest_parameters(program, gait), delta, NEXT_RADIUS)
+        answer = _solved(program, nearest_parameters(program, gait), delta)
         history = (*history, answer.step)
         if not answer.optimal:
             return replace(answer, history=history)
@@ -76,17 +76,17 @@ def literal_answer(problem: Problem) -> Answer:
     return replace(answer, second_order=second_order(answer), history=history)
 
 
-def _solved(program: GaitProgram, parameters: np.ndarray, delta: float, radius: float) -> Answer:
+def _solved(program: GaitProgram, parameters: np.ndarray, delta: float) -> Answer:
     """The full program solved from the gait of some parameters."""
 
     def compute() -> Answer:
         x = feasible_point(program, parameters, delta)
         solver = Solver(heading(program, x), {"max_iter": _ITERATIONS})
-        result = solver.solve(x, delta, None, radius)
+        result = solver.solve(x, delta, None, BOX)
         answer = answer_of(program, result, delta)
         return answer if result.optimal else replace(answer, message=_why(solver, x, result, delta))
 
-    given = (program.control.problem, parameters, delta, radius, program.mesh.edges, program.mesh.scheme.name)
+    given = (program.control.problem, parameters, delta, program.mesh.edges, program.mesh.scheme.name)
     return this_run().kept("literal", given, compute)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.search.certify import NOWHERE
-from colloc.search.converge import NEXT_RADIUS, converged
+from colloc.search.converge import converged
 from colloc.search.effort import FINE, ROUGH
 from colloc.search.optimum import Optimum, replace_keeping_space
 from colloc.search.run import this_run
@@ -23,11 +23,12 @@ from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_m
 MESHES, _SAME_AIM = 8, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, as many are planned for
 half of it, later ones for a quarter, and keep all their knots."""
-_GROWTH, _FEW_POINTS = 3, 300
-"""A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
-_MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
-"""Panels of a smooth body, and how much they grow at once, at most; error that they may leave, over what the mesh may. Every
-doubling was seen to leave a sixth or less, with a point at rest that moves over the panels."""
+_GROWTH = 4
+"""A mesh has at most so many times the points of the last one, and a smooth body so many times its panels: the gait will move,
+and what was planned is wasted."""
+_MOST_PANELS, _LEFT = 128, 6
+"""Panels of a smooth body at most; error that they may leave, over what the mesh may. Every doubling was seen to leave a sixth
+or less, with a point at rest that moves over the panels."""
 
 
 @dataclass(eq=False)
@@ -53,7 +54,7 @@ class _Meshes:
             kept=self.kept,
             nested=self.count >= _SAME_AIM,
             aim=AIM * 0.5 ** min(late, _SAME_AIM),
-            most_points=min(MOST_POINTS, _GROWTH * mesh.n_point + _FEW_POINTS),
+            most_points=min(MOST_POINTS, _GROWTH * mesh.n_point),
         )
 
 
@@ -95,14 +96,13 @@ def refine(optimum: Optimum) -> Optimum:
             except NotConvergedError:
                 v = space.laid(optimum.gait)  # breaks a row a little, as its own mesh lets it
         known = optimum.curvature if optimum.v.size == v.size else None
-        optimum = converged(space, v, optimum.delta, NEXT_RADIUS, effort, known).after(*optimum.history)
+        optimum = converged(space, v, optimum.delta, effort, known).after(*optimum.history)
 
 
 def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:
     """The class with a smooth body on as many panels as the gait needs, and its parameters; None if its own will do.
 
-    They do where half as many change the objective by no more than six times what the mesh may. The gait will still move, so
-    panels grow slowly.
+    They do where half as many change the objective by no more than six times what the mesh may.
     """
     space, v, here, problem = optimum.space, optimum.v, optimum.objective, optimum.problem
     panels, mesh = problem.body.panels, space.phase_mesh(optimum.gait)
@@ -115,7 +115,7 @@ def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:
         v = space.parameters(optimum.gait)
         return space, v, ReducedProgram(space, optimum.delta).objective(v)
 
-    before, most = on(panels // 2)[2], min(_PANELS_GROW * panels, _MOST_PANELS)
+    before, most = on(panels // 2)[2], min(_GROWTH * panels, _MOST_PANELS)
     while abs(here - before) > _LEFT * problem.mesh_tolerance * abs(here) and 2 * panels <= most:
         panels, before = 2 * panels, here
         space, v, here = on(panels)

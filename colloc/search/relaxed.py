@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from itertools import islice
 from typing import Any
 
@@ -25,9 +24,9 @@ from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative, Answer
 from colloc.results.relaxation import Optimality, Relaxation
 from colloc.results.solution import Solution
-from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, converged
+from colloc.search.converge import converged
 from colloc.search.descend import levels
-from colloc.search.effort import ROUGH, SKETCH, Effort
+from colloc.search.effort import SKETCH, Effort
 from colloc.search.explore import ENOUGH, FOLLOWED, PROMISING, Exploration, starting_gaits
 from colloc.search.optimum import Optimum
 from colloc.search.prescribed import realised
@@ -43,7 +42,7 @@ _DIRECTIONS = 72
 _IDLE = 1e-7
 _MESHES, _GAIN = 3, 2e-5
 """At the final delta, and what one must gain to be followed by another."""
-_ROUGH = replace(ROUGH, rounds=SKETCH.rounds)
+_ROUGH = Effort(1e-2)
 """For small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value."""
 
 
@@ -167,9 +166,9 @@ def _tried(problem: Problem, gait: AnyGait, pieces: int) -> Optimum:
         pieces = len(gait.durations)
     space = MixtureSpace(control_problem(problem), pieces)
     first, *others = levels(problem, problem.delta_start)
-    found = converged(space, space.parameters(gait), first, FIRST_RADIUS, SKETCH)
+    found = converged(space, space.parameters(gait), first, SKETCH)
     for delta in others[:1]:
-        found = converged(*with_turned_directions(found, pieces), delta, NEXT_RADIUS, SKETCH).after(*found.history)
+        found = converged(*with_turned_directions(found, pieces), delta, SKETCH).after(*found.history)
     return found
 
 
@@ -193,7 +192,7 @@ def descend_relaxed(found: Optimum) -> Optimum:
         # where friction is smoothest the mixture is found, below it follows
         effort: Effort = SKETCH if count else _ROUGH
         ready = with_turned_directions(found, round(_MOST * problem.intervals))
-        found = converged(*ready, delta, NEXT_RADIUS, effort).after(*found.history)
+        found = converged(*ready, delta, effort).after(*found.history)
     return found
 
 
@@ -204,7 +203,7 @@ def refine_relaxed(found: Optimum) -> Optimum:
         run.told("refine", count, _MESHES, found)
         before = found.objective
         ready = with_turned_directions(found, problem.intervals)
-        found = converged(*ready, found.delta, NEXT_RADIUS, _ROUGH).after(*found.history)
+        found = converged(*ready, found.delta, _ROUGH).after(*found.history)
         if found.objective > before - _GAIN:
             break
     return found

@@ -27,7 +27,7 @@ from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
 from colloc.search.choose import solution_of
-from colloc.search.converge import NEXT_RADIUS, converged
+from colloc.search.converge import converged
 from colloc.search.effort import FINE, ROUGH
 from colloc.search.solve import finished
 from colloc.search.spaces import remeshed, space_about, space_near, space_of, with_far
@@ -40,8 +40,6 @@ CHANGE = 0.1
 _STEP = 1e-5
 """Of differences, relative. With delta = 1e-4 the motion bends over relative changes of that order; measured on three problems,
 steps from 1e-4 to 1e-7 agree to 1e-7."""
-_NEAR = 0.1
-"""How far a parameter may go as the gait settles on another mesh [rad]."""
 _NOTHING = 1e-9
 """Relative slope that counts as none."""
 _STATIONARY = 1e-4
@@ -319,7 +317,7 @@ def _on_halved_mesh(answer: Answer, own: _Lagrangian) -> _Lagrangian:
     """With every interval halved, and the gait optimal there: multipliers go with their mesh."""
     edges = np.sort(np.concatenate([answer.edges, 0.5 * (answer.edges[1:] + answer.edges[:-1])]))
     space = remeshed(own.space, answer.gait, edges, answer.scheme)
-    found = converged(space, space.parameters(answer.gait), answer.delta, _NEAR, FINE)
+    found = converged(space, space.parameters(answer.gait), answer.delta, FINE)
     return _lagrangian(found.space, found.v, answer.delta)
 
 
@@ -346,7 +344,7 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
     """What is best where a number differs, and what the gait on file does there."""
     gait, delta = solution.answer.gait, problem.delta
     space, v = space_about(problem, gait)
-    found = solution_of(problem, finished(converged(space, v, delta, NEXT_RADIUS, ROUGH)))
+    found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
     best = found.certificate if found.success else UNCERTIFIED
     at = problem.body, problem.law, gait, delta * gait.delta_unit
     kept = replayer(problem.slope, problem.froude)(*at, breaks=gait.corner_phases, objective=problem.objective)

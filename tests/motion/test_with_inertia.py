@@ -245,7 +245,7 @@ def test_where_no_motion_is_found_the_search_says_so(monkeypatch):
     monkeypatch.setattr(WithInertia, "_closed", lambda *arguments: (*closed(*arguments)[:2], False))
     stated = problem(delta=5.0, delta_start=5.0)
     with pytest.raises(colloc.NotConvergedError, match="repeats itself"):
-        converged(*space_near(stated, LEANING), 5.0, 1.0, ROUGH)
+        converged(*space_near(stated, LEANING), 5.0, ROUGH)
 
 
 def test_what_holds_slowly_alone_is_not_asked_of_a_fast_body():

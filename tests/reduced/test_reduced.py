@@ -133,7 +133,7 @@ def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since()
     ends = space.member(v).phases
     graded = np.concatenate([a + (b - a) * np.linspace(0, 1, 9)[:-1] ** 2 for a, b in pairwise(ends)] + [ends[-1:]])
     space = remeshed(space, space.member(v), graded, "gauss-3")
-    found = converged(space, space.parameters(space.member(v)), 3e-2, 0.5, FINE)
+    found = converged(space, space.parameters(space.member(v)), 3e-2, FINE)
     answer = confirm(found)
     assert answer.message == ""
     assert np.abs(found.gait.phases - ends).max() > 1e-6

@@ -9,6 +9,7 @@ from colloc import Chain, Friction, Harmonic, Problem
 from colloc.gaits.starts import latin_hypercube_gait
 from colloc.reduced.constraints import Constraints
 from colloc.reduced.program import ReducedProgram
+from colloc.search import converge
 from colloc.search.converge import at_rest
 from colloc.search.effort import FINE
 from colloc.search.spaces import space_near
@@ -58,8 +59,9 @@ def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, 
     """With the instants held it swings: every round is optimal for the instants of the one before."""
     if not follows:
         monkeypatch.setattr(Constraints, "following", lambda held: held)
+    monkeypatch.setattr(converge, "BOX", 0.5)
     body, friction = Chain((0.25, 0.25, 0.25, 0.25)), Friction(0.4, 1, 1)
     problem = Problem("touch", body=body, friction=friction, gait=Harmonic(4), joint_limit=2.5, intervals=20)
     space, v = space_near(problem, latin_hypercube_gait(problem, 0, 0))
-    conditions = at_rest(ReducedProgram(space, 0.02), v, 0.5, FINE).conditions
+    conditions = at_rest(ReducedProgram(space, 0.02), v, FINE).conditions
     assert (max(conditions.kkt_error, conditions.violation) < 1e-6) == follows

@@ -51,7 +51,7 @@ class OneOfTwo:
 
 def test_a_gait_that_swings_between_two_instants_is_left_to_finer_cells():
     program = OneOfTwo()
-    rested = at_rest(program, np.array([0.5, -0.5]), 5.0, FINE)
+    rested = at_rest(program, np.array([0.5, -0.5]), FINE)
     assert program.placed <= 5
     assert min(abs(rested.conditions.violation - 1), abs(rested.conditions.violation - 2)) < 1e-6
 

@@ -17,6 +17,7 @@ from colloc.mechanics.bodies import FORMULATIONS
 from colloc.mechanics.chain import Chain
 from colloc.results.checks import UNCERTIFIED
 from colloc.search import solve
+from colloc.search.certify import GAP
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
 from colloc.search.ipopt import Solver
 from colloc.search.spaces import transcribed
@@ -130,4 +131,4 @@ def test_what_is_no_optimum_is_replayed_roughly(unsolved, monkeypatch):
     asked = {}
     monkeypatch.setattr(solve, "certify", lambda answer, **settings: asked.update(settings) or UNCERTIFIED)
     solve.certified(unsolved(Problem("guess", gait=Harmonic(1, "bilateral"), delta=1e-2)).answer)
-    assert asked == {"tolerance": 1e-3, "instants": 1600}
+    assert asked == {"tolerance": GAP, "instants": 1600}

@@ -72,11 +72,11 @@ def test_prices_name_a_direction_that_helps_where_one_is_missing(solution):
     # the best polygon of as many pieces leaves something to be mixed in
     alone = problem(directions=1)
     space = MixtureSpace(control_problem(alone), 14)
-    found = converged(space, space.parameters(alone.guess), 1e-2, 1.0, SKETCH)
+    found = converged(space, space.parameters(alone.guess), 1e-2, SKETCH)
     better = as_it_is(MixtureSpace(control_problem(problem()), 14), _with_idle(found.gait, problem()), 1e-2)
     assert prices(better)[0].min() < -1e-2
     ready, v = with_turned_directions(better, 14)
-    again = converged(ready, v, 1e-2, 1.0, SKETCH)
+    again = converged(ready, v, 1e-2, SKETCH)
     assert again.objective < found.objective - 1e-3
 
 

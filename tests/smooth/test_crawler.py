@@ -93,7 +93,7 @@ def test_optimising_beats_the_paper_s_crawler():
     guess = Corners(body.concertina(1.499), "antipodal")
     space, v = space_near(Problem("crawler", guess, body, gait=Polygon(8, "antipodal"), intervals=8), guess)
     paper = -ReducedProgram(space, 1e-3).objective(v)
-    found = converged(space, v, 1e-3, 1.0, SKETCH)
+    found = converged(space, v, 1e-3, SKETCH)
     assert 0.5 < paper + 0.005 < -found.objective < 1.0
 
 
