@@ -128,6 +128,14 @@ def side_lengths(n_joint: int, n_piece: int) -> LocalFunction:
     return local_function("sides", ca.vec(vertices), ca.SX(0, 1), ca.SX.sym("delta"), out)
 
 
+def side_shares(n_joint: int, n_piece: int) -> LocalFunction:
+    """The length of every piece of a chain of vertices over that of the chain."""
+    vertices = ca.SX.sym("v", n_joint, n_piece + 1)
+    step = vertices[:, 1:] - vertices[:, :-1]
+    length = ca.sqrt(ca.sum1(step * step)).T
+    return local_function("shares", ca.vec(vertices), ca.SX(0, 1), ca.SX.sym("delta"), length / ca.sum1(length))
+
+
 def unit_norm(n_joint: int) -> LocalFunction:
     """Squared norm of a tangent, less 1."""
     tangent = ca.SX.sym("t", n_joint)

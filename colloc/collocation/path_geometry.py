@@ -7,7 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from colloc.collocation.path_equations import Piece, arc, chord, excess_turn, placed_check, side, side_lengths, unit_norm
+from colloc.collocation.path_equations import (
+    Piece,
+    arc,
+    chord,
+    excess_turn,
+    placed_check,
+    side,
+    side_lengths,
+    side_shares,
+    unit_norm,
+)
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.gaits.control_problem import Admissible
 from colloc.gaits.free_path import ArcPath, FreePath, across_the_axis
@@ -44,12 +54,28 @@ class PathGeometry:
     checks: list[ShapeCheck]
     lower: np.ndarray  # (n,)
     upper: np.ndarray  # (n,)
+    shares: tuple[LocalFunction, np.ndarray] | None = None
+    """Of the pieces in the period, if they grow, by the variables: function and gather. None: the mesh is in phases."""
 
     def given(self, tau: np.ndarray) -> np.ndarray:
         """Instance parameters ``(2, k)`` of points at fractions tau ``(k,)`` of the intervals, k a multiple of their number."""
         repeat = tau.size // self.start.size
         start, width, second = (np.repeat(a, repeat) for a in (self.start, self.width, self.second))
         return np.stack([start + width * tau, second])
+
+    def evenly(self, turn: float, rate: sparse.csr_matrix) -> tuple[dict[str, sparse.csr_matrix], np.ndarray]:
+        """What an even turn adds to the rows of a state, from the matrix that integrates its rate at the points: parts of
+        blocks, and what is given."""
+        given = -turn * np.asarray(rate.sum(axis=1)).ravel()
+        if self.shares is None or not turn:
+            return {}, given
+        function, gather = self.shares
+        self.blocks["shares"] = function, gather, np.empty((0, 1))
+        n_point = rate.shape[1]
+        interval = np.repeat(np.arange(self.on.size), n_point // self.on.size)
+        place = np.arange(n_point), self.on[interval]
+        passed = sparse.csr_matrix((turn * self.second[interval], place), shape=(n_point, function.n_out))
+        return {"shares": (rate @ passed).tocsr()}, 0.0 * given
 
 
 def _ends(name: str, conditions: tuple[np.ndarray, np.ndarray], columns: np.ndarray, n: int) -> Group:
@@ -165,6 +191,7 @@ def side_geometry(
             row = across @ (selector(vertices[:, b], n) - selector(vertices[:, a], n))
             geometry.groups.append(equalities(f"side across the axis at {'start' if a == 0 else 'end'}", row))
     n_piece = vertices.shape[1] - 1
+    geometry.shares = side_shares(n_joint, n_piece), parameters[:, None]
     geometry.blocks["sides"] = (side_lengths(n_joint, n_piece), parameters[:, None], np.empty((0, 1)))
     shortest = np.full(n_piece, gait.shortest_side)
     shortest[[0, -1]] *= np.where(gait.half_ends, 0.5, 1.0)

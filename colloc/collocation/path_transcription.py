@@ -3,7 +3,7 @@
 Decision variables: the path's parameters (see their classes in `gaits`); the tail's orientation theta at every site; distance x
 and work W at every edge; in the formulation "full" also joint angles, rates, tail velocity and link forces at every point.
 Rates are unit tangents and delta is measured at unit shape speed. As in `collocation.transcription`, x is the displacement of
-the centre of mass along a fixed direction and the first orientation is free.
+the centre of mass along a fixed direction and the first orientation is free; theta is seen from axes that turn evenly.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def transcribe_path(
     """
     near, mesh = path_through(control, gait, edges, scheme)
     layout = layout_of(control, mesh, near.knots)
-    body, law, aims, fraction = *control.dynamics[:2], control.aims, control.admissible.gait.fraction
+    body, law, turn = *control.dynamics[:2], control.dynamics.turn
     geometry = _geometry(control.admissible, mesh, layout.parameters[:, 0], layout.n, near, far)
     kind = arc if isinstance(near, ArcPath) else side
     full = layout.forces.size > 0
@@ -148,11 +148,13 @@ def transcribe_path(
     omega, forward, power = (output - 3 + n_out for output in (OMEGA, ADVANCE, POWER))
     state, rate = mesh.integration()
     pick = selector(np.arange(n_point) * n_out + omega, n_out * n_point)
+    evenly, given_turn = geometry.evenly(turn, rate)
+    orientation = {"point": (-rate @ pick).tocsr()} | evenly
     groups = [
         *geometry.groups,
         *(_full_groups(body, n_out, n_point, layout.n) if full else []),
-        equalities("orientation", state @ selector(layout.theta[0], layout.n), {"point": (-rate @ pick).tocsr()}),
-        *rotation_groups(closing_sign(near.symmetry), layout.theta[0], layout.n, aims.rotation),
+        equalities("orientation", state @ selector(layout.theta[0], layout.n), orientation, given_turn),
+        *rotation_groups(closing_sign(near.symmetry), layout.theta[0], layout.n, control.aims.rotation is not None),
         quadrature_group("distance", layout.distance, forward, n_out, mesh, layout.n, 1.0),
         quadrature_group("work", layout.work, power, n_out, mesh, layout.n, 1.0),
     ]
@@ -174,13 +176,13 @@ def transcribe_path(
         return driven_point(body, law, piece.shape, piece.given, piece.speed), gather, given
 
     densities = {"length": lambda: (piece_pace(geometry.piece), here, given), "driven_work": driven}
-    besides = period_rows(aims, layout, mesh, densities, 1.0, fraction=fraction)
+    besides = period_rows(control, layout, mesh, densities, 1.0)
     besides |= actuator_rows(control.actuators, body, law, layout, 1.0)
     for name, (parts, group) in besides.items():
         geometry.blocks[name] = parts
         groups.append(group)
     implicit: Implicit = {} if full else {"point": balanced}
-    objective = objective_block(aims.objective, layout, fraction)
+    objective = objective_block(control, layout)
     return _program(control, mesh, near.knots, layout, geometry, groups, objective, implicit, velocity)
 
 

@@ -23,9 +23,10 @@ from scipy import sparse
 
 from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits.control_problem import Aims
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyClass
 from colloc.gaits.objective import QUANTITIES, Objective
+from colloc.gaits.period import chord_per_way
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.mechanics.actuators import ActuatorLimits, driven_power
 from colloc.mechanics.balance import load_wrench
@@ -176,35 +177,37 @@ BlockParts = tuple[LocalFunction, np.ndarray, np.ndarray]
 """What a `colloc.numerics.blocks.Block` is made of: function, gather, instance parameters."""
 
 
-def period_block(aims: Sequence[Objective], sign: float, layout: Layout, fraction: float) -> BlockParts:
+def period_block(control: ControlProblem, aims: Sequence[Objective], sign: float, layout: Layout) -> BlockParts:
     """`sign` times the values of objectives for a whole period, of which a part is solved."""
     names = tuple(name for name in QUANTITIES if any(name in aim.uses for aim in aims))
     parts = {name: ca.SX.sym(name, 2 if name == "rotation" else 1) for name in names}
-    period = {name: part[0] - part[1] if name == "rotation" else part / fraction for name, part in parts.items()}
+    turn, fraction = control.dynamics.turn, control.admissible.gait.fraction
+    whole = dict.fromkeys(names, 1 / fraction) | {"distance": chord_per_way(turn) / fraction}
+    period = {name: part[0] - part[1] + turn if name == "rotation" else whole[name] * part for name, part in parts.items()}
     out = ca.vertcat(*(sign * aim(period) for aim in aims))
     function = local_function("period", ca.vertcat(*parts.values()), ca.SX(0, 1), ca.SX.sym("delta"), out)
     return function, layout.of_period(names), np.empty((0, 1))
 
 
-def objective_block(objective: Objective, layout: Layout, fraction: float) -> Block:
-    """Minus an objective for a whole period, of which a part is solved."""
-    function, gather, given = period_block([objective], -1.0, layout, fraction)
+def objective_block(control: ControlProblem, layout: Layout) -> Block:
+    """Minus the objective for a whole period, of which a part is solved."""
+    function, gather, given = period_block(control, [control.aims.objective], -1.0, layout)
     return Block(function, gather, sparse.eye(1, format="csr"), given)
 
 
 def period_rows(
-    aims: Aims, layout: Layout, mesh: Mesh, densities: Mapping[str, Callable[[], BlockParts]], unit: float, *, fraction: float
+    control: ControlProblem, layout: Layout, mesh: Mesh, densities: Mapping[str, Callable[[], BlockParts]], unit: float
 ) -> dict[str, tuple[BlockParts, Group]]:
-    """Blocks and rows, by name, of what is asked of a whole period, of which a fraction is solved, besides the objective.
+    """Blocks and rows, by name, of what is asked of a whole period besides the objective.
 
     `densities`: blocks of the quantities that are integrals, per `unit` of time at the points; made if they are asked for.
     """
-    found = {}
+    found, aims = {}, control.aims
     for name, density in densities.items():
         if aims.uses(name):
             found[name] = density(), total_group(name, getattr(layout, name), mesh, layout.n, unit)
     if aims.at_least:
         reached, least = zip(*aims.at_least, strict=True)
-        parts = period_block(reached, 1.0, layout, fraction)
+        parts = period_block(control, reached, 1.0, layout)
         found["at least"] = parts, block_group("at least", np.array(least), np.inf, len(least), layout.n)
     return found

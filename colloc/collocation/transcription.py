@@ -1,8 +1,8 @@
 """Direct collocation of a problem: decision variables, constraints and objective on a mesh.
 
 Decision variables: gait parameters p; at every point joint angles, joint rates and tail velocity z; the tail's orientation
-theta at every site; distance x and work W at every edge. Rates, velocities and delta are per radian of phase, so that all
-variables are O(1).
+theta at every site, seen from axes that turn evenly (`colloc.gaits.period`); distance x and work W at every edge. Rates,
+velocities and delta are per radian of phase, so that all variables are O(1).
 
 What stands for the balance, by the formulation, is said in `colloc.collocation.point_equations`. x is the displacement of the
 centre of mass along a fixed direction. The first orientation is free, so maximising x turns the motion into that direction;
@@ -76,7 +76,7 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
     """
     mesh, dynamics, admissible, aims = control.mesh(edges, scheme), control.dynamics, control.admissible, control.aims
     layout = layout_of(control, mesh)
-    body, friction, slope, froude, _ = dynamics.in_speeds_of(RADIANS)
+    body, friction, slope, froude, *_ = dynamics.in_speeds_of(RADIANS)
     gait, n_joint = admissible.gait, body.n_joint
     checks = shape_checks(body, far, admissible.largest_speeds)
     point = point_function(control.formulation, body, friction, slope, froude * RADIANS**2)
@@ -103,7 +103,7 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
         "length": lambda: (path_pace(n_joint), layout.rates, none),
         "driven_work": lambda: (driven_point(body, friction), own, none),
     }
-    besides = period_rows(aims, layout, mesh, densities, RADIANS, fraction=gait.fraction)
+    besides = period_rows(control, layout, mesh, densities, RADIANS)
     besides |= actuator_rows(control.actuators, body, friction, layout, RADIANS)
     if slope is not None and aims.no_way_across:
         across = across_point(body, friction, slope)
@@ -136,7 +136,7 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
         return velocity(angles, rates, z, delta)
 
     implicit: Implicit = {} if control.formulation == FULL else {"point": velocity_map}
-    objective = objective_block(aims.objective, layout, gait.fraction)
+    objective = objective_block(control, layout)
     assembly, names, row_lower, row_upper, rows = assembled(layout, objective, blocks, groups, implicit)
     lower, upper = _variable_bounds(control, layout)
     return SeriesProgram(
@@ -178,13 +178,14 @@ def _point_groups(control: ControlProblem, n_out: int, mesh: Mesh, layout: Layou
 
 
 def _orientation_groups(control: ControlProblem, mesh: Mesh, layout: Layout) -> list[Group]:
-    """theta' = omega, how theta closes where no symmetry does it, and on a slope where it begins."""
+    """theta' = omega - turn, how theta closes where no symmetry does it, and on a slope where it begins."""
     state, rate = mesh.integration()
     linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
+    turn = control.dynamics.turn
     sign = closing_sign(control.admissible.gait.closing_symmetry)
     begin = selector(layout.theta[0, :1], layout.n) - selector(layout.parameters[-1], layout.n)
     return [
-        equalities("orientation", linear),
-        *rotation_groups(sign, layout.theta[0], layout.n, control.aims.rotation),
+        equalities("orientation", linear, given=-turn * np.asarray(rate.sum(axis=1)).ravel()),
+        *rotation_groups(sign, layout.theta[0], layout.n, control.aims.rotation is not None),
         *([] if control.dynamics.slope is None else [equalities("heading", begin)]),
     ]

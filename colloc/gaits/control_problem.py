@@ -37,6 +37,8 @@ class Dynamics(NamedTuple):
     froude: float
     symmetry: str
     """Of the motion: which part of a period follows from the other (`colloc.gaits.symmetry`)."""
+    turn: float = 0.0
+    """By which a period is asked to turn the body [rad]: the way is seen from axes that turn evenly (`colloc.gaits.period`)."""
 
     def in_speeds_of(self, unit: float) -> Dynamics:
         """The same for speeds that are divided by a unit."""
@@ -148,6 +150,7 @@ def control_problem(problem: Problem) -> ControlProblem:
             None if slope is None else slope._replace(grade=slope.grade / unit),  # the weight's pull is a force, too
             problem.froude / unit,  # and what drives momenta
             gait.motion_symmetry,
+            problem.rotation or 0.0,
         ),
         Admissible(gait, body, problem.joint_limit, problem.largest_speeds, problem.smallest_shape_speed),
         Aims(

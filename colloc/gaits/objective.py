@@ -18,7 +18,7 @@ from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
 QUANTITIES = {
-    "distance": "displacement of the centre of mass over a period [body lengths]",
+    "distance": "displacement of the centre of mass over a period, the chord of the arc if a turn is asked for [body lengths]",
     "work": "work against friction over a period",
     "rotation": "net rotation over a period, counter-clockwise [rad]",
     "length": "length of the path in shape space [rad]",

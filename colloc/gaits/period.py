@@ -1,11 +1,27 @@
-"""What a period of a gait comes to: values of the quantities that objectives speak of, each with its errors."""
+r"""What a period of a gait comes to: values of the quantities that objectives speak of, each with its errors.
+
+A period that turns the body by alpha turns everything about one point of the floor. The displacement of the centre of mass x
+then depends on the phase that the period is begun at, for the body wriggles about the circle that it follows. The chord of
+the circle's arc does not; it is the distance of a gait that is asked to turn:
+
+    chord = (2 sin(alpha/2) / alpha) |integral of e^(-i alpha t) x'(t) dt|.
+
+The integral is the way as it is seen from *axes that turn evenly*, by alpha a period; for alpha = 0 it is the displacement.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from colloc.gaits.objective import Objective
+
+
+def chord_per_way(turn: float) -> float:
+    """The chord of an arc that turns by an angle [rad], over the way in axes that turn evenly."""
+    return float(abs(np.sinc(turn / (2 * np.pi))))
 
 
 @dataclass(frozen=True)
@@ -35,7 +51,7 @@ class Period:
 
     @property
     def distance(self) -> float:
-        """Displacement of the centre of mass [body lengths]."""
+        """Displacement of the centre of mass, or the chord of the arc where a turn is asked for [body lengths]."""
         return self.values["distance"]
 
     @property

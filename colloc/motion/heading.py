@@ -30,7 +30,7 @@ def heading(symmetry: str, displacement: complex, rotation: float, bend: float =
 
 
 def closing_sign(symmetry: str) -> float | None:
-    """The sign with which the first orientation counts where the last one and it add up to a given turn, that of the period or
+    """The sign with which the first orientation counts where the last one and it add up to nothing, or
     a whole number of turns. None: nothing has to close."""
     return {NONE: -1.0, ANTIPODAL: 1.0, BILATERAL: None}[symmetry]
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from colloc.gaits.control_problem import Dynamics
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.period import chord_per_way
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
@@ -75,7 +76,8 @@ class Along(NamedTuple):
 
 class Passed(NamedTuple):
     """What the solved part of a period comes to: displacement from the initial orientation 0 or, where the orientation is a
-    state, in the plane; rotation, change of the sum of all joint angles [rad], work against friction."""
+    state, in the plane; rotation, change of the sum of all joint angles [rad], work against friction. Displacement and rotation
+    are seen from axes that turn evenly (`Kind.turn`)."""
 
     displacement: complex
     rotation: float
@@ -107,6 +109,8 @@ class Kind(Protocol):
     """What may be wrong where a gait has no motion, and what to try."""
     bends: bool
     """Whether it matters what the sum of all joint angles changes by over that part; else `Passed.bend` may be 0."""
+    turn: float
+    """By which a period is asked to turn the body [rad]."""
 
     def along(
         self,
@@ -144,9 +148,10 @@ class SlowOnLevel:
     told: tuple[str, ...] = ()
     lack: str = "no velocity balances the body; give another guess"
 
-    def __init__(self, body: Body, friction: Law, symmetry: str) -> None:
-        self.body, self.friction, self._symmetry = body, friction, symmetry
+    def __init__(self, body: Body, friction: Law, symmetry: str, turn: float = 0.0) -> None:
+        self.body, self.friction, self._symmetry, self.turn = body, friction, symmetry, turn
         self.periods = 1.0 / fraction(symmetry)
+        self._chords = self.periods * chord_per_way(turn)
         self.bends = (heading_shares(symmetry) or (0.0, 0.0))[1] != 0.0
 
     def along(
@@ -178,15 +183,16 @@ class SlowOnLevel:
 
     def counted(self, passed: Passed) -> dict[str, float]:
         ahead = float((passed.displacement * np.conj(self._axis(passed))).real)
-        return {"distance": self.periods * ahead, "work": self.periods * passed.work, "rotation": passed.rotation}
+        work, rotation = self.periods * passed.work, passed.rotation + self.turn
+        return {"distance": self._chords * ahead, "work": work, "rotation": rotation}
 
     def shares(self, passed: Passed) -> dict[str, Share]:
-        axis, periods = self._axis(passed), self.periods
+        axis = self._axis(passed)
         # a heading that turns with the gait
-        aside = periods * (passed.displacement * np.conj(axis)).imag
+        aside = self._chords * (passed.displacement * np.conj(axis)).imag
         on_rotation, on_bend = heading_shares(self._symmetry) or (0.0, 0.0)
-        distance = Share(periods * axis, on_rotation * aside, on_bend * aside)
-        return {"distance": distance, "work": Share(work=periods), "rotation": Share(rotation=1.0)}
+        distance = Share(self._chords * axis, on_rotation * aside, on_bend * aside)
+        return {"distance": distance, "work": Share(work=self.periods), "rotation": Share(rotation=1.0)}
 
 
 class SlowOnSlope:
@@ -197,6 +203,7 @@ class SlowOnSlope:
     lack: str = "friction does not hold the body on the slope all the way, or its joints brake; take a gentler one"
     periods: float = 1.0
     bends: bool = False
+    turn: float = 0.0
 
     def __init__(self, body: Body, friction: Law, slope: Slope) -> None:
         self.body, self.friction, self._slope = body, friction, slope
@@ -259,8 +266,8 @@ class WithInertia(SlowOnLevel):
     states: tuple[str, ...] = STATES
     lack: str = "no period with inertia was found that repeats itself; give another guess, or a smaller froude"
 
-    def __init__(self, body: Chain, friction: Law, symmetry: str, froude: float) -> None:
-        super().__init__(body, friction, symmetry)
+    def __init__(self, body: Chain, friction: Law, symmetry: str, froude: float, turn: float = 0.0) -> None:
+        super().__init__(body, friction, symmetry, turn)
         self._chain, self._froude, self._image = body, froude, momenta_image(symmetry)
 
     def along(
@@ -366,10 +373,10 @@ def through_motion(
 
 def kind_of_motion(dynamics: Dynamics) -> Kind:
     """How a body moves."""
-    body, law, slope, froude, symmetry = dynamics
+    body, law, slope, froude, symmetry, turn = dynamics
     if froude:
-        return WithInertia(checked_mass(body), law, symmetry, froude)
-    return SlowOnLevel(body, law, symmetry) if slope is None else SlowOnSlope(body, law, slope)
+        return WithInertia(checked_mass(body), law, symmetry, froude, turn)
+    return SlowOnLevel(body, law, symmetry, turn) if slope is None else SlowOnSlope(body, law, slope)
 
 
 def begin_of(kind: Kind, gait: AnyGait) -> np.ndarray:

@@ -42,10 +42,12 @@ def stacked(groups: list[Group], block: str, n_source: int) -> sparse.csr_matrix
     return sparse.csr_matrix((data, columns, ends), shape=(ends.size - 1, n_source))
 
 
-def equalities(name: str, linear: sparse.spmatrix, parts: dict[str, sparse.csr_matrix] | None = None) -> Group:
-    """Rows that vanish."""
-    zero = np.zeros(linear.shape[0])
-    return Group(name, zero, zero, sparse.csr_matrix(linear), parts or {})
+def equalities(
+    name: str, linear: sparse.spmatrix, parts: dict[str, sparse.csr_matrix] | None = None, given: np.ndarray | float = 0.0
+) -> Group:
+    """Rows that are as given, by default 0."""
+    right = np.zeros(linear.shape[0]) + given
+    return Group(name, right, right, sparse.csr_matrix(linear), parts or {})
 
 
 def gait_group(name: str, variables: np.ndarray, parameters: np.ndarray, matrix: np.ndarray, n: int) -> Group:
@@ -70,12 +72,12 @@ def quadrature_group(name: str, variable: np.ndarray, output: int, n_out: int, m
     return equalities(name, state @ selector(variable[0], n), {"point": (-unit * rate @ pick).tocsr()})
 
 
-def rotation_groups(sign: float | None, theta: np.ndarray, n: int, turn: float | None) -> list[Group]:
-    """The last of variables `theta` in order, and the first times a sign, add up to a turn; no row if sign or turn is None."""
-    if sign is None or turn is None:
+def rotation_groups(sign: float | None, theta: np.ndarray, n: int, closes: bool) -> list[Group]:
+    """The last of variables `theta` in order, and the first times a sign, add up to 0; no row if there is no sign or nothing
+    has to close."""
+    if sign is None or not closes:
         return []
-    row = sparse.csr_matrix(([1.0, sign], ([0, 0], [theta[-1], theta[0]])), shape=(1, n))
-    return [Group("rotation", np.array([turn]), np.array([turn]), row)]
+    return [equalities("rotation", sparse.csr_matrix(([1.0, sign], ([0, 0], [theta[-1], theta[0]])), shape=(1, n)))]
 
 
 def total_group(name: str, variable: np.ndarray, mesh: Mesh, n: int, unit: float) -> Group:

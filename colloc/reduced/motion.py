@@ -74,7 +74,7 @@ class ReducedMotion:
         along = self.kind.along(self.mesh, Moving(angles, rates, delta), begin, self._start(angles, rates, begin))
         self.solves += 1
         now, mesh = along.now, self.mesh
-        out = np.vstack([now.z[OMEGA], now.centre, now.power])
+        out = np.vstack([now.z[OMEGA] - self._even(pace), now.centre, now.power])
         out[:, ~along.held] = np.nan
         omega, cx, cy, power = (out * pace).reshape(4, -1, mesh.n_point).sum(axis=1)
         first = first_theta(self.kind, begin)
@@ -86,6 +86,10 @@ class ReducedMotion:
         if not self.kind.states or along.held.all():  # a search goes on from states that there are
             self._last = found
         return found
+
+    def _even(self, pace: np.ndarray) -> float:
+        """Rotation rate of the axes that turn evenly, over the pace [rad]."""
+        return self.kind.turn / float(point_weights(self.mesh) @ pace) if self.kind.turn else 0.0
 
     def _start(self, angles: np.ndarray, rates: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
         """States to start from, those of the last gait, and tail velocities: those of the last gait differentiated, moved along
@@ -143,6 +147,9 @@ class ReducedMotion:
             on_out[:, :, points] += rows[..., stage]
         on_out = np.tile(on_out, s.pace.size // mesh.n_point)
         on_pace = np.einsum("krt,rt->kt", on_out[:, : len(s.out)], s.out)
+        if kind.turn:  # the axes turn less on what a longer path makes a smaller part of the period
+            weight, even = point_weights(mesh), self._even(s.pace)
+            on_pace += np.outer(on_out[:, 0] @ s.pace, even / (weight @ s.pace) * weight)
         on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS])
         if bend.any():
             weight = bend[:, None] * self._on_columns(s)

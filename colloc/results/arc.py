@@ -1,13 +1,4 @@
-r"""The arc that a body crawls in a period: an angle, a radius and a chord that do not depend on the phase it is begun at.
-
-A period turns everything about one point of the floor by an angle alpha. The centre of mass x(t) wriggles about a circle
-around that point: as seen from axes that turn evenly with it, it goes round a loop of period 1, whose mean lies at the radius.
-On the chord of that circle a body goes
-
-    |exp(i alpha) - 1| |integral of exp(-i alpha t) (x(t) - c) dt|,      c the point it turns about,
-
-which tends to the displacement as alpha tends to 0, while the displacement itself depends on where the wriggle begins.
-"""
+"""The arc that a body crawls in a period, whatever phase it is begun at (`colloc.gaits.period`)."""
 
 from __future__ import annotations
 
@@ -28,15 +19,18 @@ class Arc(NamedTuple):
     ----------
     angle : float
         By which it turns the body, counter-clockwise [rad].
-    radius : float
-        Of the circle; infinite for one that does not turn [body lengths].
     chord : float
-        Between the ends of the period on it [body lengths].
+        Between the ends of the period on its circle [body lengths].
     """
 
     angle: float
-    radius: float
     chord: float
+
+    @property
+    def radius(self) -> float:
+        """Of the circle; infinite for one that does not turn [body lengths]."""
+        across = abs(2 * math.sin(0.5 * self.angle))
+        return self.chord / across if across else math.inf
 
     @property
     def length(self) -> float:
@@ -66,8 +60,5 @@ def arc(angle: float, centre: np.ndarray) -> Arc:
     path = centre[0] + 1j * centre[1]
     t = np.linspace(0.0, 1.0, path.size)
     turn, displacement = np.exp(1j * angle) - 1, path[-1] - path[0]
-    if turn == 0:
-        return Arc(angle, math.inf, float(abs(displacement)))
-    # turn (x - c) = turn (x - x(0)) + displacement, which is as exact for small angles
-    chord = float(abs(np.trapezoid(np.exp(-1j * angle * t) * (turn * (path - path[0]) + displacement), t)))
-    return Arc(angle, chord / float(abs(turn)), chord)
+    # integrated by parts, which needs no velocities; what is integrated is periodic, so that the rule is as good as any
+    return Arc(angle, float(abs(np.trapezoid(np.exp(-1j * angle * t) * (turn * (path - path[0]) + displacement), t))))

@@ -88,13 +88,14 @@ class CollocatedMotion:
         """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none, a slope allows none."""
         problem, theta = self.problem, self.x[self.layout.theta[0]]
         turns = problem.gait.motion_symmetry == NONE and problem.slope is None
-        return float(theta[-1] - theta[0]) if turns else 0.0
+        return float(theta[-1] - theta[0]) + (problem.rotation or 0.0) if turns else 0.0
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion at phases t, any real numbers; periods follow each other, turned by the net rotation of those before.
 
         Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's. The lab frame has the centre
-        of mass at the origin at t = 0, and the first period's way along +x; on a slope +x is straight uphill.
+        of mass at the origin at t = 0, and the first period's way along +x; on a slope +x is straight uphill, and the arc of a
+        gait that is asked to turn sets out along +x.
         """
         t = np.atleast_1d(np.asarray(t, dtype=float))
         if t.ndim != 1 or not np.isfinite(t).all():

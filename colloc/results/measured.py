@@ -92,6 +92,7 @@ def measured(
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
         settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "driven": driven, "limits": limits}
+        settings["turn"] = rotation or 0.0
         replays.append(run(*at, **settings, near=near, objective=objective))
     known = []
     for aim in (objective, EFFICIENCY):

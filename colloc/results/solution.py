@@ -161,10 +161,9 @@ class Solution:
 
     @property
     def arc(self) -> Arc:
-        """Angle, radius and chord of a period, whatever phase it is begun at (`colloc.results.arc`); straight on if no turn is
-        asked for."""
-        if self.problem.rotation == 0:
-            return Arc(0.0, math.inf, self.distance)
+        """Angle, radius and chord of a period, whatever phase it is begun at; straight on if no turn is asked for."""
+        if self.problem.rotation is not None:
+            return Arc(self.problem.rotation, self.distance)
         return arc(self.rotation, self.motion.sample(PHASES).centre)
 
     @property
@@ -185,7 +184,8 @@ class Solution:
     def played_slowly(self) -> float:
         """The objective of the same gait played so slowly that inertia does not matter."""
         at = self.problem.body, self.problem.law, self.gait, self.answer.delta_per_period
-        return replay(*at, breaks=self.gait.corner_phases, objective=self.problem.objective).value
+        aims = {"objective": self.problem.objective, "turn": self.problem.rotation or 0.0}
+        return replay(*at, breaks=self.gait.corner_phases, **aims).value  # type: ignore[arg-type]
 
     def slow_enough(self, loss: float = 0.01) -> float:
         """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than the part `loss`.
@@ -219,7 +219,7 @@ class Solution:
         p = self.problem
         if p.slope is not None or p.froude:
             raise ProblemError("bounds for dry friction are there for slow gaits on the level.")
-        return dry_friction(p.body, p.law, self.gait, breaks=self.gait.corner_phases)
+        return dry_friction(p.body, p.law, self.gait, breaks=self.gait.corner_phases, turn=p.rotation or 0.0)
 
     def certify_dry(self) -> None:
         """Put the efficiency under dry friction into the certificate, which is saved with it; raises what `dry` does."""

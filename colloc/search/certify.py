@@ -10,7 +10,6 @@ from colloc.gaits.control_problem import control_problem
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
-from colloc.gaits.symmetry import NONE
 from colloc.mechanics.chain import BALANCED
 from colloc.results.answer import EVALUATED, REALISED, Answer
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
@@ -64,8 +63,7 @@ def is_trivial(answer: Answer) -> bool:
         return control_problem(problem).in_units(answer.value) < NOWHERE
     if not goes_nowhere(answer):
         return False
-    theta = answer.x[answer.layout.theta[0]]
-    return not (problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > ANGLE)
+    return not abs(answer.motion.rotation) > ANGLE
 
 
 def goes_nowhere(answer: Answer) -> bool:

@@ -74,9 +74,13 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
     usual = {"guess": None, "delta_start": None, "intervals": None}
     stated = problem.with_(gait=gait_class, rotation=None, delta=delta, **usual)
     answer = evaluated_answer(stated, fitted.gait)
-    if abs(answer.motion.rotation) < GAP * answer.distance:
+    turned = answer.motion.rotation
+    if abs(turned) < GAP * answer.distance:
         stated = stated.with_(rotation=0.0)
         answer = replace(answer, problem=stated)
+    else:  # how far it goes is then the chord of its arc
+        stated = stated.with_(rotation=turned)
+        answer = evaluated_answer(stated, fitted.gait)
     if goes_nowhere(answer):
         said = "It goes nowhere for its work, so there is no value to certify: is it one that retraces its path?"
         return Solution(stated, answer, message=f"{fitted.describe()}. {said}")

@@ -1,8 +1,9 @@
 """Gaits that steer: the best of a problem for every turn of a period that is asked for, from sharp right to sharp left.
 
 The straight gait comes first, of the problem's own class. The others are sought in the class without symmetry, for no
-symmetric gait turns, each from its neighbour outwards. Joint angles between those of two neighbours turn by about as much as
-lies between, so that a controller can interpolate.
+symmetric gait turns, each from its neighbour outwards; a turn to the right from the mirror image of that to the left, if that
+is asked for, too. Joint angles between those of two neighbours turn by about as much as lies between, so that a controller can
+interpolate.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.limits import one_sided
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.results.solution import Solution
@@ -25,6 +27,8 @@ from colloc.system.late_binding import bound
 
 _LARGEST = math.pi
 """By more than half a turn a period the body could as well turn the other way."""
+_BEGINS = 1000
+"""Phases that are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +58,25 @@ class Steering:
         """Chord of the arc of a period per work, of every gait: it does not depend on the phase it is begun at."""
         return np.array([point.arc.chord / point.work for point in self.points])
 
+    @property
+    def begins(self) -> tuple[float, ...]:
+        """Phases at which to begin the gaits, each as near as can be to its neighbour that turns less: where a period begins
+        matters for nothing else."""
+        t = np.arange(_BEGINS) / _BEGINS
+        found = dict.fromkeys(self.turns, 0.0)
+        straight = min(self.turns, key=abs)
+        gaits = {turn: point.gait for turn, point in zip(self.turns, self.points, strict=True)}
+        for side in ([turn for turn in self.turns if turn > straight], [turn for turn in self.turns[::-1] if turn < straight]):
+            near = straight
+            for turn in side:
+                known, own = gaits[near].angles(t + found[near]), gaits[turn].angles(t)
+                matched = np.fft.ifft((np.fft.fft(own) * np.conj(np.fft.fft(known))).sum(axis=0)).real
+                found[turn], near = float(t[matched.argmax()]), turn
+        return tuple(found[turn] for turn in self.turns)
+
     def table(self, phases: int = 100) -> dict[str, Any]:
-        """What a controller needs, as plain numbers: the turns, their arcs, and joint angles at equal phases; between two
-        turns angles are interpolated linearly."""
+        """What a controller needs, as plain numbers: the turns, their arcs, and joint angles at equal phases from those of
+        `begins`; between two turns angles are interpolated linearly."""
         t = np.arange(phases) / phases
         arcs = [point.arc for point in self.points]
         return {
@@ -67,7 +87,9 @@ class Steering:
             "work_per_period_weight_times_length": [point.work for point in self.points],
             "status": [point.status for point in self.points],
             "phase": t.tolist(),
-            f"{self.problem.body.coordinate}_angles_rad": [point.gait.angles(t).T.tolist() for point in self.points],
+            f"{self.problem.body.coordinate}_angles_rad": [
+                point.gait.angles(t + begin).T.tolist() for point, begin in zip(self.points, self.begins, strict=True)
+            ],
         }
 
     def plot(self) -> Any:
@@ -136,5 +158,7 @@ def steer(
     for side in ([turn for turn in wanted if turn > 0], [turn for turn in reversed(wanted) if turn < 0]):
         near = straight
         for turn in side:
-            near = put(turn, solve(problem.with_(rotation=turn, guess=near.gait, **wide), 1))
+            mirrored = -turn in found and not one_sided(problem.joint_limit)
+            guess = found[-turn].gait.scaled(-1.0) if mirrored else near.gait
+            near = put(turn, solve(problem.with_(rotation=turn, guess=guess, **wide), 1))
     return Steering(problem, tuple(wanted), tuple(found[turn] for turn in wanted))

@@ -30,7 +30,7 @@ _MOST_PANELS = 20_000
 @dataclass(frozen=True, eq=False)
 class Rates:
     """Velocities at instants, arrays that end in the same shape: tail velocity ``(3, ...)``, velocity of the centre of mass
-    in the body frame (complex), power, driven power (0 unless asked for)."""
+    in the body frame (complex; turned back evenly by the turn of a period), power, driven power (0 unless asked for)."""
 
     z: np.ndarray
     centre: np.ndarray
@@ -48,7 +48,15 @@ class Rates:
 
 
 def rates_at(
-    body: Body, friction: Law, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None, driven: bool = False
+    body: Body,
+    friction: Law,
+    path: Path,
+    delta: float,
+    t: np.ndarray,
+    near: np.ndarray | None = None,
+    *,
+    driven: bool = False,
+    turn: float = 0.0,
 ) -> Rates:
     """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
     angles, rates = path(t.ravel())
@@ -56,7 +64,8 @@ def rates_at(
     solved = body.solve(friction, angles, rates, delta, start=start).require()
     now = body.motion(friction, angles, rates, delta, solved)
     delivered = driven_power_in_balance(body, friction, angles, rates, now.z, delta) if driven else np.zeros(t.size)
-    rows = (now.centre[0] + 1j * now.centre[1], now.power, delivered)
+    seen = (now.centre[0] + 1j * now.centre[1]) * np.exp(-1j * turn * t.ravel())
+    rows = (seen, now.power, delivered)
     return Rates(now.z.reshape(3, *t.shape), *(row.reshape(t.shape) for row in rows))
 
 
@@ -146,6 +155,7 @@ def fine_motion(
     tolerance: float,
     shares: Callable[[Mapping[str, float]], Mapping[str, float]] = EFFICIENCY.shares,
     driven: bool = False,
+    turn: float = 0.0,
 ) -> FineMotion:
     """Integrate a path between the first and the last of `edges` to a relative error of the efficiency, or another objective.
 
@@ -161,9 +171,11 @@ def fine_motion(
     tolerance : float
         Panels are halved until the sum of their disagreements is below this. The sum that remains is in the result.
     shares : callable
-        From distance, work, rotation and driven work to what a small change of each changes in the objective, relative to it.
+        From way, work, rotation and driven work to what a small change of each changes in the objective, relative to it.
     driven : bool
         Whether the driven work is asked for.
+    turn : float
+        That a period is asked for [rad]: the way is seen from axes that turn evenly (`colloc.gaits.period`).
 
     Raises
     ------
@@ -172,7 +184,8 @@ def fine_motion(
     """
 
     def solved(left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None) -> tuple[Rates, Increments]:
-        rates = rates_at(body, friction, path, delta, left[:, None] + width[:, None] * PANEL_RULE.c, near, driven)
+        nodes = left[:, None] + width[:, None] * PANEL_RULE.c
+        rates = rates_at(body, friction, path, delta, nodes, near, driven=driven, turn=turn)
         return rates, increments(PANEL_RULE, width, rates)
 
     left, width = edges[:-1], np.diff(edges)
@@ -191,10 +204,10 @@ def fine_motion(
         new_rates, new = solved(start, half, (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1))
         middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
         # the whole panel, and its polynomials half way, against the two halves
-        turn, move = new[0][0::2] + new[0][1::2], new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2]
+        spin, move = new[0][0::2] + new[0][1::2], new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2]
         sums = list(zip(new[2:], parts[2:], strict=True))
         differences = (
-            (turn - parts[0][chosen], move - parts[1][chosen], *(n[0::2] + n[1::2] - p[chosen] for n, p in sums)),
+            (spin - parts[0][chosen], move - parts[1][chosen], *(n[0::2] + n[1::2] - p[chosen] for n, p in sums)),
             tuple(half - polynomial for half, polynomial in zip((a[0::2] for a in new), middle, strict=True)),
         )
         kept = np.ones(left.size, dtype=bool)
@@ -206,13 +219,13 @@ def fine_motion(
         distance, work = max(abs(travelled[-1]), 1e-300), max(spent[-1], 1e-300)
         known = {"distance": distance, "work": work, "rotation": turned[-1], "driven_work": delivered[-1]}
         share = {k: abs(s) for k, s in shares(known).items()}
-        on_turn = share["distance"] * np.abs(travelled - travelled[-1]).max() + share["rotation"]
+        on_spin = share["distance"] * np.abs(travelled - travelled[-1]).max() + share["rotation"]
         change = sum(
             np.abs(move) * share["distance"]
-            + np.abs(turn) * on_turn
+            + np.abs(spin) * on_spin
             + np.abs(energy) * share["work"]
             + np.abs(drive) * share["driven_work"]
-            for turn, move, energy, drive in differences
+            for spin, move, energy, drive in differences
         )
         gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
         left, width = np.concatenate([left[kept], start])[place], np.concatenate([width[kept], half])[place]

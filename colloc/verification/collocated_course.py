@@ -53,7 +53,7 @@ class Defects(NamedTuple):
 
 class CourseOfGait(NamedTuple):
     """A gait's motion by the differential equation: momenta if they are states, theta, place, work against friction,
-    ``(4 or 7, n)``, at phases in order; and about the error of these."""
+    ``(4 or 7, n)``, at phases in order, seen from axes that turn evenly; and about the error of these."""
 
     at: Callable[[np.ndarray], np.ndarray]
     error: float
@@ -61,13 +61,13 @@ class CourseOfGait(NamedTuple):
 
 def course(dynamics: Dynamics, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     """The motion of a gait without breaks, delta per period; with inertia it is sought near the one on a mesh."""
-    body, friction, slope, froude, _ = dynamics
+    body, friction, slope, froude, _, turn = dynamics
     if slope is not None:
         grade = slope.grade
         on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
         ran = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
         return CourseOfGait(lambda t: ran.at(t)[:4], error)
-    played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=froude)
+    played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=froude, turn=turn)
     ran = played.settled(_along(kind_of_motion(dynamics), mesh, gait, delta).edges[:, 0], error)
     return CourseOfGait(ran.at, error)
 
@@ -81,7 +81,7 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     """Errors of collocating a gait whose motion has states, delta per period."""
     kind, objective = kind_of_motion(control.dynamics), control.aims.objective
     own = _along(kind, mesh, gait, delta)
-    pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA], own.now.centre, first_theta(kind, own.begin))
+    pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA] - kind.turn, own.now.centre, first_theta(kind, own.begin))
     angles, rates = gait(mesh.times)
     passed = np.linalg.norm(rates, axis=0)
     spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))
@@ -99,7 +99,7 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     if isinstance(kind, WithInertia):
         shapes = Shapes(angles, rates, delta)
         out, ends, alone = kind.alone(mesh, shapes, momenta[:, :-1], exact.at(mesh.times)[:-4])
-        local = CollocatedPose.on_mesh(mesh, out[OMEGA], out[3:5])
+        local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
         here, spent_alone = np.exp(1j * angle[:-1]), (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
         # an error of rotation turns everything after it, and by half of it the direction that counts
         rest = (place[0] - place[0][0]) + 1j * (place[1] - place[1][0])

@@ -57,7 +57,13 @@ class DryFriction(NamedTuple):
 
 
 def dry_friction(
-    body: Body, friction: Law, path: Path, breaks: np.ndarray | tuple[float, ...] = (), tolerance: float = 1e-6
+    body: Body,
+    friction: Law,
+    path: Path,
+    *,
+    breaks: np.ndarray | tuple[float, ...] = (),
+    tolerance: float = 1e-6,
+    turn: float = 0.0,
 ) -> DryFriction:
     """Distance of the centre of mass and work of a path over a period at delta = 0, between bounds.
 
@@ -82,7 +88,7 @@ def dry_friction(
     mean_rate = float(np.abs(path(np.linspace(0.0, 1.0, 101))[1]).max(axis=0).mean())
     delta = DRY * (mean_rate or 1.0)
     dry_balance(body, friction, *(a[:, :1] for a in path(np.array([0.0]))))  # says first if there are no bounds
-    replayed = replay(body, friction, path, delta, breaks=breaks, tolerance=tolerance)
+    replayed = replay(body, friction, path, delta, breaks=breaks, tolerance=tolerance, turn=turn)
     t, z = replayed.tail
     angles, rates = path(t)
     found = dry_balance(body, friction, angles, rates)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
-from colloc.gaits.period import Period
+from colloc.gaits.period import Period, chord_per_way
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -57,7 +57,7 @@ class InertialMotion(Period):
         By what small changes of the momenta are multiplied in a period (Floquet multipliers); stable if all are within 1.
     phases, states : (n,), (7, n)
         Where the solver stepped, and Vx, Vy, H (`colloc.mechanics.inertia`), the tail link's orientation, the place of the
-        centre of mass, and the work up to there.
+        centre of mass, and the work up to there; orientation and place are seen from axes that turn evenly.
     """
 
     froude: float
@@ -85,12 +85,23 @@ class GaitWithInertia:
     froude : float
     breaks : tuple of float
         Phases in (0, 1), ascending, at which the rates jump.
+    turn : float
+        That a period is asked for [rad].
     """
 
     def __init__(
-        self, body: Chain, friction: Law, path: Path, delta: float, *, froude: float, breaks: tuple[float, ...] = ()
+        self,
+        body: Chain,
+        friction: Law,
+        path: Path,
+        delta: float,
+        *,
+        froude: float,
+        breaks: tuple[float, ...] = (),
+        turn: float = 0.0,
     ) -> None:
-        self.body, self.friction, self.path, self.delta, self.froude, self.breaks = body, friction, path, delta, froude, breaks
+        self.body, self.friction, self.path, self.delta = body, friction, path, delta
+        self.froude, self.breaks, self.turn = froude, breaks, turn
         self._momenta = MomentaAt(body, friction, delta, froude)
 
     def slow_momenta(self) -> np.ndarray:
@@ -106,7 +117,7 @@ class GaitWithInertia:
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
             _, _, omega, vx, vy, power, *rates = self._at(t, state[_MOMENTA])
             moved = np.exp(1j * state[_THETA]) * complex(vx, vy)
-            return np.array([*rates, omega, moved.real, moved.imag, power]), None
+            return np.array([*rates, omega - self.turn, moved.real, moved.imag, power]), None
 
         return followed(slope, np.concatenate([start, np.zeros(4)]), aim, self.breaks)
 
@@ -154,6 +165,12 @@ class GaitWithInertia:
         return self._momenta(angles[:, 0], rates[:, 0], momenta)
 
 
+def passed(end: np.ndarray, turn: float) -> dict[str, float]:
+    """Distance, work and rotation of a period that ends in a state ``(7,)``, if a turn is asked for."""
+    distance = chord_per_way(turn) * float(np.hypot(*end[_PLACE]))
+    return {"distance": distance, "work": float(end[_WORK]), "rotation": float(end[_THETA]) + turn}
+
+
 def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """To where a period changes nothing."""
     return np.linalg.solve(np.eye(3) - slopes, gap)
@@ -169,6 +186,7 @@ def inertial_motion(
     tolerance: float = 1e-5,
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
+    turn: float = 0.0,
 ) -> InertialMotion:
     """Play a gait with inertia, once the body has settled to a motion in which all periods are alike.
 
@@ -189,6 +207,8 @@ def inertial_motion(
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
     objective : Objective
         Of distance, work, rotation and length.
+    turn : float
+        Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that turns by as much.
 
     Raises
     ------
@@ -207,15 +227,14 @@ def inertial_motion(
     """
     check_finite(positive=True, froude=froude, delta=delta)
     (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
-    played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at)
+    played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at, turn=turn)
     start, slopes = played.closed(played.slow_momenta())
     length, length_error = whole_length(gait)
     aim, before = _FIRST * tolerance, None
     while aim >= _LEAST:
         phases, states, _ = played.settled(start, aim, slopes)
         start = states[_MOMENTA, 0]
-        rotation, work = float(states[_THETA, -1]), float(states[_WORK, -1])
-        now = {"distance": float(np.hypot(*states[_PLACE, -1])), "work": work, "rotation": rotation}
+        now = passed(states[:, -1], turn)
         if before is not None:
             errors = {name: abs(now[name] - before[name]) for name in now} | {"length": length_error}
             values, multipliers = now | {"length": length}, np.linalg.eigvals(slopes)

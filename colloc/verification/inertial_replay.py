@@ -14,7 +14,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.inertia import checked_inertia, kinetic_energy, tail_velocity
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
-from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion
+from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion, passed
 from colloc.verification.replay import Path, Replay
 
 _APART = 1e-2
@@ -31,6 +31,7 @@ def inertial_replay(
     tolerance: float = 1e-6,
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
+    turn: float = 0.0,
     **_: object,
 ) -> Replay:
     """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`.
@@ -38,11 +39,13 @@ def inertial_replay(
     Of the result the residual is the change of the momenta in a period; the work of the joints is that against friction and
     what the body gains in kinetic energy.
     """
-    ran = inertial_motion(body, friction, gait, delta, froude, tolerance=tolerance, breaks=breaks, objective=objective)
+    settings = {"tolerance": tolerance, "breaks": breaks, "objective": objective, "turn": turn}
+    ran = inertial_motion(body, friction, gait, delta, froude, **settings)  # type: ignore[arg-type]
     phases = ran.phases % 1.0
     chain, joints = checked_inertia(body, gait)
     angles, rates = joints(phases)
-    played = GaitWithInertia(chain, friction, joints, delta, froude=froude, breaks=tuple(sorted(float(t) for t in breaks)))
+    at = tuple(sorted(float(t) for t in breaks))
+    played = GaitWithInertia(chain, friction, joints, delta, froude=froude, breaks=at, turn=turn)
     from_rest = ran.states[:3, 0]
     with suppress(NotConvergedError):  # Newton's method need not lead to any from there
         from_rest = played.closed(np.zeros(3))[0]
@@ -51,7 +54,7 @@ def inertial_replay(
     z = tail_velocity(chain, angles, rates, ran.states[:3])
     energy = froude * kinetic_energy(chain, angles, rates, z)[0]
     (x, y), (gx, gy) = chain.outline(angles), chain.centre(angles)
-    here, there = ({"distance": float(np.hypot(*end[4:6])), "work": float(end[6]), "rotation": float(end[3])} for end in ends)
+    here, there = (passed(end, turn) for end in ends)
     return Replay(
         values=ran.values,
         errors=ran.errors,

@@ -17,6 +17,7 @@ import numpy as np
 from colloc.gaits.control_problem import Admissible, ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
+from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
 from colloc.motion.collocated import CollocatedPose
 from colloc.motion.heading import heading
@@ -84,19 +85,25 @@ def gait_motion(control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh
         return _shares(control, part, length)
 
     of = (*control.dynamics[:2], gait)
-    return fine_motion(*of, delta, mesh.edges, tolerance, shares, control.aims.uses("driven_work"))
+    driven, turn = control.aims.uses("driven_work"), control.dynamics.turn
+    return fine_motion(*of, delta, mesh.edges, tolerance, shares, driven=driven, turn=turn)
 
 
 def _period(control: ControlProblem, part: Mapping[str, float], length: float) -> dict[str, float]:
-    """What a whole period comes to, from distance, work, rotation and driven work of the part that is solved."""
-    whole = {name: part[name] / control.admissible.gait.fraction for name in ("distance", "work", "driven_work")}
-    return whole | {"rotation": part["rotation"], "length": length}
+    """What a whole period comes to, from way, work, rotation and driven work of the part that is solved."""
+    return {name: factor * part[name] for name, factor in _wholes(control).items()} | {"length": length}
+
+
+def _wholes(control: ControlProblem) -> dict[str, float]:
+    """What quantities of the solved part count in the whole period; of the way, which counts as distance, the chord."""
+    periods, chord = 1 / control.admissible.gait.fraction, chord_per_way(control.dynamics.turn)
+    return {"distance": periods * chord, "work": periods, "rotation": 1.0, "driven_work": periods}
 
 
 def _shares(control: ControlProblem, part: Mapping[str, float], length: float) -> dict[str, float]:
     """What a small change of each quantity of the solved part changes in the objective, relative to it."""
-    shares = control.aims.objective.shares(_period(control, part, length))
-    return {name: share if name == "rotation" else share / control.admissible.gait.fraction for name, share in shares.items()}
+    shares, wholes = control.aims.objective.shares(_period(control, part, length)), _wholes(control)
+    return {name: share * wholes.get(name, 1 / control.admissible.gait.fraction) for name, share in shares.items()}
 
 
 def _whole_length(control: ControlProblem, gait: AnyGait) -> float:
@@ -157,7 +164,7 @@ def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: n
     control, gait, delta, fine = known
     nodes = left[:, None] + (right - left)[:, None] * rule.c
     at = *control.dynamics[:2], gait, delta, nodes
-    rates = rates_at(*at, fine.velocity(nodes), control.aims.uses("driven_work"))
+    rates = rates_at(*at, fine.velocity(nodes), driven=control.aims.uses("driven_work"), turn=control.dynamics.turn)
     pose, weights = CollocatedPose(rule, right - left, rates.z[2], rates.centre), (right - left)[:, None] * rule.b
     spent, delivered = (weights * rates.power).sum(axis=1), (weights * rates.driven).sum(axis=1)
     (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)

@@ -33,9 +33,9 @@ _CORNER = 1e-6
 
 class Panels(NamedTuple):
     """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
-    of the centre of mass in the body frame (complex), power, power of the joints, shape speed, driven power, residual and lever
-    ``(n, 5)``; shares of the actuators' limits ``(n, 5, n_share)``; and how far all balanced motions lie apart ``(n, 5, 3)``
-    (`colloc.verification.followed_motion.FollowedMotion`).
+    of the centre of mass in the body frame (complex; turned back evenly by the turn that is asked for), power, power of the
+    joints, shape speed, driven power, residual and lever ``(n, 5)``; shares of the actuators' limits ``(n, 5, n_share)``; and
+    how far all balanced motions lie apart ``(n, 5, 3)`` (`colloc.verification.followed_motion.FollowedMotion`).
     At last what halving the panel changed that each is half of ``(n, 5)`` (see `changes`)."""
 
     left: np.ndarray

@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
-from colloc.gaits.period import Period
+from colloc.gaits.period import Period, chord_per_way
 from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits, driven_power_in_balance
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
@@ -42,8 +42,8 @@ _NARROWEST = 1e-10
 class Replay(Period):
     """A gait replayed over one period: the quantities of a `Period`, and what tells how far they can be trusted.
 
-    The distance is that of the centre of mass. Errors are what halving the panels would change, summed as magnitudes, and the
-    residual. Of laws with equal coefficients there are no other motions.
+    The distance is that of the centre of mass, by `colloc.gaits.period` where a turn is asked for. Errors are what halving the
+    panels would change, summed as magnitudes, and the residual. Of laws with equal coefficients there are no other motions.
 
     Attributes
     ----------
@@ -119,6 +119,7 @@ def _evaluated(
     whole: bool,
     driven: bool,
     limits: ActuatorLimits,
+    turn: float,
 ) -> tuple[np.ndarray, ...]:
     """`Panels` from z to apart at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
 
@@ -153,7 +154,8 @@ def _evaluated(
     centre = mean("centre")
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
-    values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), pace, delivered, residual, lever)
+    seen = (centre[0] + 1j * centre[1]) * np.exp(-1j * turn * t.ravel())  # from axes that turn evenly
+    values = (seen, mean("power"), mean("actuator_power"), pace, delivered, residual, lever)
     z, apart = (a.T.reshape(*t.shape, 3) for a in (mean("z"), apart))
     return z, *(value.reshape(t.shape) for value in values), used.T.reshape(*t.shape, -1), apart
 
@@ -173,6 +175,7 @@ def replay(
     objective: Objective = EFFICIENCY,
     driven: bool = False,
     limits: ActuatorLimits = UNLIMITED,
+    turn: float = 0.0,
 ) -> Replay:
     """Distance, work, rotation and length of a path over one period, to a relative error in the efficiency, or an objective.
 
@@ -202,6 +205,8 @@ def replay(
         Whether the driven work is asked for, whatever the objective is.
     limits : ActuatorLimits
         Of which the largest shares are asked for; with limits of 1 these are the largest torques and powers themselves.
+    turn : float
+        Net rotation that the path is asked for [rad]: the distance is the chord of an arc that turns by as much.
 
     Raises
     ------
@@ -231,12 +236,13 @@ def replay(
     t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
     start = None if near is None else near.tail_velocity(t.ravel())
     driven = driven or "driven_work" in objective.uses
-    at = partial(_evaluated, body, friction, path, delta, sense=sense, driven=driven, limits=limits)
-    panels = begun(left, width, at(t, start, whole=True))
+    at = partial(_evaluated, body, friction, path, delta, sense=sense, driven=driven, limits=limits, turn=turn)
+    panels, chord = begun(left, width, at(t, start, whole=True)), chord_per_way(turn)
     while True:
-        turn, move, spent, passed, delivered = increments(WHOLE, panels, 1)
-        heading, place = travelled(turn, move)
-        values = {"distance": max(float(abs(place[-1])), 1e-300), "work": float(spent.sum()), "rotation": float(heading[-1])}
+        spin, move, spent, passed, delivered = increments(WHOLE, panels, 1)
+        heading, place = travelled(spin, move)
+        distance = max(chord * float(abs(place[-1])), 1e-300)
+        values = {"distance": distance, "work": float(spent.sum()), "rotation": float(heading[-1])}
         values["length"] = float(passed.sum())
         if driven:
             values["driven_work"] = float(delivered.sum())
@@ -244,6 +250,7 @@ def replay(
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
         changed, near_by, far = changes(panels)
         missed = left_over(near_by, far, panels.wider).T
+        missed[1] *= chord
         lost = dict(zip(("rotation", "distance", "work", "length", "driven_work"), missed, strict=True))
         gap = objective.relative_error(values, lost)
         residual = float(panels.residual.max())

@@ -1,0 +1,141 @@
+"""The distance of a gait that is asked to turn is the chord of an arc: what that means, and that every way to it agrees."""
+
+import numpy as np
+import pytest
+
+from colloc import Chain, FreePath, Friction, Harmonic, Polygon, Problem, replay
+from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.control_problem import control_problem
+from colloc.gaits.harmonic import Fourier
+from colloc.numerics.blocks import oracles
+from colloc.reduced.program import ReducedProgram
+from colloc.results.arc import arc
+from colloc.search.spaces import space_near, transcribed
+from colloc.verification.inertial_replay import inertial_replay
+from colloc.verification.mesh_error import mesh_error
+
+DELTA = 0.3
+BODY, FRICTION = Chain(), Friction()
+GAIT = Fourier(np.array([0.4, 0.3]), np.array([[1.0], [0.2]]), np.array([[0.1], [1.0]]))
+FINE = {"delta": DELTA, "tolerance": 1e-8, "instants": 400}
+
+
+def begun_at(phase):
+    return lambda t: GAIT(t + phase)
+
+
+def replayed(path=GAIT, turn=0.0):
+    return replay(BODY, FRICTION, path, turn=turn, **FINE)
+
+
+def on_a_dense_grid(path, n=4000):
+    """Rotation of a period and its places, by the trapezoidal rule on a uniform grid: of smooth periodic motion it is exact."""
+    t = np.arange(n) / n
+    angles, rates = path(t)
+    solved = BODY.solve(FRICTION, angles, rates, DELTA)
+    omega, centre = solved.z[2], np.array([1, 1j]) @ np.array(BODY.motion(FRICTION, angles, rates, DELTA, solved).centre)
+
+    def integral(rate):
+        """From 0 up to every t and 1, by the spectrum; the mean grows."""
+        k = np.fft.fftfreq(n, 1 / n)
+        parts = np.fft.fft(rate) / n
+        wave = np.where(k == 0, 0, parts / np.where(k == 0, 1, 2j * np.pi * k))
+        found = np.fft.ifft(wave * n) + parts[0] * t
+        return np.append(found, found[0] + parts[0]) - found[0]
+
+    theta = integral(omega).real
+    alpha, later = theta[-1], np.append(t, 1.0)
+    # periodic: what is seen from axes that turn evenly; its primitive times e^(i alpha t) is the place
+    seen = np.exp(1j * (theta[:-1] - alpha * t)) * centre
+    k = np.fft.fftfreq(n, 1 / n)
+    loop = np.fft.ifft(np.fft.fft(seen) / (1j * (2 * np.pi * k + alpha)))
+    return alpha, np.append(loop, loop[0]) * np.exp(1j * alpha * later)
+
+
+def test_a_period_turns_about_a_point_and_the_chord_is_that_of_the_mean_circle():
+    alpha, place = on_a_dense_grid(GAIT)
+    assert abs(alpha) > 0.05
+    # the point that a period leaves where it is: place(1) - c = e^(i alpha) (place(0) - c)
+    centre = (place[-1] - np.exp(1j * alpha) * place[0]) / (1 - np.exp(1j * alpha))
+    evenly = (place - centre)[:-1] * np.exp(-1j * alpha * np.arange(place.size - 1) / (place.size - 1))
+    radius = abs(evenly.mean())
+    assert np.ptp(abs(place - centre)) > 0.01 * radius  # it does wriggle
+    found = replayed(turn=alpha)
+    assert found.rotation == pytest.approx(alpha, abs=found.errors["rotation"])
+    assert found.distance == pytest.approx(2 * radius * abs(np.sin(alpha / 2)), rel=1e-8)
+    assert arc(alpha, np.array([place.real, place.imag])).radius == pytest.approx(radius, rel=1e-8)
+
+
+def test_the_chord_does_not_depend_on_the_phase_that_a_period_is_begun_at():
+    turn = replayed().rotation
+    chords, displacements = ([replayed(begun_at(p), at).distance for p in (0, 0.13, 0.37, 0.71)] for at in (turn, 0.0))
+    assert np.ptp(displacements) > 0.01 * max(displacements)
+    np.testing.assert_allclose(chords, chords[0], rtol=1e-9)
+
+
+def test_a_mirror_image_turns_the_other_way_on_the_same_chord():
+    turn = replayed().rotation
+    mirrored = replayed(GAIT.scaled(-1.0), -turn)
+    assert mirrored.rotation == pytest.approx(-turn, abs=1e-9)
+    assert mirrored.distance == pytest.approx(replayed(turn=turn).distance, rel=1e-9)
+
+
+def test_the_chord_tends_to_the_displacement_as_the_turn_tends_to_nothing():
+    straight = replayed().distance
+    off = [abs(replayed(turn=turn).distance - straight) for turn in (1e-2, 1e-3, 1e-4)]
+    assert off[0] > off[1] > off[2]
+    assert off[2] == pytest.approx(off[1] / 10, rel=0.05)
+
+
+CASES = {
+    "series": {"gait": Harmonic(1)},
+    "with inertia": {"gait": Harmonic(1), "froude": 0.05},
+    "free path": {"gait": FreePath(4.0, "none")},
+    "polygon of unequal friction": {"gait": Polygon(4, "none"), "friction": Friction(1.7, 1, 1.3)},
+}
+
+
+def stated(case, turn, intervals=24):
+    given = {"friction": FRICTION, "guess": GAIT, "intervals": intervals, "delta": DELTA, "delta_start": DELTA, **CASES[case]}
+    return Problem(case.replace(" ", "_"), rotation=turn, **given)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
+    free = stated(case, None)
+    space, v = space_near(free, GAIT)
+    turn = ReducedProgram(space, DELTA).motion.values(v, DELTA)["rotation"]
+    problem = stated(case, turn)
+    space, v = space_near(problem, GAIT)
+    delta, program = DELTA, ReducedProgram(space, DELTA)
+    values = program.motion.values(v, delta)
+    assert values["rotation"] == pytest.approx(turn, abs=1e-12)
+
+    full = transcribed(problem, space.member(v), space.mesh.edges)
+    x = feasible_point(full, space.full_parameters(v), delta)
+    found = oracles(full.assembly)
+    p = found.parameter_vector(delta / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]]))
+    g = np.array(found.options["jac_g"](x, p)[0]).ravel()
+    assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(-values["distance"] / values["work"], rel=1e-9)
+    for group in ("orientation", "rotation", "distance", "work", "balance"):
+        np.testing.assert_allclose(g[full.groups[group]], full.constraint_lower[full.groups[group]], atol=1e-10)
+
+    gait = space.member(v)
+    per_period = delta * gait.delta_unit
+    run, law = (inertial_replay, problem.law) if problem.froude else (replay, problem.law)
+    more = {"froude": problem.froude} if problem.froude else {}
+    fine = run(BODY, law, gait, per_period, breaks=gait.corner_phases, tolerance=1e-6, turn=turn, **more)
+    error = mesh_error(control_problem(problem), full.phase_mesh(gait), gait, per_period, 1e-7)
+    assert values["distance"] / values["work"] / fine.efficiency - 1 == pytest.approx(error.total, abs=3e-6)
+    assert abs(error.total) < error.estimate + 1e-7
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_gradients_of_the_chord_are_those_of_differences(case):
+    problem, h = stated(case, 0.3, 8), 1e-6
+    space, v = space_near(problem, GAIT)
+    motion = ReducedProgram(space, DELTA).motion
+    found = motion.gradients(v, DELTA)
+    for name in ("distance", "rotation"):
+        both = [[motion.values(v + sign * e, DELTA)[name] for sign in (1, -1)] for e in h * np.eye(v.size)]
+        np.testing.assert_allclose(found[name], np.diff(both)[:, 0] / (-2 * h), atol=2e-6)
