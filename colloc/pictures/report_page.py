@@ -121,6 +121,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             headline=_headline(solution),
             pace=_pace(solution),
             dry=_dry(solution),
+            floor=_floor(solution),
             gap=gap.strip(),
             reference=_comparison(solution, reference),
             relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
@@ -186,6 +187,15 @@ def _dry(solution: Solution) -> str:
         return str(solution.dry())
     except (ProblemError, NotConvergedError):
         return ""
+
+
+def _floor(solution: Solution) -> list[list[str]]:
+    """Rows of what other friction, lengths, feet and limits do to the best value, where that is known."""
+    try:
+        found = solution.sensitivity()
+    except (ProblemError, NotConvergedError):
+        return []
+    return [[effect.name, f"{effect.now:.4g}", *found.beside(effect)] for effect in found.seen]
 
 
 def _comparison(solution: Solution, reference: Reference | None) -> str:

@@ -160,17 +160,26 @@ class Sensitivity:
         own = {name: getattr(self, name) for name in ("name", "objective", "value", "error")}
         return own | {"effects": [effect.facts() for effect in self.effects]}
 
+    @property
+    def seen(self) -> list[Effect]:
+        """Those that change the value to first order."""
+        return [effect for effect in self.effects if not abs(effect.slope) <= _NOTHING * abs(self.value)]
+
+    def beside(self, effect: Effect) -> list[str]:
+        """The best value where a number is a tenth smaller, and where it is a tenth larger; "-" where it cannot be."""
+        values = {side: f"{self.value + side * CHANGE * effect.slope:.4f}" for side in effect.sides}
+        return [values.get(side, "-") for side in (-1, 1)]
+
     def lines(self) -> list[str]:
         """For a terminal."""
-        seen = [effect for effect in self.effects if not abs(effect.slope) <= _NOTHING * abs(self.value)]
+        seen = self.seen
         width = max((len(effect.name) for effect in seen), default=0)
         lines = [
             f"{self.name}: {self.objective} = {self.value:.6f} +- {self.error:.0e}; the best gait's elsewhere, to first order:",
             f"  {'':<{width}}  {'now':>8s}  {'10 % less':>9s}  {'10 % more':>9s}  slope",
         ]
         for effect in seen:
-            at = {side: f"{self.value + side * CHANGE * effect.slope:9.4f}" for side in effect.sides}
-            less, more = (at.get(side, f"{'-':>9s}") for side in (-1, 1))
+            less, more = (f"{text:>9s}" for text in self.beside(effect))
             unit = "" if effect.relative else "  (a tenth of its link)"
             slope = f"{effect.slope:+.5f} +- {effect.error:.0e}"
             lines.append(f"  {effect.name:<{width}}  {effect.now:8.4g}  {less}  {more}  {slope}{unit}")

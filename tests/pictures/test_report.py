@@ -352,3 +352,10 @@ def test_levels_on_the_way_do_not_alarm_and_the_last_one_does(three_link):
     assert "✗" not in text
     bad = replace(three_link, answer=replace(three_link.answer, history=(*three_link.history[:-1], rough)))
     assert "✗ not stationary" in " ".join(outline(report_page(bad)).text)
+
+
+def test_the_page_says_what_a_wrong_floor_costs(page, three_link):
+    rows = [effect.name for effect in three_link.sensitivity().seen]
+    assert rows
+    assert "What a wrong floor costs" in page
+    assert all(f"<td>{name}</td>" in page for name in rows)
