@@ -37,7 +37,8 @@ from colloc.search.spaces import heading, space_near, transcribed, with_far
 
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
-_OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60}
+_OPTIONS: dict[str, object] = {"mu_init": 1e-10, "max_iter": 60}
+"""The barrier begins where it ends, as multipliers are known: most gaits are confirmed by one or two steps."""
 
 
 class Verdict(Enum):
