@@ -12,7 +12,7 @@ VALUES = {
     "BSpline", "Basis",
     "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FeetLaw", "Foot",
     "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Period", "Polygon",
-    "Coupled", "PotentialSpace",
+    "Coupled", "Known", "PotentialSpace", "Quantity",
     "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "Saved", "TensorSpline",
     "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
 }
@@ -24,7 +24,9 @@ MUTABLE = {
 
 
 def data_classes():
-    modules = (m.name for m in pkgutil.walk_packages(colloc.__path__, "colloc.") if not m.name.endswith("__main__"))
+    modules = (
+        m.name for m in pkgutil.walk_packages(colloc.__path__, "colloc.") if not m.name.endswith(("__main__", "._kernel"))
+    )
     for name in modules:
         for thing in vars(importlib.import_module(name)).values():
             if inspect.isclass(thing) and thing.__module__ == name and "__dataclass_params__" in vars(thing):

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colloc import Problem, ProblemError
+from colloc import FreePath, Objective, Problem, ProblemError, Quantity, ellipse
 from colloc.gaits import gait_fields
 from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.bodies import Body, Moved, Shaped
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import DRIVEN_WORK
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.results.store import load, save
@@ -134,3 +136,56 @@ def test_a_class_of_your_own_can_be_put_on_a_slope_and_taken_off_it(monkeypatch,
     assert found.status == "solved", found.message
     np.testing.assert_array_equal([*found.gait.cos[[0, 1], [1, 0]], *found.gait.sin[[0, 1], [1, 0]]], 0.0)
     assert found.distance > 0
+
+
+def moments_at(solution, t):
+    """In the joints, by the balance at phases that no quadrature of the library has."""
+    body, law, delta = solution.problem.body, solution.problem.friction, solution.delta_per_period
+    angles, rates = solution.gait(t)
+    z = body.solve(law, angles, rates, delta).z
+    return joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta), rates
+
+
+def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
+    heat = Quantity("heat", "sum(moment**2)", "loss in the windings")
+    cool = Objective("distance / (work + 5 * heat)", name="coolness", quantities=[heat])
+    problem = Problem("cool", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective=cool, delta=1e-3)
+    found = solve(problem, starts=1)
+    assert found.status == "solved", found.message
+    values, t = found.certificate.values, (np.arange(8000) + 0.3) / 8000
+    # the heat is a fiftieth of what the distance is divided by, and that is replayed to 1e-6
+    assert values["heat"] == pytest.approx((moments_at(found, t)[0] ** 2).sum(axis=0).mean(), rel=5e-5)
+    assert found.value == pytest.approx(values["distance"] / (values["work"] + 5 * values["heat"]), rel=1e-5)
+    usual = solve(problem.with_(objective="efficiency"), starts=1)
+    assert usual.efficiency > found.efficiency
+    read = load(save(found, tmp_path / "cool.h5"))
+    assert (read.problem.hash, read.certificate.values) == (problem.hash, values)
+    assert read.problem.objective == cool
+    with pytest.raises(ProblemError, match="the heat of a path depends on how fast it is followed"):
+        problem.with_(gait=FreePath(4.0, "bilateral"))
+
+
+@pytest.mark.parametrize(
+    "gait", [Harmonic(1, "bilateral"), pytest.param(FreePath(4.0, "bilateral"), marks=pytest.mark.slow)], ids=["series", "path"]
+)
+def test_a_quantity_stated_anew_is_the_one_that_is_known(gait):
+    mine = Objective("distance / mine", quantities=[Quantity("mine", DRIVEN_WORK.density)])
+    known = Problem("known", ellipse(0.0, 2.8, 1.3), gait=gait, objective="driven efficiency", delta=1e-3)
+    first, second = (solve(each, starts=1) for each in (known, known.with_(objective=mine)))
+    assert second.status == first.status == "solved"
+    assert second.value == first.value
+    assert second.certificate.values["mine"] == first.certificate.values["driven_work"]
+
+
+def test_what_a_quantity_is_proportional_to_follows_from_its_formula():
+    heat, effort = Quantity("heat", "sum(moment**2)"), Quantity("effort", "sum(abs(moment * rate))")
+    mixed = Quantity("mixed", "sum(moment**2 + rate**2)")
+    assert [each.friction_degree for each in (heat, effort, mixed)] == [2.0, 1.0, None]
+    assert [each.pace_degree for each in (heat, effort, mixed)] == [0.0, 1.0, None]
+    assert Objective("distance * work / heat", quantities=[heat]).degree == -1.0
+    assert Objective("distance / mixed", quantities=[mixed]).degree is None
+    for name, density, why in [("heat", "moment**2", "no sum over the joints"), ("work", "sum(rate)", "a name of its own")]:
+        with pytest.raises(ProblemError, match=why):
+            Quantity(name, density)
+    with pytest.raises(ProblemError, match="speaks of heat"):
+        Objective("distance / heat")

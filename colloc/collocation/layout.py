@@ -9,6 +9,7 @@ import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
 from colloc.mechanics.bodies import FULL
+from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
 from colloc.numerics.mesh import Mesh
 
@@ -29,14 +30,15 @@ class Layout:
     z: np.ndarray
     momenta: np.ndarray
     forces: np.ndarray
-    length: np.ndarray
-    driven_work: np.ndarray
+    totals: np.ndarray
     n: int
+    integrals: tuple[Quantity, ...] = ()
+    """What `totals` are of, over the solved part of the period."""
 
     def of_period(self, names: Iterable[str]) -> np.ndarray:
         """``(n, 1)``: where quantities of the solved part of the period are; of the rotation its end and its begin."""
         ends = {"distance": [self.distance[0, -1]], "work": [self.work[0, -1]], "rotation": self.theta[0, [-1, 0]]}
-        own = {"length": self.length[:, 0], "driven_work": self.driven_work[:, 0]}
+        own = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
         return np.concatenate([(ends | own)[name] for name in names])[:, None]
 
 
@@ -56,11 +58,10 @@ def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = No
         "z": (3, n_point),
         "momenta": (len(STATES) if control.dynamics.froude else 0, mesh.n_site),
         "forces": (len(body.force_names) if full else 0, n_point),
-        "length": (int(control.aims.uses("length")), 1),
-        "driven_work": (int(control.aims.uses("driven_work")), 1),
+        "totals": (len(control.aims.integrals), 1),
     }
     indices, start = {}, 0
     for name, (rows, columns) in sizes.items():
         indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
         start += rows * columns
-    return Layout(n=start, **indices)
+    return Layout(n=start, **indices, integrals=control.aims.integrals)

@@ -17,6 +17,7 @@ import numpy as np
 from colloc.collocation.point_equations import forward
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
 from colloc.numerics import arcs
 from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
@@ -106,9 +107,16 @@ def chord(piece: Piece) -> LocalFunction:
     return local_function("chord", piece.shape, piece.given[1], ca.SX.sym("delta"), whole)
 
 
-def piece_pace(piece: Piece) -> LocalFunction:
-    """Length of path per unit of phase at a point of a piece."""
-    return local_function("pace", piece.shape, piece.given, ca.SX.sym("delta"), piece.speed)
+def piece_density(quantity: Quantity, body: Body, friction: Law, piece: Piece) -> LocalFunction:
+    """Density of a quantity at a point of a piece, per unit of phase. Locals: angles, rates, forces, if it needs these; then
+    the shape."""
+    delta, own = ca.SX.sym("delta"), [piece.angles, piece.direction, None]
+    if quantity.needs_forces:
+        own = [ca.SX.sym(*each) for each in (("q", body.n_joint), ("r", body.n_joint), ("forces", len(body.force_names)))]
+    angles, rates, forces = own
+    out = piece.speed * quantity.at(Instants(body, friction, angles, rates, delta, forces=forces))
+    local = ca.vertcat(*(own if quantity.needs_forces else []), piece.shape)
+    return local_function(quantity.name, local, piece.given, delta, out)
 
 
 @lru_cache(maxsize=256)

@@ -23,12 +23,12 @@ from colloc.collocation.path_equations import (
     arc,
     full_path_point,
     path_point,
-    piece_pace,
+    piece_density,
     side,
     squared_distance,
 )
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
-from colloc.collocation.point_equations import BlockParts, actuator_rows, driven_point, objective_block, period_rows
+from colloc.collocation.point_equations import BlockParts, actuator_rows, objective_block, period_rows
 from colloc.collocation.program import GaitProgram, Implicit, assembled
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.control_problem import Admissible, ControlProblem
@@ -36,6 +36,7 @@ from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.gaits.polygon import Corners
 from colloc.mechanics.bodies import Body, Pairs
+from colloc.mechanics.densities import Quantity
 from colloc.motion.heading import closing_sign
 from colloc.numerics.blocks import Block
 from colloc.numerics.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector
@@ -171,12 +172,11 @@ def transcribe_path(
         geometry.lower[state_index] = geometry.upper[state_index] = 0.0
     here = geometry.shape[:, interval]
 
-    def driven() -> BlockParts:
-        gather = np.concatenate([layout.angles, layout.rates, layout.forces, here])
-        return driven_point(body, law, piece.shape, piece.given, piece.speed), gather, given
+    def density(quantity: Quantity) -> BlockParts:
+        own = [layout.angles, layout.rates, layout.forces] if quantity.needs_forces else []
+        return piece_density(quantity, body, law, piece), np.concatenate([*own, here]), given
 
-    densities = {"length": lambda: (piece_pace(geometry.piece), here, given), "driven_work": driven}
-    besides = period_rows(control, layout, mesh, densities, 1.0)
+    besides = period_rows(control, layout, mesh, density, 1.0)
     besides |= actuator_rows(control.actuators, body, law, layout, 1.0)
     for name, (parts, group) in besides.items():
         geometry.blocks[name] = parts
@@ -205,7 +205,7 @@ def transcribe_fit(
     admissible = control.admissible
     size = layout_of(control, mesh, near.knots).parameters.size
     own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
-    layout = Layout(own, *10 * (none,), size)
+    layout = Layout(own, *9 * (none,), size)
     geometry = _geometry(admissible, mesh, own[:, 0], size, near, far)
     shapes = admissible.gait.split(own[:, 0], admissible.n_joint)
     shapes = (shapes[-1] if isinstance(near, ArcPath) else shapes).ravel(order="F")

@@ -14,7 +14,7 @@ itself is a step function of the tail velocity as delta goes to 0 and does not c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import casadi as ca
@@ -25,13 +25,13 @@ from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyClass
-from colloc.gaits.objective import QUANTITIES, Objective
+from colloc.gaits.objective import Objective
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.sloped import Slope, checked_chain
-from colloc.mechanics.actuators import ActuatorLimits, driven_power
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import ActuatorLimits, Instants, Quantity
 from colloc.mechanics.inertia import STATES, about_centre, checked_mass, momenta, turning
 from colloc.mechanics.law import Law
 from colloc.numerics.blocks import Block, LocalFunction, implicit_function, local_function
@@ -42,8 +42,6 @@ ACTUATORS = "actuators"
 """The rows of the limits on torques and powers, point by point."""
 N_RATE = 2
 """The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
-_AT_REST = 1e-12
-"""A single joint turns back where its rate vanishes; there the length of its path needs a derivative."""
 
 
 @lru_cache(maxsize=32)
@@ -137,22 +135,12 @@ def member_equations(gait: AnyClass, n_joint: int) -> LocalFunction:
     return local_function("members", p, ca.SX(0, 1), ca.SX.sym("delta"), p[gait.n_own :] - given)
 
 
-def path_pace(n_joint: int) -> LocalFunction:
-    """Length of the path in shape space per unit of time, from the joint rates of a point."""
-    rates = ca.SX.sym("r", n_joint)
-    return local_function("pace", rates, ca.SX(0, 1), ca.SX.sym("delta"), ca.sqrt(ca.sumsqr(rates) + _AT_REST**2))
-
-
-def driven_point(
-    body: Body, friction: Law, shape: ca.SX | None = None, given: ca.SX | None = None, gain: ca.SX | float = 1.0
-) -> LocalFunction:
-    """Driven power at a point of a full program, from joint angles, rates and forces; times a gain that depends on more
-    locals, `shape`, and on what is `given`."""
+def density_point(quantity: Quantity, body: Body, friction: Law, unit: float) -> LocalFunction:
+    """Density of a quantity at a point, from joint angles, rates and, if needed, forces, per period divided by `unit`."""
     _, angles, rates, _, delta = _symbols(body)
-    forces = ca.SX.sym("forces", len(body.force_names))
-    out = gain * driven_power(body, friction, angles, rates, forces, delta)
-    local = ca.vertcat(angles, rates, forces, *([] if shape is None else [shape]))
-    return local_function("driven", local, ca.SX(0, 1) if given is None else given, delta, out)
+    forces = ca.SX.sym("forces", len(body.force_names) if quantity.needs_forces else 0)
+    out = quantity.at(Instants(body, friction, angles, rates, delta, forces=forces, unit=unit))
+    return local_function(quantity.name, ca.vertcat(angles, rates, forces), ca.SX(0, 1), delta, out)
 
 
 def actuator_rows(
@@ -166,7 +154,7 @@ def actuator_rows(
         return {}
     _, angles, rates, _, delta = _symbols(body)
     forces = ca.SX.sym("forces", len(body.force_names))
-    shares = limits.shares(body, friction, angles, unit * rates, forces, delta)
+    shares = limits.at(Instants(body, friction, angles, rates, delta, forces=forces, unit=unit))
     function = local_function(ACTUATORS, ca.vertcat(angles, rates, forces), ca.SX(0, 1), delta, shares)
     gather, n_point = np.concatenate([layout.angles, layout.rates, layout.forces]), layout.angles.shape[1]
     group = block_group(ACTUATORS, np.tile(limits.least, n_point), 1.0, n_point * len(limits.names), layout.n)
@@ -179,7 +167,7 @@ BlockParts = tuple[LocalFunction, np.ndarray, np.ndarray]
 
 def period_block(control: ControlProblem, aims: Sequence[Objective], sign: float, layout: Layout) -> BlockParts:
     """`sign` times the values of objectives for a whole period, of which a part is solved."""
-    names = tuple(name for name in QUANTITIES if any(name in aim.uses for aim in aims))
+    names = tuple(dict.fromkeys(name for aim in aims for name in aim.uses))
     parts = {name: ca.SX.sym(name, 2 if name == "rotation" else 1) for name in names}
     turn, fraction = control.dynamics.turn, control.admissible.gait.fraction
     whole = dict.fromkeys(names, 1 / fraction) | {"distance": chord_per_way(turn) / fraction}
@@ -196,16 +184,15 @@ def objective_block(control: ControlProblem, layout: Layout) -> Block:
 
 
 def period_rows(
-    control: ControlProblem, layout: Layout, mesh: Mesh, densities: Mapping[str, Callable[[], BlockParts]], unit: float
+    control: ControlProblem, layout: Layout, mesh: Mesh, density: Callable[[Quantity], BlockParts], unit: float
 ) -> dict[str, tuple[BlockParts, Group]]:
     """Blocks and rows, by name, of what is asked of a whole period besides the objective.
 
-    `densities`: blocks of the quantities that are integrals, per `unit` of time at the points; made if they are asked for.
+    `density`: the block of a quantity that is an integral, per `unit` of time at the points.
     """
     found, aims = {}, control.aims
-    for name, density in densities.items():
-        if aims.uses(name):
-            found[name] = density(), total_group(name, getattr(layout, name), mesh, layout.n, unit)
+    for quantity, total in zip(aims.integrals, layout.totals, strict=True):
+        found[quantity.name] = density(quantity), total_group(quantity.name, total[:, None], mesh, layout.n, unit)
     if aims.at_least:
         reached, least = zip(*aims.at_least, strict=True)
         parts = period_block(control, reached, 1.0, layout)

@@ -12,8 +12,6 @@ pull, which depends on theta, the first theta is the last parameter of the gait,
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import casadi as ca
 import numpy as np
 from scipy import sparse
@@ -25,12 +23,11 @@ from colloc.collocation.point_equations import (
     BlockParts,
     across_point,
     actuator_rows,
-    driven_point,
+    density_point,
     gait_check,
     mean_square,
     member_equations,
     objective_block,
-    path_pace,
     period_rows,
     point_function,
 )
@@ -39,6 +36,7 @@ from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.gaits.control_problem import Admissible, ControlProblem
 from colloc.gaits.limits import widest
 from colloc.mechanics.bodies import FULL, Pairs
+from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
 from colloc.motion.heading import closing_sign, momenta_image
 from colloc.numerics.constraint_rows import (
@@ -98,12 +96,13 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
         np.empty((0, 1)),
     )
 
-    none, own = np.empty((0, mesh.n_point)), np.concatenate([layout.angles, layout.rates, layout.forces])
-    densities: dict[str, Callable[[], BlockParts]] = {
-        "length": lambda: (path_pace(n_joint), layout.rates, none),
-        "driven_work": lambda: (driven_point(body, friction), own, none),
-    }
-    besides = period_rows(control, layout, mesh, densities, RADIANS)
+    none = np.empty((0, mesh.n_point))
+
+    def density(quantity: Quantity) -> BlockParts:
+        own = [layout.angles, layout.rates, *([layout.forces] if quantity.needs_forces else [])]
+        return density_point(quantity, body, friction, RADIANS), np.concatenate(own), none
+
+    besides = period_rows(control, layout, mesh, density, RADIANS)
     besides |= actuator_rows(control.actuators, body, friction, layout, RADIANS)
     if slope is not None and aims.no_way_across:
         across = across_point(body, friction, slope)

@@ -84,10 +84,7 @@ def _besides(solution: Solution) -> list[str]:
         lines.append(f"  {EFFICIENCY.label:<15s} {found.efficiency:.6f} +- {found.efficiency_error:.0e}")
     if found.dry is not None:
         lines.append(f"  dry friction    between {found.dry[0]:.8f} and {found.dry[1]:.8f}, with no delta")
-    if problem.uses("length"):
-        lines.append(f"  path length L   {found.length:.6f} rad")
-    if problem.uses("driven_work"):
-        lines.append(f"  driven work W+  {found.driven_work:.6f}")
+    lines += [f"  {each.name.replace('_', ' '):<15s} {found.values[each.name]:.6f}" for each in problem.integrals]
     if problem.froude:
         lines.append(
             f"  played slowly   {solution.played_slowly:.6f} ({problem.objective.short} of the same gait without inertia)"

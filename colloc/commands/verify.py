@@ -44,8 +44,6 @@ _NUMBERS = (
     ("efficiency_at_zero_delta", "error_at_zero_delta", "an efficiency for delta -> 0"),
     ("value_at_zero_delta", "value_error_at_zero_delta", "a value for delta -> 0"),
     ("rotation", "", "a rotation"),
-    ("length", "", "a path length"),
-    ("driven_work", "", "a driven work"),
 )
 """What a certificate states: its number, the error of it, and words. What has no error of its own is known to the tolerance."""
 
@@ -65,9 +63,12 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
     """A sentence if the certificate in a file is not what a new one says, in any of its numbers; empty if they agree."""
     if not recorded.replayed:
         return "the file holds no certificate."
-    for name, error, words in _NUMBERS:
-        if name not in recorded.numbers:
-            continue  # nothing is stated
+    besides = [
+        (name, "", f"a {name.replace('_', ' ')}")
+        for name in recorded.values
+        if name not in dict.fromkeys(n for n, *_ in _NUMBERS)
+    ]
+    for name, error, words in (*_NUMBERS, *besides):
         stated, found = recorded.numbers[name], now.numbers.get(name, float("nan"))
         own = max(tolerance, _TOLERANCE) * max(abs(found), 1.0)
         errors = [each.numbers[error] for each in (recorded, now)] if error else [own, 0.0]

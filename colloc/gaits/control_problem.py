@@ -18,11 +18,11 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import Limit
-from colloc.gaits.objective import Objective
+from colloc.gaits.objective import Objective, integrals_of
 from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import Slope
-from colloc.mechanics.actuators import ActuatorLimits
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.densities import ActuatorLimits, Quantity
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
@@ -76,8 +76,13 @@ class Aims(NamedTuple):
     """Whether what counts on a slope is the way in a direction, with none across it."""
 
     def uses(self, quantity: str) -> bool:
-        """Whether any of it speaks of a quantity of `colloc.gaits.objective.QUANTITIES`."""
+        """Whether any of it speaks of a quantity of a period, by its name."""
         return any(quantity in aim.uses for aim in (self.objective, *(aim for aim, _ in self.at_least)))
+
+    @property
+    def integrals(self) -> tuple[Quantity, ...]:
+        """The quantities of which it speaks that are integrals of functions of an instant."""
+        return integrals_of((self.objective, *(aim for aim, _ in self.at_least)))
 
 
 @dataclass(frozen=True, eq=False)

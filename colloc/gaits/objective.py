@@ -6,13 +6,14 @@ that carry their gradient for the search in the reduced space and for error bars
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from colloc.mechanics.densities import INTEGRALS, Quantity, quantities_of
 from colloc.numerics.expression import Dual, Formula, formula
 from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
@@ -21,16 +22,15 @@ QUANTITIES = {
     "distance": "displacement of the centre of mass over a period, the chord of the arc if a turn is asked for [body lengths]",
     "work": "work against friction over a period",
     "rotation": "net rotation over a period, counter-clockwise [rad]",
-    "length": "length of the path in shape space [rad]",
-    "driven_work": "work of the actuators where none takes energy back",
+    **{name: quantity.meaning for name, quantity in INTEGRALS.items()},
 }
-"""What an expression may speak of."""
+"""What every expression may speak of."""
 _SAMPLES = (
-    {"distance": 0.4, "work": 1.7, "rotation": 0.3, "length": 7.0, "driven_work": 1.9},
-    {"distance": 0.7, "work": 2.9, "rotation": 0.8, "length": 11.0, "driven_work": 3.3},
+    {"distance": 0.4, "work": 1.7, "rotation": 0.3, "length": 7.0},
+    {"distance": 0.7, "work": 2.9, "rotation": 0.8, "length": 11.0},
 )
-"""Periods at which an expression is tried when it is stated."""
-_PROPORTIONAL_TO_FRICTION = ("work", "driven_work")
+_OTHERS = 1.9, 3.3
+"""Periods at which an expression is tried when it is stated, and all other quantities there."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,12 @@ class Objective:
     Parameters
     ----------
     expression : str
-        Of `QUANTITIES`: numbers, ``+ - * / **``, brackets, and `colloc.numerics.expression.FUNCTIONS`; powers have constant
-        exponents.
+        Of `QUANTITIES` and `quantities`: numbers, ``+ - * / **``, brackets, and `colloc.numerics.expression.FUNCTIONS`; powers
+        have constant exponents.
     name : str, optional
         By default that of `NAMED`, or the expression.
+    quantities : sequence of Quantity, optional
+        Others that the expression speaks of.
 
     Raises
     ------
@@ -57,14 +59,21 @@ class Objective:
     0.25
     >>> Objective("distance/work").name
     'efficiency'
+    >>> heat = Quantity("heat", "sum(moment**2)")
+    >>> Objective("distance / (work + 0.1 * heat)", quantities=[heat]).uses
+    ('distance', 'work', 'heat')
     """
 
     expression: str
     name: str = ""
+    quantities: tuple[Quantity, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "quantities", quantities_of(self.quantities))
+        if any(each.name in INTEGRALS and each != INTEGRALS[each.name] for each in self.quantities):
+            raise ProblemError(f"objective: a quantity has the name of another one; taken are {', '.join(QUANTITIES)}.")
         try:
-            stated = formula(NAMED.get(self.expression, self.expression), tuple(QUANTITIES))
+            stated = formula(NAMED.get(self.expression, self.expression), self._names)
         except (ProblemError, TypeError) as error:
             known = f"It may be one of {', '.join(NAMED)}, or a formula like 'distance / work'."
             raise ProblemError(f"objective: {error} {known}") from None
@@ -73,12 +82,12 @@ class Objective:
         object.__setattr__(self, "name", self.name or names.get(self.expression, self.expression))
         try:
             with np.errstate(all="ignore"):
-                values = [self(sample) for sample in _SAMPLES]
-                rises = [self.partials(sample).get("distance", 0.0) for sample in _SAMPLES]
+                values = [self(sample) for sample in self._samples]
+                rises = [self.partials(sample).get("distance", 0.0) for sample in self._samples]
         except (ArithmeticError, TypeError, ValueError):
             values, rises = [np.nan], []
         if not all(isinstance(value, float) and np.isfinite(value) for value in values):
-            raise ProblemError(f"the objective {self.expression!r} has no value for a usual gait: {_SAMPLES[0]}.")
+            raise ProblemError(f"the objective {self.expression!r} has no value for a usual gait: {self._samples[0]}.")
         if min(rises, default=0.0) < 0:
             raise ProblemError(
                 f"the objective {self.expression!r} falls with the distance; a body counts its distance in the direction in "
@@ -92,20 +101,41 @@ class Objective:
 
     @property
     def _formula(self) -> Formula:
-        return formula(self.expression, tuple(QUANTITIES))
+        return formula(self.expression, self._names)
+
+    @property
+    def _known(self) -> dict[str, Quantity]:
+        return INTEGRALS | {each.name: each for each in self.quantities}
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys([*QUANTITIES, *self._known]))
+
+    @property
+    def _samples(self) -> list[dict[str, float]]:
+        return [dict.fromkeys(self._names, other) | sample for sample, other in zip(_SAMPLES, _OTHERS, strict=True)]
 
     @cached_property
     def uses(self) -> tuple[str, ...]:
-        """The quantities that it speaks of, in the order of `QUANTITIES`."""
-        return tuple(name for name in QUANTITIES if name in self._formula.names)
+        """The quantities that it speaks of, in the order of `QUANTITIES`, its own last."""
+        return tuple(name for name in self._names if name in self._formula.names)
+
+    @cached_property
+    def integrals(self) -> tuple[Quantity, ...]:
+        """Those of them that are integrals of functions of an instant."""
+        return tuple(self._known[name] for name in self.uses if name in self._known)
 
     @cached_property
     def degree(self) -> float | None:
         """The power of the friction coefficients that the value is proportional to; None if to none."""
-        powers = []
-        for sample in _SAMPLES:
+        degrees, powers = {"work": 1.0}, []
+        for each in self.integrals:
+            if each.friction_degree is None:
+                return None
+            degrees[each.name] = each.friction_degree
+        for sample in self._samples:
             for factor in (2.0, 16.0):
-                scaled = {k: v * factor if k in _PROPORTIONAL_TO_FRICTION else v for k, v in sample.items()}
+                scaled = {k: v * factor ** degrees.get(k, 0.0) for k, v in sample.items()}
                 ratio = self(scaled) / self(sample) if self(sample) else np.nan
                 powers.append(np.log(ratio) / np.log(factor) if ratio > 0 else np.nan)
         near = float(np.round(powers[0], 6))
@@ -124,12 +154,12 @@ class Objective:
     def shares(self, period: Mapping[str, float]) -> dict[str, float]:
         """What a small change of each quantity changes in the value, over its magnitude, per unit of the change."""
         size = max(abs(self(period)), 1e-300)
-        return dict.fromkeys(QUANTITIES, 0.0) | {name: slope / size for name, slope in self.partials(period).items()}
+        return dict.fromkeys(self._names, 0.0) | {name: slope / size for name, slope in self.partials(period).items()}
 
     def relative_error(self, period: Mapping[str, float], errors: Mapping[str, Any]) -> Any:
         """Relative error of the value from those of quantities, numbers or arrays, whose signs are not known."""
         shares = self.shares(period)
-        return sum(abs(shares[name]) * error for name, error in errors.items())
+        return sum(abs(shares.get(name, 0.0)) * error for name, error in errors.items())
 
     @property
     def short(self) -> str:
@@ -141,9 +171,19 @@ class Objective:
         """For axes and tables: ``efficiency d/W``."""
         return f"{self.name} {self.short}" if self.short != self.name else self.name
 
-    def fields(self) -> dict[str, str]:
+    def fields(self) -> dict[str, Any]:
         """As plain text (JSON)."""
-        return {"expression": self.expression, "name": self.name}
+        own = {"quantities": [each.fields() for each in self.quantities]} if self.quantities else {}
+        return {"expression": self.expression, "name": self.name} | own
+
+
+def integrals_of(aims: Iterable[Objective]) -> tuple[Quantity, ...]:
+    """The integrals that any of some objectives speaks of. `ProblemError` if two of them have one name."""
+    found: dict[str, Quantity] = {}
+    for each in (quantity for aim in aims for quantity in aim.integrals):
+        if found.setdefault(each.name, each) != each:
+            raise ProblemError(f"two quantities are called {each.name}: give one of them another name.")
+    return tuple(found.values())
 
 
 NAMED = {
@@ -165,7 +205,9 @@ def objective_from(stated: object) -> Objective:
     """An objective, as it is, by its name or expression, or as `Objective.fields` wrote it."""
     if isinstance(stated, Objective):
         return stated
-    return Objective(**stated) if isinstance(stated, dict) else Objective(stated)  # type: ignore[arg-type]
+    if isinstance(stated, dict):
+        return Objective(**stated | {"quantities": [Quantity(**each) for each in stated.get("quantities", ())]})
+    return Objective(stated)  # type: ignore[arg-type]
 
 
 def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:

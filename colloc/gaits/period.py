@@ -70,11 +70,6 @@ class Period:
         return self.values["length"]
 
     @property
-    def driven_work(self) -> float:
-        """Of actuators where none takes energy back; NaN if nobody asked."""
-        return self.values.get("driven_work", float("nan"))
-
-    @property
     def efficiency(self) -> float:
         """Distance over work."""
         return self.distance / self.work

@@ -13,13 +13,13 @@ from colloc.gaits.guesses import check_guess, slowed, travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.inertia import check_paced
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each, one_sided
-from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
+from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.sloped import Slope, check_asked, class_on, slope_from
 from colloc.gaits.symmetry import NONE, check_symmetric
-from colloc.mechanics.actuators import ActuatorLimits
 from colloc.mechanics.bodies import FULL, Body, formulations
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import ActuatorLimits, Quantity
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
@@ -236,9 +236,13 @@ class Problem:
         for name in ("torque_limit", "power_limit", "speed_limit"):
             object.__setattr__(self, name, checked_actuator_limit(name, getattr(self, name), self.body.n_joint))
         limits = self.actuator_limits
-        asks = "driven_work" if self.uses("driven_work") else "a limit on actuators" if limits.names else ""
+        forced = [each.name for each in self.integrals if each.needs_forces]
+        asks = forced[0] if forced else "a limit on actuators" if limits.names else ""
         if asks and self.formulation != FULL:
             raise ProblemError(f"{asks} needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
+        paced = [each.name for each in self.integrals if each.pace_degree != 1.0]
+        if paced and self.gait.mixes:
+            raise ProblemError(f"a relaxed gait leaves the pace open, on which the {paced[0]} depends: use Harmonic.")
         if (limits.names or self.speed_limit) and self.gait.mixes:
             raise ProblemError(
                 "a relaxed gait moves in several directions at once, which no actuator does: leave its limits out."
@@ -287,6 +291,8 @@ class Problem:
             return "the joints' speed is limited"
         if self.froude:
             return "what is heavy takes time to move"
+        if paced := [each.name for each in self.integrals if each.pace_degree != 1.0]:
+            return f"the {paced[0]} of a path depends on how fast it is followed"
         return "" if rate_independent(self.law) else f"work depends on the pace under {self.law.label}"
 
     @property
@@ -295,8 +301,13 @@ class Problem:
         return (self.objective, *(aim for aim, _ in self.at_least))
 
     def uses(self, quantity: str) -> bool:
-        """Whether the objective or what must be reached speaks of a quantity of `colloc.gaits.objective.QUANTITIES`."""
+        """Whether the objective or what must be reached speaks of a quantity of a period, by its name."""
         return any(quantity in aim.uses for aim in self.aims)
+
+    @property
+    def integrals(self) -> tuple[Quantity, ...]:
+        """The quantities of which these speak that are integrals of functions of an instant."""
+        return integrals_of(self.aims)
 
     def _check_resolution(self) -> None:
         collocation, kind = scheme(self.scheme), type(self.gait).__name__

@@ -201,7 +201,7 @@ def check_asked(problem: Any) -> None:
     """A `ProblemError` for what cannot be asked of a problem on a slope."""
     if problem.rotation != 0:
         raise ProblemError("on a slope a period must not turn the body: leave rotation at 0.")
-    for quantity in ("rotation", "driven_work"):
+    for quantity in ("rotation", *(each.name for each in problem.integrals if each.needs_forces)):
         if problem.uses(quantity):
             raise ProblemError(f"on a slope the {quantity} of a period is not known: ask for distance, work and length.")
     if problem.actuator_limits.names:

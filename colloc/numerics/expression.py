@@ -133,7 +133,8 @@ class Formula:
     def __call__(self, at: Mapping[str, Array]) -> Array:
         """Its value, for floats, arrays or CasADi's symbols."""
         xp = namespace(*at.values())
-        return eval(self.code, {"__builtins__": {}}, {**{name: getattr(xp, name) for name in FUNCTIONS}, **at})
+        functions = {name: getattr(xp, name) for name in FUNCTIONS} | {"sum": xp.sum_rows}
+        return eval(self.code, {"__builtins__": {}}, {**functions, **at})
 
     def differentiated(self, at: Mapping[str, Dual]) -> Dual:
         """Its value with its derivatives."""
@@ -144,9 +145,10 @@ class Formula:
 
 
 @lru_cache(maxsize=64)
-def formula(text: str, variables: tuple[str, ...]) -> Formula:
+def formula(text: str, variables: tuple[str, ...], functions: tuple[str, ...] = FUNCTIONS) -> Formula:
     """A formula of some variables, ready to be evaluated. Objects that hold one keep its text: code cannot be pickled.
-    `ProblemError` if it is no formula, or speaks of anything but the variables, numbers and `FUNCTIONS`."""
+    Of functions there may be ``sum`` besides, over the rows of arrays; such a formula cannot be `differentiated`.
+    `ProblemError` if it is no formula, or speaks of anything but the variables, numbers and functions."""
     if not isinstance(text, str):
         raise ProblemError(f"a formula must be text, not {text!r}.")
     if len(text) > _LONGEST:
@@ -160,14 +162,14 @@ def formula(text: str, variables: tuple[str, ...]) -> Formula:
         exponent = node.right if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) else ast.Constant(1)
         if any(isinstance(part, ast.Name) for part in ast.walk(exponent)):
             raise ProblemError(f"'{text}' has an exponent that is no number.")
-        known = FUNCTIONS if id(node) in called else variables
+        known = functions if id(node) in called else variables
         if isinstance(node, ast.Name) and node.id not in known:
             raise ProblemError(f"'{text}' speaks of {node.id}; it may use {', '.join(known)}.")
         number = not isinstance(node, ast.Constant) or type(node.value) in (int, float)
         plain = not isinstance(node, ast.Compare) or len(node.ops) == 1
         single = not isinstance(node, ast.Call) or (isinstance(node.func, ast.Name) and not node.keywords)
         if not (isinstance(node, _NODES) and number and plain and single):
-            allowed = f"numbers, + - * / **, comparisons within where(condition, a, b), and {', '.join(FUNCTIONS)}"
+            allowed = f"numbers, + - * / **, comparisons within where(condition, a, b), and {', '.join(functions)}"
             raise ProblemError(f"'{text}' is no formula that can be differentiated; it may use {allowed}.")
     names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
     try:

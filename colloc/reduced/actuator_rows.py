@@ -14,10 +14,10 @@ import numpy as np
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.actuators import ActuatorLimits
+from colloc.mechanics.densities import ActuatorLimits, Instants
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks
-from colloc.reduced.actuator_slopes import share_slopes
+from colloc.reduced.density_slopes import density_slopes
 from colloc.reduced.motion import ReducedMotion
 
 _INSIDE = np.linspace(1e-9, 1 - 1e-9, SAMPLES + 1)
@@ -83,7 +83,7 @@ class ActuatorRows:
     def _signed_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
         """Shares at phases, ``(n_share, n_time)``."""
         body, at = self._motion.body, (self._motion.friction, gait.angles(t), gait.rates(t))
-        return self._limits.shares_in_balance(body, *at, body.solve(*at, delta).z, delta)
+        return np.asarray(self._limits.at(Instants(body, *at, delta, z=body.solve(*at, delta).z)))
 
     def of_moving_peaks(
         self, v: np.ndarray, delta: float, member: Callable[[np.ndarray], AnyGait], phases: Mesh, on_rows: np.ndarray
@@ -114,8 +114,7 @@ class ActuatorRows:
         return np.where(np.isfinite(self._limits.least)[:, None], np.abs(shares), shares)
 
     def _all(self, v: np.ndarray, delta: float) -> np.ndarray:
-        s, motion = self._motion.at(v, delta), self._motion
-        return self._limits.shares_in_balance(motion.body, motion.friction, s.angles, s.rates, s.z, delta)
+        return np.asarray(self._limits.at(self._motion.instants(v, delta)))
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the rows, ``(n_row,)`` each."""
@@ -131,8 +130,8 @@ class ActuatorRows:
         (share, point), each = self.placed, np.arange(self.placed.shape[1])
         if not each.size:
             return np.empty((0, v.size))
-        at = s.angles[:, point], s.rates[:, point], s.z[:, point]
-        slopes = share_slopes(motion.body, motion.friction, self._limits, *at, delta)
+        there = Instants(motion.body, motion.friction, s.angles[:, point], s.rates[:, point], delta, z=s.z[:, point])
+        slopes = density_slopes(self._limits, there)
         on_shape = np.zeros((each.size, motion.mesh.n_point, slopes.shape[1]))
         on_shape[each, point] = slopes[share, :, each]
         return motion.shapes.pulled_back(v, on_shape, np.zeros(on_shape.shape[:2]))

@@ -2,8 +2,8 @@ r"""What a period of a collocated gait comes to as functions of the gait alone, 
 
 On a mesh every equation of the collocation fixes one unknown: the balance the tail velocity, its rotation rate the
 orientation, both the displacement D (`colloc.motion.collocated`) and the work ``W = sum_ki h_k b_i P_ki``, P being the power.
-What is left is a program of the gait's parameters v alone: of distance, work, rotation, the length of the path and the driven
-work, which follow as the kind of motion says (`colloc.motion.kinds`). Gradients take one sweep back through the states.
+What is left is a program of the gait's parameters v alone: of distance, work and rotation, which follow as the kind of motion
+says (`colloc.motion.kinds`), and of integrals (`colloc.mechanics.densities`). Gradients take one sweep back through the states.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
+from colloc.mechanics.densities import Instants, Quantity
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
 from colloc.motion.kinds import OMEGA, OUTPUTS, Along, Kind, Passed, first_theta, through_motion
 from colloc.motion.kinds import Shapes as Moving
@@ -55,11 +56,11 @@ class _State:
 
 class ReducedMotion:
     """What a period of gaits comes to, as functions of their parameters; the mesh is that of the part of the period that is
-    solved, and `besides` says which of "length" and "driven_work" are asked for, too."""
+    solved, and `integrals` are asked for, too."""
 
-    def __init__(self, kind: Kind, mesh: Mesh, shapes: Shapes, besides: Sequence[str] = ()) -> None:
+    def __init__(self, kind: Kind, mesh: Mesh, shapes: Shapes, integrals: Sequence[Quantity] = ()) -> None:
         self.body, self.friction, self.shapes, self.mesh = kind.body, kind.friction, shapes, mesh
-        self.kind, self._besides, self._weight = kind, besides, stage_weights(mesh)
+        self.kind, self._integrals, self._weight = kind, integrals, stage_weights(mesh)
         self._last: _State | None = None
         self._near: tuple[_State, np.ndarray] | None = None
         self.solves = 0
@@ -111,23 +112,17 @@ class ReducedMotion:
         return float((self._weight * bending[self.mesh.points]).sum())
 
     def values(self, v: np.ndarray, delta: float) -> dict[str, float]:
-        """What a period comes to, as the kind of motion counts it, and, if asked for, the length of the path and the driven
-        work; NaN where there is no motion."""
-        s = self.at(v, delta)
+        """What a period comes to, as the kind of motion counts it, and the integrals; NaN where there is no motion."""
+        s, now = self.at(v, delta), self.instants(v, delta)
         found = self.kind.counted(s.passed)
-        for name in self._besides:
-            found[name] = self.kind.periods * float((self._density(name, s)[0] * s.pace) @ self._on_columns(s))
+        for quantity in self._integrals:
+            found[quantity.name] = self.kind.periods * float((quantity.at(now)[0] * s.pace) @ self._on_columns(s))
         return found
 
-    def _density(self, name: str, s: _State) -> tuple[np.ndarray, np.ndarray]:
-        """What grows the length of path or the driven work at every column, ``(n_column,)``, and its derivatives along (angles,
-        rates)."""
-        if name == "driven_work":
-            from colloc.reduced.actuator_slopes import driven_slopes  # loads CasADi, which a certificate can do without
-
-            return driven_slopes(self.body, self.friction, s.angles, s.rates, s.z, s.delta)
-        size = np.linalg.norm(s.rates, axis=0)
-        return size, np.concatenate([np.zeros_like(s.angles), s.rates / np.maximum(size, 1e-300)])
+    def instants(self, v: np.ndarray, delta: float) -> Instants:
+        """The collocated motion at every column, as formulas see it."""
+        s = self.at(v, delta)
+        return Instants(self.body, self.friction, s.angles, s.rates, delta, z=s.z)
 
     def _on_columns(self, s: _State) -> np.ndarray:
         """Weight of every point of every block in an integral over the part of the period that is solved."""
@@ -155,11 +150,13 @@ class ReducedMotion:
             weight = bend[:, None] * self._on_columns(s)
             on_shape[:, :, len(s.rates) :] += (weight * s.pace)[:, :, None]
             on_pace += weight * s.rates.sum(axis=0)
-        for name in self._besides:
-            weight, (density, slope) = kind.periods * self._on_columns(s), self._density(name, s)
-            on_shape = np.concatenate([on_shape, (weight * s.pace * slope).T[None]])
-            on_pace = np.concatenate([on_pace, (weight * density)[None]])
+        for quantity in self._integrals:
+            from colloc.reduced.density_slopes import density_slopes  # loads CasADi, which a certificate can do without
+
+            weight, now = kind.periods * self._on_columns(s), self.instants(v, delta)
+            on_shape = np.concatenate([on_shape, (weight * s.pace * density_slopes(quantity, now)[0]).T[None]])
+            on_pace = np.concatenate([on_pace, weight * quantity.at(now)])
         found = self.shapes.pulled_back(v, on_shape, on_pace)
         if kind.told:
             found[: len(shares), -len(kind.told) :] += on_begin
-        return dict(zip((*shares, *self._besides), found, strict=True))
+        return dict(zip((*shares, *(each.name for each in self._integrals)), found, strict=True))

@@ -52,10 +52,6 @@ class SearchSpace(Shapes, Protocol):
         """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near an optimum; None for 1."""
 
 
-FORCES = ("work", "driven_work")
-"""Quantities of a period that are proportional to friction."""
-
-
 class ReducedProgram:
     """Maximise an objective over a class of gaits on a mesh, at one delta.
 
@@ -78,8 +74,7 @@ class ReducedProgram:
     def __init__(self, space: SearchSpace, delta: float) -> None:
         self.space, self.delta = space, delta
         aims, limits = space.control.aims, space.control.actuators
-        besides = [name for name in ("length", "driven_work") if aims.uses(name)]
-        self.motion = ReducedMotion(kind_of_motion(space.control.dynamics), space.mesh, space, besides)
+        self.motion = ReducedMotion(kind_of_motion(space.control.dynamics), space.mesh, space, aims.integrals)
         held = {"rotation": aims.rotation} if space.control.admissible.gait.closing_symmetry == NONE else {}
         held |= {"across": 0.0} if aims.no_way_across else {}
         self._held = [name for name, value in held.items() if value is not None]
@@ -151,7 +146,8 @@ class ReducedProgram:
     def period(self, v: np.ndarray) -> dict[str, float]:
         """What a period comes to, by the names of `colloc.gaits.objective.QUANTITIES`, in the units of the problem."""
         found = self.motion.values(v, self.delta)
-        return {name: value * self.space.control.unit if name in FORCES else value for name, value in found.items()}
+        degrees = {"work": 1.0} | {each.name: each.friction_degree or 0.0 for each in self.space.control.aims.integrals}
+        return {name: value * self.space.control.unit ** degrees.get(name, 0.0) for name, value in found.items()}
 
     def gradient(self, v: np.ndarray) -> np.ndarray:
         """Of the objective, ``(n,)``."""

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
-from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.densities import UNLIMITED, ActuatorLimits, Quantity
 from colloc.mechanics.law import Law
 from colloc.verification.replay import MixedPath, Path, Replay, replay
 
@@ -77,7 +77,7 @@ def measured(
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
     rotation: float | None = 0.0,
-    driven: bool = False,
+    quantities: Iterable[Quantity | str] = (),
     limits: ActuatorLimits = UNLIMITED,
     run: Callable[..., Replay] = replay,
 ) -> Measured:
@@ -87,13 +87,12 @@ def measured(
     that turns by more depends on the point that is followed. `run` is what replays (`colloc.verification.replayer`).
     """
     replays: list[Replay] = []
-    smoothed = friction.regularised or "driven_work" in objective.uses
+    smoothed = friction.regularised or any(each.smoothed for each in objective.integrals)
     for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
-        settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "driven": driven, "limits": limits}
-        settings["turn"] = rotation or 0.0
-        replays.append(run(*at, **settings, near=near, objective=objective))
+        asked: dict[str, Any] = {"objective": objective, "quantities": quantities, "limits": limits, "turn": rotation or 0.0}
+        replays.append(run(*at, **asked, instants=instants, tolerance=tolerance, breaks=breaks, near=near))
     known = []
     for aim in (objective, EFFICIENCY):
         values = [aim(each.values) for each in replays]

@@ -28,7 +28,6 @@ import numpy as np
 from colloc.collocation.layout import layout_of
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
-from colloc.gaits.objective import QUANTITIES
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
@@ -79,6 +78,7 @@ _GAIT_ARRAYS = {
     "directions": ("", "piece, direction, joint"),
     "start": ("rad", "joint"),
 }
+_DRY = "dry_efficiency"
 _MIXTURE = ("durations", "directions", "start")
 
 
@@ -252,7 +252,7 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
         if name != "efficiency":  # which is the distance over the work
             put_attribute(group, name, number)
     if certificate.dry is not None:
-        put_attribute(group, "dry_efficiency", list(certificate.dry))
+        put_attribute(group, _DRY, list(certificate.dry))
     for name in ("name", "value", "threshold", "passed", "meaning"):
         put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
@@ -261,10 +261,11 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     """The certificate that `_write_certificate` wrote."""
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
     checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-    stated = [name for name in QUANTITIES if name != "driven_work" or name in group.attrs]  # which is only known if asked for
-    values = {name: attribute(group, name) for name in stated}
+    besides = {*NUMBERS, _DRY, *(f"{name}_error" for name in ("distance", "work"))}
+    integrals = [name for name in group.attrs if name not in besides]  # those that were asked for
+    values = {name: attribute(group, name) for name in ("distance", "work", "rotation", *integrals)}
     errors = {name: attribute(group, f"{name}_error") for name in ("distance", "work")}
-    dry = tuple(attribute(group, "dry_efficiency")) if "dry_efficiency" in group.attrs else None
+    dry = tuple(attribute(group, _DRY)) if _DRY in group.attrs else None
     return Certificate(values, errors, {}, checks, **{name: attribute(group, name) for name in NUMBERS}, dry=dry)
 
 

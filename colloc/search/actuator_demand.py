@@ -22,8 +22,8 @@ import numpy as np
 
 from colloc.gaits.limits import of_each_angle
 from colloc.gaits.problem import Problem
-from colloc.mechanics.actuators import ActuatorLimits
-from colloc.reduced.actuator_slopes import share_slopes
+from colloc.mechanics.densities import ActuatorLimits, Instants
+from colloc.reduced.density_slopes import density_slopes
 from colloc.system.errors import ProblemError
 
 _MARGIN = 0.05
@@ -130,9 +130,12 @@ def _senses(limits: ActuatorLimits) -> np.ndarray:
 
 def _shares(problem: Problem, limits: ActuatorLimits, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """In every sense that counts, ``(n_row, n)``."""
+    return np.asarray(_senses(limits) @ limits.at(_balanced(problem, angles, rates)))
+
+
+def _balanced(problem: Problem, angles: np.ndarray, rates: np.ndarray) -> Instants:
     body, law, delta = problem.body, problem.law, _delta(problem, rates)
-    z = body.solve(law, angles, rates, delta).z
-    return _senses(limits) @ limits.shares_in_balance(body, law, angles, rates, z, delta)
+    return Instants(body, law, angles, rates, delta, z=body.solve(law, angles, rates, delta).z)
 
 
 def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
@@ -140,7 +143,7 @@ def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
 
     Variables are (y, direction, s); s is what all shares are below, in units of the first value.
     """
-    n, limits, body, law = problem.body.n_joint, problem.actuator_limits, problem.body, problem.law
+    n, limits = problem.body.n_joint, problem.actuator_limits
     on_angles, on_rates = np.array(of_each_angle(problem.joint_limit, n)), np.full(n, _slowest_pace(problem))
 
     def room(x: np.ndarray) -> np.ndarray:
@@ -149,10 +152,9 @@ def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
     from scipy.optimize import minimize
 
     def room_slopes(x: np.ndarray) -> np.ndarray:
-        angles, rates = _instants(problem, x[:-1, None])
-        delta = _delta(problem, rates)
-        z = body.solve(law, angles, rates, delta).z
-        slopes = _senses(limits) @ share_slopes(body, law, limits, angles, rates, z, delta)[:, :, 0] / value
+        slopes = (
+            _senses(limits) @ density_slopes(limits, _balanced(problem, *_instants(problem, x[:-1, None])))[:, :, 0] / value
+        )
         on_x = slopes * np.concatenate([on_angles * np.cos(x[:n]), on_rates])
         return np.concatenate([-on_x, np.ones((len(on_x), 1))], axis=1)
 

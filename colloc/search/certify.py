@@ -147,7 +147,7 @@ def gait_certificate(
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
     run = replayer(problem.slope, problem.froude)
-    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits, "run": run}
+    settings |= {"quantities": problem.integrals, "limits": problem.actuator_limits, "run": run}
     known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (

@@ -30,8 +30,6 @@ _PATH = {
     "sides": "the least length of sides and path",
 }
 _OF_PERIOD = {
-    "length": "the length of the path",
-    "driven_work": "the work of the actuators",
     "at least": "a value that has to be reached",
     "shape speed": "the lower bound on the shape speed",
     "heading": "where the body points at the start",
@@ -64,8 +62,9 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
         return "the rotation between nodes", float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
     if name == "rotation":
         return "closure of the net rotation", float(mesh.edges[-1])
-    if name in _OF_PERIOD:
-        return _OF_PERIOD[name], 0.0
+    named = _OF_PERIOD | {each.name: f"the {each.meaning or each.name}" for each in transcription.control.aims.integrals}
+    if name in named:
+        return named[name], 0.0
     if name in ("distance", "work"):
         return f"the {name} gained over an interval", float(mesh.edges[index])
     phase = float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])

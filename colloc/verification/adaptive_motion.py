@@ -7,15 +7,14 @@ The panels know nothing of a collocation mesh; this is what a mesh is measured a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
-from colloc.mechanics.actuators import driven_power_in_balance
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.replay import Path
@@ -30,21 +29,21 @@ _MOST_PANELS = 20_000
 @dataclass(frozen=True, eq=False)
 class Rates:
     """Velocities at instants, arrays that end in the same shape: tail velocity ``(3, ...)``, velocity of the centre of mass
-    in the body frame (complex; turned back evenly by the turn of a period), power, driven power (0 unless asked for)."""
+    in the body frame (complex; turned back evenly by the turn of a period), and ``(1 + k, ...)`` power and densities of k
+    quantities."""
 
     z: np.ndarray
     centre: np.ndarray
-    power: np.ndarray
-    driven: np.ndarray
+    gained: np.ndarray
 
     def of(self, chosen: np.ndarray) -> Rates:
         """Those of some intervals."""
-        return Rates(self.z[:, chosen], self.centre[chosen], self.power[chosen], self.driven[chosen])
+        return Rates(self.z[:, chosen], self.centre[chosen], self.gained[:, chosen])
 
     def joined(self, other: Rates) -> Rates:
         """Those of these intervals, then of others."""
-        pairs = ((self.centre, other.centre), (self.power, other.power), (self.driven, other.driven))
-        return Rates(np.concatenate([self.z, other.z], axis=1), *map(np.concatenate, pairs))
+        z, gained = (np.concatenate(pair, axis=1) for pair in ((self.z, other.z), (self.gained, other.gained)))
+        return Rates(z, np.concatenate([self.centre, other.centre]), gained)
 
 
 def rates_at(
@@ -53,42 +52,46 @@ def rates_at(
     path: Path,
     delta: float,
     t: np.ndarray,
-    near: np.ndarray | None = None,
     *,
-    driven: bool = False,
+    near: np.ndarray | None = None,
+    quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> Rates:
-    """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
+    """Solved velocities of a path at phases t of any shape, per period, and densities; `near` ``(3, ...)``: tail velocities to
+    start from."""
     angles, rates = path(t.ravel())
     start = None if near is None else near.reshape(3, -1)
     solved = body.solve(friction, angles, rates, delta, start=start).require()
     now = body.motion(friction, angles, rates, delta, solved)
-    delivered = driven_power_in_balance(body, friction, angles, rates, now.z, delta) if driven else np.zeros(t.size)
-    seen = (now.centre[0] + 1j * now.centre[1]) * np.exp(-1j * turn * t.ravel())
-    rows = (seen, now.power, delivered)
-    return Rates(now.z.reshape(3, *t.shape), *(row.reshape(t.shape) for row in rows))
+    at = Instants(body, friction, angles, rates, delta, z=now.z)
+    gained = np.stack([now.power, *(quantity.at(at)[0] for quantity in quantities)])
+    rows = now.z, (now.centre[0] + 1j * now.centre[1]) * np.exp(-1j * turn * t.ravel()), gained
+    return Rates(*(row.reshape(*row.shape[:-1], *t.shape) for row in rows))
 
 
 _PIECES = 400, 200
-"""Of a whole path, in which its length is summed up, and once more for the error."""
+"""Of a whole path, in which a quantity is summed up, and once more for the error."""
 
 
-def path_lengths(gait: Any, left: np.ndarray, right: np.ndarray, pieces: int) -> np.ndarray:
-    """Length of the path over intervals, ``(n,)``, by Gauss quadrature on so many pieces of each."""
+def totals_along(quantity: Quantity, path: Path, left: np.ndarray, right: np.ndarray, pieces: int) -> np.ndarray:
+    """A quantity of shapes and their rates alone over intervals, ``(n,)``, by Gauss quadrature on so many pieces of each."""
     h = (right - left) / pieces
     starts = left[:, None] + h[:, None] * np.arange(pieces)
     t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
-    return h * (np.linalg.norm(gait.rates(t.ravel()), axis=0).reshape(t.shape) @ PANEL_RULE.b).sum(axis=1)
+    return h * (quantity.of_shapes(*path(t.ravel()))[0].reshape(t.shape) @ PANEL_RULE.b).sum(axis=1)
 
 
-def whole_length(gait: Any) -> tuple[float, float]:
-    """Length of the path over a period [rad], and its error."""
-    length, rougher = (float(path_lengths(gait, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)
-    return length, abs(length - rougher)
+def whole_totals(quantities: Iterable[Quantity], path: Path) -> tuple[dict[str, float], dict[str, float]]:
+    """Quantities of shapes and their rates alone over a period, and their errors."""
+    values, errors = {}, {}
+    for each in quantities:
+        value, rougher = (float(totals_along(each, path, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)
+        values[each.name], errors[each.name] = value, abs(value - rougher)
+    return values, errors
 
 
-Increments = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Rotation, displacement in the initial body frame (complex), work and driven work of intervals, ``(n,)`` each."""
+Increments = tuple[np.ndarray, ...]
+"""Rotation, displacement in the initial body frame (complex), work and quantities of intervals, ``(n,)`` each."""
 
 
 def increments(rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | None = None) -> Increments:
@@ -98,7 +101,7 @@ def increments(rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | 
     """
     omega, b = rates.z[2], rule.b if weights is None else weights
     turn = np.exp(1j * h[:, None] * (omega @ rule.A.T))
-    return h * (omega @ b), h * ((turn * rates.centre) @ b), h * (rates.power @ b), h * (rates.driven @ b)
+    return h * (omega @ b), h * ((turn * rates.centre) @ b), *(h * (rates.gained @ b))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +114,17 @@ class FineMotion:
     """At the panel nodes, ``(n, s)``."""
     theta: np.ndarray
     path: np.ndarray
-    work: np.ndarray
-    driven_work: np.ndarray
-    """Orientation, displacement in the lab (complex, starting with orientation 0), work and driven work at the edges,
-    ``(n + 1,)`` each."""
+    """Orientation, and displacement in the lab (complex, starting with orientation 0) at the edges, ``(n + 1,)`` each."""
+    totals: np.ndarray
+    """Work and quantities up to the edges, ``(1 + k, n + 1)``."""
     unresolved: np.ndarray
     """``(n,)``: relative error of the objective that a panel may still hold: what halving it last changed, at its end and half
     way."""
+
+    @property
+    def work(self) -> np.ndarray:
+        """Up to the edges."""
+        return np.asarray(self.totals[0])
 
     @property
     def nodes(self) -> np.ndarray:
@@ -131,7 +138,7 @@ class FineMotion:
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
     def at(self, t: np.ndarray) -> Increments:
-        """Orientation, displacement, work and driven work at phases t ``(n_time,)``, by the panels' polynomials."""
+        """Orientation, displacement, work and quantities at phases t ``(n_time,)``, by the panels' polynomials."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = np.diff(self.edges)
         weights = PANEL_RULE.integrals((t - self.edges[k]) / h[k]) * h[k][:, None]
@@ -141,8 +148,7 @@ class FineMotion:
         return (
             self.theta[k] + (weights * omega[k]).sum(axis=1),
             self.path[k] + (weights * moved[k]).sum(axis=1),
-            self.work[k] + (weights * self.rates.power[k]).sum(axis=1),
-            self.driven_work[k] + (weights * self.rates.driven[k]).sum(axis=1),
+            *(self.totals[:, k] + (weights * self.rates.gained[:, k]).sum(axis=2)),
         )
 
 
@@ -154,7 +160,7 @@ def fine_motion(
     edges: np.ndarray,
     tolerance: float,
     shares: Callable[[Mapping[str, float]], Mapping[str, float]] = EFFICIENCY.shares,
-    driven: bool = False,
+    quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> FineMotion:
     """Integrate a path between the first and the last of `edges` to a relative error of the efficiency, or another objective.
@@ -171,9 +177,9 @@ def fine_motion(
     tolerance : float
         Panels are halved until the sum of their disagreements is below this. The sum that remains is in the result.
     shares : callable
-        From way, work, rotation and driven work to what a small change of each changes in the objective, relative to it.
-    driven : bool
-        Whether the driven work is asked for.
+        From way, work, rotation and quantities to what a small change of each changes in the objective, relative to it.
+    quantities : sequence of Quantity
+        What is asked for besides.
     turn : float
         That a period is asked for [rad]: the way is seen from axes that turn evenly (`colloc.gaits.period`).
 
@@ -185,9 +191,10 @@ def fine_motion(
 
     def solved(left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None) -> tuple[Rates, Increments]:
         nodes = left[:, None] + width[:, None] * PANEL_RULE.c
-        rates = rates_at(body, friction, path, delta, nodes, near, driven=driven, turn=turn)
+        rates = rates_at(body, friction, path, delta, nodes, near=near, quantities=quantities, turn=turn)
         return rates, increments(PANEL_RULE, width, rates)
 
+    names = "work", *(quantity.name for quantity in quantities)
     left, width = edges[:-1], np.diff(edges)
     rates, parts = solved(left, width)
     gap = np.full(left.size, np.inf)
@@ -214,25 +221,24 @@ def fine_motion(
         kept[chosen] = False
         place = np.argsort(np.concatenate([left[kept], start]))
         rates = rates.of(kept).joined(new_rates).of(place)
-        parts = tuple(np.concatenate([a[kept], b])[place] for a, b in zip(parts, new, strict=True))  # type: ignore[assignment]
-        turned, travelled, spent, delivered = _accumulated(parts)
-        distance, work = max(abs(travelled[-1]), 1e-300), max(spent[-1], 1e-300)
-        known = {"distance": distance, "work": work, "rotation": turned[-1], "driven_work": delivered[-1]}
-        share = {k: abs(s) for k, s in shares(known).items()}
+        parts = tuple(np.concatenate([a[kept], b])[place] for a, b in zip(parts, new, strict=True))
+        turned, travelled, totals = _accumulated(parts)
+        known = dict(zip(names, totals[:, -1], strict=True))
+        known |= {"distance": max(abs(travelled[-1]), 1e-300), "rotation": turned[-1]}
+        share = {k: abs(s) for k, s in shares(known | {"work": max(known["work"], 1e-300)}).items()}
         on_spin = share["distance"] * np.abs(travelled - travelled[-1]).max() + share["rotation"]
         change = sum(
             np.abs(move) * share["distance"]
             + np.abs(spin) * on_spin
-            + np.abs(energy) * share["work"]
-            + np.abs(drive) * share["driven_work"]
-            for spin, move, energy, drive in differences
+            + sum(np.abs(part) * share.get(name, 0.0) for name, part in zip(names, gained, strict=True))
+            for spin, move, *gained in differences
         )
         gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
         left, width = np.concatenate([left[kept], start])[place], np.concatenate([width[kept], half])[place]
     return FineMotion(np.append(left, edges[-1]), rates, *_accumulated(parts), gap)
 
 
-def _accumulated(parts: Increments) -> Increments:
-    """Orientation, lab displacement, work and driven work at the edges, from every interval's own."""
-    theta, work, driven = (np.concatenate([[0.0], np.cumsum(a)]) for a in (parts[0], *parts[2:]))
-    return theta, np.concatenate([[0.0], np.cumsum(np.exp(1j * theta[:-1]) * parts[1])]), work, driven
+def _accumulated(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Orientation, lab displacement, and work and quantities at the edges, from every interval's own."""
+    theta, *totals = (np.concatenate([[0.0], np.cumsum(a)]) for a in (parts[0], *parts[2:]))
+    return theta, np.concatenate([[0.0], np.cumsum(np.exp(1j * theta[:-1]) * parts[1])]), np.stack(totals)

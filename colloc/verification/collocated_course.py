@@ -30,7 +30,7 @@ from colloc.motion.kinds import (
     through_motion,
 )
 from colloc.numerics.mesh import Mesh
-from colloc.verification.adaptive_motion import path_lengths
+from colloc.verification.adaptive_motion import totals_along
 from colloc.verification.gait_on_slope import GaitOnSlope
 from colloc.verification.inertial_motion import GaitWithInertia
 
@@ -83,16 +83,20 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     own = _along(kind, mesh, gait, delta)
     pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA] - kind.turn, own.now.centre, first_theta(kind, own.begin))
     angles, rates = gait(mesh.times)
-    passed = np.linalg.norm(rates, axis=0)
-    spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))
+    spent = (stage_weights(mesh) * own.now.power[mesh.points]).sum(axis=1)
     at_edges = exact.at(mesh.edges)
     momenta, (angle, *place) = at_edges[:-4], at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
-    length, periods = path_lengths(gait, mesh.edges[:-1], mesh.edges[1:], 4), kind.periods
     true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()))
     found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()))
-    period = kind.counted(true) | {"length": periods * float(length.sum()), "driven_work": np.nan}
-    other = kind.counted(found) | {"length": periods * float(run.sum()), "driven_work": np.nan}
+    known, summed = {}, {}
+    for each in control.aims.integrals:
+        known[each.name] = totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
+        summed[each.name] = (stage_weights(mesh) * each.of_shapes(angles, rates)[0, mesh.points]).sum(axis=1)
+    period, other = (
+        kind.counted(passed) | {name: kind.periods * float(part.sum()) for name, part in parts.items()}
+        for passed, parts in ((true, known), (found, summed))
+    )
     aims, value = objective.shares(period), np.zeros(mesh.n)
     rotation, energy, displacement = pose.rotations - theta, spent - work, np.diff(pose.place) - (x + 1j * y)
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
@@ -113,7 +117,7 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     for name, share in kind.shares(true).items():
         turns = rotation if name == "rotation" else 0.0
         value += aims.get(name, 0.0) * ((np.conj(share.side) * displacement).real + turns + share.work * energy)
-    value += aims["length"] * periods * (run - length)
+    value += sum(aims[name] * kind.periods * (summed[name] - known[name]) for name in known)
     if not own.held.all():
         value = np.nan * value
     return Defects(

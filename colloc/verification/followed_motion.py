@@ -7,7 +7,8 @@ ways. Both, and every other choice, differ from each other by no more than the s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from colloc.mechanics.balance_results import Branches
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
 
@@ -27,8 +29,8 @@ class FollowedMotion(NamedTuple):
     z: np.ndarray
     """``(3, n_time)``: tail velocities of the branch that is followed; NaN where no solution was found."""
     apart: np.ndarray
-    """``(3, n_time)``: how far the velocities of the centre of mass, the rotation rates and the powers of the stable solutions
-    lie apart; 0 where there is one."""
+    """``(3 + k, n_time)``: how far the velocities of the centre of mass, the rotation rates, the powers and the densities of k
+    quantities lie apart among the stable solutions; 0 where there is one."""
 
 
 def followed_motion(
@@ -37,8 +39,10 @@ def followed_motion(
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
+    *,
     before: np.ndarray | None = None,
     sense: int = FORWARDS,
+    quantities: Sequence[Quantity] = (),
 ) -> FollowedMotion | None:
     """The motion of a gait where its law may allow several; None for a body whose other motions are not looked for.
 
@@ -53,6 +57,8 @@ def followed_motion(
         Tail velocities shortly before each instant; by default those of its neighbour in the order of time.
     sense : {FORWARDS, BACKWARDS}
         Which neighbour: the branches are followed with or against time.
+    quantities : sequence of Quantity
+        Of which it is asked how far they lie apart.
     """
     found = body.all_velocities(friction, angles, rates, delta)
     if found is None:
@@ -60,12 +66,12 @@ def followed_motion(
     if not found.number.all():
         lost = int((found.number == 0).sum())
         raise NotConvergedError(f"no velocity that balances the body was found at {lost} of {found.number.size} instants.")
-    apart = np.zeros((3, angles.shape[1]))
+    apart = np.zeros((3 + len(quantities), angles.shape[1]))
     several = np.flatnonzero(found.number > 1)
     if not several.size:
         return FollowedMotion(found.z[0], apart)
     chosen = Branches(found.z[:, :, several], found.sign[:, several])
-    apart[:, several] = _ranges(body, friction, angles[:, several], rates[:, several], delta, chosen)
+    apart[:, several] = _ranges(Instants(body, friction, angles[:, several], rates[:, several], delta), chosen, quantities)
     z = found.z[0].copy()
     for now, previous in _order(found.number > 1, sense):
         z[:, now] = _nearest(found.z[:, :, now], found.sign[:, now], z[:, previous] if before is None else before[:, now])
@@ -88,12 +94,12 @@ def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
     return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]
 
 
-def _ranges(body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, found: Branches) -> np.ndarray:
+def _ranges(at: Instants, found: Branches, quantities: Sequence[Quantity]) -> np.ndarray:
     """`FollowedMotion.apart`."""
     rows = []
     for z, sign in zip(found.z, found.sign, strict=True):
-        now = body.sliding(friction, angles, rates, z, delta)
-        row = np.concatenate([now.centre, z[2:], now.power])
+        now = at.body.sliding(at.friction, at.angles, at.rates, z, at.delta)
+        row = np.concatenate([now.centre, z[2:], now.power, *(each.at(replace(at, z=z)) for each in quantities)])
         rows.append(np.where(sign > 0, row, np.nan))
     apart = np.nanmax(rows, axis=0) - np.nanmin(rows, axis=0)
-    return np.stack([np.hypot(apart[0], apart[1]), apart[2], apart[3]])
+    return np.stack([np.hypot(apart[0], apart[1]), *apart[2:]])

@@ -36,7 +36,7 @@ _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
 _OMEGA = 2
 _PANELS = 40
-_OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0, "driven_work": 0.0}
+_OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0}
 """Shares in the error of the motion on the level: its way alone is asked for."""
 
 

@@ -10,6 +10,7 @@ method on the map from one to the other, whose derivatives also say whether the 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import LENGTH, Quantity, quantities_of
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_inertia, momenta
 from colloc.mechanics.law import Law
@@ -26,7 +28,7 @@ from colloc.motion.compiled_momenta import MomentaAt
 from colloc.motion.follow import Course, followed
 from colloc.system.arguments import check_finite, is_whole
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.verification.adaptive_motion import whole_length
+from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.replay import Path
 
 _ROUGH = 1e-4
@@ -187,6 +189,7 @@ def inertial_motion(
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
+    quantities: Iterable[Quantity | str] = (),
 ) -> InertialMotion:
     """Play a gait with inertia, once the body has settled to a motion in which all periods are alike.
 
@@ -206,9 +209,11 @@ def inertial_motion(
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
     objective : Objective
-        Of distance, work, rotation and length.
+        Of distance, work, rotation and what shapes and their rates sum up to.
     turn : float
         Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that turns by as much.
+    quantities : iterable of Quantity or str
+        What shapes and their rates sum up to and is asked for besides.
 
     Raises
     ------
@@ -229,15 +234,15 @@ def inertial_motion(
     (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
     played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at, turn=turn)
     start, slopes = played.closed(played.slow_momenta())
-    length, length_error = whole_length(gait)
+    totals, total_errors = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
     aim, before = _FIRST * tolerance, None
     while aim >= _LEAST:
         phases, states, _ = played.settled(start, aim, slopes)
         start = states[_MOMENTA, 0]
         now = passed(states[:, -1], turn)
         if before is not None:
-            errors = {name: abs(now[name] - before[name]) for name in now} | {"length": length_error}
-            values, multipliers = now | {"length": length}, np.linalg.eigvals(slopes)
+            errors = {name: abs(now[name] - before[name]) for name in now} | total_errors
+            values, multipliers = now | totals, np.linalg.eigvals(slopes)
             found = InertialMotion(values, errors, {}, froude, multipliers, phases=phases, states=states)
             if found.error_of(objective) <= tolerance:
                 return found

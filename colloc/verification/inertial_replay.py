@@ -5,12 +5,15 @@ What a body comes to that sets out from rest is looked at, too: if it is another
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import checked_inertia, kinetic_energy, tail_velocity
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
@@ -32,6 +35,7 @@ def inertial_replay(
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
+    quantities: Iterable[Quantity | str] = (),
     **_: object,
 ) -> Replay:
     """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`.
@@ -39,8 +43,8 @@ def inertial_replay(
     Of the result the residual is the change of the momenta in a period; the work of the joints is that against friction and
     what the body gains in kinetic energy.
     """
-    settings = {"tolerance": tolerance, "breaks": breaks, "objective": objective, "turn": turn}
-    ran = inertial_motion(body, friction, gait, delta, froude, **settings)  # type: ignore[arg-type]
+    settings: Any = {"tolerance": tolerance, "breaks": breaks, "objective": objective, "turn": turn, "quantities": quantities}
+    ran = inertial_motion(body, friction, gait, delta, froude, **settings)
     phases = ran.phases % 1.0
     chain, joints = checked_inertia(body, gait)
     angles, rates = joints(phases)

@@ -33,7 +33,7 @@ def kink_phases(body: Body, friction: Law, path: Path, delta: float, fine: FineM
     least = inner[link, index]
     for _ in range(_ZOOMS if centre.size else 0):
         near = centre[:, None] + radius[:, None] * np.linspace(-1, 1, _SAMPLES)
-        z = rates_at(body, friction, path, delta, near, fine.velocity(near)).z.reshape(3, -1)
+        z = rates_at(body, friction, path, delta, near, near=fine.velocity(near)).z.reshape(3, -1)
         sampled = _slowness(body, friction, path, delta, near.ravel(), z)
         own = sampled[np.repeat(link, _SAMPLES), np.arange(near.size)].reshape(near.shape)
         best = own.argmin(axis=1)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from colloc.motion.heading import heading
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, path_lengths, rates_at, whole_length
+from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, rates_at
 from colloc.verification.collocated_course import course, course_defects
 
 FINER = 0.05
@@ -79,38 +80,26 @@ def gait_motion(control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh
     """The gait's motion on adaptive panels, a `FineMotion`; where it has states, a `CourseOfGait`."""
     if kind_of_motion(control.dynamics).states:
         return course(control.dynamics, gait, delta, mesh, _OF_WAY * tolerance)
-    length = _whole_length(control, gait)
-
-    def shares(part: Mapping[str, float]) -> dict[str, float]:
-        return _shares(control, part, length)
-
-    of = (*control.dynamics[:2], gait)
-    driven, turn = control.aims.uses("driven_work"), control.dynamics.turn
-    return fine_motion(*of, delta, mesh.edges, tolerance, shares, driven=driven, turn=turn)
+    shares, (body, friction, *_) = partial(_shares, control), control.dynamics
+    asked: Any = {"quantities": control.aims.integrals, "turn": control.dynamics.turn}
+    return fine_motion(body, friction, gait, delta, mesh.edges, tolerance, shares, **asked)
 
 
-def _period(control: ControlProblem, part: Mapping[str, float], length: float) -> dict[str, float]:
-    """What a whole period comes to, from way, work, rotation and driven work of the part that is solved."""
-    return {name: factor * part[name] for name, factor in _wholes(control).items()} | {"length": length}
+def _period(control: ControlProblem, part: Mapping[str, float]) -> dict[str, float]:
+    """What a whole period comes to, from what the part that is solved does; of the way, which counts as distance, the chord."""
+    return {name: _whole(control, name) * value for name, value in part.items()}
 
 
-def _wholes(control: ControlProblem) -> dict[str, float]:
-    """What quantities of the solved part count in the whole period; of the way, which counts as distance, the chord."""
-    periods, chord = 1 / control.admissible.gait.fraction, chord_per_way(control.dynamics.turn)
-    return {"distance": periods * chord, "work": periods, "rotation": 1.0, "driven_work": periods}
+def _whole(control: ControlProblem, name: str) -> float:
+    """What a quantity of the solved part counts in the whole period."""
+    chord = chord_per_way(control.dynamics.turn) if name == "distance" else 1.0
+    return 1.0 if name == "rotation" else chord / control.admissible.gait.fraction
 
 
-def _shares(control: ControlProblem, part: Mapping[str, float], length: float) -> dict[str, float]:
+def _shares(control: ControlProblem, part: Mapping[str, float]) -> dict[str, float]:
     """What a small change of each quantity of the solved part changes in the objective, relative to it."""
-    shares, wholes = control.aims.objective.shares(_period(control, part, length)), _wholes(control)
-    return {name: share * wholes.get(name, 1 / control.admissible.gait.fraction) for name, share in shares.items()}
-
-
-def _whole_length(control: ControlProblem, gait: AnyGait) -> float:
-    """Length of the path over a period [rad]; 1 where nobody asks for it."""
-    if not control.aims.uses("length"):
-        return 1.0
-    return gait.length if control.admissible.gait.unit_speed else whole_length(gait)[0]
+    shares = control.aims.objective.shares(_period(control, part))
+    return {name: share * _whole(control, name) for name, share in shares.items()}
 
 
 def mesh_error(
@@ -125,11 +114,11 @@ def mesh_error(
         return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
     known = Known(control, gait, delta, fine)
     own = _collocated_intervals(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])
-    exact = control.aims.objective(_period(control, _fine_part(known), _whole_length(control, gait)))
+    exact = control.aims.objective(_period(control, _fine_part(known)))
     return MeshError(
         own.rotation,
         np.abs(own.displacement),
-        own.work,
+        own.gained[0],
         _velocity_error(mesh, own.rates, fine),
         own.value,
         constraint_violation(control.admissible, mesh, gait),
@@ -147,40 +136,39 @@ def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndar
 
 
 class _Own(NamedTuple):
-    """What a scheme makes of intervals: errors as in `MeshError`, rates at its nodes, its own pose, work and driven work."""
+    """What a scheme makes of intervals: errors as in `MeshError`, those of work and integrals ``(1 + k, n)``, rates at its
+    nodes, its own pose, and work and integrals ``(1 + k,)``."""
 
     rotation: np.ndarray
     displacement: np.ndarray
-    work: np.ndarray
-    length: np.ndarray
+    gained: np.ndarray
     value: np.ndarray
     rates: Rates
     pose: CollocatedPose
-    spent: float
-    delivered: float
+    totals: np.ndarray
 
 
 def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Own:
     control, gait, delta, fine = known
     nodes = left[:, None] + (right - left)[:, None] * rule.c
     at = *control.dynamics[:2], gait, delta, nodes
-    rates = rates_at(*at, fine.velocity(nodes), driven=control.aims.uses("driven_work"), turn=control.dynamics.turn)
+    rates = rates_at(*at, near=fine.velocity(nodes), quantities=control.aims.integrals, turn=control.dynamics.turn)
     pose, weights = CollocatedPose(rule, right - left, rates.z[2], rates.centre), (right - left)[:, None] * rule.b
-    spent, delivered = (weights * rates.power).sum(axis=1), (weights * rates.driven).sum(axis=1)
-    (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)
-    rotation, energy = pose.rotations - (theta_right - theta), spent - (work_right - work)
+    totals = (weights * rates.gained).sum(axis=2)
+    (theta, path, *begun), (theta_right, path_right, *ended) = fine.at(left), fine.at(right)
+    rotation, gained = pose.rotations - (theta_right - theta), totals - (np.array(ended) - np.array(begun))
     displacement = pose.displacements * np.exp(1j * theta) - (path_right - path)
     # an error of rotation turns everything after it, and by half of it the direction that counts
     pull = displacement + 1j * rotation * (0.5 * fine.path[-1] - path_right)
-    direction, length = _direction(control, fine.path[-1], fine.theta[-1]), np.zeros(left.size)
-    if control.aims.uses("length") and not control.admissible.gait.unit_speed:  # else arc length is the clock, and exact
-        pace = np.linalg.norm(gait.rates(nodes.ravel()), axis=0).reshape(nodes.shape)
-        length = (right - left) * (pace @ rule.b) - path_lengths(gait, left, right, 4)
-    shares = _shares(control, _fine_part(known), _whole_length(control, gait))
-    ahead = (pull * np.conj(direction)).real
-    value = shares["distance"] * ahead + shares["work"] * energy + shares["rotation"] * rotation + shares["length"] * length
-    value += shares["driven_work"] * (delivered - (driven_right - driven))
-    return _Own(rotation, displacement, energy, length, value, rates, pose, float(spent.sum()), float(delivered.sum()))
+    direction, shares = _direction(control, fine.path[-1], fine.theta[-1]), _shares(control, _fine_part(known))
+    value = shares["distance"] * (pull * np.conj(direction)).real + shares["rotation"] * rotation
+    value += sum(shares[name] * part for name, part in zip(_summed(control), gained, strict=True))
+    return _Own(rotation, displacement, gained, value, rates, pose, totals.sum(axis=1))
+
+
+def _summed(control: ControlProblem) -> tuple[str, ...]:
+    """What is summed up besides the way."""
+    return "work", *(quantity.name for quantity in control.aims.integrals)
 
 
 def _turning(known: Known, own: _Own) -> np.ndarray:
@@ -188,23 +176,21 @@ def _turning(known: Known, own: _Own) -> np.ndarray:
     return own.rotation * (0.5 / abs(known.fine.path[-1]) if known.control.admissible.gait.symmetry == NONE else 0.0)
 
 
-def _part(control: ControlProblem, end: complex, work: float, rotation: float, driven_work: float) -> dict[str, float]:
+def _part(control: ControlProblem, end: complex, rotation: float, totals: np.ndarray) -> dict[str, float]:
     distance = float((end * np.conj(_direction(control, end, rotation))).real)
-    return {"distance": distance, "work": float(work), "rotation": float(rotation), "driven_work": float(driven_work)}
+    return {"distance": distance, "rotation": float(rotation)} | dict(zip(_summed(control), totals.tolist(), strict=True))
 
 
 def _fine_part(known: Known) -> dict[str, float]:
     """What the solved part comes to."""
     fine = known.fine
-    return _part(known.control, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
+    return _part(known.control, fine.path[-1], fine.theta[-1], fine.totals[:, -1])
 
 
 def _collocated_value(known: Known, own: _Own) -> float:
     """The objective as the scheme sees it."""
     control = known.control
-    part = _part(control, own.pose.place[-1], own.spent, own.pose.theta[-1], own.delivered)
-    length = _whole_length(control, known.gait) + float(own.length.sum()) / control.admissible.gait.fraction
-    return control.aims.objective(_period(control, part, length))
+    return control.aims.objective(_period(control, _part(control, own.pose.place[-1], own.pose.theta[-1], own.totals)))
 
 
 def _direction(control: ControlProblem, end: complex, rotation: float) -> complex:

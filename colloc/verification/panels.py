@@ -34,8 +34,9 @@ _CORNER = 1e-6
 class Panels(NamedTuple):
     """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
     of the centre of mass in the body frame (complex; turned back evenly by the turn that is asked for), power, power of the
-    joints, shape speed, driven power, residual and lever ``(n, 5)``; shares of the actuators' limits ``(n, 5, n_share)``; and
-    how far all balanced motions lie apart ``(n, 5, 3)`` (`colloc.verification.followed_motion.FollowedMotion`).
+    joints ``(n, 5)``; densities of k quantities ``(n, 5, k)``; residual and lever ``(n, 5)``; shares of the actuators' limits
+    ``(n, 5, n_share)``; and how far all balanced motions lie apart ``(n, 5, 3 + k)``
+    (`colloc.verification.followed_motion.FollowedMotion`).
     At last what halving the panel changed that each is half of ``(n, 5)`` (see `changes`)."""
 
     left: np.ndarray
@@ -44,8 +45,7 @@ class Panels(NamedTuple):
     centre: np.ndarray
     power: np.ndarray
     actuator: np.ndarray
-    pace: np.ndarray
-    driven: np.ndarray
+    densities: np.ndarray
     residual: np.ndarray
     lever: np.ndarray
     shares: np.ndarray
@@ -54,8 +54,8 @@ class Panels(NamedTuple):
 
     @property
     def rates(self) -> np.ndarray:
-        """What is integrated, ``(5, n, 5)``: spin, velocity of the centre, power, shape speed, driven power."""
-        return np.stack([self.z[..., 2], self.centre, self.power, self.pace, self.driven])
+        """What is integrated, ``(3 + k, n, 5)``: spin, velocity of the centre, power, densities."""
+        return np.stack([self.z[..., 2], self.centre, self.power, *np.moveaxis(self.densities, -1, 0)])
 
     def take(self, chosen: np.ndarray) -> Panels:
         return Panels(*(a[chosen] for a in self))
@@ -92,7 +92,7 @@ def travelled(turn: np.ndarray, move: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What halving each panel changes in the period's rotation, distance, work, path length and driven work ``(n, 5)``.
+    """What halving each panel changes in the period's rotation, distance, work and integrals ``(n, 3 + k)``.
 
     And the most that it would change if the panel lay up to one, and up to two instants earlier or later. All are magnitudes.
     """
@@ -132,8 +132,8 @@ def _beside(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
 
 
 def left_over(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarray:
-    """Error of the halves of panels ``(n, 5)``, from the changes up to one and two instants beside them, and from those of the
-    panels twice as wide.
+    """Error of the halves of panels ``(n, 3 + k)``, from the changes up to one and two instants beside them, and from those of
+    the panels twice as wide.
 
     The rest of a geometric series, which falls no faster than at a kink that lies anywhere; but no less than smooth motion
     would leave of the change before, with a margin.
@@ -143,13 +143,13 @@ def left_over(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarra
 
 
 def increments(rule: np.ndarray, panels: Panels, every: int) -> tuple[np.ndarray, ...]:
-    """Rotation, displacement in the axes at the panel's begin (complex), work, path length and driven work of panels, ``(n,)``
-    each, on every `every`-th instant."""
+    """Rotation, displacement in the axes at the panel's begin (complex), work and integrals of panels, ``(n,)`` each, on every
+    `every`-th instant."""
     return _integrals(rule, panels.width, panels.rates[..., ::every])
 
 
 def _integrals(rule: np.ndarray, h: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The same of rates ``(5, ..., n, k)``."""
-    (omega, *others), centre, b = rates[[0, 2, 3, 4]].real, rates[1], rule[-1]
+    """The same of `Panels.rates` at more instants ``(3 + k, ..., n, m)``."""
+    omega, centre, others, b = rates[0].real, rates[1], rates[2:].real, rule[-1]
     turn = np.exp(1j * h[:, None] * (omega @ rule.T))
     return h * (omega @ b), h * ((turn * centre) @ b), *(h * (other @ b) for other in others)

@@ -12,7 +12,7 @@ far the others would lead (`colloc.verification.followed_motion`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
@@ -21,8 +21,8 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
-from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits, driven_power_in_balance
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.densities import LENGTH, UNLIMITED, ActuatorLimits, Instants, Quantity, quantities_of
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
@@ -117,7 +117,7 @@ def _evaluated(
     *,
     sense: int,
     whole: bool,
-    driven: bool,
+    quantities: tuple[Quantity, ...],
     limits: ActuatorLimits,
     turn: float,
 ) -> tuple[np.ndarray, ...]:
@@ -130,21 +130,21 @@ def _evaluated(
     if mixed:
         near = None  # which is a mean, and of no one direction
     shares = mixed[0] if mixed else np.ones((1, t.size))
-    motions, residual, apart = [], np.zeros(t.size), np.zeros((3, t.size))
-    pace, delivered, used = np.zeros(t.size), np.zeros(t.size), np.full((len(limits.names), t.size), -np.inf)
+    motions, residual, apart = [], np.zeros(t.size), np.zeros((3 + len(quantities), t.size))
+    densities, used = np.zeros((len(quantities), t.size)), np.full((len(limits.names), t.size), -np.inf)
     for share, some in zip(shares, rates if mixed else rates[None], strict=True):
         start = near
         if not friction.associated:
-            followed = followed_motion(body, friction, angles, some, delta, None if whole else near, sense)
+            before = None if whole else near
+            followed = followed_motion(body, friction, angles, some, delta, before=before, sense=sense, quantities=quantities)
             if followed is not None:
                 start, apart = np.nan_to_num(followed.z), apart + share * followed.apart
         motion, left = body.replayed(friction, angles, some, delta, start)
         motions.append(motion)
-        pace += share * np.linalg.norm(some, axis=0)
-        if driven:
-            delivered += share * driven_power_in_balance(body, friction, angles, some, motion.z, delta)
+        now = Instants(body, friction, angles, some, delta, z=motion.z)
+        densities += share * np.concatenate([quantity.at(now) for quantity in quantities])
         if limits.names:
-            done = limits.shares_in_balance(body, friction, angles, some, motion.z, delta)
+            done = limits.at(now)
             used = np.maximum(used, np.where(np.isfinite(limits.least)[:, None], np.abs(done), done))
         residual = np.maximum(residual, left)
 
@@ -155,9 +155,8 @@ def _evaluated(
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
     seen = (centre[0] + 1j * centre[1]) * np.exp(-1j * turn * t.ravel())  # from axes that turn evenly
-    values = (seen, mean("power"), mean("actuator_power"), pace, delivered, residual, lever)
-    z, apart = (a.T.reshape(*t.shape, 3) for a in (mean("z"), apart))
-    return z, *(value.reshape(t.shape) for value in values), used.T.reshape(*t.shape, -1), apart
+    values = (mean("z"), seen, mean("power"), mean("actuator_power"), densities, residual, lever, used, apart)
+    return tuple(value.T.reshape(*t.shape, *value.shape[:-1]) for value in values)
 
 
 def replay(
@@ -173,7 +172,7 @@ def replay(
     near: Replay | None = None,
     sense: int = FORWARDS,
     objective: Objective = EFFICIENCY,
-    driven: bool = False,
+    quantities: Iterable[Quantity | str] = (),
     limits: ActuatorLimits = UNLIMITED,
     turn: float = 0.0,
 ) -> Replay:
@@ -201,8 +200,8 @@ def replay(
     sense : {FORWARDS, BACKWARDS}
         Whether branches are followed with or against time, where several motions are balanced.
     objective : Objective
-    driven : bool
-        Whether the driven work is asked for, whatever the objective is.
+    quantities : iterable of Quantity or str
+        What is asked for besides, whatever the objective is, as ``["driven_work"]``.
     limits : ActuatorLimits
         Of which the largest shares are asked for; with limits of 1 these are the largest torques and powers themselves.
     turn : float
@@ -235,23 +234,22 @@ def replay(
     t[np.isin(left, ends[1:-1]), 0] += _ONE_SIDED
     t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
     start = None if near is None else near.tail_velocity(t.ravel())
-    driven = driven or "driven_work" in objective.uses
-    at = partial(_evaluated, body, friction, path, delta, sense=sense, driven=driven, limits=limits, turn=turn)
+    asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
+    names = "rotation", "distance", "work", *(each.name for each in asked)
+    at = partial(_evaluated, body, friction, path, delta, sense=sense, quantities=asked, limits=limits, turn=turn)
     panels, chord = begun(left, width, at(t, start, whole=True)), chord_per_way(turn)
     while True:
-        spin, move, spent, passed, delivered = increments(WHOLE, panels, 1)
+        spin, move, spent, *sums = increments(WHOLE, panels, 1)
         heading, place = travelled(spin, move)
         distance = max(chord * float(abs(place[-1])), 1e-300)
         values = {"distance": distance, "work": float(spent.sum()), "rotation": float(heading[-1])}
-        values["length"] = float(passed.sum())
-        if driven:
-            values["driven_work"] = float(delivered.sum())
+        values |= {each.name: float(part.sum()) for each, part in zip(asked, sums, strict=True)}
         if not values["work"] > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
         changed, near_by, far = changes(panels)
         missed = left_over(near_by, far, panels.wider).T
         missed[1] *= chord
-        lost = dict(zip(("rotation", "distance", "work", "length", "driven_work"), missed, strict=True))
+        lost = dict(zip(names, missed, strict=True))
         gap = objective.relative_error(values, lost)
         residual = float(panels.residual.max())
         order = np.argsort(gap)
@@ -266,13 +264,13 @@ def replay(
         start = _starts(old.z, friction, sense).reshape(-1, 3).T
         new = at(between, start, whole=False)
         panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new, changed[chosen]))
-    several, others = _others(panels, np.abs(place - place[-1]).max())
+    several, apart = _others(panels, np.abs(place - place[-1]).max())
     known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
-    left_in_balance = residual * np.array([1.0, values["distance"], values["work"], 0.0, values["work"]])
+    balanced = [1.0, values["distance"], values["work"], *(each.needs_forces * abs(values[each.name]) for each in asked)]
     return Replay(
         values=values,
-        errors={name: float(each.sum() + left) for (name, each), left in zip(lost.items(), left_in_balance, strict=True)},
-        others=others,
+        errors={name: float(lost[name].sum() + residual * size) for name, size in zip(names, balanced, strict=True)},
+        others=dict(zip(names, apart, strict=True)),
         lever=float(panels.lever.max()),
         actuator_work=float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
         residual=residual,
@@ -301,13 +299,12 @@ def _starts(z: np.ndarray, friction: Law, sense: int) -> np.ndarray:
     return z[:, :-1] if sense == FORWARDS else z[:, 1:]
 
 
-def _others(panels: Panels, reach: float) -> tuple[float, dict[str, float]]:
-    """Part of the period with several motions, and how far any others would lead at most, by quantities.
+def _others(panels: Panels, reach: float) -> tuple[float, list[float]]:
+    """Part of the period with several motions, and how far any others would lead at most: rotation, distance, work, integrals.
 
     Between two instants they count as at the worse; a rotation moves what is within `reach`.
     """
     worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
-    speed, spin, power = map(float, np.einsum("n,nki->i", 0.25 * panels.width, worse))
+    speed, spin, *others = map(float, np.einsum("n,nki->i", 0.25 * panels.width, worse))
     several = 0.25 * panels.width @ worse.any(axis=2).sum(axis=1)
-    # what other motions do to the work they do to its driven part as well
-    return float(several), {"distance": speed + reach * spin, "work": power, "rotation": spin, "driven_work": power}
+    return float(several), [spin, speed + reach * spin, *others]

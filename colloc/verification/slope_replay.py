@@ -7,6 +7,7 @@ taken from work against friction and the climb, and beside it from the moments i
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,11 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.densities import LENGTH, Quantity, quantities_of
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
-from colloc.verification.adaptive_motion import whole_length
+from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.replay import Replay
 from colloc.verification.slope import gait_on_slope
@@ -39,6 +41,7 @@ def slope_replay(
     tolerance: float = 1e-6,
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
+    quantities: Iterable[Quantity | str] = (),
     **_: object,
 ) -> Replay:
     """A period of a gait that says where it points, on a slope: arguments as of `colloc.verification.replay.replay`.
@@ -48,13 +51,13 @@ def slope_replay(
     instant, or rounding hides the accuracy that is asked for.
     """
     on, aim = gait_on_slope(body, friction, gait, delta, slope.grade, breaks), _FIRST * tolerance
-    length, length_error = whole_length(gait)
+    totals, total_errors = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
 
     def run(aim: float) -> tuple[SlopeMotion, complex, dict[str, float]]:
         ran = on.run(0.0, gait.theta, 1, aim, _LONGEST / instants)
         way = complex(ran.climb[0], ran.aside[0]) * complex(np.exp(-1j * slope.ahead))
         work = float(ran.friction_work[0] + slope.grade * ran.climb[0])
-        return ran, way, {"distance": way.real, "work": work, "rotation": ran.turn, "length": length}
+        return ran, way, {"distance": way.real, "work": work, "rotation": ran.turn} | totals
 
     before = run(aim)[2]
     while True:
@@ -72,7 +75,7 @@ def slope_replay(
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     return Replay(
         values=period,
-        errors=errors | {"length": length_error},
+        errors=errors | total_errors,
         others={},
         lever=float(np.hypot(x - gx, y - gy).max()),
         actuator_work=float(ran.joint_work[0]),

@@ -8,7 +8,8 @@ from colloc import Chain, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscou
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.control_problem import control_problem
-from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power, joint_moments
+from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.densities import DRIVEN_WORK, ActuatorLimits, Instants
 
 ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
@@ -22,12 +23,14 @@ def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
     forces = BODY.forces(law, angles, rates, np.zeros((3, 20)), delta)
 
     def driven(share):
-        return driven_power(BODY, law, angles, share * rates, forces, delta)[0]
+        return DRIVEN_WORK.at(Instants(BODY, law, angles, share * rates, delta, forces=forces))[0]
 
     np.testing.assert_allclose(driven(0.0), 2 * 0.5 * idle, rtol=1e-12)
     h = 1e-5 * idle
     slope = (driven(h) - driven(-h)) / (2 * h)
-    np.testing.assert_allclose(slope, 0.5 * actuator_powers(BODY, law, angles, rates, forces, delta).sum(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(
+        slope, 0.5 * Instants(BODY, law, angles, rates, delta, forces=forces).power.sum(axis=0), rtol=1e-6
+    )
 
 
 def test_torques_are_limited_both_ways_and_powers_one_way():

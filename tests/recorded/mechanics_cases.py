@@ -6,7 +6,6 @@ from colloc import Chain, Friction
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
-from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power
 from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.contact import (
     clearance,
@@ -18,6 +17,7 @@ from colloc.mechanics.contact import (
     share_of_first,
     tangent_of_minimum,
 )
+from colloc.mechanics.densities import DRIVEN_WORK, ActuatorLimits, Instants
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.native_kernel import numpy_instead
@@ -141,5 +141,5 @@ def actuators():
     angles, rates, z = shapes(FIVE, 5, 13, 2.0)
     forces = FIVE.forces(UNEQUAL, angles, rates, z, 1e-2)
     limits = ActuatorLimits(torque=(0.1, 0.2, 0.3, 0.4), power=(0.4, 0.3, 0.2, 0.1))
-    at = FIVE, UNEQUAL, angles, rates, forces, 1e-2
-    return actuator_powers(*at), driven_power(*at), limits.shares(*at), limits.names, limits.least
+    now = Instants(FIVE, UNEQUAL, angles, rates, 1e-2, forces=forces)
+    return now.power, DRIVEN_WORK.at(now), limits.at(now), limits.names, limits.least

@@ -5,7 +5,7 @@ import numpy as np
 from colloc import Chain, Corners, Fourier, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.objective import Objective
-from colloc.mechanics.actuators import ActuatorLimits
+from colloc.mechanics.densities import DRIVEN_WORK, ActuatorLimits
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.measured import measured
@@ -44,7 +44,7 @@ def replay_of_equal_coefficients():
 
 def replay_of_unequal_coefficients_with_limits():
     limits = ActuatorLimits(torque=(0.1, 0.2), power=(0.3, 0.2))
-    settings = {"instants": 200, "tolerance": 1e-4, "driven": True, "limits": limits}
+    settings = {"instants": 200, "tolerance": 1e-4, "quantities": ["driven_work"], "limits": limits}
     return replay(WEIGHTY, UNEQUAL, SKEW, 1e-3, **settings)
 
 
@@ -80,11 +80,11 @@ def replay_of_a_smooth_body():
 
 
 def measured_for_vanishing_delta():
-    return measured(Chain(), UNEQUAL, SKEW, 1e-2, tolerance=1e-4, instants=200, driven=True)
+    return measured(Chain(), UNEQUAL, SKEW, 1e-2, tolerance=1e-4, instants=200, quantities=["driven_work"])
 
 
 def adaptive_panels():
-    fine = fine_motion(FOUR_LINKS, UNEQUAL, FOUR, 1e-3, np.linspace(0, 1, 13), 1e-5, driven=True)
+    fine = fine_motion(FOUR_LINKS, UNEQUAL, FOUR, 1e-3, np.linspace(0, 1, 13), 1e-5, quantities=[DRIVEN_WORK])
     t = np.random.default_rng(1).uniform(size=20)
     return fine, fine.at(t), fine.velocity(t.reshape(4, 5)), kink_phases(FOUR_LINKS, UNEQUAL, FOUR, 1e-3, fine)
 

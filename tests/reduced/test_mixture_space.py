@@ -5,6 +5,7 @@ import pytest
 
 from colloc import Chain, Friction, Problem, Relaxed, replay
 from colloc.gaits.control_problem import control_problem
+from colloc.mechanics.densities import LENGTH
 from colloc.motion.kinds import SlowOnLevel
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.motion import ReducedMotion
@@ -34,7 +35,7 @@ def test_slopes_of_what_a_period_comes_to_and_of_rows_are_those_of_differences(s
     space, v = begun(symmetry, links, far=far)
     program, h = ReducedProgram(space, DELTA), 1e-6
     kind = SlowOnLevel(*space.control.dynamics[:2], symmetry)
-    program.motion = ReducedMotion(kind, space.mesh, space, ["length"])
+    program.motion = ReducedMotion(kind, space.mesh, space, [LENGTH])
     asked = space.constraints(v)
     slopes, rows = program.motion.gradients(v, DELTA), asked.slopes(v)
     for k in np.random.default_rng(2).choice(space.n, 8, replace=False):

@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
+from colloc.mechanics.densities import Instants
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.search.spaces import space_near
@@ -105,7 +106,7 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
         gait, body, t = space.member(at), problem.body, np.atleast_1d(t)
         angles, rates = gait(t)
         z = body.solve(problem.friction, angles, rates, problem.delta).z
-        return problem.actuator_limits.shares_in_balance(body, problem.friction, angles, rates, z, problem.delta)[1, 0]
+        return problem.actuator_limits.at(Instants(body, problem.friction, angles, rates, problem.delta, z=z))[1, 0]
 
     def peak(at):
         reach = {"bounds": (2 * left - right, 2 * right - left), "method": "bounded", "options": {"xatol": 1e-12}}

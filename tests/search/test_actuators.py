@@ -24,8 +24,9 @@ from colloc import (
     save,
 )
 from colloc.commands import verify
-from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power_in_balance, joint_moments
+from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import instant
+from colloc.mechanics.densities import DRIVEN_WORK, ActuatorLimits, Instants
 from colloc.reduced.program import ReducedProgram
 from colloc.search.actuator_demand import check_actuators_suffice, least_share, least_share_without_cusps
 from colloc.search.solve import solve
@@ -81,7 +82,7 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
     drag = [moments(Chain(), Viscous(2, 1), angles, pace * rates, 1e-3)[0] for pace in (1.0, 2.0)]
     np.testing.assert_allclose(drag[1], 2 * drag[0], rtol=1e-9)
     z = BODY.solve(LAW, angles, rates, 1e-3).z
-    powers = actuator_powers(BODY, LAW, angles, rates, BODY.forces(LAW, angles, rates, z, 1e-3), 1e-3)
+    powers = Instants(BODY, LAW, angles, rates, 1e-3, z=z).power
     np.testing.assert_allclose(powers, slow * rates, rtol=1e-12)
 
 
@@ -89,7 +90,7 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
 def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
     angles, rates = random_instants(50)
     z = Chain().solve(law, angles, rates, 0.1).z
-    slow, fast = (driven_power_in_balance(Chain(), law, angles, pace * rates, pace * z, pace * 0.1) for pace in (1.0, 3.0))
+    slow, fast = (DRIVEN_WORK.at(Instants(Chain(), law, angles, pace * rates, pace * 0.1, z=pace * z)) for pace in (1.0, 3.0))
     np.testing.assert_allclose(fast, 3.0 ** (1 + degree) * slow, rtol=1e-9)
 
 
@@ -97,8 +98,8 @@ def test_of_a_law_without_a_degree_driven_power_is_the_positive_part_up_to_what_
     law, (angles, rates) = OwnLaw("-vs/speed*(1 + exp(-speed))", "-vn/speed*(1 + exp(-speed))"), random_instants(50)
     assert law.degree is None
     z = Chain().solve(law, angles, rates, 1e-3).z
-    powers = actuator_powers(Chain(), law, angles, rates, Chain().forces(law, angles, rates, z, 1e-3), 1e-3)
-    more = driven_power_in_balance(Chain(), law, angles, rates, z, 1e-3) - np.maximum(powers, 0).sum(axis=0)
+    now = Instants(Chain(), law, angles, rates, 1e-3, z=z)
+    more = DRIVEN_WORK.at(now)[0] - np.maximum(now.power, 0).sum(axis=0)
     assert np.all(more >= 0)
     assert more.max() <= 2 * law.largest * 1e-3 / 2
 

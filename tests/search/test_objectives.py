@@ -22,7 +22,7 @@ from colloc import (
 from colloc.collocation.warm_start import feasible_point
 from colloc.commands import verify
 from colloc.gaits.objective import EFFICIENCY, SPEED
-from colloc.mechanics.actuators import actuator_powers, driven_power
+from colloc.mechanics.densities import DRIVEN_WORK, Instants
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
@@ -197,11 +197,12 @@ def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
     solved = body.solve(friction, angles, rates, delta)
     motion = body.motion(friction, angles, rates, delta, solved)
     forces = body.forces(friction, angles, rates, motion.z, delta)
-    powers = actuator_powers(body, friction, angles, rates, forces, delta)
+    now = Instants(body, friction, angles, rates, delta, forces=forces)
+    powers = now.power
     np.testing.assert_allclose(powers.sum(axis=0), motion.actuator_power, atol=1e-12)
     # the head link's normal force acts half its length from the joint, its tangential force has no arm
     np.testing.assert_allclose(powers[1], -(0.25 * forces[5] + forces[8]) * rates[1], atol=1e-12)
-    driven = driven_power(body, friction, angles, rates, forces, delta)[0]
+    driven = DRIVEN_WORK.at(now)[0]
     exact = np.maximum(powers, 0.0).sum(axis=0)
     assert (powers < 0).any()
     assert (driven >= exact).all()
@@ -211,12 +212,12 @@ def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
 def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
     """A gait with such joints: its driven work is more than its work, and so it pays to look for another."""
     problem = Problem("brake", SKEW, gait=Harmonic(1), objective="driven efficiency", delta=1e-3)
-    before = replay(problem.body, problem.friction, SKEW, 1e-3, driven=True)
-    assert before.driven_work > (1 + 1e-3) * before.work
+    before = replay(problem.body, problem.friction, SKEW, 1e-3, quantities=["driven_work"])
+    assert before.values["driven_work"] > (1 + 1e-3) * before.work
     solution = solve(problem, 1)
     assert solution.success
     found = solution.certificate
-    assert found.value == pytest.approx(found.distance / found.driven_work, rel=1e-12)
+    assert found.value == pytest.approx(found.distance / found.values["driven_work"], rel=1e-12)
     assert found.value <= found.efficiency
     usual = solve(problem.with_(objective="efficiency", guess=solution.gait), 1)
     assert solution.value >= replay(problem.body, problem.friction, usual.gait, 1e-3, objective=problem.objective).value * (

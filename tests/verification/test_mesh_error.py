@@ -72,7 +72,7 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
     for k in range(mesh.n):
         stage = theta + mesh.h[k] * mesh.scheme.A @ rates.z[2, k]
         x += mesh.h[k] * mesh.scheme.b @ (np.exp(1j * stage) * rates.centre[k])
-        work += mesh.h[k] * mesh.scheme.b @ rates.power[k]
+        work += mesh.h[k] * mesh.scheme.b @ rates.gained[0, k]
         theta += mesh.h[k] * mesh.scheme.b @ rates.z[2, k]
     true = abs(x) / work / replayed(friction).efficiency - 1
     assert error.total == pytest.approx(true, rel=2e-3, abs=3e-8)

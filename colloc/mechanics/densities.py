@@ -1,0 +1,252 @@
+"""What a period sums up besides its way and work: integrals over time of functions of an instant, each one formula.
+
+A formula speaks of every joint, or other shape coordinate, at an instant. It is text, so that files can hold it, and is
+evaluated with NumPy where a motion is replayed and with CasADi where derivatives are needed: there is no second statement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.law import Law
+from colloc.numerics.arrays import Array, namespace
+from colloc.numerics.expression import FUNCTIONS, Formula, formula
+from colloc.system.errors import ProblemError
+
+VARIABLES = {
+    "angle": "of every joint [rad]",
+    "rate": "of every joint [rad per period]",
+    "moment": "that the actuator of every joint exerts [weight x body length]",
+    "power": "that it delivers, moment times rate",
+    "idle": "power at an instant below which regularised friction does not tell who drives whom: friction at the speed delta",
+}
+"""What a formula may speak of."""
+SUMMED = (*FUNCTIONS, "sum")
+"""What it may use; ``sum`` is over the joints."""
+_OF_FORCES = {"moment", "power", "idle"}
+_WITH_PACE, _WITH_FRICTION = ("rate", "power", "idle"), ("moment", "power", "idle")
+_TAKEN = ("distance", "work", "rotation", "across", "efficiency", "value", "instants")
+
+
+@dataclass(frozen=True, eq=False)
+class Instants:
+    """A body at instants, as formulas see it.
+
+    Parameters
+    ----------
+    body, friction
+    angles, rates : (n_joint, n_time)
+        Rates and delta are those per period divided by `unit`; friction takes them.
+    delta
+    z : (3, n_time), optional
+        Tail velocities that balance the body; or
+    forces : (n_force, n_time), optional
+        Forces on its parts (`colloc.mechanics.bodies.Moved.forces`). Neither is needed where nobody asks for moments.
+    unit : float
+    """
+
+    body: Body
+    friction: Law
+    angles: Array
+    rates: Array
+    delta: Array
+    z: Array = None
+    forces: Array = None
+    unit: float = 1.0
+
+    @property
+    def angle(self) -> Array:
+        return self.angles
+
+    @property
+    def rate(self) -> Array:
+        return self.unit * self.rates
+
+    @cached_property
+    def moment(self) -> Array:
+        body, friction, forces = self.body, self.friction, self.forces
+        if forces is None:
+            forces = body.forces(friction, self.angles, self.rates, self.z, self.delta)
+        return joint_moments(body, friction, self.angles, forces, self.delta)
+
+    @property
+    def power(self) -> Array:
+        return self.moment * self.rate
+
+    @property
+    def idle(self) -> Array:
+        return self.unit * self.friction.largest * self.delta ** (1.0 + (self.friction.degree or 0.0))
+
+
+def read(text: str) -> Formula:
+    """A formula of `VARIABLES`. `ProblemError` if it is none."""
+    return formula(text, tuple(VARIABLES), SUMMED)
+
+
+def sample() -> dict[str, Any]:
+    """Instants of three joints at which formulas are tried."""
+    rng = np.random.default_rng(0)
+    angle, rate, moment = rng.uniform(0.2, 1.0, (3, 3, 5)) * rng.choice([-1.0, 1.0], (3, 3, 5))
+    return {"angle": angle, "rate": rate, "moment": moment, "power": moment * rate, "idle": 1e-3}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """An integral over a period of a function of an instant, for objectives to speak of.
+
+    Parameters
+    ----------
+    name : str
+        By which objectives call it.
+    density : str
+        Formula of ``angle``, ``rate``, ``moment``, ``power`` of every joint, and ``idle`` (`VARIABLES`): numbers,
+        ``+ - * / **``, `colloc.numerics.expression.FUNCTIONS`, and ``sum``, over the joints.
+    meaning : str, optional
+        In words.
+
+    Raises
+    ------
+    ProblemError
+        If it is no formula, has no finite value somewhere, or one for each joint.
+
+    Examples
+    --------
+    >>> heat = Quantity("heat", "sum(moment**2)", "loss in the windings")
+    >>> heat.friction_degree, heat.pace_degree
+    (2.0, 0.0)
+    """
+
+    name: str
+    density: str
+    meaning: str = ""
+
+    def __post_init__(self) -> None:
+        name = self.name
+        known = isinstance(name, str) and name.isidentifier() and not name.endswith(("_error", "_delta"))
+        if not known or name in (*_TAKEN, *SUMMED):
+            raise ProblemError(f"a quantity needs a name of its own that is a word, not {name!r}.")
+        object.__setattr__(self, "density", read(self.density).text)
+        with np.errstate(all="ignore"):
+            value = self._formula(sample())
+        if np.shape(value) != (1, 5):
+            raise ProblemError(f"the quantity {name}: '{self.density}' is no sum over the joints; put sum(...) around it.")
+        if not np.isfinite(value).all():
+            raise ProblemError(f"the quantity {name}: '{self.density}' has no finite value at a usual instant.")
+
+    @property
+    def _formula(self) -> Formula:
+        return read(self.density)
+
+    @cached_property
+    def needs_forces(self) -> bool:
+        """Whether it depends on more than shapes and their rates."""
+        return bool(_OF_FORCES & self._formula.names)
+
+    @cached_property
+    def smoothed(self) -> bool:
+        """Whether it depends on delta by itself."""
+        return "idle" in self._formula.names
+
+    def at(self, now: Instants) -> Array:
+        """Its density ``(1, n_time)``, per unit of time of the instants."""
+        return self._formula({name: getattr(now, name) for name in VARIABLES if name in self._formula.names}) / now.unit
+
+    def of_shapes(self, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+        """The same of shapes and their rates ``(n_joint, n_time)``, where it needs no forces."""
+        return np.asarray(self._formula({"angle": angles, "rate": rates}))
+
+    @cached_property
+    def friction_degree(self) -> float | None:
+        """The power of the friction coefficients that it is proportional to; None if to none."""
+        return self._degree(_WITH_FRICTION)
+
+    @cached_property
+    def pace_degree(self) -> float | None:
+        """The same of the pace, under dry friction. What grows like the pace itself belongs to a path, however fast it is
+        followed."""
+        return self._degree(_WITH_PACE)
+
+    def _degree(self, scaled: tuple[str, ...]) -> float | None:
+        at = sample()
+        before = self._formula(at)
+        after = [self._formula({k: v * factor if k in scaled else v for k, v in at.items()}) for factor in (2.0, 16.0)]
+        with np.errstate(all="ignore"):
+            powers = np.concatenate([np.log2(after[0] / before), np.log2(after[1] / before) / 4.0])
+        near = float(np.round(powers.flat[0], 6)) + 0.0
+        return near if np.allclose(powers, near, rtol=0, atol=1e-9) else None
+
+    def fields(self) -> dict[str, str]:
+        """As plain text (JSON)."""
+        return {"name": self.name, "density": self.density, "meaning": self.meaning}
+
+
+LENGTH = Quantity("length", "sqrt(sum(rate**2) + 1e-24)", "length of the path in shape space [rad]")
+"""The small number is for a derivative where a joint turns back."""
+DRIVEN_WORK = Quantity(
+    "driven_work", "sum(power + sqrt(power**2 + idle**2)) / 2", "work of the actuators where none takes energy back"
+)
+"""Work against friction is the sum of what all actuators do, and one that is driven backwards counts as a gain there. A real
+one brakes: it gives nothing back. The positive part of a power P has a corner at 0, which is smoothed at the scale of the
+regularised friction: below the speed delta friction is viscous, and so a power of delta times friction at that speed tells
+nothing about who drives whom. It vanishes with delta like friction's own regularisation, and the certificate's limit for
+delta -> 0 covers both."""
+INTEGRALS = {each.name: each for each in (LENGTH, DRIVEN_WORK)}
+"""Quantities that every objective may speak of."""
+
+
+def quantities_of(asked: Any) -> tuple[Quantity, ...]:
+    """Quantities by their names, or as they are. `ProblemError` for a name that is none."""
+    for each in asked:
+        if not isinstance(each, Quantity) and each not in INTEGRALS:
+            raise ProblemError(f"{each!r} is no quantity: name one of {', '.join(INTEGRALS)}, or state a Quantity.")
+    return tuple(each if isinstance(each, Quantity) else INTEGRALS[each] for each in asked)
+
+
+class ActuatorLimits(NamedTuple):
+    """The most that actuators can do, one value for each shape coordinate; nothing where there is no limit.
+
+    Attributes
+    ----------
+    torque : tuple of float
+        On the magnitude of the moments [weight x body length].
+    power : tuple of float
+        On the powers that are delivered [weight x body length / period]; nothing limits a brake.
+
+    Examples
+    --------
+    >>> ActuatorLimits(torque=(0.1, 0.1)).names
+    ('torque of joint 1', 'torque of joint 2')
+    """
+
+    torque: tuple[float, ...] = ()
+    power: tuple[float, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the rows of `shares` are."""
+        kinds = ("torque", self.torque), ("power", self.power)
+        return tuple(f"{kind} of joint {j + 1}" for kind, limits in kinds for j in range(len(limits)))
+
+    @property
+    def least(self) -> np.ndarray:
+        """Of the shares, that are allowed ``(n_share,)``; the most is 1."""
+        return np.array([-1.0] * len(self.torque) + [-np.inf] * len(self.power))
+
+    @property
+    def needs_forces(self) -> bool:
+        return True
+
+    def at(self, now: Instants) -> Array:
+        """Moments, then powers, over their limits, ``(n_share, n_time)``."""
+        rows = [now.moment / np.array(self.torque)[:, None]] if self.torque else []
+        rows += [now.power / np.array(self.power)[:, None]] if self.power else []
+        return namespace(now.moment).stack(rows)
+
+
+UNLIMITED = ActuatorLimits()
