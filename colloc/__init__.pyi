@@ -8,7 +8,7 @@ from colloc.gaits.objective import Objective as Objective
 from colloc.mechanics.chain import Chain as Chain
 from colloc.mechanics.coupled import Coupled as Coupled
 from colloc.mechanics.feet import Foot as Foot, Pad as Pad, Wheel as Wheel
-from colloc.mechanics.densities import ActuatorLimits as ActuatorLimits
+from colloc.mechanics.densities import PathLimit as PathLimit
 from colloc.mechanics.densities import Quantity as Quantity
 from colloc.smooth.modal_body import ModalBody as ModalBody
 from colloc.smooth.concertina import Concertina as Concertina

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colloc import FreePath, Objective, Problem, ProblemError, Quantity, ellipse
+from colloc import FreePath, Objective, PathLimit, Problem, ProblemError, Quantity, ellipse
 from colloc.gaits import gait_fields
 from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Fourier, Harmonic
@@ -189,3 +189,43 @@ def test_what_a_quantity_is_proportional_to_follows_from_its_formula():
             Quantity(name, density)
     with pytest.raises(ProblemError, match="speaks of heat"):
         Objective("distance / heat")
+
+
+WEAK = Problem("weak", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), torque_limit=0.053, delta=1e-2)
+
+
+def test_a_limit_of_your_own_is_kept_certified_stored_and_read(tmp_path):
+    """On the sum of all squared torques, which is what heats a motor: it binds, and does not elsewhere."""
+    problem = WEAK.with_(torque_limit=None, limits=[PathLimit("heat", "sum(moment**2)", 0.005, both_ways=False)])
+    found = solve(problem, starts=1)
+    assert found.status == "solved", found.message
+    moments, _ = moments_at(found, np.linspace(0, 1, 4001))
+    assert (moments**2).sum(axis=0).max() == pytest.approx(0.005, rel=1e-4)
+    checks = {check.name: check for check in found.certificate.checks}
+    assert "nearest to its own: heat" in checks["actuators"].meaning
+    read = load(save(found, tmp_path / "warm.h5"))
+    assert (read.problem.hash, read.problem.limits) == (problem.hash, problem.limits)
+
+
+@pytest.mark.slow
+def test_limits_stated_anew_are_those_that_are_known():
+    """A torque as a row of the same program; a speed as rows of it, which the library keeps at the gait's fastest instants."""
+    mine = WEAK.with_(torque_limit=None, limits=[PathLimit("torque", "moment", 0.053)])
+    assert solve(mine, starts=1).value == solve(WEAK, starts=1).value
+    fast = WEAK.with_(torque_limit=None, speed_limit=9.0)
+    own = fast.with_(speed_limit=None, limits=[PathLimit("speed", "rate", 9.0)])
+    known, found = solve(fast, starts=1), solve(own, starts=1)
+    assert known.status == found.status == "solved"
+    assert found.value == pytest.approx(known.value, rel=1e-6)
+
+
+def test_limits_that_cannot_be_kept_or_read_are_refused():
+    for most, why in [(-1.0, "must be positive"), ("x", "must be positive")]:
+        with pytest.raises(ProblemError, match=why):
+            PathLimit("heat", "moment**2", most)
+    with pytest.raises(ProblemError, match="has 3 values; give one, or 2"):
+        WEAK.with_(limits=[PathLimit("heat", "moment**2", (1.0, 1.0, 1.0))])
+    with pytest.raises(ProblemError, match="the speed is limited"):
+        WEAK.with_(torque_limit=None, gait=FreePath(4.0, "bilateral"), limits=[PathLimit("speed", "rate", 9.0)])
+    with pytest.raises(ProblemError, match="PathLimit"):
+        WEAK.with_(limits=["moment < 1"])

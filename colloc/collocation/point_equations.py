@@ -31,7 +31,7 @@ from colloc.gaits.sloped import Slope, checked_chain
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.densities import ActuatorLimits, Instants, Quantity
+from colloc.mechanics.densities import Instants, PathLimits, Quantity
 from colloc.mechanics.inertia import STATES, about_centre, checked_mass, momenta, turning
 from colloc.mechanics.law import Law
 from colloc.numerics.blocks import Block, LocalFunction, implicit_function, local_function
@@ -144,7 +144,7 @@ def density_point(quantity: Quantity, body: Body, friction: Law, unit: float) ->
 
 
 def actuator_rows(
-    limits: ActuatorLimits, body: Body, friction: Law, layout: Layout, unit: float
+    limits: PathLimits, body: Body, friction: Law, layout: Layout, unit: float
 ) -> dict[str, tuple[BlockParts, Group]]:
     """Block and rows, by name, that keep the actuators within their limits at the points of a full program, if there are any.
 

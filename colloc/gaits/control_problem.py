@@ -22,7 +22,7 @@ from colloc.gaits.objective import Objective, integrals_of
 from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import ActuatorLimits, Quantity
+from colloc.mechanics.densities import PathLimits, Quantity
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
@@ -96,7 +96,7 @@ class ControlProblem:
     dynamics : Dynamics
     admissible : Admissible
     aims : Aims
-    actuators : ActuatorLimits
+    actuators : PathLimits
     formulation : str
         Of the full program.
     scheme : str
@@ -121,7 +121,7 @@ class ControlProblem:
     dynamics: Dynamics
     admissible: Admissible
     aims: Aims
-    actuators: ActuatorLimits
+    actuators: PathLimits
     formulation: str
     scheme: str
     intervals: int
@@ -145,8 +145,9 @@ class ControlProblem:
 def control_problem(problem: Problem) -> ControlProblem:
     """What solves a problem: its parts, in units of friction."""
     body, gait, law, aims = problem.body, problem.gait, problem.law, (problem.objective, *(aim for aim, _ in problem.at_least))
-    unit = 1.0 if any(aim.degree is None for aim in aims) else friction_unit(law)
-    limits, slope = problem.actuator_limits, problem.slope
+    limits, slope = problem.path_limits, problem.slope
+    degrees = [part.degree for part in aims] + [limit.friction_degree for limit in limits.each]
+    unit = 1.0 if None in degrees else friction_unit(law)
     return ControlProblem(
         problem,
         Dynamics(
@@ -164,7 +165,7 @@ def control_problem(problem: Problem) -> ControlProblem:
             problem.rotation,
             problem.towards is not None,
         ),
-        ActuatorLimits(*(tuple(most / unit for most in each) for each in (limits.torque, limits.power))),
+        limits.in_units_of(unit),
         problem.formulation,
         problem.scheme,
         problem.intervals,

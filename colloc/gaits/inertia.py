@@ -29,7 +29,7 @@ def check_paced(problem: Any) -> None:
             f"gaits of symmetry {problem.gait.symmetry} run backwards in half of their period, as nothing with inertia does: "
             f"take symmetry {ANTIPODAL!r} or {NONE!r}."
         )
-    if problem.actuator_limits.names or any(each.needs_forces for each in problem.integrals):
+    if problem.path_limits.names or any(each.needs_forces for each in problem.integrals):
         raise ProblemError("what single joints have to do with inertia is not known yet: leave driven work and limits out.")
     if problem.formulation != FULL:
         raise ProblemError(f"with inertia there is only the formulation {FULL!r}.")

@@ -19,7 +19,7 @@ from colloc.gaits.sloped import Slope, check_asked, class_on, slope_from
 from colloc.gaits.symmetry import NONE, check_symmetric
 from colloc.mechanics.bodies import FULL, Body, formulations
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.densities import ActuatorLimits, Quantity
+from colloc.mechanics.densities import PathLimit, PathLimits, Quantity, stated_limit, torque_and_power
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
@@ -92,6 +92,8 @@ class Problem:
     torque_limit, power_limit : float or sequence of float, optional
         The most that the joints' actuators can do, all or each: magnitude of the moment [weight x body length], power
         delivered [weight x body length / period]. With a power limit the pace matters.
+    limits : sequence of PathLimit, optional
+        Others, on functions of an instant of your own (docs/howto/motors.md).
     speed_limit : float or sequence of float, optional
         The largest speed of the joints at any instant, all or each [rad per period]: that of a motor [rad/s] times the period
         [s]. The pace matters.
@@ -141,6 +143,7 @@ class Problem:
     torque_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
     power_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
     speed_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
+    limits: tuple[PathLimit, ...] = field(default=(), metadata=STATED_IF_SET)
     grade: float = field(default=0.0, metadata=STATED_IF_SET)
     towards: float | None = field(default=None, metadata=STATED_IF_SET)
     froude: float = field(default=0.0, metadata=STATED_IF_SET)
@@ -235,9 +238,10 @@ class Problem:
     def _check_actuators(self) -> None:
         for name in ("torque_limit", "power_limit", "speed_limit"):
             object.__setattr__(self, name, checked_actuator_limit(name, getattr(self, name), self.body.n_joint))
-        limits = self.actuator_limits
+        object.__setattr__(self, "limits", tuple(stated_limit(each) for each in self.limits))
+        limits = self.path_limits
         forced = [each.name for each in self.integrals if each.needs_forces]
-        asks = forced[0] if forced else "a limit on actuators" if limits.names else ""
+        asks = forced[0] if forced else f"a limit on the {limits.each[0].name}" if limits.each else ""
         if asks and self.formulation != FULL:
             raise ProblemError(f"{asks} needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
         paced = [each.name for each in self.integrals if each.pace_degree != 1.0]
@@ -255,9 +259,11 @@ class Problem:
             )
 
     @property
-    def actuator_limits(self) -> ActuatorLimits:
-        """What the actuators can do, joint by joint."""
-        return ActuatorLimits(*(of_each(limit, self.body.n_joint) for limit in (self.torque_limit, self.power_limit)))
+    def path_limits(self) -> PathLimits:
+        """What motors can do, joint by joint, and the other `limits`."""
+        n_joint = self.body.n_joint
+        motors = torque_and_power(of_each(self.torque_limit, n_joint), of_each(self.power_limit, n_joint))
+        return PathLimits((*motors, *(each.on(n_joint) for each in self.limits)))
 
     @property
     def largest_speeds(self) -> tuple[float, ...]:
@@ -289,6 +295,8 @@ class Problem:
             return "the joints' power is limited"
         if self.speed_limit is not None:
             return "the joints' speed is limited"
+        if limited := [each.name for each in self.limits if each.pace_degree != 0.0]:
+            return f"the {limited[0]} is limited"
         if self.froude:
             return "what is heavy takes time to move"
         if paced := [each.name for each in self.integrals if each.pace_degree != 1.0]:

@@ -204,7 +204,7 @@ def check_asked(problem: Any) -> None:
     for quantity in ("rotation", *(each.name for each in problem.integrals if each.needs_forces)):
         if problem.uses(quantity):
             raise ProblemError(f"on a slope the {quantity} of a period is not known: ask for distance, work and length.")
-    if problem.actuator_limits.names:
+    if problem.path_limits.names:
         raise ProblemError("on a slope what the single joints have to do is not known: leave limits of actuators out.")
     if problem.formulation != FULL:
         raise ProblemError(f"on a slope there is only the formulation {FULL!r}.")

@@ -1,4 +1,4 @@
-"""What a period sums up besides its way and work: integrals over time of functions of an instant, each one formula.
+"""Functions of an instant, each one formula: what a period sums up besides its way and work, and what is limited all along.
 
 A formula speaks of every joint, or other shape coordinate, at an instant. It is text, so that files can hold it, and is
 evaluated with NumPy where a motion is replayed and with CasADi where derivatives are needed: there is no second statement.
@@ -6,9 +6,9 @@ evaluated with NumPy where a motion is replayed and with CasADi where derivative
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.expression import FUNCTIONS, Formula, formula
+from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
 VARIABLES = {
@@ -96,8 +97,60 @@ def sample() -> dict[str, Any]:
     return {"angle": angle, "rate": rate, "moment": moment, "power": moment * rate, "idle": 1e-3}
 
 
+class OfInstants:
+    """A function of an instant by the formula `text`: what follows from the formula alone."""
+
+    text: str
+
+    @property
+    def _formula(self) -> Formula:
+        return read(self.text)
+
+    @cached_property
+    def needs_forces(self) -> bool:
+        """Whether it depends on more than shapes and their rates."""
+        return bool(_OF_FORCES & self._formula.names)
+
+    @cached_property
+    def smoothed(self) -> bool:
+        """Whether it depends on delta by itself."""
+        return "idle" in self._formula.names
+
+    def _value(self, now: Instants) -> Array:
+        return self._formula({name: getattr(now, name) for name in VARIABLES if name in self._formula.names})
+
+    @cached_property
+    def friction_degree(self) -> float | None:
+        """The power of the friction coefficients that it is proportional to; None if to none."""
+        return self._degree(_WITH_FRICTION)
+
+    @cached_property
+    def pace_degree(self) -> float | None:
+        """The same of the pace, under dry friction. An integral of what grows like the pace itself belongs to a path, however
+        fast it is followed; so does the largest value of what does not grow."""
+        return self._degree(_WITH_PACE)
+
+    def _degree(self, scaled: tuple[str, ...]) -> float | None:
+        at = sample()
+        before = self._formula(at)
+        after = [self._formula({k: v * factor if k in scaled else v for k, v in at.items()}) for factor in (2.0, 16.0)]
+        with np.errstate(all="ignore"):
+            powers = np.concatenate([np.log2(after[0] / before), np.log2(after[1] / before) / 4.0])
+        near = float(np.round(powers.flat[0], 6)) + 0.0
+        return near if np.allclose(powers, near, rtol=0, atol=1e-9) else None
+
+    def _checked(self, what: str, rows: tuple[int, ...], instead: str) -> None:
+        """A `ProblemError` for a formula without as many rows, or without a finite value somewhere."""
+        with np.errstate(all="ignore"):
+            value = self._formula(sample())
+        if np.shape(value) not in [(n, 5) for n in rows]:
+            raise ProblemError(f"{what}: '{self.text}' {instead}.")
+        if not np.isfinite(value).all():
+            raise ProblemError(f"{what}: '{self.text}' has no finite value at a usual instant.")
+
+
 @dataclass(frozen=True)
-class Quantity:
+class Quantity(OfInstants):
     """An integral over a period of a function of an instant, for objectives to speak of.
 
     Parameters
@@ -132,54 +185,19 @@ class Quantity:
         if not known or name in (*_TAKEN, *SUMMED):
             raise ProblemError(f"a quantity needs a name of its own that is a word, not {name!r}.")
         object.__setattr__(self, "density", read(self.density).text)
-        with np.errstate(all="ignore"):
-            value = self._formula(sample())
-        if np.shape(value) != (1, 5):
-            raise ProblemError(f"the quantity {name}: '{self.density}' is no sum over the joints; put sum(...) around it.")
-        if not np.isfinite(value).all():
-            raise ProblemError(f"the quantity {name}: '{self.density}' has no finite value at a usual instant.")
+        self._checked(f"the quantity {name}", (1,), "is no sum over the joints; put sum(...) around it")
 
     @property
-    def _formula(self) -> Formula:
-        return read(self.density)
-
-    @cached_property
-    def needs_forces(self) -> bool:
-        """Whether it depends on more than shapes and their rates."""
-        return bool(_OF_FORCES & self._formula.names)
-
-    @cached_property
-    def smoothed(self) -> bool:
-        """Whether it depends on delta by itself."""
-        return "idle" in self._formula.names
+    def text(self) -> str:  # type: ignore[override]
+        return self.density
 
     def at(self, now: Instants) -> Array:
         """Its density ``(1, n_time)``, per unit of time of the instants."""
-        return self._formula({name: getattr(now, name) for name in VARIABLES if name in self._formula.names}) / now.unit
+        return self._value(now) / now.unit
 
     def of_shapes(self, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
         """The same of shapes and their rates ``(n_joint, n_time)``, where it needs no forces."""
         return np.asarray(self._formula({"angle": angles, "rate": rates}))
-
-    @cached_property
-    def friction_degree(self) -> float | None:
-        """The power of the friction coefficients that it is proportional to; None if to none."""
-        return self._degree(_WITH_FRICTION)
-
-    @cached_property
-    def pace_degree(self) -> float | None:
-        """The same of the pace, under dry friction. What grows like the pace itself belongs to a path, however fast it is
-        followed."""
-        return self._degree(_WITH_PACE)
-
-    def _degree(self, scaled: tuple[str, ...]) -> float | None:
-        at = sample()
-        before = self._formula(at)
-        after = [self._formula({k: v * factor if k in scaled else v for k, v in at.items()}) for factor in (2.0, 16.0)]
-        with np.errstate(all="ignore"):
-            powers = np.concatenate([np.log2(after[0] / before), np.log2(after[1] / before) / 4.0])
-        near = float(np.round(powers.flat[0], 6)) + 0.0
-        return near if np.allclose(powers, near, rtol=0, atol=1e-9) else None
 
     def fields(self) -> dict[str, str]:
         """As plain text (JSON)."""
@@ -208,45 +226,118 @@ def quantities_of(asked: Any) -> tuple[Quantity, ...]:
     return tuple(each if isinstance(each, Quantity) else INTEGRALS[each] for each in asked)
 
 
-class ActuatorLimits(NamedTuple):
-    """The most that actuators can do, one value for each shape coordinate; nothing where there is no limit.
+@dataclass(frozen=True)
+class PathLimit(OfInstants):
+    """The most that a function of an instant may be, at every instant of a period.
 
-    Attributes
+    Parameters
     ----------
-    torque : tuple of float
-        On the magnitude of the moments [weight x body length].
-    power : tuple of float
-        On the powers that are delivered [weight x body length / period]; nothing limits a brake.
+    name : str
+    function : str
+        Formula as of a `Quantity`; with a value for each joint, or one for all.
+    most : float or sequence of float
+        For all joints, or each.
+    both_ways : bool
+        Whether the magnitude is limited.
+
+    Raises
+    ------
+    ProblemError
+        If it is no formula, or the most is not positive.
 
     Examples
     --------
-    >>> ActuatorLimits(torque=(0.1, 0.1)).names
+    >>> PathLimit("torque", "moment", (0.1, 0.2)).names
     ('torque of joint 1', 'torque of joint 2')
+    >>> PathLimit("all power", "sum(power)", 0.5, both_ways=False).names
+    ('all power',)
     """
 
-    torque: tuple[float, ...] = ()
-    power: tuple[float, ...] = ()
+    name: str
+    function: str
+    most: float | tuple[float, ...]
+    both_ways: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.strip():
+            raise ProblemError(f"a path limit needs a name, not {self.name!r}.")
+        object.__setattr__(self, "function", read(self.function).text)
+        self._checked(f"the limit {self.name}", (1, 3), "has no value at an instant: let it speak of joints")
+        each = tuple(np.ravel(np.asarray(self.most, dtype=object)).tolist())
+        if not each or not all(is_number(a) and a > 0 for a in each):
+            raise ProblemError(f"the limit {self.name}: the most must be positive and finite, not {self.most!r}.")
+        object.__setattr__(self, "most", tuple(map(float, each)) if np.ndim(self.most) else float(each[0]))
+
+    @property
+    def text(self) -> str:  # type: ignore[override]
+        return self.function
+
+    @cached_property
+    def of_each(self) -> bool:
+        """Whether it is on every joint."""
+        return self._formula(sample()).shape[0] == 3
+
+    def on(self, n_joint: int) -> PathLimit:
+        """The same with a most for each of its values. `ProblemError` if there are others."""
+        rows = n_joint if self.of_each else 1
+        if np.size(self.most) not in (1, rows):
+            raise ProblemError(f"the limit {self.name} has {np.size(self.most)} values; give one, or {rows}.")
+        return replace(self, most=tuple(np.broadcast_to(self.most, rows).tolist()))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the rows of `shares` are."""
-        kinds = ("torque", self.torque), ("power", self.power)
-        return tuple(f"{kind} of joint {j + 1}" for kind, limits in kinds for j in range(len(limits)))
+        """What the rows of `at` are, once there is a most for each."""
+        rows = range(np.size(self.most))
+        return tuple(f"{self.name} of joint {j + 1}" for j in rows) if self.of_each else (self.name,)
+
+    def at(self, now: Instants) -> Array:
+        """Shares of what is allowed ``(n_row, n_time)``."""
+        return self._value(now) / np.array(self.most)[:, None]
+
+    def fields(self) -> dict[str, Any]:
+        """As plain numbers and text (JSON)."""
+        most = list(self.most) if isinstance(self.most, tuple) else self.most
+        return {"name": self.name, "function": self.function, "most": most, "both_ways": self.both_ways}
+
+
+@dataclass(frozen=True)
+class PathLimits:
+    """Limits of a body, each with a most for each of its values (`PathLimit.on`)."""
+
+    each: tuple[PathLimit, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the rows of `at` are."""
+        return tuple(name for limit in self.each for name in limit.names)
 
     @property
     def least(self) -> np.ndarray:
         """Of the shares, that are allowed ``(n_share,)``; the most is 1."""
-        return np.array([-1.0] * len(self.torque) + [-np.inf] * len(self.power))
+        return np.array([-1.0 if limit.both_ways else -np.inf for limit in self.each for _ in limit.names])
 
     @property
     def needs_forces(self) -> bool:
-        return True
+        return any(limit.needs_forces for limit in self.each)
 
     def at(self, now: Instants) -> Array:
-        """Moments, then powers, over their limits, ``(n_share, n_time)``."""
-        rows = [now.moment / np.array(self.torque)[:, None]] if self.torque else []
-        rows += [now.power / np.array(self.power)[:, None]] if self.power else []
-        return namespace(now.moment).stack(rows)
+        """Shares of what is allowed ``(n_share, n_time)``."""
+        return namespace(now.rates).stack([limit.at(now) for limit in self.each])
+
+    def in_units_of(self, unit: float) -> PathLimits:
+        """The same for friction that is divided by a unit."""
+        scaled = [np.array(limit.most) / unit ** (limit.friction_degree or 0.0) for limit in self.each]
+        return PathLimits(tuple(replace(limit, most=tuple(most)) for limit, most in zip(self.each, scaled, strict=True)))
 
 
-UNLIMITED = ActuatorLimits()
+def stated_limit(stated: Any) -> PathLimit:
+    """A limit, as it is or as `PathLimit.fields` wrote it. `ProblemError` if it is none."""
+    if not isinstance(stated, (PathLimit, dict)):
+        raise ProblemError(f"limits are of the kind PathLimit(name, function, most), not {stated!r}.")
+    return stated if isinstance(stated, PathLimit) else PathLimit(**stated)
+
+
+def torque_and_power(torque: tuple[float, ...], power: tuple[float, ...]) -> tuple[PathLimit, ...]:
+    """What motors can do, joint by joint, where it is limited: moments either way, and powers that they deliver, not brake."""
+    stated = ("torque", "moment", torque, True), ("power", "power", power, False)
+    return tuple(PathLimit(*each) for each in stated if each[2])

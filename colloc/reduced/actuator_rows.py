@@ -14,7 +14,7 @@ import numpy as np
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.densities import ActuatorLimits, Instants
+from colloc.mechanics.densities import Instants, PathLimits
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks
 from colloc.reduced.density_slopes import density_slopes
@@ -43,7 +43,7 @@ class ActuatorRows:
         Share and point of each row.
     """
 
-    def __init__(self, motion: ReducedMotion, limits: ActuatorLimits) -> None:
+    def __init__(self, motion: ReducedMotion, limits: PathLimits) -> None:
         self._motion, self._limits = motion, limits
         self.placed = np.empty((2, 0), dtype=int)
         shape = len(limits.names), motion.mesh.n_point

@@ -11,12 +11,12 @@ import casadi as ca
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import ActuatorLimits, Instants, Quantity
+from colloc.mechanics.densities import Instants, PathLimits, Quantity
 from colloc.mechanics.law import Law
 
 
 @lru_cache(maxsize=32)
-def _function(body: Body, friction: Law, of: Quantity | ActuatorLimits) -> ca.Function:
+def _function(body: Body, friction: Law, of: Quantity | PathLimits) -> ca.Function:
     """(y, z, delta) to the total derivatives along y."""
     angles, rates, z, delta = (ca.SX.sym(*s) for s in (("q", body.n_joint), ("r", body.n_joint), ("z", 3), ("delta", 1)))
     y, out = ca.vertcat(angles, rates), of.at(Instants(body, friction, angles, rates, delta, z=z))
@@ -27,7 +27,7 @@ def _function(body: Body, friction: Law, of: Quantity | ActuatorLimits) -> ca.Fu
     return ca.Function("slopes", [y, z, delta], [ca.vec(ca.densify(slope))], {"cse": True})
 
 
-def density_slopes(of: Quantity | ActuatorLimits, now: Instants) -> np.ndarray:
+def density_slopes(of: Quantity | PathLimits, now: Instants) -> np.ndarray:
     """Derivatives ``(n_row, 2 n_joint, n_time)`` of a density, or of the shares of limits, at balanced tail velocities."""
     slope = _function(now.body, now.friction, of)(np.concatenate([now.angles, now.rates]), now.z, now.delta)
     return slope.full().reshape(-1, 2 * len(now.angles), now.angles.shape[1])

@@ -10,7 +10,7 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import UNLIMITED, ActuatorLimits, Quantity
+from colloc.mechanics.densities import PathLimit, PathLimits, Quantity
 from colloc.mechanics.law import Law
 from colloc.verification.replay import MixedPath, Path, Replay, replay
 
@@ -78,7 +78,7 @@ def measured(
     objective: Objective = EFFICIENCY,
     rotation: float | None = 0.0,
     quantities: Iterable[Quantity | str] = (),
-    limits: ActuatorLimits = UNLIMITED,
+    limits: Iterable[PathLimit] | PathLimits = (),
     run: Callable[..., Replay] = replay,
 ) -> Measured:
     """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.

@@ -1,6 +1,6 @@
 """What the joints of any gait have to do at least: limits that no gait can keep are told before a search.
 
-Two statements about instants, with the shares of the limits (`colloc.mechanics.actuators.ActuatorLimits`):
+Two statements about instants, with the shares of the limits (`colloc.mechanics.densities.PathLimits`):
 
 - A gait moves at some instant at least as fast as its mean, in some direction of some shape. So it needs no less than the
   smallest share over all shapes and directions at the slowest pace allowed.
@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.limits import of_each_angle
+from colloc.gaits.limits import of_each, of_each_angle
 from colloc.gaits.problem import Problem
-from colloc.mechanics.densities import ActuatorLimits, Instants
+from colloc.mechanics.densities import Instants, PathLimits, torque_and_power
 from colloc.reduced.density_slopes import density_slopes
 from colloc.system.errors import ProblemError
 
@@ -38,16 +38,17 @@ _PHASES = np.arange(64) / 64
 
 def check_actuators_suffice(problem: Problem) -> None:
     """A `ProblemError` if no gait of a problem keeps the limits on its joints' torques and powers, whatever its efficiency."""
-    limits = problem.actuator_limits
+    limits = _motors(problem)
     if not limits.names or problem.slope is not None or problem.law.degree is None or _guess_keeps(problem):
         return
     stated = " and ".join(name for name in ("torque_limit", "power_limit") if getattr(problem, name) is not None)
     distance = max((least for aim, least in problem.at_least if aim.expression == "distance"), default=0.0)
     needed = problem.law.smallest * distance
-    if limits.power and problem.law.degree == 0 and sum(limits.power) < needed:
+    power = of_each(problem.power_limit, problem.body.n_joint)
+    if power and problem.law.degree == 0 and sum(power) < needed:
         raise ProblemError(
             f"no gait keeps power_limit and goes as far as at_least asks: a distance of {distance:g} takes a power of "
-            f"{needed:.3g} on average, and the joints together may deliver {sum(limits.power):.3g}."
+            f"{needed:.3g} on average, and the joints together may deliver {sum(power):.3g}."
         )
     share = least_share(problem, enough=1.0)
     if share > 1 + _MARGIN:
@@ -78,7 +79,7 @@ def least_share(problem: Problem, enough: float = 0.0) -> float:
     y = rng.uniform(-0.5 * np.pi, 0.5 * np.pi, (n, _SAMPLES)) * rng.uniform(size=_SAMPLES)
     directions = rng.normal(size=(n, _SAMPLES))
     samples = np.concatenate([y, directions / np.linalg.norm(directions, axis=0)])
-    found = _shares(problem, problem.actuator_limits, *_instants(problem, samples)).max(axis=0)
+    found = _shares(problem, _motors(problem), *_instants(problem, samples)).max(axis=0)
     best = float(found.min())
     for k in found.argsort()[:_STARTS]:
         if best <= enough:
@@ -89,7 +90,7 @@ def least_share(problem: Problem, enough: float = 0.0) -> float:
 
 def least_share_without_cusps(problem: Problem) -> float:
     """The same of torques, as every gait without cusps needs it somewhere; 0 where the class has others that go anywhere."""
-    limits, law = ActuatorLimits(torque=problem.actuator_limits.torque), problem.law
+    limits, law = PathLimits(tuple(each for each in _motors(problem).each if each.name == "torque")), problem.law
     if not (limits.names and problem.gait.without_cusps and problem.body.n_joint == 2 and law.reversible and law.degree == 0):
         return 0.0
     each = (np.linspace(-most, most, _SHAPES) for most in of_each_angle(problem.joint_limit, 2))
@@ -106,7 +107,7 @@ def _slowest_pace(problem: Problem) -> float:
 
 def _guess_keeps(problem: Problem) -> bool:
     """Whether the guess, which is a member of the class or near one, keeps the limits at some phases."""
-    return bool(_shares(problem, problem.actuator_limits, *problem.guess(_PHASES)).max() <= 1.0)
+    return bool(_shares(problem, _motors(problem), *problem.guess(_PHASES)).max() <= 1.0)
 
 
 def _instants(problem: Problem, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -122,13 +123,19 @@ def _delta(problem: Problem, rates: np.ndarray) -> float:
     return problem.delta * (float(np.linalg.norm(rates, axis=0).mean()) if problem.gait.unit_speed else 1.0)
 
 
-def _senses(limits: ActuatorLimits) -> np.ndarray:
+def _motors(problem: Problem) -> PathLimits:
+    """Limits on torques and powers; what others there are need not grow with the pace."""
+    n_joint = problem.body.n_joint
+    return PathLimits(torque_and_power(of_each(problem.torque_limit, n_joint), of_each(problem.power_limit, n_joint)))
+
+
+def _senses(limits: PathLimits) -> np.ndarray:
     """``(n_row, n_share)``: shares to what must not exceed 1; moments count in both senses."""
     unit = np.eye(len(limits.names))
     return np.concatenate([unit, -unit[np.isfinite(limits.least)]])
 
 
-def _shares(problem: Problem, limits: ActuatorLimits, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+def _shares(problem: Problem, limits: PathLimits, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """In every sense that counts, ``(n_row, n)``."""
     return np.asarray(_senses(limits) @ limits.at(_balanced(problem, angles, rates)))
 
@@ -143,7 +150,7 @@ def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
 
     Variables are (y, direction, s); s is what all shares are below, in units of the first value.
     """
-    n, limits = problem.body.n_joint, problem.actuator_limits
+    n, limits = problem.body.n_joint, _motors(problem)
     on_angles, on_rates = np.array(of_each_angle(problem.joint_limit, n)), np.full(n, _slowest_pace(problem))
 
     def room(x: np.ndarray) -> np.ndarray:

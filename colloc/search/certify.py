@@ -147,7 +147,7 @@ def gait_certificate(
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
     run = replayer(problem.slope, problem.froude)
-    settings |= {"quantities": problem.integrals, "limits": problem.actuator_limits, "run": run}
+    settings |= {"quantities": problem.integrals, "limits": problem.path_limits, "run": run}
     known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
@@ -264,7 +264,7 @@ def _reached(problem: Problem, fine: Replay) -> list[Check]:
 
 def _actuators(problem: Problem, fine: Replay) -> list[Check]:
     """What the joints have to do, against what they can."""
-    names = problem.actuator_limits.names
+    names = problem.path_limits.names
     if not names:
         return []
     most, excess = names[np.argmax(fine.shares)], max(float(fine.shares.max()) - 1.0, 0.0)

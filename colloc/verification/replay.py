@@ -22,7 +22,7 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import LENGTH, UNLIMITED, ActuatorLimits, Instants, Quantity, quantities_of
+from colloc.mechanics.densities import LENGTH, Instants, PathLimit, PathLimits, Quantity, quantities_of
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
@@ -118,7 +118,7 @@ def _evaluated(
     sense: int,
     whole: bool,
     quantities: tuple[Quantity, ...],
-    limits: ActuatorLimits,
+    limits: PathLimits,
     turn: float,
 ) -> tuple[np.ndarray, ...]:
     """`Panels` from z to apart at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
@@ -173,7 +173,7 @@ def replay(
     sense: int = FORWARDS,
     objective: Objective = EFFICIENCY,
     quantities: Iterable[Quantity | str] = (),
-    limits: ActuatorLimits = UNLIMITED,
+    limits: Iterable[PathLimit] | PathLimits = (),
     turn: float = 0.0,
 ) -> Replay:
     """Distance, work, rotation and length of a path over one period, to a relative error in the efficiency, or an objective.
@@ -202,8 +202,8 @@ def replay(
     objective : Objective
     quantities : iterable of Quantity or str
         What is asked for besides, whatever the objective is, as ``["driven_work"]``.
-    limits : ActuatorLimits
-        Of which the largest shares are asked for; with limits of 1 these are the largest torques and powers themselves.
+    limits : iterable of PathLimit
+        Of which the largest shares are asked for; with limits of 1 these are the largest values themselves.
     turn : float
         Net rotation that the path is asked for [rad]: the distance is the chord of an arc that turns by as much.
 
@@ -236,6 +236,7 @@ def replay(
     start = None if near is None else near.tail_velocity(t.ravel())
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     names = "rotation", "distance", "work", *(each.name for each in asked)
+    limits = limits if isinstance(limits, PathLimits) else PathLimits(tuple(each.on(body.n_joint) for each in limits))
     at = partial(_evaluated, body, friction, path, delta, sense=sense, quantities=asked, limits=limits, turn=turn)
     panels, chord = begun(left, width, at(t, start, whole=True)), chord_per_way(turn)
     while True:

@@ -9,9 +9,9 @@ from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.control_problem import control_problem
 from colloc.mechanics.actuators import joint_moments
-from colloc.mechanics.densities import DRIVEN_WORK, ActuatorLimits, Instants
+from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 
-ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
+ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
 
 

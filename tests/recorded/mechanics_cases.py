@@ -17,7 +17,7 @@ from colloc.mechanics.contact import (
     share_of_first,
     tangent_of_minimum,
 )
-from colloc.mechanics.densities import DRIVEN_WORK, ActuatorLimits, Instants
+from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.native_kernel import numpy_instead
@@ -140,6 +140,6 @@ def every_motion():
 def actuators():
     angles, rates, z = shapes(FIVE, 5, 13, 2.0)
     forces = FIVE.forces(UNEQUAL, angles, rates, z, 1e-2)
-    limits = ActuatorLimits(torque=(0.1, 0.2, 0.3, 0.4), power=(0.4, 0.3, 0.2, 0.1))
+    limits = PathLimits(torque_and_power((0.1, 0.2, 0.3, 0.4), (0.4, 0.3, 0.2, 0.1)))
     now = Instants(FIVE, UNEQUAL, angles, rates, 1e-2, forces=forces)
     return now.power, DRIVEN_WORK.at(now), limits.at(now), limits.names, limits.least

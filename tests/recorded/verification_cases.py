@@ -5,7 +5,7 @@ import numpy as np
 from colloc import Chain, Corners, Fourier, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.objective import Objective
-from colloc.mechanics.densities import DRIVEN_WORK, ActuatorLimits
+from colloc.mechanics.densities import DRIVEN_WORK, torque_and_power
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.measured import measured
@@ -43,7 +43,7 @@ def replay_of_equal_coefficients():
 
 
 def replay_of_unequal_coefficients_with_limits():
-    limits = ActuatorLimits(torque=(0.1, 0.2), power=(0.3, 0.2))
+    limits = torque_and_power((0.1, 0.2), (0.3, 0.2))
     settings = {"instants": 200, "tolerance": 1e-4, "quantities": ["driven_work"], "limits": limits}
     return replay(WEIGHTY, UNEQUAL, SKEW, 1e-3, **settings)
 

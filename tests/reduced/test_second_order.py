@@ -97,7 +97,7 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
     space, v = space_near(problem, problem.guess)
     program = ReducedProgram(space, problem.delta)
     program.place_rows(v)
-    (shares, points), names = program.actuators.placed, problem.actuator_limits.names
+    (shares, points), names = program.actuators.placed, problem.path_limits.names
     row = int(np.argmax(np.where(shares == names.index("torque of joint 2"), program.actuators.values(v, problem.delta), -1)))
     cell = points[row] // space.mesh.scheme.s
     left, right = space.mesh.edges[cell : cell + 2]
@@ -106,7 +106,7 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
         gait, body, t = space.member(at), problem.body, np.atleast_1d(t)
         angles, rates = gait(t)
         z = body.solve(problem.friction, angles, rates, problem.delta).z
-        return problem.actuator_limits.at(Instants(body, problem.friction, angles, rates, problem.delta, z=z))[1, 0]
+        return problem.path_limits.at(Instants(body, problem.friction, angles, rates, problem.delta, z=z))[1, 0]
 
     def peak(at):
         reach = {"bounds": (2 * left - right, 2 * right - left), "method": "bounded", "options": {"xatol": 1e-12}}

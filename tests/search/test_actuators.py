@@ -26,13 +26,13 @@ from colloc import (
 from colloc.commands import verify
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import instant
-from colloc.mechanics.densities import DRIVEN_WORK, ActuatorLimits, Instants
+from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.reduced.program import ReducedProgram
 from colloc.search.actuator_demand import check_actuators_suffice, least_share, least_share_without_cusps
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 
-ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
+ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
 USUAL = Problem("limited", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"))
 
@@ -153,7 +153,7 @@ def test_limits_are_kept_in_files_and_verified(weak, tmp_path, capsys):
     assert again.problem.power_limit == 0.6
     assert again.problem.hash == weak.problem.hash
     assert "torque_limit" not in again.problem.to_dict()
-    assert Problem.from_dict(again.problem.to_dict()).actuator_limits == ActuatorLimits((), (0.6, 0.6))
+    assert Problem.from_dict(again.problem.to_dict()).path_limits == PathLimits(torque_and_power((), (0.6, 0.6)))
     assert verify.main([str(path)]) == 0
     assert "actuators" in capsys.readouterr().out
 
@@ -187,7 +187,7 @@ def test_joints_too_weak_for_a_search_from_one_guess_are_named():
 
 def largest_share(problem, gait):
     delta = problem.delta * gait.delta_unit
-    limits = problem.actuator_limits
+    limits = problem.path_limits
     return replay(problem.body, problem.friction, gait, delta, limits=limits, tolerance=1e-3, instants=200).shares.max()
 
 

@@ -84,9 +84,9 @@ def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
         first = 1 if problem.gait.symmetry == "none" and problem.rotation is not None else 0
         own = reduced.rows(v)[first : first + len(problem.at_least)]
         np.testing.assert_allclose(g[full.groups["at least"]], own, atol=1e-11)
-    if problem.actuator_limits.names:
+    if problem.path_limits.names:
         share, point = reduced.actuators.placed
-        shares = g[full.groups["actuators"]].reshape(-1, len(problem.actuator_limits.names))
+        shares = g[full.groups["actuators"]].reshape(-1, len(problem.path_limits.names))
         assert share.size > 10
         np.testing.assert_allclose(shares[point, share], reduced.actuators.values(v, delta), atol=1e-9)
     assert_derivatives_are_differences(found, x, p, 3e-5)
