@@ -88,6 +88,14 @@ class GaitFunction:
         """The gait in words or as a formula."""
         raise NotImplementedError
 
+    @property
+    def pointing(self) -> list[str]:
+        """A line that says where it points, if it does."""
+        if self.theta is None:
+            return []
+        turned = np.degrees(np.angle(np.exp(1j * self.theta)))
+        return [f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)"]
+
     def named(self, coordinate: str) -> Any:
         """The gait of a body that calls its shape coordinates so."""
         found = copy.copy(self)

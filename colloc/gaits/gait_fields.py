@@ -22,7 +22,6 @@ from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
-from colloc.gaits.sloped import PointedSeries
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
@@ -45,7 +44,9 @@ AnyGait: TypeAlias = Any
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
-GAITS: tuple[type, ...] = (Fourier, ArcPath, Combination, Corners, Mixture, Phases, PointedSeries, SerpenoidSeries)
+GAITS: tuple[type, ...] = (Fourier, ArcPath, Combination, Corners, Mixture, Phases, SerpenoidSeries)
+_FORMERLY = {"PointedSeries": "Fourier"}
+"""Kinds in older files."""
 CLASSES: tuple[type, ...] = (Harmonic, BSpline, Basis, FreePath, Polygon, Relaxed, Prescribed, Serpenoid)
 BODIES: list[type] = [Chain, Coupled, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
@@ -86,6 +87,7 @@ def _revived(value: Any) -> Any:
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
     values = dict(given)
     name = values.pop(KIND)
+    name = _FORMERLY.get(name, name)
     kind = next((kind for kind in kinds if kind.__name__ == name), None)
     if kind is None:
         raise KeyError(f"{name} is none of {', '.join(kind.__name__ for kind in kinds)}")

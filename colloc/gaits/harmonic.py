@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,11 @@ from colloc.gaits.gait import GaitFunction, finite_array
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, symmetric_samples
 from colloc.mechanics.bodies import Body
-from colloc.system.arguments import is_whole, named_arguments
+from colloc.system.arguments import STATED_IF_SET, is_whole, named_arguments
 from colloc.system.errors import ProblemError
+
+_SAME_START = 1e-9
+"""Sine of the first joint's first harmonic up to which a gait starts where those of its class do."""
 
 
 @named_arguments
@@ -24,6 +27,8 @@ class Fourier(GaitFunction):
     ----------
     mean : (n_joint,)
     cos, sin : (n_joint, n_harmonic)
+    theta : float, optional
+        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
 
     Examples
     --------
@@ -36,6 +41,7 @@ class Fourier(GaitFunction):
     mean: np.ndarray
     cos: np.ndarray
     sin: np.ndarray
+    theta: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
 
     is_series = True
 
@@ -84,7 +90,7 @@ class Fourier(GaitFunction):
                 wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
                 terms.append(f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}")
             found.append(f"{self.coordinate} {j + 1}: " + " ".join(terms))
-        return found
+        return [*found, *self.pointing]
 
     def mapped(self, matrix: np.ndarray) -> Fourier:
         """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
@@ -268,9 +274,12 @@ class Harmonic(LinearClass):
     def parameters(self, gait: Fourier) -> np.ndarray:
         """The parameter vector of the class member nearest to `gait`, after shifting its start phase if that is free."""
         gait = gait.resized(self.harmonics)
-        if self.symmetry != "bilateral":
+        if self.symmetry != BILATERAL:
             gait = shifted(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
         return self.nearest(gait)
+
+    def in_phase(self, gait: Fourier) -> bool:
+        return self.symmetry == BILATERAL or bool(abs(gait.sin[0, 0]) < _SAME_START)
 
     def nearest(self, gait: Fourier) -> np.ndarray:
         """The parameter vector of the class member nearest to `gait`, in its phase."""

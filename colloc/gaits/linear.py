@@ -8,7 +8,7 @@ their own image. Fourier series (`colloc.gaits.harmonic`), B-splines and columns
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -18,7 +18,7 @@ from scipy.linalg import qr
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.mechanics.bodies import Body
-from colloc.system.arguments import named_arguments
+from colloc.system.arguments import STATED_IF_SET, named_arguments
 from colloc.system.errors import ProblemError
 
 _COARSE = 16
@@ -42,6 +42,8 @@ class Combination(GaitFunction):
         The class whose functions are meant.
     table : (n_joint, n_function)
         Their coefficients.
+    theta : float, optional
+        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
 
     Examples
     --------
@@ -53,6 +55,7 @@ class Combination(GaitFunction):
 
     basis: Any
     table: np.ndarray
+    theta: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
 
     is_series = True
 
@@ -86,7 +89,8 @@ class Combination(GaitFunction):
         """The formula, joint by joint, or mode by mode."""
         table, names = np.round(self.table, 4) + 0.0, [self.basis.label(i) for i in range(self.table.shape[1])]
         rows = (" ".join(f"{c:+.4f} {name}" for c, name in zip(row, names, strict=True) if c != 0) for row in table)
-        return [f"φ: {self.basis.describe()}", *(f"{self.coordinate} {j}: {row or '0'}" for j, row in enumerate(rows, 1))]
+        formula = (f"{self.coordinate} {j}: {row or '0'}" for j, row in enumerate(rows, 1))
+        return [f"φ: {self.basis.describe()}", *formula, *self.pointing]
 
     def mapped(self, matrix: np.ndarray) -> Any:
         """The Fourier series of the gait with shapes multiplied by a matrix ``(m, n_joint)``."""
@@ -165,6 +169,14 @@ class LinearClass(ClassOfGaits):
         return Combination(self, (self._basis(n_joint) @ parameters).reshape(n_joint, -1))
 
     def parameters(self, gait: Any) -> np.ndarray:
+        """The parameter vector of the class member nearest to a gait."""
+        return self.nearest(gait)
+
+    def in_phase(self, gait: Any) -> bool:
+        """Whether a gait starts where members do."""
+        return True
+
+    def nearest(self, gait: Any) -> np.ndarray:
         """The parameter vector of the class member nearest to a gait, in its phase (least squares over the period)."""
         if getattr(gait, "basis", None) == self:
             return np.linalg.lstsq(self._basis(gait.n_joint), gait.table.ravel(), rcond=None)[0]

@@ -9,27 +9,24 @@ the weight.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields, replace
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.gaits.gait import finite_array
-from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.schemes import scheme
-from colloc.system.arguments import is_number, named_arguments
+from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
 _ANY_ANGLE = 100.0
 """Bound on where a body may point [rad]: none."""
-_SAME_START = 1e-9
-"""Sine of the first joint's first harmonic up to which a gait starts where those of its class do."""
 
 
 class Slope(NamedTuple):
@@ -56,35 +53,9 @@ class Slope(NamedTuple):
         return f"slope of grade {self.grade:g}: d is {way}, W the work of the joints"
 
 
-@named_arguments
-@dataclass(frozen=True, eq=False, repr=False)
-class PointedSeries(Fourier):
-    """A Fourier series of a body on a slope.
-
-    Parameters
-    ----------
-    mean, cos, sin
-        As of a `Fourier`.
-    theta : float
-        Angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
-    """
-
-    theta: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "theta", float(finite_array("guess.theta", self.theta, 0)))
-
-    def lines(self) -> list[str]:
-        """The formula, and where the body points."""
-        turned = np.degrees(np.angle(np.exp(1j * self.theta)))
-        where = f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)"
-        return [*super().lines(), where]
-
-
-class OnSlope(Harmonic):
-    """What a slope changes in a class of series: the last parameter says where the tail link points at phase 0. Classes on
-    slopes derive from it first and then from the class they are on the level (`class_on`)."""
+class OnSlope(LinearClass):
+    """What a slope changes in a class that is linear in its parameters: one more says where the tail link points at phase 0.
+    Classes on slopes derive from it first and then from the class they are on the level (`class_on`)."""
 
     delta_start = 0.02
     """At more the body creeps down faster than it crawls up."""
@@ -103,14 +74,14 @@ class OnSlope(Harmonic):
         return BILATERAL if self.symmetry == BILATERAL else NONE
 
     @property
-    def level(self) -> Harmonic:
+    def level(self) -> Any:
         return type(self).__bases__[1](**_fields(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _pointed, (self.level,)
 
-    def series(self, harmonics: int) -> Harmonic:
-        return self.level
+    def series(self, harmonics: int) -> Any:
+        return self.level.series(harmonics)
 
     def _basis(self, n_joint: int) -> np.ndarray:
         """No angle depends on where the body points."""
@@ -118,20 +89,36 @@ class OnSlope(Harmonic):
         return np.column_stack([basis, np.zeros(len(basis))])
 
     def largest_parameters(self, body: Body, limit: float) -> np.ndarray:
-        return np.append(super().largest_parameters(body, limit)[:-1], _ANY_ANGLE)
+        return np.append(self.level.largest_parameters(body, limit), _ANY_ANGLE)
 
-    def fourier(self, parameters: np.ndarray, n_joint: int) -> Fourier:
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
         """The gait of a parameter vector, which points nowhere yet if that does not."""
-        gait = super().fourier(np.append(parameters[:-1], 0.0), n_joint)
-        return gait if np.isnan(parameters[-1]) else PointedSeries(gait.mean, gait.cos, gait.sin, parameters[-1])
+        gait = self.level.member(parameters[:-1], n_joint)
+        return gait if np.isnan(parameters[-1]) else replace(gait, theta=float(parameters[-1]))
 
-    def parameters(self, gait: Fourier) -> np.ndarray:
+    def through(self, gait: Any) -> Any:
+        near = self.level.through(gait)
+        return replace(near, theta=gait.theta) if gait.is_series else near
+
+    def parameters(self, gait: Any) -> np.ndarray:
         """The parameter vector of the member nearest to a gait; its last one is NaN if that does not say where it points, or
         would, started in another phase."""
-        in_phase = self.symmetry == BILATERAL or abs(gait.sin[0, 0]) < _SAME_START
-        if gait.theta is None or not in_phase:
-            return np.append(super().parameters(gait)[:-1], np.nan)
-        return np.append(self.nearest(gait)[:-1], gait.theta)
+        if gait.theta is None or not self.in_phase(gait):
+            return np.append(self.level.parameters(gait), np.nan)
+        return np.append(self.level.nearest(gait), gait.theta)
+
+    # where searches begin: where a body points is not drawn
+    def first_guess(self, gait: Any) -> Any:
+        return self.level.first_guess(gait)
+
+    def dimension(self, n_joint: int) -> int:
+        return self.level.dimension(n_joint)
+
+    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
+        return self.level.drawn(unit, n_joint)
+
+    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
+        return self.level.moved(gait, step, fall, rng)
 
 
 def _fields(gait_class: Any) -> dict[str, Any]:
@@ -149,7 +136,7 @@ def _pointed(gait_class: Any) -> Any:
 
 
 def class_on(slope: Slope | None, gait_class: Any) -> Any:
-    """A class of gaits on a slope, or on the level; any that derives from `Harmonic`, one's own too, can be on both.
+    """A class of gaits on a slope, or on the level; any that derives from `LinearClass`, one's own too, can be on both.
 
     Raises
     ------
@@ -159,8 +146,11 @@ def class_on(slope: Slope | None, gait_class: Any) -> Any:
     level = gait_class.level
     if slope is None:
         return level
-    if not (isinstance(level, Harmonic) and level.linear):
-        raise ProblemError(f"on a slope gaits are sought in a class Harmonic, not {type(level).__name__}.")
+    if not (isinstance(level, LinearClass) and level.linear):
+        raise ProblemError(
+            f"on a slope gaits are sought in classes whose angles are linear in their parameters, not {type(level).__name__}: "
+            "take Harmonic, BSpline or Basis."
+        )
     return _pointed(level)
 
 

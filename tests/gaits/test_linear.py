@@ -173,7 +173,6 @@ def test_a_file_of_columns_is_read_with_or_without_its_last_line(tmp_path):
         (lambda: Problem("twice", gait=Basis([bump, bump])), "depend on one another"),
         (lambda: Problem("one", gait=Basis([lambda t: bump(t - 0.1)], "bilateral")), "no symmetry 'bilateral'"),
         (lambda: Problem("long", body=Chain((0.25,) * 4), gait=Basis(ELLIPSES)), "angles of 2 joints, and the body has 3"),
-        (lambda: Problem("slope", gait=BSpline(8), grade=0.1), "on a slope"),
     ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(made, words):

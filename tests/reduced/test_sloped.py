@@ -3,12 +3,18 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Wheel, ellipse
+from colloc import Basis, BSpline, Chain, Foot, Friction, Harmonic, Pad, Problem, Wheel, ellipse
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.gait_fields import fields, gait_from
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver
 from colloc.search.spaces import space_near, transcribed
 from colloc.verification.slope import slope_motion
+
+
+def bump(t):
+    return np.exp(np.cos(2 * np.pi * t))
+
 
 LEVEL = Problem("bilateral", gait=Harmonic(1, "bilateral"), grade=0.4, intervals=60)
 SKEW = Problem(
@@ -21,6 +27,8 @@ FEET = SKEW.with_(
     grade=0.2,
 )  # fmt: skip
 
+SPLINE = SKEW.with_(name="spline", gait=BSpline(7, degree=3), guess=None)
+
 
 def program_at(problem, delta):
     """A program, and a point of it with nothing special."""
@@ -31,7 +39,7 @@ def program_at(problem, delta):
     return program, v
 
 
-@pytest.mark.parametrize("problem", [LEVEL, SKEW, FEET], ids=lambda p: p.name)
+@pytest.mark.parametrize("problem", [LEVEL, SKEW, FEET, SPLINE], ids=lambda p: p.name)
 def test_the_mesh_has_the_motion_of_the_differential_equation(problem):
     program, v = program_at(problem.with_(intervals=120), 0.1)
     ran = slope_motion(problem.body, problem.friction, program.space.member(v), 0.1, problem.grade)
@@ -40,7 +48,7 @@ def test_the_mesh_has_the_motion_of_the_differential_equation(problem):
         assert found[name] == pytest.approx(float(np.squeeze(exact)), abs=1e-5), name
 
 
-@pytest.mark.parametrize("problem", [LEVEL, SKEW, FEET], ids=lambda p: p.name)
+@pytest.mark.parametrize("problem", [LEVEL, FEET, SPLINE], ids=lambda p: p.name)
 @pytest.mark.parametrize(("towards", "objective"), [(None, "efficiency"), (2.0, "distance / (work + 0.01 * length)")])
 def test_gradients_are_the_limit_of_differences(problem, towards, objective):
     program, v = program_at(problem.with_(towards=towards, objective=objective), 0.05)
@@ -71,3 +79,17 @@ def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towa
 def test_what_friction_does_not_hold_has_no_value():
     program, v = program_at(LEVEL.with_(friction=Friction(10, 0.1, 0.1), grade=5.0, intervals=12), 1e-3)
     assert np.isnan(program.objective(v))
+
+
+@pytest.mark.parametrize("gait", [Harmonic(2), BSpline(8, symmetry="bilateral"), Basis([bump, lambda t: bump(t - 0.3)])])
+def test_a_member_that_points_somewhere_is_known_by_its_parameters_and_kept_in_files(gait):
+    problem = LEVEL.with_(gait=gait, guess=None)
+    v = np.append(np.random.default_rng(1).normal(size=problem.gait.size(2) - 1), 0.7)
+    member = problem.gait.member(v, 2)
+    assert member.theta == 0.7
+    assert "points +40.11°" in str(member)
+    np.testing.assert_allclose(problem.gait.parameters(problem.gait.through(gait_from(fields(member)))), v, atol=1e-12)
+    free = problem.gait.parameters(gait.member(v[:-1], 2))
+    np.testing.assert_allclose(free[:-1], v[:-1], atol=1e-12)
+    assert np.isnan(free[-1])
+    assert problem.with_(grade=0.0).gait == gait

@@ -11,7 +11,6 @@ from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.objective import QUANTITIES
 from colloc.gaits.problem import Problem
-from colloc.gaits.sloped import PointedSeries
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.results.answer import SecondOrder
@@ -160,7 +159,7 @@ def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(failures,
 @pytest.mark.parametrize(("part", "passes"), [(-1.15, False), (0.85, True), (1.15, False)])
 def test_a_way_on_a_slope_may_lead_off_by_a_thousandth_of_a_radian(part, passes):
     """Where the gait goes is known from another integration; it is asked to go beside that."""
-    gait = PointedSeries(*(getattr(ellipse(0, 2.8, 1.3), name) for name in ("mean", "cos", "sin")), 0.7)
+    gait = replace(ellipse(0, 2.8, 1.3), theta=0.7)
     ran = slope_motion(Chain(), Friction(), gait, 1e-2, 0.1, tolerance=1e-3)
     goes = np.arctan2(ran.aside[0], ran.climb[0])
     asked = {"delta": 1e-2, "grade": 0.1, "towards": goes + part * 1e-3}

@@ -23,9 +23,7 @@ from colloc import (
 from colloc.commands import report, verify
 from colloc.commands import solve as solve_command
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.sloped import PointedSeries
 from colloc.mechanics.bodies import FULL
-from colloc.numerics.mesh import Mesh
 from colloc.reduced.program import ReducedProgram
 from colloc.search.certify import _one_motion, gait_certificate
 from colloc.search.solve import solve
@@ -79,7 +77,7 @@ def test_no_gait_and_no_heading_beside_it_climbs_better(uphill):
     for size in (0.03, 0.1):
         for _ in range(2):
             step = np.append(-np.abs(rng.normal(size=v.size - 1)) * np.sign(v[:-1]), rng.normal())  # folded links may not cross
-            assert run(Chain(), own.fourier(v + size * step, 2)) < uphill.certificate.value
+            assert run(Chain(), own.member(v + size * step, 2)) < uphill.certificate.value
     assert uphill.certificate.value > 1.05 * run(Chain(), ellipse(0, 2.8, 1.3))
 
 
@@ -120,21 +118,17 @@ def test_the_command_line_solves_a_problem_file_with_a_grade(tmp_path, capsys):
 
 def test_a_gait_that_turns_and_points_elsewhere_fails_its_certificate(uphill):
     gait = uphill.gait
-    turns = PointedSeries(gait.mean + np.array([0.1, 0.2]), gait.cos, gait.sin, gait.theta + 0.02)  # no gait of the class
+    turns = Fourier(gait.mean + np.array([0.1, 0.2]), gait.cos, gait.sin, theta=gait.theta + 0.02)  # no gait of the class
     found = gait_certificate(PROBLEM.with_(towards=0.05), turns, 1e-2, np.empty(0), tolerance=1e-4, claimed=uphill.value)
     assert {"replay gap", "net rotation", "direction"} <= {check.name for check in found.failures}
     assert {"work = dissipation", "balance in replay", "replay error"} <= {c.name for c in found.checks if c.passed}
 
 
 def test_the_error_of_a_mesh_is_known_interval_by_interval(uphill):
-    fine, coarse = (
-        mesh_error(control_problem(PROBLEM), Mesh(uphill.mesh.scheme, edges), uphill.gait, 1e-2)
-        for edges in (uphill.mesh.edges, np.linspace(0.0, 1.0, 21))
-    )
+    space, v = space_near(PROBLEM, uphill.gait, np.linspace(0.0, 1.0, 21))
+    fine, coarse = (mesh_error(control_problem(PROBLEM), mesh, uphill.gait, 1e-2) for mesh in (uphill.mesh, space.mesh))
     assert fine.estimate < PROBLEM.mesh_tolerance < 0.1 * coarse.estimate
     assert coarse.total == pytest.approx(coarse.value.sum(), rel=0.05)
-    edges = np.linspace(0.0, 1.0, 21)
-    space, v = space_near(PROBLEM, uphill.gait, edges)
     own = -ReducedProgram(space, 1e-2).objective(v)
     assert coarse.total == pytest.approx(own / uphill.certificate.value - 1, rel=1e-2)
 
@@ -192,7 +186,7 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"gait": FreePath()}, "gaits are sought in a class Harmonic, not FreePath"),
+        ({"gait": FreePath()}, "linear in their parameters, not FreePath"),
         ({"body": CrawlerBody(), "gait": None, "guess": None}, "only a Chain"),
         ({"objective": "turning"}, "the objective speaks of the rotation"),
         ({"objective": "driven efficiency"}, "on a slope the driven_work of a period is not known"),
