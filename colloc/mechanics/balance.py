@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.floor_contact import Rest
 from colloc.mechanics.law import Law, Matrix
 from colloc.mechanics.link_friction import LinkForce, power
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
@@ -41,14 +40,10 @@ class Moving(NamedTuple):
         load = None if self.load is None else self.load[:, chosen]
         return self._replace(angles=self.angles[:, chosen], rates=self.rates[:, chosen], load=load)
 
-    def at_rest(self, rest: Rest) -> np.ndarray:
-        """Tail velocity ``(3, n_time)`` when a point of a link does not move, nor a link turn."""
-        link, along, offset, still = rest
-        body, posture = self.body, self.body.posture(self.angles, link)
-        w = 0.0 - body.relative_turning(self.rates, link)[still]
-        cos, sin = posture.cos[link], posture.sin[link]
-        arm_x, arm_y = along * cos - offset * sin, along * sin + offset * cos
-        return body.tail_velocity(posture, self.rates, np.stack([w * arm_y, -w * arm_x, w]), link)
+    def at_rest(self, link: int) -> np.ndarray:
+        """Tail velocity ``(3, n_time)`` when a link rests."""
+        at = self.body.posture(self.angles, link)
+        return self.body.tail_velocity(at, self.rates, np.zeros((3, self.angles.shape[1])), link)
 
 
 def instant(

@@ -3,7 +3,9 @@
 An associated law (`colloc.mechanics.law`) is the gradient of a strictly convex, coercive dissipation potential, so
 Armijo-damped Newton on that potential converges from any start. Other laws have no potential; there Newton steps are taken
 while they reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
-reweighted least squares) is the safeguard when a Newton step fails.
+reweighted least squares) is the safeguard when a Newton step fails. What ends in a valley of the residual goes on by "natural"
+steps: one counts if the next one, taken with the same matrix, is shorter (Deuflhard, Numer. Math. 22, 1974), so the residual
+may rise.
 
 What a body is made of (links, panels of a smooth curve) is the business of the `Batch`. Velocities are those of a
 *reference* of the body, and the iteration moves it to the slowest one, the *anchor*: a stretch at stick moves at speeds
@@ -21,6 +23,7 @@ import numpy as np
 from colloc.mechanics.law import Law
 
 _ARMIJO = 1e-4
+_NATURAL_GAIN = 0.25
 _BACKTRACKING = (0.5,) * 4 + (0.1,) * 8
 _SHORT_BACKTRACKING = (0.5, 0.25)
 """Without a potential a Newton direction may not descend at all, and shorter steps than these creep along a valley of the
@@ -33,7 +36,7 @@ _DIRECT_ITERATIONS = 40
 _LADDER_ITERATIONS = 240
 _DRY, _VISCOUS = 1e-100, 1e8
 _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
-METHODS = ("auto", "newton", "fixed_point", "direct")
+METHODS = ("auto", "newton", "fixed_point", "direct", "natural")
 
 
 Evaluated = tuple[np.ndarray, np.ndarray, np.ndarray | None]
@@ -114,7 +117,7 @@ def solve(
     attempt alone; the other methods are for comparison.
     """
     everything, first_anchor = np.arange(state.residual.size), state.anchor.copy()
-    direct = min(budget, _DIRECT_ITERATIONS) if method in ("auto", "direct") else budget
+    direct = min(budget, _DIRECT_ITERATIONS) if method in ("auto", "direct", "natural") else budget
     at_rest = ~state.velocity.any(axis=0)
     _advance(state, make_batch, n_reference, everything, delta, tolerance, direct, method)
     if method != "auto":
@@ -187,6 +190,7 @@ def iterate(
             state, force, potential = batch.evaluate(select, z, delta)
             return state, force, 0.5 * np.sum(force * force, axis=0) if potential is None else potential
 
+    shares = _BACKTRACKING if batch.friction.associated or method == "natural" else _SHORT_BACKTRACKING
     n_time = z.shape[1]
     z = z.copy()
     residual, iterations = np.full(n_time, np.inf), np.zeros(n_time, dtype=int)
@@ -200,16 +204,14 @@ def iterate(
             return z, residual, iterations
         active, links, force, merit = active[keep], links[:, :, keep], force[:, keep], merit[keep]
         d, newton = delta[:, active], fixed_point_steps_due[active] == 0
-        step = _step(batch, links, force, d, newton)
+        step, matrix = _step(batch, links, force, d, newton)
         if batch.friction.associated:
             slope, slack = -np.sum(force * step, axis=0), _ROUNDING * merit
         else:
             slope, slack = -2.0 * merit, np.zeros_like(merit)
-        alpha = np.ones(active.size)
-        trial = z[:, active] + step
-        new_links, new_force, new_merit = evaluated(active, trial, d)
-        failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
-        for shrink in _BACKTRACKING if batch.friction.associated else _SHORT_BACKTRACKING:
+        alpha, failed = np.ones(active.size), np.ones(active.size, dtype=bool)
+        trial, new_links, new_force, new_merit = z[:, active], links.copy(), force.copy(), merit.copy()
+        for shrink in (1.0, *shares):
             retry = np.flatnonzero(failed)
             if not retry.size:
                 break
@@ -217,7 +219,12 @@ def iterate(
             trial[:, retry] = z[:, active[retry]] + alpha[retry] * step[:, retry]
             again = evaluated(active[retry], trial[:, retry], d[:, retry])
             new_links[:, :, retry], new_force[:, retry], new_merit[retry] = again
-            failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
+            if method == "natural":
+                following = np.abs(solve3(matrix, new_force)).max(axis=0)
+                fell = following <= (1 - _NATURAL_GAIN * alpha) * np.abs(step).max(axis=0)
+            else:
+                fell = new_merit <= merit + _ARMIJO * alpha * slope + slack
+            failed = newton & ~fell
         trial[:, failed], new_links[:, :, failed] = z[:, active[failed]], links[:, :, failed]
         new_force[:, failed], new_merit[failed] = force[:, failed], merit[failed]
         z[:, active], links, force, merit = trial, new_links, new_force, new_merit
@@ -228,14 +235,15 @@ def iterate(
             iterations[active[failed]] = max_iterations
 
 
-def _step(batch: Batch, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
-    """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``."""
-    step = np.empty_like(force)
+def _step(
+    batch: Batch, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``, and their matrices ``(n, 3, 3)``."""
+    matrix = np.empty((newton.size, 3, 3))
     for by_newton, chosen in ((True, newton), (False, ~newton)):
         if chosen.any():
-            matrix = batch.matrix(state[:, :, chosen], delta[:, chosen], newton=by_newton)
-            step[:, chosen] = solve3(matrix, force[:, chosen])
-    return step
+            matrix[chosen] = batch.matrix(state[:, :, chosen], delta[:, chosen], newton=by_newton)
+    return solve3(matrix, force), matrix
 
 
 def solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -123,9 +123,10 @@ def solve_balance(
         Largest `BalanceSolution.residual` at which an instant counts as converged.
     max_iterations : int
         Steps allowed to an instant in each attempt.
-    method : {"auto", "newton", "fixed_point", "direct"}
-        "auto" damps Newton and falls back on the paper's fixed point: from the start, with each link at rest, from the balance
-        of a larger delta, and at last from afar. "direct" is the first of these attempts, and the others are for comparison.
+    method : {"auto", "newton", "fixed_point", "direct", "natural"}
+        "auto" damps Newton and falls back on the paper's fixed point: from the start, by natural steps, with each link at rest,
+        from the balance of a larger delta, and at last from afar. "direct" and "natural" are single attempts, the others are
+        for comparison.
 
     Returns
     -------
@@ -193,7 +194,8 @@ def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
 def _balanced(
     solved: Callable[..., Found], moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> Found:
-    """What `solved` finds directly, with each link at rest, from where friction is smoother, and last by the method given."""
+    """What `solved` finds directly, then by natural steps, with each link at rest, from where friction is smoother, and last by
+    the method given."""
     found = solved(moving, start, tolerance, max_iterations, "direct")
     enough, contact = _reachable(moving, tolerance), moving.body.contact
 
@@ -201,12 +203,14 @@ def _balanced(
         return _balanced(solved, there._replace(delta=_SMOOTHER * there.delta), None, tolerance, max_iterations, "direct")[0]
 
     def ways() -> Iterator[tuple[Callable[[Moving], np.ndarray | None], str]]:
-        # unequal coefficients: the balance may have folds, beside which steps end; one of the links, or feet, rests nearly
-        for rest in (*contact.rests, *contact.further_rests):
-            yield partial(Moving.at_rest, rest=rest), "direct"
+        # beside a fold, or with feet nearly on a line, the residual has valleys in which it must rise before it falls
+        yield lambda there: found[0][:, failed], "natural"
+        for how in ("direct", "natural"):
+            for link in contact.rests:
+                yield partial(Moving.at_rest, link=link), how
         if moving.load is None and moving.delta < np.abs(moving.rates).max(initial=0.0):
             # several rest nearly, each where the others let it
-            yield smoother, "direct"
+            yield smoother, "natural"
         if method != "direct":
             yield lambda there: None, method
 

@@ -47,15 +47,6 @@ class _PartVelocity(NamedTuple):
     w: Array
 
 
-class Rest(NamedTuple):
-    """A point that does not move, by its link and its place there, and a link that does not turn: where a balance is near."""
-
-    link: int
-    along: float
-    offset: float
-    still: int
-
-
 class _Group(NamedTuple):
     """Parts of one kind under one law."""
 
@@ -101,14 +92,10 @@ class FloorContact:
         self._scatter[self.links, np.arange(len(parts))] = 1.0
         self._pads = [k for k, part in enumerate(parts) if part.extent > 0]
         self._points = [k for k, part in enumerate(parts) if part.extent == 0]
-        order = from_middle(len(lengths))
-        points = sorted(zip(self.links, self.along[:, 0], self.offset[:, 0], strict=True), key=lambda at: order.index(at[0]))
-        self.rests = tuple(Rest(*at, at[0]) for at in points)
-        """What may be at rest: from each of them a balance is sought that is not found otherwise."""
+        self.rests = tuple(link for link in from_middle(len(lengths)) if link in self.links)
+        """Links that may be at rest: from each of them a balance is sought that is not found otherwise."""
         self._short = any(part.extent < 1 for part in parts)
         """A part that is shorter than its link may rest while that turns."""
-        self.further_rests = tuple(Rest(*at, link) for at in points for link in order if self._short and link != at[0])
-        """Others that are tried where these lead nowhere."""
 
     @property
     def rounding(self) -> float:

@@ -64,7 +64,7 @@ def all_balanced_velocities(
     moving = Moving(body, friction, angles, rates, delta, load)
     if friction.associated:
         return Branches(*_solved(moving, np.zeros((1, 3, angles.shape[1])), "auto"))
-    z, sign = _solved(moving, np.stack([moving.at_rest(rest) for rest in body.contact.rests]))
+    z, sign = _solved(moving, np.stack([moving.at_rest(link) for link in body.contact.rests]))
     found = _distinct(z, sign, _speed(rates))
     doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
     if not doubtful.size:

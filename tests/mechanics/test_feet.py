@@ -8,7 +8,7 @@ from shared.instants import random_instants
 from shared.kernels import by_both
 
 from colloc import Chain, Elliptic, Foot, Friction, OwnLaw, Pad, PowerLaw, Problem, ProblemError, Viscous, Wheel, solve_balance
-from colloc.mechanics.native_kernel import native_kernel
+from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 
 LENGTHS = (0.3, 0.45, 0.25)
 PAIR = (Foot(0, 0.2), Foot(1, 0.3, offset=0.05), Foot(1, 0.3, offset=-0.05), Foot(2, 1.0))
@@ -262,6 +262,17 @@ def test_compiled_balances_and_slopes_are_those_of_numpy(law, feet):
     np.testing.assert_allclose(motion.centre, known.centre, atol=1e-11)
     np.testing.assert_allclose(motion.actuator_power, motion.power, atol=1e-9)
     np.testing.assert_allclose(slopes, reference, atol=1e-8)
+
+
+def test_feet_nearly_on_a_line_are_balanced_where_the_residual_must_rise_before_it_falls():
+    bend = np.geomspace(1e-6, 0.1, 400)
+    at = Chain((0.5, 0.5), feet=2), Friction(1, 1, 3), np.stack([[*bend, *-bend]]), np.ones((1, 800)), 5e-6
+    solved = solve_balance(*at).require()
+    net = [wrench(*at[:2], at[2][:, k], at[3][:, k], solved.z[:, k], 5e-6)[0] for k in range(0, 800, 40)]
+    np.testing.assert_allclose(net, 0.0, atol=3e-9)  # rounding of velocities, over delta
+    assert (solve_balance(*at, method="direct").residual > 1e-9).any()
+    with numpy_instead():
+        solve_balance(*at[:2], *(a[:, ::20] for a in at[2:4]), 5e-6).require()
 
 
 @pytest.mark.skipif(native_kernel() is None, reason="no C compiler")

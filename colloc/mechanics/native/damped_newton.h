@@ -8,9 +8,10 @@
 
 #include "chain.h"
 
-enum { AUTO, NEWTON, FIXED_POINT, DIRECT };
+enum { AUTO, NEWTON, FIXED_POINT, DIRECT, NATURAL };
 
 #define ARMIJO 1e-4
+#define NATURAL_GAIN 0.25
 #define ROUNDING 8e-16
 #define FIXED_POINT_STEPS_AFTER_FAILURE 5
 #define DIRECT_ITERATIONS 40
@@ -72,12 +73,21 @@ static inline void solve3(Matrix3 A, const Vector3 b, double shift, Vector3 x)
         x[0] = x0 / d[0], x[1] = x1 / d[1], x[2] = x2 / d[2];
 }
 
+/* By how much the next step would be shorter with the same matrix, once a part alpha of a step is taken; > 0 is progress. */
+static inline double natural_gain(Matrix3 left, const Vector3 force, const Vector3 step, double alpha)
+{
+    Vector3 next;
+    solve3(left, force, 0.0, next);
+    return (1.0 - NATURAL_GAIN * alpha) * largest_of(step) - largest_of(next);
+}
+
 /* Up to `most` steps with the present anchor. */
 static inline void iterate(const int n, State *s, double delta, double tolerance, long long most, int method)
 {
     const Law *law = &s->law;
-    const double *shrink = law->associated ? BACKTRACKING : SHORT_BACKTRACKING;
-    const size_t tries = law->associated ? sizeof BACKTRACKING / sizeof *shrink : sizeof SHORT_BACKTRACKING / sizeof *shrink;
+    const bool far = law->associated || method == NATURAL;
+    const double *shrink = far ? BACKTRACKING : SHORT_BACKTRACKING;
+    const size_t tries = far ? sizeof BACKTRACKING / sizeof *shrink : sizeof SHORT_BACKTRACKING / sizeof *shrink;
     const double unit = unit_of_force(law, delta, s->largest_rate);
     long long iterations = 0, fixed_point_due = method == FIXED_POINT ? -1 : 0;
     double *z = s->velocity;
@@ -98,16 +108,19 @@ static inline void iterate(const int n, State *s, double delta, double tolerance
             slope = -(at.force[0] * step[0] + at.force[1] * step[1] + at.force[2] * step[2]);
             slack = ROUNDING * at.merit;
         }
-        for (int i = 0; i < 3; ++i)
-            trial[i] = z[i] + step[i];
-        Total next = evaluate(n, s->link, s->trial, s->anchor, trial, law, delta);
-        bool failed = newton && !(next.merit <= at.merit + ARMIJO * alpha * slope + slack);
-        for (size_t t = 0; failed && t < tries; ++t) {
-            alpha *= shrink[t];
+        Total next;
+        bool failed = true;
+        for (size_t t = 0; failed && t <= tries; ++t) {
+            alpha *= t > 0 ? shrink[t - 1] : 1.0;
             for (int i = 0; i < 3; ++i)
                 trial[i] = z[i] + alpha * step[i];
             next = evaluate(n, s->link, s->trial, s->anchor, trial, law, delta);
-            failed = !(next.merit <= at.merit + ARMIJO * alpha * slope + slack);
+            if (!newton)
+                failed = false;
+            else if (method == NATURAL)
+                failed = !(natural_gain(left, next.force, step, alpha) >= 0);
+            else
+                failed = !(next.merit <= at.merit + ARMIJO * alpha * slope + slack);
         }
         iterations += 1;
         if (!newton && fixed_point_due > 0)
@@ -153,13 +166,13 @@ static inline void advance(const int n, State *s, double delta, double tolerance
     }
 }
 
-/* Up to four attempts: from where the state is (DIRECT ends there), from rest, down a ladder of delta, by fixed-point steps
+/* Up to four attempts: from where the state is (DIRECT and NATURAL end there), from rest, down a ladder of delta, by fixed-point steps
    only. */
 static inline void solve(const int n, State *s, double delta, double tolerance, long long budget, int method)
 {
     const int first_anchor = s->anchor;
     const bool at_rest = s->velocity[0] == 0 && s->velocity[1] == 0 && s->velocity[2] == 0;
-    const bool briefly = (method == AUTO || method == DIRECT) && budget > DIRECT_ITERATIONS;
+    const bool briefly = (method == AUTO || method == DIRECT || method == NATURAL) && budget > DIRECT_ITERATIONS;
     const long long direct = briefly ? DIRECT_ITERATIONS : budget;
     const long long each = budget > LADDER_ITERATIONS ? LADDER_ITERATIONS : budget;
     advance(n, s, delta, tolerance, direct, method);
