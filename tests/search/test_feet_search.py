@@ -8,6 +8,7 @@ from scipy.optimize import root
 from shared.instants import random_instants
 
 from colloc import Chain, Elliptic, Foot, Friction, Harmonic, Problem, ProblemError, Wheel, load, save, solve_balance
+from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.main import main as colloc
@@ -141,9 +142,16 @@ def test_the_way_from_the_centre_of_mass_is_largest_where_all_links_pull_one_way
     assert Chain(feet=3).largest_imbalance < 1e-15
 
 
+def test_a_gait_of_no_size_pays_no_more_than_the_least_friction_on_one_foot_a_link_only():
+    """Two feet hold while the third is swung: 1/min(mu), which no gait exceeds. More feet to a link are dragged along."""
+    folded, straight = np.array([2.5, -2.5]), np.zeros(2)
+    assert 1 - 1e-4 < small_gait(Chain(feet=1), Friction(), folded).efficiency <= 1
+    assert 1 - 1e-3 < small_gait(Chain(feet=1), Friction(), straight).efficiency <= 1
+    more = [small_gait(Chain(feet=n), Friction(), straight).efficiency for n in (2, 3)]
+    np.testing.assert_allclose(more, [0.6585, 0.5], atol=2e-4)
+
+
 def test_what_feet_cannot_do_yet_is_refused():
-    with pytest.raises(ProblemError, match="on feet cannot be put on a slope"):
-        Problem("hill", body=Chain(feet=1), grade=0.1)
     with pytest.raises(ProblemError, match="not for feet"):
         Domain(Chain(feet=1), Friction(), 2.0)
     assert "not for feet" in refusal(Problem("bound", body=Chain(feet=1)))
