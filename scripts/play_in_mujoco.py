@@ -13,6 +13,8 @@ writes that as a GIF. Needs ``pip install colloc[engines]``.
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +24,7 @@ from scipy.integrate import solve_ivp
 
 import colloc
 from colloc import Chain, Foot, Problem
+from colloc.commands.ending import OK, run
 from colloc.mechanics.inertia import checked_mass
 from colloc.mechanics.law import Law
 from colloc.results.robot_model import mjcf
@@ -181,13 +184,16 @@ def with_contacts(solution: Solution, froude: float, film: Path | None = None) -
     return float(np.hypot(*(data.subtree_com[1] - start)[:2])), work / 9.81
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Play a gait in MuJoCo beside colloc's own motion.")
     parser.add_argument("result", help="a result file of a chain")
     parser.add_argument("--froude", type=float, nargs="+", default=FROUDE, metavar="FR")
     parser.add_argument("--contacts", action="store_true", help="also MuJoCo's own contacts, at the last Froude number")
     parser.add_argument("--film", type=Path, metavar="GIF", help="film of MuJoCo's own contacts")
-    options = parser.parse_args()
+    return run(parser, _play, arguments)
+
+
+def _play(options: argparse.Namespace) -> int:
     solution = colloc.load(options.result)
     print(f"{solution.problem.name}, delta = {DELTA:g}\n")
     print("| Froude number | d MuJoCo | d colloc | W MuJoCo | W colloc | apart |\n|---|---|---|---|---|---|")
@@ -202,7 +208,8 @@ def main() -> None:
         distance, work = with_contacts(solution, options.froude[-1], options.film)
         said = f"d = {distance:.4f}, W = {work:.4f}, d/W = {distance / work:.4f}"
         print(f"\nMuJoCo's own contacts at {options.froude[-1]:g}: {said}")
+    return OK
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -24,10 +24,11 @@ _TURNS = (-30.0, -15.0, 0.0, 15.0, 30.0)
 _EPILOG = """\
 Positive angles turn left, counter-clockwise. The problem states the gait that goes straight. Every gait is a result like any
 other: NAME.steer/00.h5 turns right the most. NAME.steer.json holds all their joint angles at equal phases: a controller
-interpolates between two turns. Chord and radius are those of the arc that a period crawls, whatever phase it is begun at.
+interpolates between two turns. --spot adds the gaits of least work for their turn, NAME.steer/spot_00.h5 and so on. Chord
+and radius are those of the arc that a period crawls, whatever phase it is begun at.
 
   colloc steer problems/three_link.py
-  colloc steer mine.py --turn -40 -20 -10 0 10 20 40"""
+  colloc steer mine.py --turn -40 -20 -10 0 10 20 40 --spot -30 30"""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -36,6 +37,9 @@ def _parser() -> argparse.ArgumentParser:
     default = " ".join(f"{turn:g}" for turn in _TURNS)
     parser.add_argument(
         "--turn", type=float, nargs="+", metavar="DEG", default=list(_TURNS), help=f"of a period (default: {default})"
+    )
+    parser.add_argument(
+        "--spot", type=float, nargs="+", metavar="DEG", default=[], help="turns on the spot, with the least work"
     )
     parser.add_argument("--starts", type=int, metavar="N", help="starts to find the straight gait of (default: 32)")
     parser.add_argument("--output", metavar="PATH", help="folder, or .json file (default: results/NAME.steer.json)")
@@ -52,8 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _steer(options: argparse.Namespace) -> int:
     if options.starts is not None and options.starts < 1:
         raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
-    if not all(abs(turn) < 180 for turn in options.turn):
-        raise ProblemError("--turn takes degrees between -180 and 180: by more the body could as well turn the other way.")
+    if not all(abs(turn) < 180 for turn in (*options.turn, *options.spot)) or 0 in options.spot:
+        raise ProblemError(
+            "--turn and --spot take degrees between -180 and 180, --spot not 0: by more a body could turn the other way."
+        )
     stated = read_problem_file(options.problem)
     problem = changed(stated.problem, options)
     table = output_path(options.output, Path("results") / f"{problem.name}.steer.json")
@@ -67,17 +73,19 @@ def _steer(options: argparse.Namespace) -> int:
         def told(turn: float, found: Solution) -> None:
             line.say(f"{problem.name}: {math.degrees(turn):+.4g} degrees a period: {found}")
 
-        turns = [math.radians(turn) for turn in options.turn]
-        family = steer(problem, turns, starts=options.starts or stated.starts or STARTS, progress=told)
+        turns, spot = ([math.radians(turn) for turn in each] for each in (options.turn, options.spot))
+        family = steer(problem, turns, spot=spot, starts=options.starts or stated.starts or STARTS, progress=told)
     kept, rows = [], []
-    for k, point in enumerate(family.points):
+    spots = () if family.on_the_spot is None else family.on_the_spot.points
+    named = [(f"{k:02d}", point) for k, point in enumerate(family.points)]
+    for name, point in [*named, *((f"spot_{k:02d}", point) for k, point in enumerate(spots))]:
         point.source = stated.source
-        kept += (saved := save_result(point, table.with_suffix("") / f"{k:02d}.h5"))
+        kept += (saved := save_result(point, table.with_suffix("") / f"{name}.h5"))
         arc = point.arc
-        told_turn, radius = math.degrees(family.turns[k]), f"{arc.radius:8.4f}" if math.isfinite(arc.radius) else "       -"
+        radius = f"{arc.radius:8.4f}" if math.isfinite(arc.radius) else "       -"
         rows.append(
-            f"  {told_turn:+7.2f}°  radius {radius}  chord {arc.chord:.6f}  work {point.work:.6f}"
-            f"  efficiency {family.efficiency[k]:.6f}  {point.status}  {saved[0].path}"
+            f"  {math.degrees(arc.angle):+7.2f}°  radius {radius}  chord {arc.chord:.6f}  work {point.work:.6f}"
+            f"  efficiency {arc.chord / point.work:.6f}  {point.status}  {saved[0].path}"
         )
     facts = family.table() | {"efficiency": family.efficiency.tolist()}
     with replaced_file(table) as temporary:

@@ -108,7 +108,7 @@ class Known:
         if self.dry is None:
             return ""
         problem, gait = self.problem, self.gait
-        now = dry_friction(problem.body, problem.law, gait, breaks=gait.corner_phases).efficiency
+        now = dry_friction(problem.body, problem.law, gait, breaks=gait.corner_phases, turn=problem.rotation or 0.0).efficiency
         if np.allclose(self.dry, now, rtol=_DRY_AGREEMENT, atol=0):
             return ""
         return f"dry friction: the table says {self.dry[0]:.8f} to {self.dry[1]:.8f}, and it is {now[0]:.8f} to {now[1]:.8f}"

@@ -2,8 +2,8 @@
 
 The straight gait comes first, of the problem's own class. The others are sought in the class without symmetry, for no
 symmetric gait turns, each from its neighbour outwards; a turn to the right from the mirror image of that to the left, if that
-is asked for, too. Joint angles between those of two neighbours turn by about as much as lies between, so that a controller can
-interpolate.
+is asked for, too. Gaits that turn on the spot are those of least work for their turn. Joint angles between those of two
+neighbours turn by about as much as lies between, so that a controller can interpolate.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.limits import one_sided
+from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.results.solution import Solution
@@ -27,6 +28,8 @@ from colloc.system.late_binding import bound
 
 _LARGEST = math.pi
 """By more than half a turn a period the body could as well turn the other way."""
+LEAST_WORK = Objective("1 / work", "least work")
+"""Of gaits that turn by a given angle: on the spot, for going anywhere takes work."""
 _BEGINS = 1000
 """Phases that are tried."""
 
@@ -42,16 +45,19 @@ class Steering:
         Counter-clockwise [rad], rising.
     points : tuple of Solution
         One for each, with a certificate of its own.
+    on_the_spot : Steering, optional
+        Those that turn with the least work, and hardly leave their place.
     """
 
     problem: Problem
     turns: tuple[float, ...]
     points: tuple[Solution, ...]
+    on_the_spot: Steering | None = None
 
     @property
     def certified(self) -> bool:
         """Whether every gait is."""
-        return all(point.success for point in self.points)
+        return all(point.success for point in self.points) and (self.on_the_spot is None or self.on_the_spot.certified)
 
     @property
     def efficiency(self) -> np.ndarray:
@@ -79,7 +85,8 @@ class Steering:
         `begins`; between two turns angles are interpolated linearly."""
         t = np.arange(phases) / phases
         arcs = [point.arc for point in self.points]
-        return {
+        more = {} if self.on_the_spot is None else {"on_the_spot": self.on_the_spot.table(phases)}
+        return more | {
             "name": self.problem.name,
             "turn_rad": list(self.turns),
             "chord_body_lengths": [each.chord for each in arcs],
@@ -106,6 +113,7 @@ def steer(
     problem: Problem,
     turns: Sequence[float],
     *,
+    spot: Sequence[float] = (),
     starts: int = STARTS,
     progress: Callable[[float, Solution], object] | None = None,
 ) -> Steering:
@@ -117,8 +125,10 @@ def steer(
         Of gaits that go straight; its objective is that of all of them.
     turns : sequence of float
         Counter-clockwise [rad], less than half a turn; 0 need not be among them.
+    spot : sequence of float
+        Turns on the spot, the same way; not 0.
     starts : int
-        From which the straight gait is the best.
+        From which the straight gait is the best, and the first on the spot.
     progress : callable, optional
         Called with a turn and its solution.
 
@@ -138,15 +148,14 @@ def steer(
     """
     if not problem.gait.free or problem.slope is not None or problem.rotation != 0:
         raise ProblemError("steering begins at a gait that is free and goes straight on the level: rotation 0, grade 0.")
-    if not len(turns) or not all(is_number(turn) and abs(turn) < _LARGEST for turn in turns):
-        raise ProblemError(f"turns must be angles of less than half a turn a period, not {list(turns)!r}.")
-    wanted = sorted({float(turn) for turn in turns})
-    found: dict[float, Solution] = {}
+    if not len(turns) or not all(is_number(turn) and abs(turn) < _LARGEST for turn in (*turns, *spot)) or 0 in spot:
+        raise ProblemError(
+            f"turns must be angles of less than half a turn a period, and not 0 on the spot; not {[*turns, *spot]!r}."
+        )
 
     def put(turn: float, solution: Solution) -> Solution:
         if solution.interrupted:
             raise KeyboardInterrupt
-        found[turn] = solution
         if progress is not None:
             progress(turn, solution)
         return solution
@@ -154,11 +163,26 @@ def steer(
     straight = put(0.0, solve(problem, starts))
     if not straight.success:
         raise ProblemError(f"the straight gait is not certified, so there is nothing to steer: {straight.message}")
-    wide = {"gait": replace(problem.gait, symmetry=NONE), "delta_start": problem.delta}
-    for side in ([turn for turn in wanted if turn > 0], [turn for turn in reversed(wanted) if turn < 0]):
-        near = straight
-        for turn in side:
-            mirrored = -turn in found and not one_sided(problem.joint_limit)
-            guess = found[-turn].gait.scaled(-1.0) if mirrored else near.gait
-            near = put(turn, solve(problem.with_(rotation=turn, guess=guess, **wide), 1))
-    return Steering(problem, tuple(wanted), tuple(found[turn] for turn in wanted))
+    free = {"gait": replace(problem.gait, symmetry=NONE)}
+    from_neighbour = free | {"delta_start": problem.delta}
+
+    def turned(stated: Problem, wanted: Sequence[float], known: dict[float, Solution]) -> tuple[Solution, ...]:
+        """Outwards from those that are known, to the left first; from all starts if there is none."""
+        for side in ([turn for turn in wanted if turn > 0], [turn for turn in reversed(wanted) if turn < 0]):
+            near = known.get(0.0)
+            for turn in side:
+                if -turn in known and not one_sided(problem.joint_limit):
+                    near = known[-turn]
+                    near = put(turn, solve(stated.with_(rotation=turn, guess=near.gait.scaled(-1.0), **from_neighbour), 1))
+                elif near is not None:
+                    near = put(turn, solve(stated.with_(rotation=turn, guess=near.gait, **from_neighbour), 1))
+                else:
+                    near = put(turn, solve(stated.with_(rotation=turn, guess=None, delta_start=None, **free), starts))
+                known[turn] = near
+        return tuple(known[turn] for turn in wanted)
+
+    turns, spot = (sorted({float(turn) for turn in each}) for each in (turns, spot))
+    points = turned(problem, turns, {0.0: straight})
+    cheapest = problem.with_(**free, objective=LEAST_WORK, rotation=1.0)
+    places = Steering(cheapest, tuple(spot), turned(cheapest, spot, {})) if spot else None
+    return Steering(problem, tuple(turns), points, places)

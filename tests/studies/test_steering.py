@@ -55,6 +55,18 @@ def test_an_offset_turns_a_serpenoid_snake():
     assert right * left < 0
 
 
+def test_on_the_spot_a_turn_takes_the_least_work_and_leads_nowhere():
+    on_the_way = steer(PROBLEM, [0.2], spot=[0.2], starts=2)
+    spot = on_the_way.on_the_spot
+    assert on_the_way.certified
+    assert spot.points[0].rotation == pytest.approx(0.2, abs=PROBLEM.mesh_tolerance)
+    assert spot.points[0].work < 0.8 * on_the_way.points[0].work
+    assert spot.points[0].arc.radius < 0.3 * on_the_way.points[0].arc.radius
+    assert on_the_way.table(4)["on_the_spot"]["turn_rad"] == [0.2]
+    marks = {line.get_marker() for line in steering_figure(on_the_way).axes[1].lines}
+    assert marks == {"None", "o", "s"}
+
+
 def test_the_figure_names_its_axes(family):
     cost, floor = steering_figure(family).axes
     assert "turn" in cost.get_xlabel()
