@@ -114,6 +114,32 @@ class LinearSpace:
         return None
 
 
+class SerpenoidSpace(LinearSpace):
+    """Members of the class `colloc.gaits.serpenoid.Serpenoid` by their own parameters v; the chain rule to what a space of
+    series knows of their coefficients."""
+
+    def __init__(self, control: ControlProblem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
+        super().__init__(control, edges, scheme, far)
+        self.n = control.admissible.gait.n_own
+        self.lower, self.upper, self.own = self.lower[: self.n], self.upper[: self.n], self.own[: self.n]
+
+    def full_parameters(self, v: np.ndarray) -> np.ndarray:
+        return self._admissible.gait.full(v, self._admissible.n_joint)
+
+    def _slopes(self, v: np.ndarray) -> np.ndarray:
+        """Of the full parameters, ``(n_full, n)``."""
+        return np.vstack([np.eye(self.n), self._admissible.gait.coefficient_slopes(v, self._admissible.n_joint)])
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return super().at(self.full_parameters(v))
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        return super().pulled_back(self.full_parameters(v), on_shape, on_pace) @ self._slopes(v)
+
+    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+        return super().constraints(v, later).through(self.full_parameters, self._slopes)
+
+
 class _Placed(NamedTuple):
     """A check at instants, one in each of some mesh cells: the shares that its cuts hold, what the shapes there are of the
     parameters, ``(n, n_joint, n_parameter)``, and which instants move with the gait."""

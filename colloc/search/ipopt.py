@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -13,8 +14,7 @@ from colloc.collocation.program import GaitProgram
 from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
 from colloc.search.certify import EXACT
-from colloc.search.stop_request import StopRequest
-from colloc.system.interruption import interruptible
+from colloc.system.interruption import interrupted, interruptible
 
 _PUSHED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
 IPOPT_OPTIONS: dict[str, object] = {
@@ -221,3 +221,28 @@ def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarra
     with np.errstate(invalid="ignore"):
         product = np.where(np.isinf(distance), np.abs(multiplier), np.abs(multiplier * distance))
     return float(product[inequality].max(initial=0.0))
+
+
+class StopRequest(ca.Callback):
+    """What IPOPT asks between iterations, the ``iteration_callback`` of nlpsol: whether Ctrl-C came. Stopped so, it ends at
+    once and says nothing."""
+
+    def __init__(self, nlp: Mapping[str, ca.MX]) -> None:
+        ca.Callback.__init__(self)
+        self._sparsity = {name: nlp[name.removeprefix("lam_")].sparsity() for name in ca.nlpsol_out()}
+        self.construct("stop_request")
+
+    def get_n_in(self) -> int:
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_name_in(self, index: int) -> str:
+        return ca.nlpsol_out(index)
+
+    def get_sparsity_in(self, index: int) -> ca.Sparsity:
+        return self._sparsity[ca.nlpsol_out(index)]
+
+    def eval(self, arguments: list[ca.DM]) -> list[int]:
+        return [int(interrupted())]

@@ -26,11 +26,10 @@ from colloc.gaits.sloped import OnSlope
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.heading import whole_turns
-from colloc.reduced.linear_space import LinearSpace
+from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
-from colloc.reduced.serpenoid_space import SerpenoidSpace
 from colloc.reduced.sloped import SlopeSpace
 from colloc.system.errors import ProblemError
 
