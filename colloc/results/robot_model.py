@@ -2,8 +2,8 @@
 
 Links have the problem's lengths, masses and moments of inertia and are drawn as boxes; joints are hinges about the vertical.
 Links of no width are drawn `_THIN` wide. What touches the floor is the whole link, or a small sphere at each foot. A
-simulator's own contacts know one coefficient of friction, here the geometric mean of the smallest and the largest: where
-friction has a direction, its floor is another than colloc's (`scripts.play_in_mujoco` applies the law itself).
+simulator's own contacts know one coefficient of friction each, here the geometric mean of its smallest and its largest: where
+friction has a direction, that floor is another than colloc's (`scripts.play_in_mujoco` applies the law itself).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from colloc.gaits.limits import range_of
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.law import Law
 from colloc.results.robot import Robot
 from colloc.system.errors import ProblemError
 
@@ -54,7 +55,7 @@ def mjcf(robot: Robot, *, planar: bool = False) -> str:
     >>> mjcf(robot).count("<joint ")
     2
     """
-    chain, half = _chain(robot), 0.5 * _height(robot)
+    chain, half, law = _chain(robot), 0.5 * _height(robot), robot.solution.problem.law
     root = Element("mujoco", model=robot.solution.problem.name)
     SubElement(root, "compiler", angle="radian", autolimits="true")
     gravity = 0.0 if planar else -robot.gravity
@@ -66,7 +67,7 @@ def mjcf(robot: Robot, *, planar: bool = False) -> str:
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos="0 0 3", dir="0 0 -1", ambient="0.4 0.4 0.4")
     if not planar:
-        friction = f"{_mean_friction(robot):.9g} 0 0"
+        friction = f"{_mean_friction(law):.9g} 0 0"
         SubElement(world, "geom", name="floor", type="plane", size="0 0 1", material="squares", friction=friction, condim="3")
     parent, at = world, f"0 0 {half:.9g}"
     peaks, ranges = robot.facts["peak_torque_N_m"], _ranges(robot)
@@ -84,15 +85,14 @@ def mjcf(robot: Robot, *, planar: bool = False) -> str:
         SubElement(parent, "inertial", pos=f"{length / 2:.9g} 0 0", mass=f"{mass:.9g}", diaginertia=inertia)
         size = f"{length / 2:.9g} {_width(robot) / 2:.9g} {half:.9g}"
         box = {"type": "box", "pos": f"{length / 2:.9g} 0 0", "size": size, "rgba": _COLOUR}
-        SubElement(parent, "geom", box | _touch(robot, not planar and not chain.feet), name=f"box_{k + 1}")
+        SubElement(parent, "geom", box | _touch(law, not planar and not chain.feet), name=f"box_{k + 1}")
         for number, foot in enumerate(chain.standing_on, 1):
             if foot.link == k:
                 place = f"{foot.place * length:.9g} {foot.offset * robot.length:.9g} 0"
                 pad = f"{foot.extent * length / 2:.9g} {half:.9g} {half:.9g}"
                 form = {"type": "box", "size": pad} if foot.extent else {"type": "sphere", "size": f"{half:.9g}"}
-                SubElement(
-                    parent, "geom", form | {"pos": place, "mass": "0"} | _touch(robot, not planar), name=f"foot_{number}"
-                )
+                touch = _touch(foot.friction or robot.solution.problem.friction, not planar)
+                SubElement(parent, "geom", form | {"pos": place, "mass": "0"} | touch, name=f"foot_{number}")
         at = f"{length:.9g} 0 0"
     servos = SubElement(root, "actuator")
     for j, peak in enumerate(peaks, 1):
@@ -179,9 +179,10 @@ def _inertia(robot: Robot, link: int, mass: float) -> tuple[float, float, float]
     return mass * (_width(robot) ** 2 + _height(robot) ** 2) / 12, upright, upright
 
 
-def _touch(robot: Robot, floor: bool) -> dict[str, str]:
-    """Of a shape that touches the floor, or nothing: parts of a body never touch each other, which is the gait's business."""
-    friction = {"friction": f"{_mean_friction(robot):.9g} 0 0"} if floor else {}
+def _touch(law: Law, floor: bool) -> dict[str, str]:
+    """Of a shape that touches the floor, by its own friction, or nothing: parts of a body never touch each other, which is the
+    gait's business."""
+    friction = {"priority": "1", "friction": f"{_mean_friction(law):.9g} 0 0"} if floor else {}
     return {"contype": "0", "conaffinity": "1" if floor else "0"} | friction
 
 
@@ -190,8 +191,7 @@ def _ranges(robot: Robot) -> list[tuple[float, float]]:
     return [range_of(own) for own in (limit if isinstance(limit, tuple) else (limit,) * count)]
 
 
-def _mean_friction(robot: Robot) -> float:
-    law = robot.solution.problem.law
+def _mean_friction(law: Law) -> float:
     return float(np.sqrt(law.smallest * law.largest))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Chain, Coupled, Foot, Friction, Harmonic, Problem, ProblemError
+from colloc import Chain, Coupled, Foot, Friction, Harmonic, Problem, ProblemError, Wheel
 from colloc.commands.export import main
 from colloc.results.robot_model import mjcf, urdf
 
@@ -46,6 +46,14 @@ def test_an_mjcf_has_the_links_masses_ranges_and_feet_of_the_robot(uneven):
     np.testing.assert_allclose(feet, np.array([[0.048, 0, 0], [0.3, 0, 0], [0.252, -0.024, 0], [0.252, 0.024, 0]]), atol=1e-12)
     start = numbers(root.find("keyframe/key").get("qpos"))
     assert start[-2:] == pytest.approx(uneven.gait.angles(np.zeros(1))[:, 0])
+
+
+def test_every_foot_slides_by_the_mean_of_its_own_friction(uneven):
+    feet = (Foot(0), Foot(1, friction=Friction(4, 1, 1)), Wheel(2, rolling=0.04, sideways=1.0))
+    problem = uneven.problem.with_(body=Chain(feet=feet), friction=Friction(9, 1, 1), joint_limit=3.0)
+    root = ElementTree.fromstring(mjcf(colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7)).robot(**SIZE)))
+    found = {geom.get("name"): numbers(geom.get("friction"))[0] for geom in root.iter("geom") if geom.get("priority") == "1"}
+    assert found == pytest.approx({"foot_1": 3.0, "foot_2": 2.0, "foot_3": 0.2})
 
 
 def test_a_urdf_is_a_tree_of_links_with_efforts_and_speeds_that_suffice(uneven):
