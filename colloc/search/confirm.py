@@ -37,8 +37,10 @@ from colloc.search.spaces import heading, space_near, transcribed, with_far
 
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
-_OPTIONS: dict[str, object] = {"mu_init": 1e-10, "max_iter": 60}
+_OPTIONS: dict[str, object] = {"mu_init": 1e-10}
 """The barrier begins where it ends, as multipliers are known: most gaits are confirmed by one or two steps."""
+_MOST_PARAMETERS = 150
+"""Curvature is measured for so many parameters at most: it takes two gradients for each, 8 s for a free path of 256."""
 
 
 class Verdict(Enum):
@@ -216,6 +218,8 @@ def second_order(answer: Answer) -> SecondOrder:
     """The curvature of the Lagrangian at an answer, with all pairs of links kept apart."""
     problem = answer.problem
     space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
+    if v.size > _MOST_PARAMETERS:
+        return replace(NOT_MEASURED, why_not=f"not measured, for {v.size} parameters")
     program = ReducedProgram(with_far(space, problem.body.far_pairs), answer.delta)
     program.place_rows(v)
     found, size = curvature(program, v), abs(answer.value / program.stated(-1.0))
