@@ -20,7 +20,7 @@ from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
 
 _EPILOG = """\
-The page needs no network and no other file: certificate, animation with friction, shape space, speeds, power, convergence,
+The page needs no network and no other file: film with friction, robot, shape space, speeds, power, certificate, convergence,
 mesh, problem source, versions, and how to reproduce it. Results that failed get a page too.
 
   colloc report results/three_link.h5                 results/three_link.html

@@ -121,6 +121,26 @@ def test_the_page_needs_no_network_and_no_other_file(page):
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&<!--"
 
 
+def test_a_reader_who_hears_the_page_is_told_what_is_drawn_and_can_scroll_with_the_keyboard(page):
+    drawn = re.findall(r"<(?:svg|canvas)[^>]*>", page)
+    assert len(drawn) > 6
+    assert all('role="img"' in tag and re.search(r'aria-label="[^"]+"', tag) for tag in drawn)
+    assert re.findall(r"<figcaption>(.*?)</figcaption>", page) == re.findall(r'<svg[^>]*aria-label="([^"]*)"', page)
+    scrolling = re.findall(r'<(?:pre|div class="scroll")[^>]*>', page)
+    assert scrolling
+    assert all('tabindex="0"' in tag for tag in scrolling)
+    assert not re.search(r"<th[^>]*></th>", page)
+
+
+def test_the_film_comes_first_and_the_certificate_is_folded_away_unless_it_fails(page, three_link):
+    places = [page.index(words) for words in ("Motion in the lab frame", "What was solved", "<h2>Gait", "<h2>Certificate")]
+    assert places == sorted(places)
+    assert "<details><summary><h2>Certificate: 15 of 15 checks hold" in page
+    bad = replace(three_link.certificate, checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks))
+    failed = report_page(Solution(three_link.problem, three_link.answer, bad))
+    assert "<details open><summary><h2>Certificate: 15 of 16 checks hold" in failed
+
+
 def test_everything_from_the_file_is_escaped(three_link):
     checks = (Check(EVIL, 1.0, 0.0, EVIL), *three_link.certificate.checks)
     history = (*three_link.history, replace(three_link.history[0], status=EVIL, optimal=False))
