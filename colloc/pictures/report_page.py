@@ -225,7 +225,11 @@ def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, 
     svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # it would style the whole page
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg)
     svg = re.sub(r'<g id="[^"]*"', "<g", svg)  # the same in every panel
-    svg = re.sub(r'<svg [^>]*viewBox="([^"]*)"[^>]*>', lambda svg: f'<svg viewBox="{svg[1]}" role="img" aria-label="{escape(caption)}">', svg)
+    svg = re.sub(
+        r'<svg [^>]*viewBox="([^"]*)"[^>]*>',
+        lambda svg: f'<svg viewBox="{svg[1]}" role="img" aria-label="{escape(caption)}">',
+        svg,
+    )
     svg = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)  # hundredths of a point
     svg = svg.replace(INK, "currentColor")
     axes = figure.axes[0]
