@@ -120,6 +120,14 @@ def on_page_content(html: str, page: Any, config: Any, files: Any) -> str:
     return re.sub(r"FORMULA(\d+)END", lambda match: page.meta["formulas"][int(match[1])], html)
 
 
+def on_post_page(output: str, page: Any, config: Any) -> str:
+    """What scrolls can be reached with the keyboard, and the search has a name for those who hear the page."""
+    output = output.replace(
+        'data-md-component="search" role="dialog"', 'data-md-component="search" role="dialog" aria-label="Search"'
+    )
+    return output.replace("<pre><span></span><code>", '<pre><span></span><code tabindex="0">')
+
+
 def gallery_page() -> str:
     """All pictures at a glance, then a section a problem file: its story, picture, numbers and source."""
     table = json.loads((ROOT / "results/curated/gallery.json").read_text())
@@ -155,7 +163,22 @@ def gallery_page() -> str:
 
 def changelog_page() -> str:
     """CHANGELOG.md, its links as from docs/."""
-    return (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace("](docs/", "](")
+    return (
+        (ROOT / "CHANGELOG.md")
+        .read_text(encoding="utf-8")
+        .replace("](docs/", "](")
+        .replace("](CONTRIBUTING.md", "](contributing.md")
+    )
+
+
+def contributing_page() -> str:
+    """CONTRIBUTING.md, its links as from docs/."""
+    return (
+        (ROOT / "CONTRIBUTING.md")
+        .read_text(encoding="utf-8")
+        .replace("](docs/", "](")
+        .replace("](CHANGELOG.md", "](changelog.md")
+    )
 
 
 def commands_page() -> str:
@@ -223,6 +246,7 @@ GENERATED = {
     "api.md": api_page,
     "modules.md": modules_page,
     "changelog.md": changelog_page,
+    "contributing.md": contributing_page,
 }
 
 

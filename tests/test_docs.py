@@ -18,7 +18,7 @@ from colloc.results.store import save
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-TEXTS = [*PAGES, ROOT / "CHANGELOG.md", *sorted((ROOT / "results").rglob("*.md"))]
+TEXTS = [*PAGES, ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "results").rglob("*.md"))]
 NOTEBOOK = ROOT / "docs/notebook.ipynb"
 SOURCES = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "colloc").rglob("*.py"))
 
