@@ -121,11 +121,10 @@ def on_page_content(html: str, page: Any, config: Any, files: Any) -> str:
 
 
 def on_post_page(output: str, page: Any, config: Any) -> str:
-    """What scrolls can be reached with the keyboard, and the search has a name for those who hear the page."""
-    output = output.replace(
+    """The search has a name for those who hear the page."""
+    return output.replace(
         'data-md-component="search" role="dialog"', 'data-md-component="search" role="dialog" aria-label="Search"'
     )
-    return output.replace("<pre><span></span><code>", '<pre><span></span><code tabindex="0">')
 
 
 def gallery_page() -> str:
