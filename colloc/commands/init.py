@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,25 +17,32 @@ from colloc.system.errors import ProblemError
 _FEWEST, _MOST = 3, 12
 _EPILOG = """\
   colloc init mine.py --links 4 --feet 1
+  colloc init mine.py --lengths 22 30 30 22 --wheels
   colloc solve mine.py"""
-_LINE = "\n    body=Chain(({lengths})),"
-_FEET = """
+_FLOOR = {
+    "": "    body=Chain({lengths}),",
+    "feet": """\
     # and what they stand on: feet on each link, evenly spread; or one by one, feet=(Foot(0), Wheel(1), ...)
-    body=Chain(({lengths}), feet={feet}),"""
+    body=Chain({lengths}, feet={feet}),""",
+    "wheels": """\
+    # and what they stand on: a wheel in the middle of each link, with its own friction in units of the weight
+    body=Chain({lengths}, feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range({links}))),""",
+}
 _TEMPLATE = '''\
-"""{links} equal links: change what is yours, then `colloc solve {file}`."""
+"""{links} links: change what is yours, then `colloc solve {file}`."""
 
-from colloc import Chain, Friction, Harmonic, Problem
+from colloc import {names}
 
 PROBLEM = Problem(
     name="{name}",
-    # link lengths from tail to head; they add up to 1, the unit of length{floor}
+    # link lengths from tail to head; they add up to 1, the unit of length
+{floor}
     # what sliding sideways, forwards and backwards costs, in units of the weight; friction does not depend on speed
     friction=Friction(mu_t=1.0, mu_f=1.0, mu_b=1.0),
     # the class of gaits to search, which decides the answer: more harmonics allow finer motions.
     # "bilateral": the body run backwards in time looks the same from its head; it never turns, and half a period is enough.
     # It needs lengths that read the same from both ends. Others: "antipodal" (the second half mirrors the first), "none"
-    gait=Harmonic(harmonics=2, symmetry="bilateral"),
+    gait=Harmonic(harmonics=2, symmetry="{symmetry}"),
     # the largest angle of a joint [rad], at most pi
     joint_limit=3.14,
     # No guess is needed: travelling waves, known gaits and random ones are tried. guess=Fourier(mean, cos, sin) adds yours.
@@ -43,25 +51,43 @@ PROBLEM = Problem(
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("init", "Write a commented problem file for a chain of equal links; it runs as it is.", _EPILOG)
+    parser = new_parser("init", "Write a commented problem file for a chain of links; it runs as it is.", _EPILOG)
     parser.add_argument("problem", type=Path, metavar="FILE.py", help="the file to write; an existing one is left alone")
-    parser.add_argument("--links", type=int, default=_FEWEST, metavar="N", help=f"links of the chain (default: {_FEWEST})")
-    parser.add_argument("--feet", type=int, default=0, metavar="N", help="feet on each link (default: none, it lies)")
+    chain = parser.add_mutually_exclusive_group()
+    chain.add_argument("--links", type=int, default=_FEWEST, metavar="N", help=f"equal links (default: {_FEWEST})")
+    chain.add_argument("--lengths", type=float, nargs="+", metavar="L", help="of the links, tail to head, in any unit")
+    floor = parser.add_mutually_exclusive_group()
+    floor.add_argument("--feet", type=int, default=0, metavar="N", help="feet on each link (default: none, it lies)")
+    floor.add_argument("--wheels", action="store_true", help="a wheel in the middle of each link")
     add_printing(parser)
     return parser
 
 
-def problem_text(path: Path, links: int, feet: int = 0) -> str:
-    """A problem file for a chain of so many equal links, on so many feet each. `ProblemError` if a number is out of range, or
-    the file's name cannot be a problem's."""
+def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bool = False) -> str:
+    """Text of a problem file for a chain of links of such lengths, in any unit, on the floor, on feet or on wheels.
+
+    Raises `ProblemError` if a number is out of range, or the file's name cannot be a problem's.
+    """
+    links, whole = len(lengths), math.fsum(lengths)
     if not _FEWEST <= links <= _MOST:
-        raise ProblemError(f"--links must be {_FEWEST} to {_MOST}, not {links}.")
+        raise ProblemError(f"a chain must have {_FEWEST} to {_MOST} links here, not {links}.")
+    if not (all(length > 0 for length in lengths) and math.isfinite(whole)):
+        raise ProblemError(f"--lengths must be positive numbers, not {', '.join(f'{length:g}' for length in lengths)}.")
     if path.suffix != ".py":
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
-    lengths = ", ".join([f"1 / {links}"] * links)
-    Problem(path.stem, body=Chain((1 / links,) * links, feet=feet))  # refuses names and feet that files cannot have
-    floor = (_FEET if feet else _LINE).format(lengths=lengths, feet=feet)
-    return _TEMPLATE.format(links=links, file=path.name, name=path.stem, floor=floor)
+    Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))  # refuses what files cannot have
+    names = ["Chain", "Friction", "Harmonic", "Problem", *(["Wheel"] if wheels else [])]
+    floor = _FLOOR["wheels" if wheels else "feet" if feet else ""]
+    return _TEMPLATE.format(
+        links=links,
+        file=path.name,
+        name=path.stem,
+        names=", ".join(names),
+        floor=floor.format(
+            lengths=f"({', '.join(f'{length:.6g} / {whole:.6g}' for length in lengths)})", feet=feet, links=links
+        ),
+        symmetry="bilateral" if list(lengths) == list(reversed(lengths)) else "none",
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,13 +97,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _init(options: argparse.Namespace) -> int:
     path: Path = options.problem
-    text = problem_text(path, options.links, options.feet)
+    lengths = options.lengths or [1.0] * options.links
+    text = problem_text(path, lengths, options.feet, options.wheels)
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
         raise ProblemError(f"{path} is there already; choose another name.") from None
     read_problem_file(path)
-    line = f"wrote {path}: a problem of {options.links} links. Change it, then: colloc solve {path}"
-    tell(options, {"status": "written", "file": str(path), "links": options.links}, [line])
+    line = f"wrote {path}: a problem of {len(lengths)} links. Change it, then: colloc solve {path}"
+    tell(options, {"status": "written", "file": str(path), "links": len(lengths)}, [line])
     return OK

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from colloc import solve
+from colloc import Wheel, solve
 from colloc.commands.ending import BAD_PROBLEM, OK
 from colloc.commands.init import main
 from colloc.gaits.problem_file import read_problem_file
@@ -25,6 +25,24 @@ def test_the_file_runs_as_it_is(tmp_path):
     main([str(path), "--links", "4"])
     solution = solve(read_problem_file(path).problem, 1)
     assert solution.status == "solved", solution.message
+
+
+def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
+    bodies = []
+    for name, lengths in (("cm", ("22", "30", "30", "22")), ("m", ("0.22", "0.3", "0.3", "0.22"))):
+        path = tmp_path / f"{name}.py"
+        assert main([str(path), "--lengths", *lengths, "--wheels"]) == OK
+        bodies.append(read_problem_file(path).problem.body)
+    assert bodies[0].lengths == pytest.approx([22 / 104, 30 / 104, 30 / 104, 22 / 104])
+    assert bodies[1].lengths == pytest.approx(bodies[0].lengths)
+    assert [type(foot) for foot in bodies[0].feet] == [Wheel] * 4
+
+
+def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_path):
+    for lengths, symmetry in ((("1", "2", "1"), "bilateral"), (("1", "2", "3"), "none")):
+        path = tmp_path / f"{symmetry}.py"
+        assert main([str(path), "--lengths", *lengths]) == OK
+        assert read_problem_file(path).problem.gait.symmetry == symmetry
 
 
 @pytest.mark.parametrize(
