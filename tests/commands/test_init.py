@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from colloc import Wheel, solve
+from colloc import Chain, Wheel, solve
 from colloc.commands.ending import BAD_PROBLEM, OK
 from colloc.commands.init import main
 from colloc.gaits.problem_file import read_problem_file
@@ -35,7 +35,7 @@ def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
         bodies.append(read_problem_file(path).problem.body)
     assert bodies[0].lengths == pytest.approx([22 / 104, 30 / 104, 30 / 104, 22 / 104])
     assert bodies[1].lengths == pytest.approx(bodies[0].lengths)
-    assert [type(foot) for foot in bodies[0].feet] == [Wheel] * 4
+    assert bodies[0] == Chain(bodies[0].lengths, feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(4)))
 
 
 def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_path):
