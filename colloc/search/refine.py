@@ -71,32 +71,43 @@ def refine(optimum: Optimum) -> Optimum:
     Optimum
         Optimised to the last digit. Its `lacks` says what is missing if no mesh was fine enough.
     """
-    problem, run = optimum.problem, this_run()
-    refines, meshes = problem.mesh_tolerance > 0, _Meshes()
-    if problem.slope is not None and optimum.objective > -NOWHERE:
+    meshes = _Meshes()
+    if optimum.problem.slope is not None and optimum.objective > -NOWHERE:
         return optimum  # relative to nothing no mesh is fine enough
     while True:
-        run.told("refine", meshes.count, MESHES, optimum)
-        finer = on_more_panels(optimum) if refines else None
-        plan = meshes.plan(optimum) if refines and finer is None else None
-        if finer is None and plan is None and optimum.effort == FINE:
-            return optimum
-        if meshes.count == MESHES:
-            lacks = f"refinement ended after {MESHES} meshes: the gait still moves with the mesh."
-            return replace_keeping_space(optimum, lacks=lacks)
-        space, v, effort = optimum.space, optimum.v, FINE
-        if finer is not None:
-            (space, v), effort = finer, ROUGH
-        if plan is not None:
-            meshes.count, meshes.kept = meshes.count + 1, np.concatenate([meshes.kept, plan.kept])
-            space = remeshed(space, optimum.gait, plan.edges, plan.scheme)
-            effort = FINE if meshes.count > _SAME_AIM else ROUGH
-            try:
-                v = space.parameters(optimum.gait)
-            except NotConvergedError:
-                v = space.laid(optimum.gait)  # breaks a row a little, as its own mesh lets it
-        known = optimum.curvature if optimum.v.size == v.size else None
-        optimum = converged(space, v, optimum.delta, effort, known).after(*optimum.history)
+        this_run().told("refine", meshes.count, MESHES, optimum)
+        try:
+            finer = _finer(optimum, meshes)
+        except NotConvergedError as error:  # the gait at hand is not lost for it: its certificate says what it is worth
+            finer = replace_keeping_space(optimum, lacks=f"refinement ended, as on a finer mesh: {error}")
+        if finer is None or finer.lacks:
+            return finer or optimum
+        optimum = finer
+
+
+def _finer(optimum: Optimum, meshes: _Meshes) -> Optimum | None:
+    """The gait optimised on the next mesh, or on more panels; with what it lacks after the last one. None if its own will do."""
+    refines = optimum.problem.mesh_tolerance > 0
+    finer = on_more_panels(optimum) if refines else None
+    plan = meshes.plan(optimum) if refines and finer is None else None
+    if finer is None and plan is None and optimum.effort == FINE:
+        return None
+    if meshes.count == MESHES:
+        lacks = f"refinement ended after {MESHES} meshes: the gait still moves with the mesh."
+        return replace_keeping_space(optimum, lacks=lacks)
+    space, v, effort = optimum.space, optimum.v, FINE
+    if finer is not None:
+        (space, v), effort = finer, ROUGH
+    if plan is not None:
+        meshes.count, meshes.kept = meshes.count + 1, np.concatenate([meshes.kept, plan.kept])
+        space = remeshed(space, optimum.gait, plan.edges, plan.scheme)
+        effort = FINE if meshes.count > _SAME_AIM else ROUGH
+        try:
+            v = space.parameters(optimum.gait)
+        except NotConvergedError:
+            v = space.laid(optimum.gait)  # breaks a row a little, as its own mesh lets it
+    known = optimum.curvature if optimum.v.size == v.size else None
+    return converged(space, v, optimum.delta, effort, known).after(*optimum.history)
 
 
 def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:

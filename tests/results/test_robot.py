@@ -196,7 +196,7 @@ def fast():
     stated = colloc.Problem(
         "fast", gait=colloc.Harmonic(1, "antipodal"), guess=colloc.ellipse(A0=0, A1=2.3, B1=1.3), froude=0.05
     )
-    return colloc.solve(stated.with_(delta=1e-2), starts=1)
+    return colloc.solve(stated.with_(delta=1e-2, mesh_tolerance=1e-6), starts=1)
 
 
 def test_torques_with_inertia_do_the_work_of_friction_and_swing_the_masses(fast):
