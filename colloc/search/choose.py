@@ -84,7 +84,7 @@ def _message(problem: Problem, answer: Answer, certificate: Certificate, failure
         return answer.message  # why the search ended says more than what does not hold for that
     lowered = ""
     if answer.delta < problem.delta * (1 - 1e-9):
-        lowered = f"The gait is so small that delta had to be lowered from {problem.delta:.1g} to {answer.delta:.1g}."
+        lowered = f"The gait is so slow or small that delta had to be lowered from {problem.delta:.1g} to {answer.delta:.1g}."
     text = answer.message
     failed = certificate.failures
     if failed:

@@ -24,7 +24,7 @@ class Effort:
     @property
     def accuracy(self) -> float:
         """Of the objective, at which SQP stops: well below what the conditions leave."""
-        return 0.01 * self.kkt_error**2
+        return 1e-3 * self.kkt_error**2
 
     @property
     def rounds(self) -> int:

@@ -155,12 +155,12 @@ def _tried(optima: Sequence[Optimum], counts: Callable[[Certified], bool]) -> li
 def finished(optimum: Optimum) -> Certified:
     """An optimum through the last stages: refined, confirmed, and certified.
 
-    Where it turns out to be a saddle, the search goes on below it; where it is so small that friction is viscous, at a smaller
-    delta: what is slow enough for a large gait is not for a small one.
+    Where it turns out to be a saddle, the search goes on below it; where friction is viscous at its speeds, at a smaller
+    delta: what is slow enough for a large gait is not for a small one, or where feet hold.
     """
     for _ in range(_TRIES):
         found = certified(confirmed(optimum))
-        if not _is_small_and_viscous(found):
+        if not _is_viscous(found):
             break
         optimum = _at_smaller_delta(optimum)
     return found
@@ -195,9 +195,9 @@ def certified(answer: Answer) -> Certified:
         return Certified(answer, failure=str(error))
 
 
-def _is_small_and_viscous(found: Certified) -> bool:
-    """Whether nothing fails but the influence of delta, at a gait that shrank to the bound on the shape speed."""
-    return not found.is_finite and [check.name for check in found.certificate.failures] == ["delta influence"]
+def _is_viscous(found: Certified) -> bool:
+    """Whether nothing fails but the influence of delta: the gait is so slow, or small, that friction is viscous at it."""
+    return [check.name for check in found.certificate.failures] == ["delta influence"]
 
 
 def _at_smaller_delta(optimum: Optimum) -> Optimum:
