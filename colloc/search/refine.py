@@ -86,7 +86,7 @@ def refine(optimum: Optimum) -> Optimum:
 
 
 def _finer(optimum: Optimum, meshes: _Meshes) -> Optimum | None:
-    """The gait optimised on the next mesh, or on more panels; with what it lacks after the last one. None if its own will do."""
+    """The gait optimised on the next mesh, or on more panels; after the last with what it lacks. None if its own will do."""
     refines = optimum.problem.mesh_tolerance > 0
     finer = on_more_panels(optimum) if refines else None
     plan = meshes.plan(optimum) if refines and finer is None else None
