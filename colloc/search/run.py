@@ -162,16 +162,14 @@ class Run:
 
     @contextmanager
     def under_way(self, seconds: float) -> Iterator[None]:
-        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C, and after so many seconds, and
-        then all of it is written: where there is an end, nothing can be lost."""
+        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C, and after so many seconds. However it
+        ends, all of it is written: the result may yet fail to be saved."""
         token = _CURRENT.set(self)
         try:
             with interruptible(polled=False), time_limit(seconds):
                 yield
-        except BaseException:
-            self.write()
-            raise
         finally:
+            self.write()
             _CURRENT.reset(token)
 
 

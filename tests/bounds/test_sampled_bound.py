@@ -409,7 +409,7 @@ def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_pa
 
 
 def test_a_tighter_bound_is_offered_where_one_can_be_computed_and_nowhere_else(tmp_path, monkeypatch):
-    monkeypatch.setattr("colloc.bounds.optimality_gap.efficiency_bound", lambda *domain, cache: "computed")
+    monkeypatch.setattr("colloc.bounds.sampled.efficiency_bound", lambda *domain, cache: "computed")
     for body in (Chain(), Chain((0.2,) * 5), Chain((1 / 6,) * 6), Chain((1 / 9,) * 9), ModalBody(2)):
         problem = Problem("other", body=body, gait=Harmonic(1, "antipodal"))
         try:
