@@ -162,8 +162,8 @@ class Run:
 
     @contextmanager
     def under_way(self, seconds: float) -> Iterator[None]:
-        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C, and after so many seconds. However it
-        ends, all of it is written: the result may yet fail to be saved."""
+        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C, and after so many seconds.
+        However it ends, all of it is written: the result may yet fail to be saved."""
         token = _CURRENT.set(self)
         try:
             with interruptible(polled=False), time_limit(seconds):
