@@ -23,6 +23,8 @@ import os
 import posixpath
 import re
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -160,24 +162,12 @@ def gallery_page() -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def changelog_page() -> str:
-    """CHANGELOG.md, its links as from docs/."""
-    return (
-        (ROOT / "CHANGELOG.md")
-        .read_text(encoding="utf-8")
-        .replace("](docs/", "](")
-        .replace("](CONTRIBUTING.md", "](contributing.md")
-    )
-
-
-def contributing_page() -> str:
-    """CONTRIBUTING.md, its links as from docs/."""
-    return (
-        (ROOT / "CONTRIBUTING.md")
-        .read_text(encoding="utf-8")
-        .replace("](docs/", "](")
-        .replace("](CHANGELOG.md", "](changelog.md")
-    )
+def root_page(name: str) -> str:
+    """A page beside the README, its links as from docs/."""
+    text = (ROOT / name).read_text(encoding="utf-8").replace("](docs/", "](")
+    for other in ("CHANGELOG", "CONTRIBUTING"):
+        text = text.replace(f"]({other}.md", f"]({other.lower()}.md")
+    return text
 
 
 def commands_page() -> str:
@@ -238,14 +228,14 @@ def shown(output: dict[str, Any]) -> str:
     return f"```text\n{text.rstrip()}\n```"
 
 
-GENERATED = {
+GENERATED: dict[str, Callable[[], str]] = {
     "notebook.md": notebook_page,
     "gallery.md": gallery_page,
     "commands.md": commands_page,
     "api.md": api_page,
     "modules.md": modules_page,
-    "changelog.md": changelog_page,
-    "contributing.md": contributing_page,
+    "changelog.md": partial(root_page, "CHANGELOG.md"),
+    "contributing.md": partial(root_page, "CONTRIBUTING.md"),
 }
 
 

@@ -45,8 +45,6 @@ AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
 GAITS: tuple[type, ...] = (Fourier, ArcPath, Combination, Corners, Mixture, Phases, SerpenoidSeries)
-_FORMERLY = {"PointedSeries": "Fourier"}
-"""Kinds in older files."""
 CLASSES: tuple[type, ...] = (Harmonic, BSpline, Basis, FreePath, Polygon, Relaxed, Prescribed, Serpenoid)
 BODIES: list[type] = [Chain, Coupled, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
@@ -87,7 +85,6 @@ def _revived(value: Any) -> Any:
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
     values = dict(given)
     name = values.pop(KIND)
-    name = _FORMERLY.get(name, name)
     kind = next((kind for kind in kinds if kind.__name__ == name), None)
     if kind is None:
         raise KeyError(f"{name} is none of {', '.join(kind.__name__ for kind in kinds)}")

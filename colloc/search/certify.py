@@ -220,7 +220,7 @@ def _motion(
     ]
     if (lean := float(body.imbalance(angles).max())) > BALANCED:
         beside = "way from the centre of mass to where its weights press [body lengths]; reported, not judged"
-        checks.append(Check("statics", lean, np.inf, beside))
+        checks.append(Check("statics", lean, 1.0, beside))  # the body is no longer than that
     if fine.multipliers:
         meaning = "largest Floquet multiplier: what a period leaves of a small change of the momenta"
         checks.append(Check("stability", float(np.abs(fine.multipliers).max()), 1.0, meaning))

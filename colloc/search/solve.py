@@ -40,7 +40,7 @@ REDUCED, FULL = "reduced", "full"
 SEARCHES = (REDUCED, FULL)
 _TRIES = 3
 """Gaits of a kind that are solved for at most, until a certificate holds; saddles left one after another; and deltas tried
-where a gait is so small that friction is viscous."""
+where nothing but the influence of delta fails."""
 _EXPLORING = 0.6
 """The share of the time allowed that is spent on starts; the rest is for the answer."""
 

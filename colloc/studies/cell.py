@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.gait_fields import AnyGait, fields, statement_hash
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
 from colloc.results.distinct_optima import fourier_series, phase_distance
@@ -34,8 +32,7 @@ GUESS, WARM, COLD, RESCUE = "guess", "warm", "cold", "rescue"
 
 def start_key(gait: AnyGait) -> str:
     """A name for a gait, the same wherever it comes from."""
-    parts = (np.ascontiguousarray(getattr(gait, part.name)) for part in dataclasses.fields(gait))
-    return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()[:16]
+    return statement_hash(fields(gait))[:16]
 
 
 @dataclass(frozen=True, eq=False)

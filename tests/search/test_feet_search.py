@@ -130,6 +130,7 @@ def test_a_certificate_says_how_far_the_feet_press_beside_the_centre_of_mass(sol
     angles = worm.gait.angles(np.linspace(0, 1, 2001))
     assert statics.value == pytest.approx(worm.problem.body.imbalance(angles).max(), rel=1e-3)
     assert statics.value < worm.problem.body.largest_imbalance
+    json.dumps(worm.certificate.facts(), allow_nan=False)  # every number, allowed ones too, is one of JSON
     assert "beside the centre of mass" in worm.problem.body.describe()
 
 

@@ -14,6 +14,7 @@ import pytest
 
 from colloc.commands import sweep as sweep_study
 from colloc.gaits.free_path import ArcPath, FreePath
+from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
@@ -445,6 +446,14 @@ def test_the_displacement_that_decides_the_class_is_that_of_the_replay():
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
     assert replay(Chain(), friction, path, 1e-3, instants=400, most_instants=400).distance > 0.01
     assert abs(gait_class(gait, Chain(), friction).forward) > 0.9
+
+
+def test_the_name_of_a_gait_is_the_same_in_every_process():
+    gait = Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [0.4]])
+    given = f"from colloc.gaits.gait_fields import gait_from; gait = gait_from({fields(gait)})"
+    code = f"{given}; from colloc.studies.cell import start_key; print(start_key(gait))"
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert other.stdout.strip() == start_key(gait) != start_key(Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [0.5]]))
 
 
 def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):

@@ -83,6 +83,17 @@ int colloc_balance(
     return link && sliding ? 0 : 1;
 }
 
+/* 0 if there was memory for all of these, which is given back; else 1. */
+static int freed(Link *link, Sliding *k, Matrix3 *K, Change *d)
+{
+    const bool all = link && k && K && d;
+    free(link);
+    free(k);
+    free(K);
+    free(d);
+    return all ? 0 : 1;
+}
+
 /* Rows of `find_values`, (ROWS, n_time), for chains whose anchors move as given; and, unless `slopes` is NULL, the
    derivatives of the first of them with respect to joint angles and rates, and to the load if there is one,
    (DIFFERENTIATED_ROWS, 2 (n - 1) (+ 2), n_time). */
@@ -133,12 +144,7 @@ int colloc_motion(
                 slopes[(row * columns + column) * n_time + t] = of_rate ? change[row] : change[row] * speed;
         }
     }
-    const bool done = link && k && K && d;
-    free(link);
-    free(k);
-    free(K);
-    free(d);
-    return done ? 0 : 1;
+    return freed(link, k, K, d);
 }
 
 /* Of chains with momenta `states` (3, n_time) and moments of inertia `spin` of the links: rows (MOMENTA_ROWS, n_time), and their
@@ -180,10 +186,5 @@ int colloc_momenta(
                 slopes[(row * columns + column) * n_time + t] = change[row];
         }
     }
-    const bool done = link && k && K && d;
-    free(link);
-    free(k);
-    free(K);
-    free(d);
-    return done ? 0 : 1;
+    return freed(link, k, K, d);
 }
