@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ellipse
+from colloc import Chain, Friction, Harmonic, NotConvergedError, Problem, ellipse
 from colloc.gaits.starts import latin_hypercube_gait
+from colloc.search.converge import as_it_is
+from colloc.search.refine import refine
 from colloc.search.solve import solve
+from colloc.search.spaces import space_near
 
 
 def from_start(start, friction, symmetry, **fields):
@@ -57,3 +60,16 @@ def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     assert solution.status == "solved", solution.message
     assert "kink" in solution.message
     assert solution.certificate.efficiency == pytest.approx(0.4162, abs=2e-4)
+
+
+def test_a_gait_whose_finer_mesh_has_no_balance_is_kept_and_says_so(monkeypatch):
+    def fails(*_):
+        raise NotConvergedError("the balance did not converge.")
+
+    gait = ellipse(A0=0, A1=2.8, B1=1.3)
+    problem = Problem("coarse", gait, gait=Harmonic(1, "bilateral"), intervals=8)
+    found = as_it_is(*space_near(problem, gait), problem.delta)
+    monkeypatch.setattr("colloc.search.refine.converged", fails)
+    kept = refine(found)
+    np.testing.assert_array_equal(kept.v, found.v)
+    assert kept.lacks == "refinement ended, as on a finer mesh: the balance did not converge."
