@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
+from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
@@ -65,3 +66,10 @@ def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = No
         indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
         start += rows * columns
     return Layout(n=start, **indices, integrals=control.aims.integrals)
+
+
+def distance_and_work(control: ControlProblem, layout: Layout, x: np.ndarray) -> dict[str, float]:
+    """Of a whole period, as the problem states them, from variables ``(n,)`` in units of friction. Of a gait that turns the
+    variables have the way that is seen from axes that turn evenly (`colloc.gaits.period`)."""
+    way, work = (float(x[row[0, -1]]) / control.admissible.gait.fraction for row in (layout.distance, layout.work))
+    return {"distance": chord_per_way(control.dynamics.turn) * way, "work": work * control.unit}

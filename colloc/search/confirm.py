@@ -13,15 +13,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any
 
 import numpy as np
 
-from colloc.collocation.layout import Layout, layout_of
+from colloc.collocation.layout import distance_and_work, layout_of
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
-from colloc.gaits.control_problem import ControlProblem
 from colloc.numerics.sqp import Stationarity, stationarity
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
@@ -167,7 +165,7 @@ def answer_of(program: GaitProgram, result: NlpResult, delta: float) -> Answer:
         lam_x=result.lam_x,
         lam_g=result.lam_g,
         value=program.control.stated(-result.objective),
-        **_of_period(program.control, program.layout, result.x),
+        **distance_and_work(program.control, program.layout, result.x),
         kkt_error=result.kkt_error,
         violation=result.violation,
         complementarity=result.complementarity,
@@ -196,7 +194,7 @@ def unconfirmed(optimum: Optimum) -> Answer:
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
         value=optimum.value,
-        **_of_period(control, layout, x),
+        **distance_and_work(control, layout, x),
         kkt_error=optimum.kkt_error,
         violation=optimum.violation,
         complementarity=optimum.complementarity,
@@ -206,12 +204,6 @@ def unconfirmed(optimum: Optimum) -> Answer:
         seconds=optimum.seconds,
         history=optimum.history,
     )
-
-
-def _of_period(control: ControlProblem, layout: Layout, x: np.ndarray) -> dict[str, Any]:
-    """Distance and work of a whole period, from variables in units of friction."""
-    distance, work = (float(x[row[0, -1]]) / control.admissible.gait.fraction for row in (layout.distance, layout.work))
-    return {"distance": distance, "work": work * control.unit}
 
 
 def second_order(answer: Answer) -> SecondOrder:

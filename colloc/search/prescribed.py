@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.collocation.layout import layout_of
+from colloc.collocation.layout import distance_and_work, layout_of
 from colloc.collocation.warm_start import balanced_variables
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
@@ -74,8 +74,7 @@ def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray
     control = control_problem(problem)
     layout = layout_of(control, mesh)
     x = balanced_variables(control.dynamics, layout, mesh, gait, parameters, problem.delta)
-    periods = 1.0 / problem.gait.fraction
-    distance, work = (periods * float(x[row[0, -1]]) for row in (layout.distance, layout.work))
+    found = distance_and_work(control, layout, x)
     return Answer(
         problem,
         gait,
@@ -86,9 +85,8 @@ def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
-        value=distance / (work * control.unit),
-        distance=distance,
-        work=work * control.unit,
+        value=found["distance"] / found["work"],
+        **found,
         kkt_error=0.0,
         violation=0.0,
         complementarity=0.0,

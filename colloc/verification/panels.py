@@ -32,16 +32,17 @@ _CORNER = 1e-6
 
 
 class Panels(NamedTuple):
-    """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
-    of the centre of mass in the body frame (complex; turned back evenly by the turn that is asked for), power, power of the
-    joints ``(n, 5)``; densities of k quantities ``(n, 5, k)``; residual and lever ``(n, 5)``; shares of the actuators' limits
-    ``(n, 5, n_share)``; and how far all balanced motions lie apart ``(n, 5, 3 + k)``
-    (`colloc.verification.followed_motion.FollowedMotion`).
+    """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``; rate of
+    rotation as it is seen from axes that turn evenly by the turn that is asked for, velocity of the centre of mass in the body
+    frame (complex), power, power of the joints ``(n, 5)``; densities of k quantities ``(n, 5, k)``; residual and lever
+    ``(n, 5)``; shares of the actuators' limits ``(n, 5, n_share)``; and how far all balanced motions lie apart
+    ``(n, 5, 3 + k)`` (`colloc.verification.followed_motion.FollowedMotion`).
     At last what halving the panel changed that each is half of ``(n, 5)`` (see `changes`)."""
 
     left: np.ndarray
     width: np.ndarray
     z: np.ndarray
+    spin: np.ndarray
     centre: np.ndarray
     power: np.ndarray
     actuator: np.ndarray
@@ -55,7 +56,7 @@ class Panels(NamedTuple):
     @property
     def rates(self) -> np.ndarray:
         """What is integrated, ``(3 + k, n, 5)``: spin, velocity of the centre, power, densities."""
-        return np.stack([self.z[..., 2], self.centre, self.power, *np.moveaxis(self.densities, -1, 0)])
+        return np.stack([self.spin, self.centre, self.power, *np.moveaxis(self.densities, -1, 0)])
 
     def take(self, chosen: np.ndarray) -> Panels:
         return Panels(*(a[chosen] for a in self))

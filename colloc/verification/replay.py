@@ -154,8 +154,9 @@ def _evaluated(
     centre = mean("centre")
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
-    seen = (centre[0] + 1j * centre[1]) * np.exp(-1j * turn * t.ravel())  # from axes that turn evenly
-    values = (mean("z"), seen, mean("power"), mean("actuator_power"), densities, residual, lever, used, apart)
+    z = mean("z")
+    rates = z[2] - turn, centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), densities
+    values = (z, *rates, residual, lever, used, apart)
     return tuple(value.T.reshape(*t.shape, *value.shape[:-1]) for value in values)
 
 
@@ -243,7 +244,7 @@ def replay(
         spin, move, spent, *sums = increments(WHOLE, panels, 1)
         heading, place = travelled(spin, move)
         distance = max(chord * float(abs(place[-1])), 1e-300)
-        values = {"distance": distance, "work": float(spent.sum()), "rotation": float(heading[-1])}
+        values = {"distance": distance, "work": float(spent.sum()), "rotation": float(heading[-1]) + turn}
         values |= {each.name: float(part.sum()) for each, part in zip(asked, sums, strict=True)}
         if not values["work"] > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, FreePath, Friction, Harmonic, Polygon, Problem, replay
+from colloc import Chain, FreePath, Friction, Harmonic, Polygon, Problem, evaluate, replay
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
@@ -71,6 +71,20 @@ def test_the_chord_does_not_depend_on_the_phase_that_a_period_is_begun_at():
     chords, displacements = ([replayed(begun_at(p), at).distance for p in (0, 0.13, 0.37, 0.71)] for at in (turn, 0.0))
     assert np.ptp(displacements) > 0.01 * max(displacements)
     np.testing.assert_allclose(chords, chords[0], rtol=1e-9)
+
+
+def test_the_error_of_a_chord_falls_with_the_instants_as_that_of_a_displacement_does():
+    # what lies before a period and after it is seen from the same axes, turned on: no seam is left between two periods
+    turn = replayed().rotation
+    straight, chord = (replay(BODY, FRICTION, GAIT, DELTA, instants=8000, turn=at).errors for at in (0.0, turn))
+    assert chord["distance"] < 3 * straight["distance"]
+
+
+def test_an_answer_states_the_chord_that_its_replay_finds():
+    turning = evaluate(Problem("turns", body=BODY, friction=FRICTION, delta=DELTA), GAIT)
+    assert abs(turning.rotation) > 0.05
+    assert turning.answer.distance == pytest.approx(turning.certificate.distance, rel=1e-5)
+    assert turning.answer.value == pytest.approx(turning.certificate.value, rel=1e-5)
 
 
 def test_a_mirror_image_turns_the_other_way_on_the_same_chord():

@@ -6,6 +6,7 @@ import pytest
 from colloc.gaits.control_problem import control_problem, friction_unit
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
+from colloc.mechanics.densities import PathLimit
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
@@ -23,6 +24,17 @@ def test_friction_of_usual_size_is_left_alone():
         control = control_problem(problem)
         assert (control.unit, control.dynamics.law) == (1.0, problem.law)
     assert friction_unit(Friction(2e-6, 1e-6, 3e-6)) == pytest.approx(1e-6)
+
+
+def test_every_limit_follows_friction_by_its_own_power():
+    def limits(mu):
+        heat = PathLimit("heat", "sum(moment**2)", 0.04 * mu**2)
+        problem = stated(mu, mu, mu, torque_limit=0.2 * mu, power_limit=0.9 * mu, limits=[heat])
+        return control_problem(problem).actuators
+
+    for light, usual in zip(limits(1e-3).each, limits(1.0).each, strict=True):
+        assert light.name == usual.name
+        np.testing.assert_allclose(light.most, usual.most, rtol=1e-12)
 
 
 @pytest.fixture(scope="module")

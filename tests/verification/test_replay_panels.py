@@ -21,7 +21,7 @@ def panels_of(power, n=16, corner=None):
         t[np.isclose(left, corner), 0] += 1e-12
         t[np.isclose(left + width, corner), 4] -= 1e-12
     nothing, vectors, shares = np.zeros((n, 5)), np.zeros((n, 5, 3)), np.zeros((n, 5, 0))
-    values = (vectors, nothing.astype(complex), power(t), nothing, shares, nothing, nothing, shares, vectors)
+    values = (vectors, nothing, nothing.astype(complex), power(t), nothing, shares, nothing, nothing, shares, vectors)
     return begun(left, width, values)
 
 
@@ -77,7 +77,7 @@ def test_halves_carry_on_and_know_what_halving_their_panel_changed():
     changed = changes(panels)[0]
     between = panels.left[:, None] + panels.width[:, None] * (np.arange(4) + 0.5) / 4
     nothing, vectors, shares = np.zeros((n, 4)), np.zeros((n, 4, 3)), np.zeros((n, 4, 0))
-    new = (vectors, nothing.astype(complex), np.exp(between), nothing, shares, nothing, nothing, shares, vectors)
+    new = (vectors, nothing, nothing.astype(complex), np.exp(between), nothing, shares, nothing, nothing, shares, vectors)
     finer = halves(panels, new, changed)
     for side in (0, 1):
         np.testing.assert_array_equal(finer.wider[side::2], changed)
@@ -96,7 +96,7 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
     z[..., 2] *= 1e-3  # to first order in the turn
     power, actuator, residual, lever = (rng.uniform(1, 2, (n, 5)) for _ in range(4))
     densities, shares, apart = rng.uniform(1, 2, (n, 5, 2)), np.zeros((n, 5, 0)), np.zeros((n, 5, 5))
-    values = (z, centre, power, actuator, densities, residual, lever, shares, apart)
+    values = (z, z[..., 2], centre, power, actuator, densities, residual, lever, shares, apart)
     panels = Panels(np.arange(n) / n, np.full(n, 1 / n), *values, np.zeros((n, 5)))
     once, twice = increments(HALF, panels, 2), increments(WHOLE, panels, 1)
 
