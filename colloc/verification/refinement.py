@@ -144,9 +144,11 @@ def planned_mesh(
     knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
     if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
-    if kind_of_motion(control.dynamics).states:
-        return _fewest(_halved(known, rule, knots, tolerance, aim, most_points) for rule in _family(scheme(control.scheme)))
     given = scheme(control.scheme)
+    if kind_of_motion(control.dynamics).states:
+        uniform = np.linspace(0.0, control.admissible.gait.fraction, control.intervals + 1)
+        first = np.union1d(mesh.edges if nested else uniform, knots)
+        return _fewest(_halved(known, Mesh(rule, first), knots, tolerance, aim, most_points) for rule in _family(given))
     kinks = kink_knots(control, gait, delta, fine)
     switches = not control.dynamics.law.reversible
     best: MeshPlan | None = None
@@ -236,10 +238,9 @@ def _split(
     return MeshPlan(rule.name, np.sort(np.append(left, right.max())), estimate, estimate <= tolerance, kept)
 
 
-def _halved(known: Known, rule: Scheme, kept: np.ndarray, tolerance: float, aim: float, most_points: int) -> MeshPlan:
-    """A uniform mesh whose intervals with the largest errors are halved until all together are small enough."""
-    control, gait, delta, fine = known
-    edges = np.union1d(np.linspace(0.0, control.admissible.gait.fraction, control.intervals + 1), kept)
+def _halved(known: Known, mesh: Mesh, kept: np.ndarray, tolerance: float, aim: float, most_points: int) -> MeshPlan:
+    """A mesh whose intervals with the largest errors are halved until all together are small enough."""
+    (control, gait, delta, fine), (rule, edges) = known, (mesh.scheme, mesh.edges)
     while True:
         error = mesh_error(control, Mesh(rule, edges), gait, delta, tolerance, fine)
         shares = np.abs(error.value)
