@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
@@ -51,7 +52,8 @@ class Known:
     value_at_zero_delta, value_error_at_zero_delta : float
         The same for delta -> 0.
     dry : (float, float) or None
-        Between what the efficiency lies under dry friction, with no delta, where the result stated it (``colloc solve --dry``).
+        Between what the efficiency, whatever is maximised, lies under dry friction, with no delta, where the result stated it
+        (``colloc solve --dry``).
     command, version : str
         What found it, with which version of colloc.
 
@@ -207,7 +209,7 @@ def markdown(rows: Iterable[Known]) -> str:
         problem = row.problem
         told = f"{row.value:.6f} ± {row.value_error:.0e}"
         limit = f"{row.value_at_zero_delta:.6f} ± {row.value_error_at_zero_delta:.0e}" if problem.law.regularised else ""
-        limit = limit if row.dry is None else "between {:.6f} and {:.6f}".format(*row.dry)
+        limit = limit if row.dry is None or problem.objective != EFFICIENCY else "between {:.6f} and {:.6f}".format(*row.dry)
         return f"| {problem.name} | {problem.asked} | {told} | {limit} | `{row.command}` |\n"
 
     return heads + "".join(map(line, rows))
