@@ -68,8 +68,8 @@ def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = No
     return Layout(n=start, **indices, integrals=control.aims.integrals)
 
 
-def distance_and_work(control: ControlProblem, layout: Layout, x: np.ndarray) -> dict[str, float]:
+def distance_and_work(control: ControlProblem, layout: Layout, x: np.ndarray) -> tuple[float, float]:
     """Of a whole period, as the problem states them, from variables ``(n,)`` in units of friction. Of a gait that turns the
     variables have the way that is seen from axes that turn evenly (`colloc.gaits.period`)."""
     way, work = (float(x[row[0, -1]]) / control.admissible.gait.fraction for row in (layout.distance, layout.work))
-    return {"distance": chord_per_way(control.dynamics.turn) * way, "work": work * control.unit}
+    return chord_per_way(control.dynamics.turn) * way, work * control.unit

@@ -154,6 +154,7 @@ def _sentence(optimum: Optimum, outcome: _Outcome) -> str:
 def answer_of(program: GaitProgram, result: NlpResult, delta: float) -> Answer:
     """A point of a full program, as an answer to the stated problem."""
     gait = program.member(result.x[program.layout.parameters[:, 0]])
+    distance, work = distance_and_work(program.control, program.layout, result.x)
     answer = Answer(
         program.control.problem,
         gait,
@@ -165,7 +166,8 @@ def answer_of(program: GaitProgram, result: NlpResult, delta: float) -> Answer:
         lam_x=result.lam_x,
         lam_g=result.lam_g,
         value=program.control.stated(-result.objective),
-        **distance_and_work(program.control, program.layout, result.x),
+        distance=distance,
+        work=work,
         kkt_error=result.kkt_error,
         violation=result.violation,
         complementarity=result.complementarity,
@@ -183,6 +185,7 @@ def unconfirmed(optimum: Optimum) -> Answer:
     space, control = optimum.space, optimum.space.control
     mesh, layout = space.phase_mesh(optimum.gait), layout_of(control, space.mesh, optimum.gait.knots)
     x = balanced_variables(control.dynamics, layout, mesh, optimum.gait, space.full_parameters(optimum.v), optimum.delta)
+    distance, work = distance_and_work(control, layout, x)
     return Answer(
         optimum.problem,
         optimum.gait,
@@ -194,7 +197,8 @@ def unconfirmed(optimum: Optimum) -> Answer:
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
         value=optimum.value,
-        **distance_and_work(control, layout, x),
+        distance=distance,
+        work=work,
         kkt_error=optimum.kkt_error,
         violation=optimum.violation,
         complementarity=optimum.complementarity,

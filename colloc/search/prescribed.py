@@ -74,7 +74,7 @@ def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray
     control = control_problem(problem)
     layout = layout_of(control, mesh)
     x = balanced_variables(control.dynamics, layout, mesh, gait, parameters, problem.delta)
-    found = distance_and_work(control, layout, x)
+    distance, work = distance_and_work(control, layout, x)
     return Answer(
         problem,
         gait,
@@ -85,8 +85,9 @@ def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
-        value=found["distance"] / found["work"],
-        **found,
+        value=distance / work,
+        distance=distance,
+        work=work,
         kkt_error=0.0,
         violation=0.0,
         complementarity=0.0,

@@ -155,8 +155,8 @@ def _evaluated(
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
     z = mean("z")
-    rates = z[2] - turn, centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), densities
-    values = (z, *rates, residual, lever, used, apart)
+    seen = z, z[2] - turn, centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), densities
+    values: tuple[np.ndarray, ...] = (*seen, residual, lever, used, apart)
     return tuple(value.T.reshape(*t.shape, *value.shape[:-1]) for value in values)
 
 
