@@ -14,8 +14,9 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from colloc.collocation.point_equations import forward
+from colloc.collocation.point_equations import forward, with_forces
 from colloc.collocation.shape_checks import ShapeCheck
+from colloc.gaits.control_problem import Dynamics
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
@@ -107,16 +108,16 @@ def chord(piece: Piece) -> LocalFunction:
     return local_function("chord", piece.shape, piece.given[1], ca.SX.sym("delta"), whole)
 
 
-def piece_density(quantity: Quantity, body: Body, friction: Law, piece: Piece) -> LocalFunction:
-    """Density of a quantity at a point of a piece, per unit of phase. Locals: angles, rates, forces, if it needs these; then
+def piece_density(quantity: Quantity, dynamics: Dynamics, piece: Piece) -> LocalFunction:
+    """Density of a quantity at a point of a piece, per unit of phase. Locals: those of `with_forces`, if it needs these; then
     the shape."""
-    delta, own = ca.SX.sym("delta"), [piece.angles, piece.direction, None]
+    delta, body = ca.SX.sym("delta"), dynamics.body
+    local, now = ca.SX(0, 1), Instants(body, dynamics.law, piece.angles, piece.direction, delta)
     if quantity.needs_forces:
-        own = [ca.SX.sym(*each) for each in (("q", body.n_joint), ("r", body.n_joint), ("forces", len(body.force_names)))]
-    angles, rates, forces = own
-    out = piece.speed * quantity.at(Instants(body, friction, angles, rates, delta, forces=forces))
-    local = ca.vertcat(*(own if quantity.needs_forces else []), piece.shape)
-    return local_function(quantity.name, local, piece.given, delta, out)
+        theta, angles, rates = (ca.SX.sym(*each) for each in (("theta", 1), ("q", body.n_joint), ("r", body.n_joint)))
+        local, now = with_forces(dynamics, theta, angles, rates, delta, 1.0)
+    out = piece.speed * quantity.at(now)
+    return local_function(quantity.name, ca.vertcat(local, piece.shape), piece.given, delta, out)
 
 
 @lru_cache(maxsize=256)

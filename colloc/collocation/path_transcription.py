@@ -171,13 +171,14 @@ def transcribe_path(
     for state_index in (layout.distance[0, 0], layout.work[0, 0]):
         geometry.lower[state_index] = geometry.upper[state_index] = 0.0
     here = geometry.shape[:, interval]
+    with_forces = np.concatenate([theta, layout.angles, layout.rates, layout.forces]) if full else here
 
     def density(quantity: Quantity) -> BlockParts:
-        own = [layout.angles, layout.rates, layout.forces] if quantity.needs_forces else []
-        return piece_density(quantity, body, law, piece), np.concatenate([*own, here]), given
+        own = [*([with_forces] if quantity.needs_forces else []), here]
+        return piece_density(quantity, control.dynamics, piece), np.concatenate(own), given
 
     besides = period_rows(control, layout, mesh, density, 1.0)
-    besides |= actuator_rows(control.actuators, body, law, layout, 1.0)
+    besides |= actuator_rows(control.actuators, control.dynamics, with_forces, layout.n, 1.0)
     for name, (parts, group) in besides.items():
         geometry.blocks[name] = parts
         groups.append(group)

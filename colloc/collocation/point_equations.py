@@ -23,7 +23,7 @@ from scipy import sparse
 
 from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits.control_problem import ControlProblem
+from colloc.gaits.control_problem import ControlProblem, Dynamics
 from colloc.gaits.gait_fields import AnyClass
 from colloc.gaits.objective import Objective
 from colloc.gaits.period import chord_per_way
@@ -135,29 +135,42 @@ def member_equations(gait: AnyClass, n_joint: int) -> LocalFunction:
     return local_function("members", p, ca.SX(0, 1), ca.SX.sym("delta"), p[gait.n_own :] - given)
 
 
-def density_point(quantity: Quantity, body: Body, friction: Law, unit: float) -> LocalFunction:
-    """Density of a quantity at a point, from joint angles, rates and, if needed, forces, per period divided by `unit`."""
-    _, angles, rates, _, delta = _symbols(body)
-    forces = ca.SX.sym("forces", len(body.force_names) if quantity.needs_forces else 0)
-    out = quantity.at(Instants(body, friction, angles, rates, delta, forces=forces, unit=unit))
-    return local_function(quantity.name, ca.vertcat(angles, rates, forces), ca.SX(0, 1), delta, out)
+def density_point(quantity: Quantity, dynamics: Dynamics, unit: float) -> LocalFunction:
+    """Density of a quantity at a point, from joint angles and rates or, if it needs forces, from what `actuator_rows` gathers,
+    per period divided by `unit`."""
+    theta, angles, rates, _, delta = _symbols(dynamics.body)
+    if not quantity.needs_forces:
+        out = quantity.at(Instants(dynamics.body, dynamics.law, angles, rates, delta, unit=unit))
+        return local_function(quantity.name, ca.vertcat(angles, rates), ca.SX(0, 1), delta, out)
+    local, now = with_forces(dynamics, theta, angles, rates, delta, unit)
+    return local_function(quantity.name, local, ca.SX(0, 1), delta, quantity.at(now))
+
+
+def with_forces(
+    dynamics: Dynamics, theta: ca.SX, angles: ca.SX, rates: ca.SX, delta: ca.SX, unit: float
+) -> tuple[ca.SX, Instants]:
+    """The locals orientation, angles, rates and forces of a point of a full program, and its instant as formulas see it."""
+    body, law = dynamics.body, dynamics.law
+    forces, load = ca.SX.sym("forces", len(body.force_names)), dynamics.pull(theta)
+    now = Instants(body, law, angles, rates, delta, forces=forces, unit=unit, load=load)
+    return ca.vertcat(theta, angles, rates, forces), now
 
 
 def actuator_rows(
-    limits: PathLimits, body: Body, friction: Law, layout: Layout, unit: float
+    limits: PathLimits, dynamics: Dynamics, gather: np.ndarray, n: int, unit: float
 ) -> dict[str, tuple[BlockParts, Group]]:
-    """Block and rows, by name, that keep the actuators within their limits at the points of a full program, if there are any.
+    """Block and rows, by name, that keep the actuators within their limits at the points of a full program of n variables, if
+    there are any.
 
-    Rates of the variables are those per period divided by `unit`; `friction` takes them.
+    `gather`: orientation, joint angles, rates and forces of the points. Rates of the variables are those per period divided by
+    `unit`; the law of friction takes them.
     """
     if not limits.names:
         return {}
-    _, angles, rates, _, delta = _symbols(body)
-    forces = ca.SX.sym("forces", len(body.force_names))
-    shares = limits.at(Instants(body, friction, angles, rates, delta, forces=forces, unit=unit))
-    function = local_function(ACTUATORS, ca.vertcat(angles, rates, forces), ca.SX(0, 1), delta, shares)
-    gather, n_point = np.concatenate([layout.angles, layout.rates, layout.forces]), layout.angles.shape[1]
-    group = block_group(ACTUATORS, np.tile(limits.least, n_point), 1.0, n_point * len(limits.names), layout.n)
+    theta, angles, rates, _, delta = _symbols(dynamics.body)
+    local, now = with_forces(dynamics, theta, angles, rates, delta, unit)
+    function, n_point = local_function(ACTUATORS, local, ca.SX(0, 1), delta, limits.at(now)), gather.shape[1]
+    group = block_group(ACTUATORS, np.tile(limits.least, n_point), 1.0, n_point * len(limits.names), n)
     return {ACTUATORS: ((function, gather, np.empty((0, n_point))), group)}
 
 

@@ -74,7 +74,8 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
     """
     mesh, dynamics, admissible, aims = control.mesh(edges, scheme), control.dynamics, control.admissible, control.aims
     layout = layout_of(control, mesh)
-    body, friction, slope, froude, *_ = dynamics.in_speeds_of(RADIANS)
+    moved = dynamics.in_speeds_of(RADIANS)
+    body, friction, slope, froude, *_ = moved
     gait, n_joint = admissible.gait, body.n_joint
     checks = shape_checks(body, far, admissible.largest_speeds)
     point = point_function(control.formulation, body, friction, slope, froude * RADIANS**2)
@@ -97,13 +98,14 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
     )
 
     none = np.empty((0, mesh.n_point))
+    with_forces = np.concatenate([layout.theta[:, sites], layout.angles, layout.rates, layout.forces])
 
     def density(quantity: Quantity) -> BlockParts:
-        own = [layout.angles, layout.rates, *([layout.forces] if quantity.needs_forces else [])]
-        return density_point(quantity, body, friction, RADIANS), np.concatenate(own), none
+        own = with_forces if quantity.needs_forces else np.concatenate([layout.angles, layout.rates])
+        return density_point(quantity, moved, RADIANS), own, none
 
     besides = period_rows(control, layout, mesh, density, RADIANS)
-    besides |= actuator_rows(control.actuators, body, friction, layout, RADIANS)
+    besides |= actuator_rows(control.actuators, moved, with_forces, layout.n, RADIANS)
     if slope is not None and aims.no_way_across:
         across = across_point(body, friction, slope)
         parts = across, point_gather[: across.n_local], none

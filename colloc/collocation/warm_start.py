@@ -8,7 +8,6 @@ from colloc.collocation.layout import Layout
 from colloc.collocation.program import GaitProgram
 from colloc.gaits.control_problem import Dynamics
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.densities import Instants
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
 from colloc.motion.kinds import OMEGA, Passed, Shapes, begin_of, first_theta, kind_of_motion
 from colloc.numerics.mesh import Mesh
@@ -50,7 +49,7 @@ def balanced_variables(
     x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
     x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
     x[layout.theta[0, mesh.edge_sites]] = theta_0 + pose.theta
-    at = Instants(body, friction, angles, rates, slow, z=z, unit=unit)
+    at = kind.instants(Shapes(angles, rates, slow, unit), pose.theta_on(mesh), z)
     for quantity, total in zip(layout.integrals, layout.totals, strict=True):
         x[total] = (weight * quantity.at(at)[0, points]).sum()
     if layout.z.size:

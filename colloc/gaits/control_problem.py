@@ -24,6 +24,7 @@ from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimits, Quantity
 from colloc.mechanics.law import Law
+from colloc.numerics.arrays import Array
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
 
@@ -43,6 +44,11 @@ class Dynamics(NamedTuple):
     def in_speeds_of(self, unit: float) -> Dynamics:
         """The same for speeds that are divided by a unit."""
         return self._replace(law=self.law.in_speeds_of(unit))
+
+    def pull(self, theta: Array) -> Array | None:
+        """The outside force on the body at orientations theta ``(1, n_time)``, in its axes, ``(2, n_time)``; None if there is
+        none. NumPy and CasADi."""
+        return None if self.slope is None else self.slope.pull(theta)
 
 
 class Admissible(NamedTuple):

@@ -190,12 +190,10 @@ def slope_from(body: Body, friction: Law, grade: object, towards: object) -> Slo
 def check_asked(problem: Any) -> None:
     """A `ProblemError` for what cannot be asked of a problem on a slope."""
     if problem.rotation != 0:
-        raise ProblemError("on a slope a period must not turn the body: leave rotation at 0.")
-    for quantity in ("rotation", *(each.name for each in problem.integrals if each.needs_forces)):
-        if problem.uses(quantity):
-            raise ProblemError(f"on a slope the {quantity} of a period is not known: ask for distance, work and length.")
-    if problem.path_limits.names:
-        raise ProblemError("on a slope what the single joints have to do is not known: leave limits of actuators out.")
+        raise ProblemError(
+            "on a slope a body that a period turns has no gait that repeats, as its weight then pulls from another side: leave "
+            "rotation at 0, and out of what is asked for."
+        )
     if problem.formulation != FULL:
         raise ProblemError(f"on a slope there is only the formulation {FULL!r}.")
     if scheme(problem.scheme).left:

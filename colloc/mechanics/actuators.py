@@ -1,7 +1,8 @@
 """What the actuators of a body's shape coordinates do: moments, powers, and how these compare with what real ones can do.
 
 With forces on the body's parts, the power is bilinear in them and in the velocities, and these are linear in the rates: so the
-moment of a shape coordinate is the power at its unit rate, all others and the body at rest.
+moment of a shape coordinate is the power at its unit rate, all others and the body at rest, less what an outside force does
+then, such as the weight's pull on a slope.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 
 
-def joint_moments(body: Body, friction: Law, angles: Array, forces: Array, delta: Array) -> Array:
+def joint_moments(body: Body, friction: Law, angles: Array, forces: Array, delta: Array, load: Array | None = None) -> Array:
     """Moment that every shape coordinate's actuator exerts, ``(n_joint, n_time)``, for a body with a full formulation, from
-    angles ``(n_joint, n_time)`` and forces ``(n_force, n_time)`` on its parts (`colloc.mechanics.bodies.Body.forces`)."""
+    angles ``(n_joint, n_time)``, forces ``(n_force, n_time)`` on its parts (`colloc.mechanics.bodies.Body.forces`), and an
+    outside force ``(2, n_time)`` on its centre of mass, in its axes, if there is one."""
     still, moments = np.zeros((3, angles.shape[1])), []
     for joint in range(body.n_joint):
         unit = np.zeros(angles.shape)
         unit[joint] = 1.0
-        moments.append(body.with_forces(friction, angles, unit, still, forces, delta).power)
+        alone = body.with_forces(friction, angles, unit, still, forces, delta)
+        moments.append(alone.power if load is None else alone.power - namespace(load).sum_rows(load * alone.centre))
     return namespace(angles, forces).stack(moments)

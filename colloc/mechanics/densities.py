@@ -6,6 +6,7 @@ evaluated with NumPy where a motion is replayed and with CasADi where derivative
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -50,6 +51,8 @@ class Instants:
     forces : (n_force, n_time), optional
         Forces on its parts (`colloc.mechanics.bodies.Moved.forces`). Neither is needed where nobody asks for moments.
     unit : float
+    load : (2, n_time), optional
+        An outside force on its centre of mass, in its axes.
     """
 
     body: Body
@@ -60,6 +63,13 @@ class Instants:
     z: Array = None
     forces: Array = None
     unit: float = 1.0
+    load: Array = None
+
+    def chosen(self, which: np.ndarray) -> Instants:
+        """Some of them."""
+        some = (None if row is None else row[:, which] for row in (self.angles, self.rates, self.z, self.forces, self.load))
+        angles, rates, z, forces, load = some
+        return replace(self, angles=angles, rates=rates, z=z, forces=forces, load=load)
 
     @property
     def angle(self) -> Array:
@@ -74,7 +84,7 @@ class Instants:
         body, friction, forces = self.body, self.friction, self.forces
         if forces is None:
             forces = body.forces(friction, self.angles, self.rates, self.z, self.delta)
-        return joint_moments(body, friction, self.angles, forces, self.delta)
+        return joint_moments(body, friction, self.angles, forces, self.delta, self.load)
 
     @property
     def power(self) -> Array:
@@ -324,6 +334,10 @@ class PathLimits:
         """Shares of what is allowed ``(n_share, n_time)``."""
         return namespace(now.rates).stack([limit.at(now) for limit in self.each])
 
+    def sizes(self, shares: np.ndarray) -> np.ndarray:
+        """What must not exceed 1, of shares: magnitudes where both ways are limited."""
+        return np.where(np.isfinite(self.least)[:, None], np.abs(shares), shares)
+
     def in_units_of(self, unit: float) -> PathLimits:
         """The same for friction that is divided by a unit."""
         scaled = [np.array(limit.most) / unit ** (limit.friction_degree or 0.0) for limit in self.each]
@@ -335,6 +349,11 @@ def stated_limit(stated: Any) -> PathLimit:
     if not isinstance(stated, (PathLimit, dict)):
         raise ProblemError(f"limits are of the kind PathLimit(name, function, most), not {stated!r}.")
     return stated if isinstance(stated, PathLimit) else PathLimit(**stated)
+
+
+def limits_of(asked: Iterable[PathLimit] | PathLimits, n_joint: int) -> PathLimits:
+    """Limits of a body with so many joints, as they are stated or ready."""
+    return asked if isinstance(asked, PathLimits) else PathLimits(tuple(each.on(n_joint) for each in asked))
 
 
 def torque_and_power(torque: tuple[float, ...], power: tuple[float, ...]) -> tuple[PathLimit, ...]:

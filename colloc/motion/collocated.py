@@ -82,6 +82,12 @@ class CollocatedPose:
         c = centre[0] + 1j * centre[1]
         return cls(mesh.scheme, mesh.h, omega[mesh.points], c[mesh.points], theta_0)
 
+    def theta_on(self, mesh: Mesh) -> np.ndarray:
+        """Orientation at the points of the mesh, ``(n_point,)``."""
+        theta = np.empty(mesh.n_point)
+        theta[mesh.points] = self.stage_theta
+        return theta
+
     @property
     def displacements(self) -> np.ndarray:
         """Displacement over each interval in the axes the body has at its begin, complex, ``(n,)``."""

@@ -25,6 +25,8 @@ from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import Instants
+from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import STATES, checked_mass, momenta
 from colloc.mechanics.law import Law
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
@@ -122,6 +124,10 @@ class Kind(Protocol):
     ) -> Along:
         """The motion along a mesh from the begin of its states; `near`: states and tail velocities to start from."""
 
+    def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
+        """What formulas see of shapes ``(n_joint, n)`` at orientations ``(n,)`` and tail velocities ``(3, n)``; unless these
+        are given, those that balance the body, if no other state counts."""
+
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles, rates), ``(6, 2 n_joint,
         n_point)``, and to the states, ``(6, n_state, n_point)``; then of the rates of states, where they are none of these."""
@@ -166,6 +172,10 @@ class SlowOnLevel:
         solved = self.body.solve(*at, start=near[1], tolerance=tolerance)
         held = solved.residual < _ACCEPTED * tolerance
         return Along(begin, np.empty((0, held.size)), solved.z, self.body.motion(*at, solved), held, solved=solved)
+
+    def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
+        at = self.friction, shapes.angles, shapes.rates, shapes.delta
+        return Instants(self.body, *at, z=self.body.solve(*at).z if z is None else z, unit=shapes.unit)
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         assert along.solved is not None
@@ -232,6 +242,11 @@ class SlowOnSlope:
         states, _, held = CollocatedStates(mesh, unit=shapes.unit).solved(rates, begin, states)
         slopes = now.on_shape, now.on_theta[:, None]
         return Along(begin, states, now.solved.z, now.now, np.full(mesh.n_point, held), slopes)
+
+    def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
+        at, load = (self.friction, shapes.angles, shapes.rates, shapes.delta), self._slope.pull(theta[None])
+        z = solve_balance(self._chain, *at, load=load).z if z is None else z
+        return Instants(self.body, *at, z=z, unit=shapes.unit, load=load)
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         assert along.slopes is not None
@@ -357,17 +372,23 @@ class WithInertia(SlowOnLevel):
 
 
 def through_motion(
-    kind: Kind, mesh: Mesh, pose: CollocatedPose, shares: Iterable[Share], on_states: np.ndarray
+    kind: Kind,
+    mesh: Mesh,
+    pose: CollocatedPose,
+    shares: Iterable[Share],
+    on_states: np.ndarray,
+    by_theta: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of m numbers of a period with respect to (rotation rate, velocity of the centre, power, rates of states) at
-    the stages, ``(m, 4 + more, n, s)``, and to the begins that are told, ``(m, n_told)``; `on_states` as of `Kind.slopes`."""
+    the stages, ``(m, 4 + more, n, s)``, and to the begins that are told, ``(m, n_told)``; `on_states` as of `Kind.slopes`,
+    `by_theta` is what they depend on the orientation by themselves, ``(m, n, s)``."""
     side, rotation, _, work = (np.array(column) for column in zip(*shares, strict=True))
     weight = stage_weights(mesh)
     on_theta, on_centre = pose.on_pose(side)
     rows = np.zeros((side.size, len(on_states[OUTPUTS]), *weight.shape))
     rows[:, 0], rows[:, 3] = (part[:, None, None] * weight for part in (rotation, work))
     rows[:, 1:3] = on_centre
-    on_begin = kind.through_pose(mesh, pose, on_theta, rows, on_states)
+    on_begin = kind.through_pose(mesh, pose, on_theta + by_theta, rows, on_states)
     return rows, on_begin
 
 

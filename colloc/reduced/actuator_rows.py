@@ -14,7 +14,8 @@ import numpy as np
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.densities import Instants, PathLimits
+from colloc.mechanics.densities import PathLimits
+from colloc.motion.kinds import Shapes
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks
 from colloc.reduced.density_slopes import density_slopes
@@ -52,8 +53,8 @@ class ActuatorRows:
     def place(self, v: np.ndarray, delta: float, gait: AnyGait, phases: Mesh) -> float:
         """Choose the rows near the gait v, whose mesh in its phases is given; by how much it exceeds any limit, relative."""
         mesh = self._motion.mesh
-        here = self._magnitudes(self._all(v, delta))
-        largest = self._largest(gait, delta * gait.delta_unit, phases)
+        here = self._limits.sizes(self._all(v, delta))
+        largest = self._largest(v, delta, gait, phases)
         between = np.maximum(largest - here[:, mesh.points].max(axis=2), 0.0)
         lowered = np.zeros_like(here)
         for points in mesh.points.T:  # neighbours may share a point
@@ -64,10 +65,10 @@ class ActuatorRows:
         excess = float(largest.max()) - 1.0
         return excess if excess > _EXACT or np.isnan(excess) else 0.0
 
-    def _largest(self, gait: AnyGait, delta: float, phases: Mesh) -> np.ndarray:
-        """In every interval, ``(n_share, n)``; delta is per period."""
+    def _largest(self, v: np.ndarray, delta: float, gait: AnyGait, phases: Mesh) -> np.ndarray:
+        """In every interval, ``(n_share, n)``."""
         t = phases.edges[:-1, None] + phases.h[:, None] * _INSIDE
-        found = self._magnitudes(self._signed_at(gait, delta, t.ravel())).reshape(-1, *t.shape)
+        found = self._limits.sizes(self._signed_at(v, delta, gait, t.ravel())).reshape(-1, *t.shape)
         largest = found.max(axis=2)
         share, interval = np.nonzero(largest > 1.0 - _CLOSE)
         if share.size:
@@ -75,15 +76,15 @@ class ActuatorRows:
             left, right = t[interval, near - 1], t[interval, near + 1]
 
             def own(t: np.ndarray) -> np.ndarray:
-                return self._magnitudes(self._signed_at(gait, delta, t.ravel())).reshape(-1, *t.shape)[share, each]
+                return self._limits.sizes(self._signed_at(v, delta, gait, t.ravel())).reshape(-1, *t.shape)[share, each]
 
             largest[share, interval] = np.maximum(largest[share, interval], peaks(own, left, right - left, _ZOOMS)[1])
         return largest
 
-    def _signed_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
-        """Shares at phases, ``(n_share, n_time)``."""
-        body, at = self._motion.body, (self._motion.friction, gait.angles(t), gait.rates(t))
-        return np.asarray(self._limits.at(Instants(body, *at, delta, z=body.solve(*at, delta).z)))
+    def _signed_at(self, v: np.ndarray, delta: float, gait: AnyGait, t: np.ndarray) -> np.ndarray:
+        """Shares of the gait of parameters v at phases, ``(n_share, n_time)``."""
+        shapes, motion = Shapes(gait.angles(t), gait.rates(t), delta * gait.delta_unit), self._motion
+        return np.asarray(self._limits.at(motion.kind.instants(shapes, motion.theta(v, delta, t))))
 
     def of_moving_peaks(
         self, v: np.ndarray, delta: float, member: Callable[[np.ndarray], AnyGait], phases: Mesh, on_rows: np.ndarray
@@ -101,17 +102,13 @@ class ActuatorRows:
         def shares(at: np.ndarray, t: np.ndarray) -> np.ndarray:
             """Of every row ``(n_row, k)``, for parameters and phases of that shape."""
             gait = member(at)
-            return self._signed_at(gait, delta * gait.delta_unit, t.ravel()).reshape(-1, *t.shape)[share, each]
+            return self._signed_at(at, delta, gait, t.ravel()).reshape(-1, *t.shape)[share, each]
 
         peak, _ = peaks(lambda t: np.abs(shares(v, t)), left + edge, width - 2 * edge)
         t = peak[:, None] + _SHIFT * width[:, None] * np.array([-1.0, 0.0, 1.0])
         steps = _STEP * np.eye(v.size)
         slopes = np.array([shares(v + step, t) - shares(v - step, t) for step in steps]) / (2 * _STEP)
         return curvature_of_moving(on_rows, shares(v, t).T, slopes.transpose(2, 1, 0))
-
-    def _magnitudes(self, shares: np.ndarray) -> np.ndarray:
-        """What a bound from above is laid on: moments are bounded both ways."""
-        return np.where(np.isfinite(self._limits.least)[:, None], np.abs(shares), shares)
 
     def _all(self, v: np.ndarray, delta: float) -> np.ndarray:
         return np.asarray(self._limits.at(self._motion.instants(v, delta)))
@@ -126,15 +123,14 @@ class ActuatorRows:
 
     def slopes(self, v: np.ndarray, delta: float) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
-        s, motion = self._motion.at(v, delta), self._motion
+        motion, now = self._motion, self._motion.instants(v, delta)
         (share, point), each = self.placed, np.arange(self.placed.shape[1])
         if not each.size:
             return np.empty((0, v.size))
-        there = Instants(motion.body, motion.friction, s.angles[:, point], s.rates[:, point], delta, z=s.z[:, point])
-        slopes = density_slopes(self._limits, there)
-        on_shape = np.zeros((each.size, motion.mesh.n_point, slopes.shape[1]))
-        on_shape[each, point] = slopes[share, :, each]
-        return motion.shapes.pulled_back(v, on_shape, np.zeros(on_shape.shape[:2]))
+        slopes = density_slopes(self._limits, now.chosen(point))
+        on_points = np.zeros((each.size, slopes.shape[1], motion.mesh.n_point))
+        on_points[each, :, point] = slopes[share, :, each]
+        return motion.through_points(v, delta, on_points)
 
     def laid_on(self, program: GaitProgram) -> GaitProgram:
         """The full program on the same mesh with the same bounds."""

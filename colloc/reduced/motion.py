@@ -16,7 +16,7 @@ import numpy as np
 
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
-from colloc.motion.kinds import OMEGA, OUTPUTS, Along, Kind, Passed, first_theta, through_motion
+from colloc.motion.kinds import OMEGA, OUTPUTS, Along, Kind, Passed, Share, first_theta, through_motion
 from colloc.motion.kinds import Shapes as Moving
 from colloc.numerics.mesh import Mesh
 
@@ -62,7 +62,7 @@ class ReducedMotion:
         self.body, self.friction, self.shapes, self.mesh = kind.body, kind.friction, shapes, mesh
         self.kind, self._integrals, self._weight = kind, integrals, stage_weights(mesh)
         self._last: _State | None = None
-        self._near: tuple[_State, np.ndarray] | None = None
+        self._near: tuple[_State, np.ndarray, np.ndarray] | None = None
         self.solves = 0
 
     def at(self, v: np.ndarray, delta: float) -> _State:
@@ -102,7 +102,7 @@ class ReducedMotion:
             states = last.along.states.copy()
             states[: begin.size] += (begin - last.along.begin)[:, None]
             return states, last.z
-        near, slopes = self._near
+        near, slopes, _ = self._near
         moved = np.concatenate([angles - near.angles, rates - near.rates])
         return None, near.z + np.einsum("ijt,jt->it", slopes[:3], moved)
 
@@ -122,7 +122,16 @@ class ReducedMotion:
     def instants(self, v: np.ndarray, delta: float) -> Instants:
         """The collocated motion at every column, as formulas see it."""
         s = self.at(v, delta)
-        return Instants(self.body, self.friction, s.angles, s.rates, delta, z=s.z)
+        theta = np.tile(s.pose.theta_on(self.mesh), s.pace.size // self.mesh.n_point)
+        return self.kind.instants(Moving(s.angles, s.rates, delta), theta, s.z)
+
+    def theta(self, v: np.ndarray, delta: float, t: np.ndarray) -> np.ndarray:
+        """The orientation at places t of the mesh, ``(n_time,)``; 0 where it is no state."""
+        edges = self.mesh.edges
+        if "theta" not in self.kind.states:
+            return np.zeros(t.size)
+        k = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, self.mesh.n - 1)
+        return self.at(v, delta).pose.at(k, (t - edges[k]) / self.mesh.h[k])[0]
 
     def _on_columns(self, s: _State) -> np.ndarray:
         """Weight of every point of every block in an integral over the part of the period that is solved."""
@@ -131,32 +140,51 @@ class ReducedMotion:
 
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
         """Derivatives of `values`, ``(n,)`` each."""
-        s, mesh, kind = self.at(v, delta), self.mesh, self.kind
-        slopes, on_states = kind.slopes(Moving(s.angles, s.rates, delta), s.along)
-        self._near = (s, slopes)
-        shares = kind.shares(s.passed)
-        bend = np.array([share.bend for share in shares.values()])
-        rows, on_begin = through_motion(kind, mesh, s.pose, shares.values(), on_states)
+        s, now, kind = self.at(v, delta), self.instants(v, delta), self.kind
+        shares, weight, n_joint = kind.shares(s.passed), self._on_columns(s), len(s.rates)
+        on_points = np.zeros((len(shares) + len(self._integrals), 2 * n_joint + 1, s.pace.size))
+        on_pace = np.zeros((len(on_points), s.pace.size))
+        for row, share in enumerate(shares.values()):
+            on_points[row, n_joint:-1] = share.bend * weight * s.pace
+            on_pace[row] = share.bend * weight * s.rates.sum(axis=0)
+        for row, quantity in enumerate(self._integrals, len(shares)):
+            from colloc.reduced.density_slopes import density_slopes  # loads CasADi, which a certificate can do without
+
+            on_points[row] = kind.periods * weight * s.pace * density_slopes(quantity, now)[0]
+            on_pace[row] = kind.periods * weight * quantity.at(now)[0]
+        found = self._through(s, [*shares.values(), *(Share() for _ in self._integrals)], on_points, on_pace)
+        return dict(zip((*shares, *(each.name for each in self._integrals)), found, strict=True))
+
+    def through_points(self, v: np.ndarray, delta: float, on_points: np.ndarray) -> np.ndarray:
+        """Derivatives ``(m, n)`` of m numbers, from those with respect to (angles, rates, orientation) at the columns, ``(m,
+        2 n_joint + 1, n_column)``."""
+        on_pace = np.zeros((len(on_points), on_points.shape[2]))
+        if not on_points[:, -1].any():
+            return self.shapes.pulled_back(v, on_points[:, :-1].transpose(0, 2, 1), on_pace)
+        return self._through(self.at(v, delta), [Share()] * len(on_points), on_points, on_pace)
+
+    def _through(self, s: _State, shares: Sequence[Share], on_points: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        """The same of numbers that depend on the pace, too, and have shares in what the period comes to."""
+        mesh, kind, blocks = self.mesh, self.kind, s.pace.size // self.mesh.n_point
+        slopes, on_states = self._slopes(s)
+        by_theta = on_points[:, -1].reshape(len(on_points), blocks, -1).sum(axis=1)
+        rows, on_begin = through_motion(kind, mesh, s.pose, shares, on_states, by_theta[:, mesh.points])
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
-        on_out = np.tile(on_out, s.pace.size // mesh.n_point)
-        on_pace = np.einsum("krt,rt->kt", on_out[:, : len(s.out)], s.out)
+        on_out = np.tile(on_out, blocks)
+        on_pace = on_pace + np.einsum("krt,rt->kt", on_out[:, : len(s.out)], s.out)
         if kind.turn:  # the axes turn less on what a longer path makes a smaller part of the period
             weight, even = point_weights(mesh), self._even(s.pace)
             on_pace += np.outer(on_out[:, 0] @ s.pace, even / (weight @ s.pace) * weight)
-        on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS])
-        if bend.any():
-            weight = bend[:, None] * self._on_columns(s)
-            on_shape[:, :, len(s.rates) :] += (weight * s.pace)[:, :, None]
-            on_pace += weight * s.rates.sum(axis=0)
-        for quantity in self._integrals:
-            from colloc.reduced.density_slopes import density_slopes  # loads CasADi, which a certificate can do without
-
-            weight, now = kind.periods * self._on_columns(s), self.instants(v, delta)
-            on_shape = np.concatenate([on_shape, (weight * s.pace * density_slopes(quantity, now)[0]).T[None]])
-            on_pace = np.concatenate([on_pace, weight * quantity.at(now)])
-        found = self.shapes.pulled_back(v, on_shape, on_pace)
+        on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS]) + on_points[:, :-1].transpose(0, 2, 1)
+        found = self.shapes.pulled_back(s.v, on_shape, on_pace)
         if kind.told:
-            found[: len(shares), -len(kind.told) :] += on_begin
-        return dict(zip((*shares, *(each.name for each in self._integrals)), found, strict=True))
+            found[:, -len(kind.told) :] += on_begin
+        return found
+
+    def _slopes(self, s: _State) -> tuple[np.ndarray, np.ndarray]:
+        """`Kind.slopes` of a motion, near which the next is sought."""
+        if self._near is None or self._near[0] is not s:
+            self._near = (s, *self.kind.slopes(Moving(s.angles, s.rates, s.delta), s.along))
+        return self._near[1:]

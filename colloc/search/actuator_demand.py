@@ -160,7 +160,7 @@ def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
 
     def room_slopes(x: np.ndarray) -> np.ndarray:
         slopes = (
-            _senses(limits) @ density_slopes(limits, _balanced(problem, *_instants(problem, x[:-1, None])))[:, :, 0] / value
+            _senses(limits) @ density_slopes(limits, _balanced(problem, *_instants(problem, x[:-1, None])))[:, :-1, 0] / value
         )
         on_x = slopes * np.concatenate([on_angles * np.cos(x[:n]), on_rates])
         return np.concatenate([-on_x, np.ones((len(on_x), 1))], axis=1)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem, Dynamics
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.sloped import checked_chain
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.inertia import checked_mass
@@ -57,16 +57,19 @@ class CourseOfGait(NamedTuple):
 
     at: Callable[[np.ndarray], np.ndarray]
     error: float
+    sums: Callable[[np.ndarray], np.ndarray] | None = None
+    """Quantities that forces are needed for up to phases in order, ``(k, n)``; None if there are none."""
 
 
-def course(dynamics: Dynamics, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
+def course(control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     """The motion of a gait without breaks, delta per period; with inertia it is sought near the one on a mesh."""
+    dynamics = control.dynamics
     body, friction, slope, froude, _, turn = dynamics
     if slope is not None:
-        grade = slope.grade
-        on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
-        ran = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
-        return CourseOfGait(lambda t: ran.at(t)[:4], error)
+        grade, asked = slope.grade, tuple(each for each in control.aims.integrals if each.needs_forces)
+        on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade, asked)
+        ran = on.followed(on.at_rest(gait.theta), error)
+        return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: ran.at(t)[6:])
     played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=froude, turn=turn)
     ran = played.settled(_along(kind_of_motion(dynamics), mesh, gait, delta).edges[:, 0], error)
     return CourseOfGait(ran.at, error)
@@ -89,10 +92,11 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
     true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()))
     found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()))
-    known, summed = {}, {}
+    known, summed, followed = {}, {}, iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
+    now = kind.instants(Shapes(angles, rates, delta), pose.theta_on(mesh), own.z)
     for each in control.aims.integrals:
-        known[each.name] = totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
-        summed[each.name] = (stage_weights(mesh) * each.of_shapes(angles, rates)[0, mesh.points]).sum(axis=1)
+        known[each.name] = next(followed) if each.needs_forces else totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
+        summed[each.name] = (stage_weights(mesh) * each.at(now)[0, mesh.points]).sum(axis=1)
     period, other = (
         kind.counted(passed) | {name: kind.periods * float(part.sum()) for name, part in parts.items()}
         for passed, parts in ((true, known), (found, summed))

@@ -24,6 +24,7 @@ import numpy as np
 
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.motion.follow import Course, followed
@@ -33,7 +34,8 @@ from colloc.verification.adaptive_motion import fine_motion
 from colloc.verification.replay import Path
 
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
-"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
+"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly. Those of
+quantities are 1."""
 _OMEGA = 2
 _PANELS = 40
 _OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0}
@@ -64,9 +66,10 @@ class SlopeMotion:
     several : float
         Part of the time at which several motions are balanced, by the solver's steps; 0 for laws that leave one. One of them is
         followed, and no error says what the others would change.
-    phases, states : (n,), (6, n)
+    phases, states : (n,), (6 + k, n)
         Where the solver stepped, counted from the first start, and its unknowns: theta, way up and aside, work against
-        friction and of the joints, logarithm of the steering, all but theta from the first start.
+        friction and of the joints, logarithm of the steering, and k quantities that are asked for; all but theta from the first
+        start.
     """
 
     grade: float
@@ -107,6 +110,12 @@ class GaitOnSlope(NamedTuple):
     delta: float
     breaks: tuple[float, ...]
     grade: float
+    quantities: tuple[Quantity, ...] = ()
+    """That forces are needed for."""
+
+    def at_rest(self, theta: float) -> np.ndarray:
+        """The unknowns ``(6 + k,)`` at the begin."""
+        return np.append(theta, np.zeros(5 + len(self.quantities)))
 
     def course(self, tolerance: float) -> float:
         """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
@@ -115,8 +124,9 @@ class GaitOnSlope(NamedTuple):
         return float(np.angle(way)) if abs(way) > tolerance else 0.0
 
     def followed(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
-        """The unknowns ``(6,)`` through a period; no step is longer than `longest`."""
-        return followed(self._rates, begin, tolerance * _UNKNOWNS, self.breaks, longest)
+        """The unknowns through a period, from those at its begin; no step is longer than `longest`."""
+        units = np.append(_UNKNOWNS, np.ones(len(self.quantities)))
+        return followed(self._rates, begin, tolerance * units, self.breaks, longest)
 
     def pull(self, theta: np.ndarray) -> np.ndarray:
         """Of the weight, in the body's axes, ``(2, n)``."""
@@ -133,7 +143,7 @@ class GaitOnSlope(NamedTuple):
 
     def run(self, course: float, heading: float, periods: int, tolerance: float, longest: float = np.inf) -> SlopeMotion:
         """The motion through periods from a heading, without its error; no step is longer than `longest`."""
-        state = np.array([heading - course, 0.0, 0.0, 0.0, 0.0, 0.0])
+        state = self.at_rest(heading - course)
         ends, phases, states = [state], [], []
         for period in range(periods):
             t, through, _ = self.followed(ends[-1], tolerance, longest)
@@ -141,7 +151,7 @@ class GaitOnSlope(NamedTuple):
             phases.append(period + t)
             states.append(through)
         theta, *sums = np.stack(ends, axis=1)
-        climb, aside, friction_work, joint_work, steering = np.diff(sums)
+        climb, aside, friction_work, joint_work, steering = np.diff(sums[:5])
         unknown = np.concatenate(phases), np.concatenate(states, axis=1)
         works = friction_work, joint_work
         return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, np.nan, *unknown)
@@ -158,5 +168,10 @@ class GaitOnSlope(NamedTuple):
                 "may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
             )
         moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
-        unknowns = now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], on_theta[_OMEGA, 0]
-        return np.array(unknowns), solved.z
+        unknowns = [now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], on_theta[_OMEGA, 0]]
+        at = self.instants(*shapes[:2], np.array([theta]), solved.z)
+        return np.array([*unknowns, *(each.at(at)[0, 0] for each in self.quantities)]), solved.z
+
+    def instants(self, angles: np.ndarray, rates: np.ndarray, theta: np.ndarray, z: np.ndarray) -> Instants:
+        """What formulas see of balanced instants."""
+        return Instants(self.body, self.friction, angles, rates, self.delta, z=z, load=self.pull(theta))

@@ -79,7 +79,7 @@ class Known(NamedTuple):
 def gait_motion(control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float) -> Any:
     """The gait's motion on adaptive panels, a `FineMotion`; where it has states, a `CourseOfGait`."""
     if kind_of_motion(control.dynamics).states:
-        return course(control.dynamics, gait, delta, mesh, _OF_WAY * tolerance)
+        return course(control, gait, delta, mesh, _OF_WAY * tolerance)
     shares, (body, friction, *_) = partial(_shares, control), control.dynamics
     asked: Any = {"quantities": control.aims.integrals, "turn": control.dynamics.turn}
     return fine_motion(body, friction, gait, delta, mesh.edges, tolerance, shares, **asked)

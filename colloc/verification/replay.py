@@ -22,7 +22,7 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import LENGTH, Instants, PathLimit, PathLimits, Quantity, quantities_of
+from colloc.mechanics.densities import LENGTH, Instants, PathLimit, PathLimits, Quantity, limits_of, quantities_of
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
@@ -144,8 +144,7 @@ def _evaluated(
         now = Instants(body, friction, angles, some, delta, z=motion.z)
         densities += share * np.concatenate([quantity.at(now) for quantity in quantities])
         if limits.names:
-            done = limits.at(now)
-            used = np.maximum(used, np.where(np.isfinite(limits.least)[:, None], np.abs(done), done))
+            used = np.maximum(used, limits.sizes(limits.at(now)))
         residual = np.maximum(residual, left)
 
     def mean(name: str) -> np.ndarray:
@@ -237,7 +236,7 @@ def replay(
     start = None if near is None else near.tail_velocity(t.ravel())
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     names = "rotation", "distance", "work", *(each.name for each in asked)
-    limits = limits if isinstance(limits, PathLimits) else PathLimits(tuple(each.on(body.n_joint) for each in limits))
+    limits = limits_of(limits, body.n_joint)
     at = partial(_evaluated, body, friction, path, delta, sense=sense, quantities=asked, limits=limits, turn=turn)
     panels, chord = begun(left, width, at(t, start, whole=True)), chord_per_way(turn)
     while True:

@@ -15,7 +15,7 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import LENGTH, Quantity, quantities_of
+from colloc.mechanics.densities import LENGTH, PathLimit, PathLimits, Quantity, limits_of, quantities_of
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
@@ -42,6 +42,7 @@ def slope_replay(
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
     quantities: Iterable[Quantity | str] = (),
+    limits: Iterable[PathLimit] | PathLimits = (),
     **_: object,
 ) -> Replay:
     """A period of a gait that says where it points, on a slope: arguments as of `colloc.verification.replay.replay`.
@@ -50,14 +51,18 @@ def slope_replay(
     would change is not known, only for which part of the time there are any. `NotConvergedError` if no balance is found at some
     instant, or rounding hides the accuracy that is asked for.
     """
-    on, aim = gait_on_slope(body, friction, gait, delta, slope.grade, breaks), _FIRST * tolerance
-    totals, total_errors = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
+    asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
+    followed = tuple(each for each in asked if each.needs_forces)
+    on = gait_on_slope(body, friction, gait, delta, slope.grade, breaks)._replace(quantities=followed)
+    totals, total_errors = whole_totals([each for each in asked if not each.needs_forces], gait)
+    aim, limits = _FIRST * tolerance, limits_of(limits, body.n_joint)
 
     def run(aim: float) -> tuple[SlopeMotion, complex, dict[str, float]]:
         ran = on.run(0.0, gait.theta, 1, aim, _LONGEST / instants)
         way = complex(ran.climb[0], ran.aside[0]) * complex(np.exp(-1j * slope.ahead))
         work = float(ran.friction_work[0] + slope.grade * ran.climb[0])
-        return ran, way, {"distance": way.real, "work": work, "rotation": ran.turn} | totals
+        sums = dict(zip((each.name for each in followed), ran.states[6:, -1].tolist(), strict=True))
+        return ran, way, {"distance": way.real, "work": work, "rotation": ran.turn} | sums | totals
 
     before = run(aim)[2]
     while True:
@@ -65,13 +70,14 @@ def slope_replay(
             raise NotConvergedError(f"the motion on the slope cannot be replayed to a relative error of {tolerance:.0e}.")
         aim *= _TENTH
         ran, way, period = run(aim)
-        errors = {name: abs(period[name] - before[name]) for name in ("distance", "work", "rotation")}
+        errors = {name: abs(value - before[name]) for name, value in period.items() if name not in totals}
         error, before = float(objective.relative_error(period, errors)), period
         if not error > tolerance:
             break
     phases = ran.phases % 1.0
     angles, rates = gait(phases)
     solved = solve_balance(on.body, friction, angles, rates, delta, load=on.pull(ran.states[0]))
+    done = limits.at(on.instants(angles, rates, ran.states[0], solved.z)) if limits.names else np.empty((0, phases.size))
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     return Replay(
         values=period,
@@ -84,6 +90,7 @@ def slope_replay(
         several=on.several(ran),
         instants=ran.phases.size,
         tail=(phases, solved.z),
+        shares=limits.sizes(done).max(axis=1),
         objective=objective,
         across=way.imag,
     )

@@ -8,6 +8,7 @@ from shared.loaded_chain import left_over, lying, standing
 
 from colloc import Chain, Elliptic, Foot, Friction, OwnLaw, PowerLaw, ProblemError, Viscous, Wheel, solve_balance
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.densities import Instants
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
 
@@ -53,6 +54,8 @@ def test_joints_do_the_work_of_friction_less_that_of_the_load(law, size):
     solved = solve_balance(BODY, law, angles, rates, 1e-5, load=load).require()
     now = chain_motion(BODY, law, angles, rates, 1e-5, solved, load)
     np.testing.assert_allclose(now.actuator_power, now.power - (load * now.centre).sum(axis=0), atol=1e-9)
+    own = Instants(BODY, law, angles, rates, 1e-5, z=now.z, load=load).power
+    np.testing.assert_allclose(own.sum(axis=0), now.actuator_power, atol=1e-9)
     assert (now.power >= 0).all()
     assert np.abs((load * now.centre).sum(axis=0)).max() > 1e-3
 
