@@ -7,11 +7,11 @@ import threading
 import time
 from dataclasses import replace
 
-import h5py
 import numpy as np
 import pytest
 
 import colloc
+from benchmarks.kills import contents, lost, stopped
 from colloc import Chain, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, Relaxed, ellipse
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.store import load
@@ -33,22 +33,6 @@ FILE = """
 from colloc import *
 PROBLEM = Problem("quick", gait=Harmonic(1, "bilateral"), friction=Friction(2, 1, 1.4), delta=1e-3)
 """
-
-
-def contents(path):
-    """All numbers and texts of a result, times aside."""
-    found = {}
-
-    def seen(name, thing):
-        if isinstance(thing, h5py.Dataset) and "seconds" not in name:
-            found[name] = np.asarray(thing[()]).tobytes()
-        for key, value in thing.attrs.items():
-            if "seconds" not in key and key not in ("REFERENCE_LIST", "DIMENSION_LIST"):
-                found[f"{name} {key}"] = np.asarray(value).tobytes()
-
-    with h5py.File(path) as file:
-        file.visititems(seen)
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -118,17 +102,9 @@ def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
 @pytest.mark.parametrize("part", np.random.default_rng(3).uniform(0.05, 1.0, 5).round(3))
 def test_so_it_does_at_other_moments_and_if_it_is_stopped_twice(undisturbed, tmp_path, asked, part):
     file, wanted = undisturbed
-    command = [sys.executable, "-m", "colloc", "solve", file, "--starts", "4", "--output", f"{tmp_path}/", "--no-figure"]
-    for seconds in (6.0 * part, 3.0 * part):
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        try:
-            process.wait(seconds)
-        except subprocess.TimeoutExpired:
-            process.send_signal(asked)
-        process.wait(60)
-    subprocess.run(command, capture_output=True, check=True)
-    assert contents(tmp_path / "quick.h5") == wanted
-    assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
+    stopped(file, tmp_path, asked, 6.0 * part)
+    stopped(file, tmp_path, asked, 3.0 * part)
+    assert lost(file, tmp_path, wanted) == ""
 
 
 def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path, monkeypatch):
