@@ -35,6 +35,8 @@ from colloc.system.errors import ProblemError
 
 _SMOOTHER = 2.0
 """Times delta, at which a balance is solved first that cannot be solved at delta itself."""
+_BESIDE, _STILL = (-1e-4, 1e-4), 1e-300
+"""Changes of the fastest angle [rad] to instants from whose balance one is sought that cannot be found otherwise."""
 
 
 Found = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -125,8 +127,8 @@ def solve_balance(
         Steps allowed to an instant in each attempt.
     method : {"auto", "newton", "fixed_point", "direct", "natural"}
         "auto" damps Newton and falls back on the paper's fixed point: from the start, by natural steps, with each link at rest,
-        from the balance of a larger delta, and at last from afar. "direct" and "natural" are single attempts, the others are
-        for comparison.
+        from the balances of a larger delta and of instants beside it, and at last from afar. "direct" and "natural" are single
+        attempts, the others are for comparison.
 
     Returns
     -------
@@ -194,13 +196,17 @@ def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
 def _balanced(
     solved: Callable[..., Found], moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> Found:
-    """What `solved` finds directly, then by natural steps, with each link at rest, from where friction is smoother, and last by
-    the method given."""
+    """What `solved` finds directly, then by natural steps, with each link at rest, from where friction is smoother, from beside
+    it, and last by the method given."""
     found = solved(moving, start, tolerance, max_iterations, "direct")
     enough, contact = _reachable(moving, tolerance), moving.body.contact
 
     def smoother(there: Moving) -> np.ndarray:
         return _balanced(solved, there._replace(delta=_SMOOTHER * there.delta), None, tolerance, max_iterations, "direct")[0]
+
+    def beside(there: Moving, shift: float) -> np.ndarray:
+        bent = there._replace(angles=there.angles + shift * there.rates / np.abs(there.rates).max(axis=0, initial=_STILL))
+        return _balanced(solved, bent, None, tolerance, max_iterations, "direct")[0]
 
     def ways() -> Iterator[tuple[Callable[[Moving], np.ndarray | None], str]]:
         # beside a fold, or with feet nearly on a line, the residual has valleys in which it must rise before it falls
@@ -211,6 +217,10 @@ def _balanced(
         if moving.load is None and moving.delta < np.abs(moving.rates).max(initial=0.0):
             # several rest nearly, each where the others let it
             yield smoother, "natural"
+        if method != "direct":
+            # past a fold there is another balance, which instants a little earlier or later have too
+            for shift in _BESIDE:
+                yield partial(beside, shift=shift), "natural"
         if method != "direct":
             yield lambda there: None, method
 

@@ -217,10 +217,15 @@ BESIDE_A_FOLD = [
         [2.597688063049994, -2.786161703726339, 3.0860764570646855, -2.866002211321948],
         [0.0026765635702248325, 2.586684889251715, -0.9621272363129159, -2.9613888780556366],
     ),
+    (
+        Chain((0.5, 0.5), feet=3), Friction(0.3424415961365978, 1.0, 4.962750564244436), 1e-4,
+        [0.5236097], [-15.35957115],
+    ),
 ]  # fmt: skip
+CASES = ["five links", "four links", "backward friction", "on feet"]
 
 
-@pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=["five links", "four links", "backward friction"])
+@pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=CASES)
 def test_beside_a_fold_of_the_balance_the_other_solution_is_found(case):
     """Two solutions have just met and vanished: the residual has a minimum there, at which every step from rest used to end."""
     body, friction, delta, angles, rates = case
@@ -230,7 +235,7 @@ def test_beside_a_fold_of_the_balance_the_other_solution_is_found(case):
     assert np.abs(net_force(now.posture, now.force)).max() < 1e-9
 
 
-@pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=["five links", "four links", "backward friction"])
+@pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=CASES)
 def test_another_start_is_tried_before_a_long_way_from_afar(case):
     """Where the first attempt ends beside a fold, the way down from a large delta takes thousands of steps: it comes last."""
     body, friction, delta, angles, rates = case
