@@ -69,6 +69,25 @@ def test_noise_is_smoothed_and_what_is_left_out_is_stated():
     assert f"400 samples: off by {found.rms:.1e} rad r.m.s." in found.describe()
 
 
+def test_what_is_missing_at_the_end_of_a_record_is_found_and_a_drift_taken_out(tmp_path):
+    unequal = np.sort(np.random.default_rng(0).uniform(0, 1, 60))
+    for t in (T[:-3], unequal):
+        np.testing.assert_allclose(
+            fitted_gait(written(tmp_path / "a.csv", t, GAIT.angles(t)), 2).gait.angles(T - t[0]), GAIT.angles(T), atol=1e-6
+        )
+    drifts = GAIT.angles(T) + np.array([[0.1], [-0.05]]) * (T - T.mean())
+    found = fitted_gait(drifts, 2)
+    np.testing.assert_allclose(found.gait.angles(T), GAIT.angles(T), atol=1e-9)
+    assert found.drift == pytest.approx(0.1)
+    assert found.largest == pytest.approx(0.05, rel=0.02)
+    assert (
+        "a drift of 5.73° a period taken out: off by 1.3e+00° r.m.s."
+        in fitted_gait(np.degrees(drifts), 2, degrees=True).describe()
+    )
+    with pytest.raises(colloc.ProblemError, match=r"joint 1 is off by 57\.3°, and it moves through"):
+        fitted_gait(np.degrees(GAIT.angles(T) + np.array([[1.0], [0.0]]) * T), 2, degrees=True)
+
+
 def test_a_corner_is_rounded_off_and_said():
     found = fitted_gait(lambda t: np.stack([np.abs(4 * t - 2) - 1, np.sin(2 * np.pi * t)]), 2)
     assert 1e-4 < found.rms < found.largest < 0.05
@@ -142,12 +161,13 @@ def test_the_command_says_yours_and_the_best(tmp_path, monkeypatch, capsys, eval
     assert json.loads(capsys.readouterr().out)["best"]["amplitude"] > 0.1
 
 
+REST = "5,0,0\n6,0,0\n7,0,0\n8,0,0\n"
 BAD = {
-    "t,a,b\n0,1,nan\n1,2,3\n2,1,1\n3,1,2\n": "sample 1: '0,1,nan' is not 3 finite numbers",
-    "t,a\n0,1\n1,2\n2,1\n": "1 column of angles, and the body has 2 joints",
-    "t,a,b\n0,0,0\n1,1,0\n1,0,1\n": "do not rise after sample 2",
+    "t,a,b\n0,1,nan\n1,2,3\n" + REST: "sample 1: '0,1,nan' is not 3 finite numbers",
+    "t,a\n0,1\n1,2\n2,1\n3,1\n4,2\n5,1\n": "1 column of angles, and the body has 2 joints",
+    "t,a,b\n0,0,0\n1,1,0\n1,0,1\n" + REST: "do not rise after sample 2",
     "t,a,b\n0,0,0\n1,1,0\n": "holds 2 samples",
-    "t,a,b\n0,0,0\n1,90,0\n2,0,90\n": "an angle of 90 rad: if angles are degrees, say so",
+    "t,a,b\n0,0,0\n1,90,0\n2,0,90\n" + REST: "an angle of 90 rad: if angles are degrees, say so",
     "": "holds 0 samples",
 }
 
@@ -166,7 +186,8 @@ def test_bad_files_are_refused_in_a_sentence(text, tmp_path):
         (np.full((2, 20), np.nan), {}, "no finite angle of joint 1 at sample 1"),
         (GAIT.angles(T[:20]), {}, "does not close"),
         (GAIT.angles(T), {"period": -1}, "period must be positive"),
-        (GAIT.angles(T), {"harmonics": 40}, "60 samples determine 1 to 29 harmonics"),
+        (GAIT.angles(T), {"period": 0.06}, "in the file's unit of time"),
+        (GAIT.angles(T), {"harmonics": 40}, "60 samples determine 1 to 28 harmonics"),
         (0.01 * GAIT.angles(T), {}, "hardly moves"),
         ("nowhere.csv", {}, "cannot read nowhere.csv"),
         ({"a": 1}, {}, "must be joint angles"),
