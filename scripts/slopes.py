@@ -54,7 +54,7 @@ def climbers(friction: Friction, harmonics: int, grades: tuple[float, ...], star
 
 def heading(best: Solution) -> float:
     """Direction in which a gait would go on the level, from straight uphill [deg]."""
-    if best.problem.slope is None:
+    if best.problem.regime.slow_on_level:
         return 0.0
     at = best.problem.body, best.problem.friction, best.gait, best.delta_per_period, best.problem.grade
     return float(np.degrees(np.angle(np.exp(1j * slope_motion(*at, tolerance=1e-4).headings[0]))))

@@ -64,8 +64,8 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
 def _bounded(problem: Problem) -> bool:
     """Work that depends on the pace has no bound per distance: a slow gait pays as little as it likes. Nor has a body that
     coasts."""
-    slow_on_level = problem.slope is None and not problem.froude
-    return slow_on_level and problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.law)
+    dry = problem.regime.slow_on_level and rate_independent(problem.law)
+    return dry and problem.objective == EFFICIENCY and problem.rotation == 0
 
 
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None, *, asked: bool = False) -> str:

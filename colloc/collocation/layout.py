@@ -57,7 +57,7 @@ def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = No
         "angles": (n_joint, n_point),
         "rates": (n_joint, n_point),
         "z": (3, n_point),
-        "momenta": (len(STATES) if control.dynamics.froude else 0, mesh.n_site),
+        "momenta": (len(STATES) if control.dynamics.regime.froude else 0, mesh.n_site),
         "forces": (len(body.force_names) if full else 0, n_point),
         "totals": (len(control.aims.integrals), 1),
     }

@@ -27,7 +27,7 @@ from colloc.gaits.control_problem import ControlProblem, Dynamics
 from colloc.gaits.gait_fields import AnyClass
 from colloc.gaits.objective import Objective
 from colloc.gaits.period import chord_per_way
-from colloc.gaits.sloped import Slope, checked_chain
+from colloc.gaits.regime import LEVEL, Regime
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
@@ -45,18 +45,17 @@ N_RATE = 2
 
 
 @lru_cache(maxsize=32)
-def point_function(
-    formulation: str, body: Body, friction: Law, slope: Slope | None = None, froude: float = 0.0
-) -> LocalFunction:
-    """Outputs at a mesh point: equations that must vanish, then rate of distance and power; on a slope that of the joints.
+def point_function(formulation: str, body: Body, friction: Law, regime: Regime = LEVEL, unit: float = 1.0) -> LocalFunction:
+    """Outputs at a mesh point: equations that must vanish, then rate of distance and power of the joints, all per period
+    divided by `unit`, as the law of friction takes rates.
 
     Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links. With
     inertia the momenta, too: they, not the balance, have to be those that the body has, and before the last outputs are their
     rates.
     """
-    if froude:
-        return _point_with_inertia(checked_mass(body), friction, froude)
-    return _full_point(body, friction, slope) if formulation == FULL else _map_point(body, friction)
+    if regime.froude:
+        return _point_with_inertia(checked_mass(body), friction, regime.froude * unit**2)
+    return _full_point(body, friction, regime) if formulation == FULL else _map_point(body, friction)
 
 
 def _symbols(body: Body) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -70,16 +69,15 @@ def forward(theta: ca.SX, centre: ca.SX) -> ca.SX:
     return ca.cos(theta) * centre[0] - ca.sin(theta) * centre[1]
 
 
-def _full_point(body: Body, friction: Law, slope: Slope | None) -> LocalFunction:
+def _full_point(body: Body, friction: Law, regime: Regime) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     forces = ca.SX.sym("forces", len(body.force_names))
     laws, balance, centre, power = body.with_forces(friction, angles, rates, z, forces, delta)
-    ahead = forward(theta, centre)
-    if slope is not None:
-        chain = checked_chain(body, friction, slope.grade)
-        balance += load_wrench(chain, chain.posture(angles), slope.pull(theta))
-        ahead, power = forward(theta - slope.ahead, centre), power + slope.grade * ahead
-    out = ca.vertcat(laws, balance, ahead, power)
+    load = regime.pull(theta)
+    if load is not None:
+        balance += load_wrench(body, body.posture(angles), load)  # type: ignore[attr-defined, arg-type]
+        power -= ca.sum1(load * centre)
+    out = ca.vertcat(laws, balance, forward(theta - regime.ahead, centre), power)
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
 
 
@@ -97,10 +95,11 @@ def _point_with_inertia(body: Chain, friction: Law, froude: float) -> LocalFunct
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces, states), ca.SX(0, 1), delta, out)
 
 
-def across_point(body: Body, friction: Law, slope: Slope) -> LocalFunction:
+def across_point(dynamics: Dynamics) -> LocalFunction:
     """Velocity of the centre of mass to the left of the direction whose way counts."""
+    body, friction, regime, *_ = dynamics
     theta, angles, rates, z, delta = _symbols(body)
-    out = forward(theta - slope.ahead - 0.5 * np.pi, body.sliding(friction, angles, rates, z, delta).centre)
+    out = forward(theta - regime.ahead - 0.5 * np.pi, body.sliding(friction, angles, rates, z, delta).centre)
     return local_function("across", ca.vertcat(theta, angles, rates, z), ca.SX(0, 1), delta, out)
 
 
@@ -151,7 +150,7 @@ def with_forces(
 ) -> tuple[ca.SX, Instants]:
     """The locals orientation, angles, rates and forces of a point of a full program, and its instant as formulas see it."""
     body, law = dynamics.body, dynamics.law
-    forces, load = ca.SX.sym("forces", len(body.force_names)), dynamics.pull(theta)
+    forces, load = ca.SX.sym("forces", len(body.force_names)), dynamics.regime.pull(theta)
     now = Instants(body, law, angles, rates, delta, forces=forces, unit=unit, load=load)
     return ca.vertcat(theta, angles, rates, forces), now
 

@@ -39,6 +39,7 @@ from colloc.mechanics.bodies import FULL, Pairs
 from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
 from colloc.motion.heading import closing_sign, momenta_image
+from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.constraint_rows import (
     Group,
     block_group,
@@ -75,10 +76,10 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
     mesh, dynamics, admissible, aims = control.mesh(edges, scheme), control.dynamics, control.admissible, control.aims
     layout = layout_of(control, mesh)
     moved = dynamics.in_speeds_of(RADIANS)
-    body, friction, slope, froude, *_ = moved
+    body, friction = moved.body, moved.law
     gait, n_joint = admissible.gait, body.n_joint
     checks = shape_checks(body, far, admissible.largest_speeds)
-    point = point_function(control.formulation, body, friction, slope, froude * RADIANS**2)
+    point = point_function(control.formulation, body, friction, dynamics.regime, RADIANS)
     n_parameter = layout.parameters.shape[0]
 
     sites = np.empty(mesh.n_point, dtype=int)
@@ -106,8 +107,8 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
 
     besides = period_rows(control, layout, mesh, density, RADIANS)
     besides |= actuator_rows(control.actuators, moved, with_forces, layout.n, RADIANS)
-    if slope is not None and aims.no_way_across:
-        across = across_point(body, friction, slope)
+    if aims.no_way_across:
+        across = across_point(moved)
         parts = across, point_gather[: across.n_local], none
         besides["across"] = parts, zero_total_group("across", mesh, layout.n)
     if not gait.linear:
@@ -179,7 +180,7 @@ def _point_groups(control: ControlProblem, n_out: int, mesh: Mesh, layout: Layou
 
 
 def _orientation_groups(control: ControlProblem, mesh: Mesh, layout: Layout) -> list[Group]:
-    """theta' = omega - turn, how theta closes where no symmetry does it, and on a slope where it begins."""
+    """theta' = omega - turn, how theta closes where no symmetry does it, and where it begins if the gait says so."""
     state, rate = mesh.integration()
     linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
     turn = control.dynamics.turn
@@ -188,5 +189,5 @@ def _orientation_groups(control: ControlProblem, mesh: Mesh, layout: Layout) -> 
     return [
         equalities("orientation", linear, given=-turn * np.asarray(rate.sum(axis=1)).ravel()),
         *rotation_groups(sign, layout.theta[0], layout.n, control.aims.rotation is not None),
-        *([] if control.dynamics.slope is None else [equalities("heading", begin)]),
+        *([equalities("heading", begin)] if "theta" in kind_of_motion(control.dynamics).told else []),
     ]

@@ -20,22 +20,20 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import Limit
 from colloc.gaits.objective import Objective, integrals_of
 from colloc.gaits.problem import Problem
-from colloc.gaits.sloped import Slope
+from colloc.gaits.regime import Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimits, Quantity
 from colloc.mechanics.law import Law
-from colloc.numerics.arrays import Array
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
 
 
 class Dynamics(NamedTuple):
-    """What moves how: a body under a law of friction on the level or a slope, slowly or at a Froude number."""
+    """What moves how: a body under a law of friction, in a regime such as slow on the level."""
 
     body: Body
     law: Law
-    slope: Slope | None
-    froude: float
+    regime: Regime
     symmetry: str
     """Of the motion: which part of a period follows from the other (`colloc.gaits.symmetry`)."""
     turn: float = 0.0
@@ -44,11 +42,6 @@ class Dynamics(NamedTuple):
     def in_speeds_of(self, unit: float) -> Dynamics:
         """The same for speeds that are divided by a unit."""
         return self._replace(law=self.law.in_speeds_of(unit))
-
-    def pull(self, theta: Array) -> Array | None:
-        """The outside force on the body at orientations theta ``(1, n_time)``, in its axes, ``(2, n_time)``; None if there is
-        none. NumPy and CasADi."""
-        return None if self.slope is None else self.slope.pull(theta)
 
 
 class Admissible(NamedTuple):
@@ -151,7 +144,7 @@ class ControlProblem:
 def control_problem(problem: Problem) -> ControlProblem:
     """What solves a problem: its parts, in units of friction."""
     body, gait, law, aims = problem.body, problem.gait, problem.law, (problem.objective, *(aim for aim, _ in problem.at_least))
-    limits, slope = problem.path_limits, problem.slope
+    limits, regime = problem.path_limits, problem.regime
     degrees = [part.degree for part in aims] + [limit.friction_degree for limit in limits.each]
     unit = 1.0 if None in degrees else friction_unit(law)
     return ControlProblem(
@@ -159,8 +152,7 @@ def control_problem(problem: Problem) -> ControlProblem:
         Dynamics(
             body,
             law if unit == 1.0 else law.in_units_of(unit),
-            None if slope is None else slope._replace(grade=slope.grade / unit),  # the weight's pull is a force, too
-            problem.froude / unit,  # and what drives momenta
+            regime.in_units_of(unit),
             gait.motion_symmetry,
             problem.rotation or 0.0,
         ),
@@ -169,7 +161,7 @@ def control_problem(problem: Problem) -> ControlProblem:
             problem.objective,
             tuple((aim, value / _size(aim, unit)) for aim, value in problem.at_least),
             problem.rotation,
-            problem.towards is not None,
+            regime.keeps_ahead,
         ),
         limits.in_units_of(unit),
         problem.formulation,

@@ -118,6 +118,8 @@ def problem_fields(problem: Any) -> dict[str, Any]:
     stated["gait"] = problem.gait.level  # the grade says that it is on a slope
     stated |= {name: fields(stated[name]) for name in ("guess", "gait", "body", "friction")}
     stated |= {"objective": problem.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in problem.at_least]}
+    if problem.motion is not None:
+        stated["motion"] = fields(problem.motion)
     stated["limits"] = [limit.fields() for limit in problem.limits]
     return {name: value for name, value in stated.items() if name not in usual}
 

@@ -11,17 +11,17 @@ from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.guesses import check_guess, slowed, travelling_wave
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.inertia import check_paced
+from colloc.gaits.inertia import Paced
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each, one_sided
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
-from colloc.gaits.sloped import Slope, check_asked, class_on, slope_from
+from colloc.gaits.regime import LEVEL, Regime
+from colloc.gaits.sloped import slope_from
 from colloc.gaits.symmetry import NONE, check_symmetric
 from colloc.mechanics.bodies import FULL, Body, formulations
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import PathLimit, PathLimits, Quantity, stated_limit, torque_and_power
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import STATED_IF_SET, check_finite, is_number, is_whole, named_arguments
@@ -105,6 +105,8 @@ class Problem:
     froude : float
         Froude number L/(g T^2) at which gaits are played: length over gravity and the period squared; 0 is so slow that inertia
         does not matter (docs/howto/pace.md). What counts is its ratio to the coefficient of friction.
+    motion : Regime, optional
+        A kind of motion of your own, instead of `grade` and `froude` (`colloc.gaits.regime`).
     shrinking : bool
         Whether a gait may be the answer that shrank to ``smallest_shape_speed``. By default the best gait of finite size is,
         if there is one.
@@ -147,6 +149,7 @@ class Problem:
     grade: float = field(default=0.0, metadata=STATED_IF_SET)
     towards: float | None = field(default=None, metadata=STATED_IF_SET)
     froude: float = field(default=0.0, metadata=STATED_IF_SET)
+    motion: Regime | None = field(default=None, metadata=STATED_IF_SET)
     shrinking: bool = field(default=False, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
@@ -158,9 +161,9 @@ class Problem:
         schedule = self.body.schedule
         self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
         self._check_parts()
-        slope = self.slope
-        object.__setattr__(self, "gait", class_on(slope, self.gait))
-        object.__setattr__(self, "grade", 0.0 if slope is None else slope.grade)
+        regime = self.regime
+        object.__setattr__(self, "gait", regime.class_of(self.gait))
+        object.__setattr__(self, "grade", float(self.grade))
         usual = self.body.usual
         start = (self.gait.delta_start or usual.delta_start) if self.law.regularised else usual.delta
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=formulations(self.body)[0])
@@ -168,10 +171,7 @@ class Problem:
         self._check_numbers()
         self._check_aims()
         self._check_actuators()
-        if self.slope is not None:
-            check_asked(self)
-        if self.froude != 0:
-            check_paced(self)
+        regime.check(self)
         self._check_gaits()
         if self.guess is None:
             free = self.gait.free
@@ -276,17 +276,17 @@ class Problem:
         return self.body.law(self.friction)
 
     @property
-    def slope(self) -> Slope | None:
-        """The slope the body is on; None on the level."""
-        return slope_from(self.body, self.friction, self.grade, self.towards)
+    def regime(self) -> Regime:
+        """How gaits are played. `ProblemError` if they cannot be."""
+        slope = slope_from(self.body, self.friction, self.grade, self.towards)
+        if self.motion is not None and (slope is not None or self.froude != 0):
+            raise ProblemError("a kind of motion of your own takes the place of grade and froude: leave these out.")
+        return self.motion or (Paced(self.froude) if self.froude != 0 else slope or LEVEL)
 
     @property
     def scene(self) -> str:
         """Where the body is and how fast, in words; "" on the level and slow."""
-        if self.froude:
-            period = 1 / np.sqrt(GRAVITY * self.froude)
-            return f"played at the Froude number {self.froude:.4g}: a body of 1 m takes {period:.3g} s a period"
-        return "" if self.slope is None else self.slope.describe()
+        return self.regime.describe()
 
     @property
     def paced_by(self) -> str:
@@ -297,8 +297,8 @@ class Problem:
             return "the joints' speed is limited"
         if limited := [each.name for each in self.limits if each.pace_degree != 0.0]:
             return f"the {limited[0]} is limited"
-        if self.froude:
-            return "what is heavy takes time to move"
+        if self.regime.pace:
+            return self.regime.pace
         if paced := [each.name for each in self.integrals if each.pace_degree != 1.0]:
             return f"the {paced[0]} of a path depends on how fast it is followed"
         return "" if rate_independent(self.law) else f"work depends on the pace under {self.law.label}"
@@ -350,8 +350,7 @@ class Problem:
         """What is asked, in a line: the objective if it is not the efficiency, joints, friction, scene and class of gaits."""
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
-        grade = f", grade {self.grade:g}" if self.grade else f", Froude number {self.froude:g}" if self.froude else ""
-        return f"{best}{coordinates}, {self.law.label}{grade}, {self.gait.describe()}"
+        return f"{best}{coordinates}, {self.law.label}{self.regime.label}, {self.gait.describe()}"
 
     def __repr__(self) -> str:
         return f"<Problem {self.name}: {self.asked}, delta {self.delta:.0e}>"

@@ -9,13 +9,14 @@ the weight.
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from colloc.gaits.linear import LinearClass
+from colloc.gaits.regime import Regime
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
@@ -29,17 +30,42 @@ _ANY_ANGLE = 100.0
 """Bound on where a body may point [rad]: none."""
 
 
-class Slope(NamedTuple):
+@dataclass(frozen=True)
+class Slope(Regime):
     """A slope: the tangent of its inclination, and the direction whose way counts, from straight uphill to the left [rad];
     None: the climb counts, whatever the way aside."""
 
     grade: float
     towards: float | None = None
 
+    slides = True
+    spent = "friction and climb"
+    others_measured = False
+
     @property
     def ahead(self) -> float:
-        """The direction whose way counts."""
         return self.towards or 0.0
+
+    @property
+    def keeps_ahead(self) -> bool:
+        return self.towards is not None
+
+    @property
+    def label(self) -> str:
+        return f", grade {self.grade:g}"
+
+    def in_units_of(self, unit: float) -> Slope:
+        return replace(self, grade=self.grade / unit)  # the weight's pull is a force, too
+
+    def class_of(self, gait_class: Any) -> Any:
+        """Any class that derives from `LinearClass`, one's own too, can be here. `ProblemError` for others."""
+        level = gait_class.level
+        if not (isinstance(level, LinearClass) and level.linear):
+            raise ProblemError(
+                "on a slope gaits are sought in classes whose angles are linear in their parameters, not "
+                f"{type(level).__name__}: take Harmonic, BSpline or Basis."
+            )
+        return _pointed(level)
 
     def pull(self, theta: Array) -> Array:
         """Of the weight, in the body's axes, ``(2, n_time)``, with its tail link at angles theta ``(1, n_time)`` from straight
@@ -47,15 +73,25 @@ class Slope(NamedTuple):
         xp = namespace(theta)
         return xp.stack([-self.grade * xp.cos(theta), self.grade * xp.sin(theta)])
 
+    def check(self, problem: Any) -> None:
+        if problem.rotation != 0:
+            raise ProblemError(
+                "on a slope a body that a period turns has no gait that repeats, as its weight then pulls from another side: "
+                "leave rotation at 0, and out of what is asked for."
+            )
+        if problem.formulation != FULL:
+            raise ProblemError(f"on a slope there is only the formulation {FULL!r}.")
+        if scheme(problem.scheme).left:
+            raise ProblemError(f"on a slope a gauss-N or radau-N scheme is needed, not {problem.scheme}.")
+
     def describe(self) -> str:
-        """In words, for reports."""
         way = "the climb" if self.towards is None else f"the way {np.degrees(self.towards):.4g}° to the left of straight uphill"
         return f"slope of grade {self.grade:g}: d is {way}, W the work of the joints"
 
 
 class OnSlope(LinearClass):
     """What a slope changes in a class that is linear in its parameters: one more says where the tail link points at phase 0.
-    Classes on slopes derive from it first and then from the class they are on the level (`class_on`)."""
+    Classes on slopes derive from it first and then from the class they are on the level (`Slope.class_of`)."""
 
     delta_start = 0.02
     """At more the body creeps down faster than it crawls up."""
@@ -135,25 +171,6 @@ def _pointed(gait_class: Any) -> Any:
     return _on_slopes(kind)(**_fields(gait_class))
 
 
-def class_on(slope: Slope | None, gait_class: Any) -> Any:
-    """A class of gaits on a slope, or on the level; any that derives from `LinearClass`, one's own too, can be on both.
-
-    Raises
-    ------
-    ProblemError
-        If it has no gaits for slopes.
-    """
-    level = gait_class.level
-    if slope is None:
-        return level
-    if not (isinstance(level, LinearClass) and level.linear):
-        raise ProblemError(
-            f"on a slope gaits are sought in classes whose angles are linear in their parameters, not {type(level).__name__}: "
-            "take Harmonic, BSpline or Basis."
-        )
-    return _pointed(level)
-
-
 def _checked_grade(grade: object) -> float:
     if not is_number(grade) or grade < 0:
         raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
@@ -185,16 +202,3 @@ def slope_from(body: Body, friction: Law, grade: object, towards: object) -> Slo
         return None
     checked_chain(body, friction, tangent)
     return Slope(tangent, None if towards is None else float(towards))
-
-
-def check_asked(problem: Any) -> None:
-    """A `ProblemError` for what cannot be asked of a problem on a slope."""
-    if problem.rotation != 0:
-        raise ProblemError(
-            "on a slope a body that a period turns has no gait that repeats, as its weight then pulls from another side: leave "
-            "rotation at 0, and out of what is asked for."
-        )
-    if problem.formulation != FULL:
-        raise ProblemError(f"on a slope there is only the formulation {FULL!r}.")
-    if scheme(problem.scheme).left:
-        raise ProblemError(f"on a slope a gauss-N or radau-N scheme is needed, not {problem.scheme}.")

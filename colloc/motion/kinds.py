@@ -13,13 +13,16 @@ collocates a motion asks it, and not whether there is a slope.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import singledispatch
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from colloc.gaits.control_problem import Dynamics
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.inertia import Paced
 from colloc.gaits.period import chord_per_way
+from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
@@ -392,12 +395,25 @@ def through_motion(
     return rows, on_begin
 
 
+@singledispatch
+def kind_in(regime: Regime, of: Dynamics) -> Kind:
+    """How a body moves in a regime; that of another is registered with ``kind_in.register``."""
+    return SlowOnLevel(of.body, of.law, of.symmetry, of.turn)
+
+
+@kind_in.register
+def _on_slope(regime: Slope, of: Dynamics) -> Kind:
+    return SlowOnSlope(of.body, of.law, regime)
+
+
+@kind_in.register
+def _with_inertia(regime: Paced, of: Dynamics) -> Kind:
+    return WithInertia(checked_mass(of.body), of.law, of.symmetry, regime.froude, of.turn)
+
+
 def kind_of_motion(dynamics: Dynamics) -> Kind:
     """How a body moves."""
-    body, law, slope, froude, symmetry, turn = dynamics
-    if froude:
-        return WithInertia(checked_mass(body), law, symmetry, froude, turn)
-    return SlowOnLevel(body, law, symmetry, turn) if slope is None else SlowOnSlope(body, law, slope)
+    return kind_in(dynamics.regime, dynamics)
 
 
 def begin_of(kind: Kind, gait: AnyGait) -> np.ndarray:

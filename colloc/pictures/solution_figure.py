@@ -53,12 +53,11 @@ def _headline(solution: Solution) -> str:
 
 
 def _of_motion(solution: Solution) -> _Panels:
-    t, problem = _PHASES, solution.problem
+    t, work = _PHASES, solution.measured.work
     found: _Panels = {"in the lab (black: at the end)": lambda axes: draw_lab(axes, solution)}
     found["shape space (disc: t = 0)" if _is_planar(solution) else "shape"] = lambda axes: draw_gait(axes, solution)
     found["speeds along the body; what is near δ sticks"] = lambda axes: draw_speeds(axes, solution, t)
-    spent = "W" if problem.slope is None else "against friction; W of the joints"
-    found[f"{spent} = {solution.measured.work:.4f} a period (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
+    found[f"power; W = {work:.4f} (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
     return found
 
 

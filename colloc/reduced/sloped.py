@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.regime import LEVEL
 from colloc.motion.kinds import kind_of_motion
 from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.motion import ReducedMotion
@@ -21,12 +22,11 @@ class SlopeSpace(LinearSpace):
         v = super().parameters(gait)
         if np.isnan(v[-1]):
             dynamics, delta, v[-1] = self.control.dynamics, self.control.delta_start, 0.0
-            assert dynamics.slope is not None
             level, here = (
-                ReducedMotion(kind_of_motion(dynamics._replace(slope=slope)), self.mesh, self)
-                for slope in (None, dynamics.slope)
+                ReducedMotion(kind_of_motion(dynamics._replace(regime=regime)), self.mesh, self)
+                for regime in (LEVEL, dynamics.regime)
             )
-            v[-1] = dynamics.slope.ahead - np.angle(level.at(v, delta).pose.place[-1])
+            v[-1] = dynamics.regime.ahead - np.angle(level.at(v, delta).pose.place[-1])
             beside = (np.append(v[:-1], v[-1] + turn) for turn in _TURNS)
             v = next((each for each in beside if np.isfinite(here.values(each, delta)["work"])), v)
         return v

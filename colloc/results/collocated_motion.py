@@ -10,7 +10,6 @@ import numpy as np
 from colloc.collocation.layout import Layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.gaits.sloped import checked_chain
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.balance_results import Sliding
@@ -54,14 +53,13 @@ class CollocatedMotion:
     def at_points(self) -> Sliding:
         """The body at the collocation points; its force is what is left over: with the weight's pull if it is on a slope, and
         less what its momenta grow by if it has inertia."""
-        now, slope = self.sliding(*self._points), self.problem.slope
+        now, body = self.sliding(*self._points), self.problem.body
+        force = np.array(now.force)
+        if (load := self.problem.regime.pull(self._theta[None])) is not None:
+            force += load_wrench(body, body.posture(self._points[0]), load)  # type: ignore[attr-defined, arg-type]
         if self.problem.froude:
-            return now._replace(force=now.force - self._growth)
-        if slope is None:
-            return now
-        chain = checked_chain(self.problem.body, self.problem.law, slope.grade)
-        pull = load_wrench(chain, chain.posture(self._points[0]), slope.pull(self._theta[None]))
-        return now._replace(force=now.force + pull)
+            force -= self._growth
+        return now._replace(force=force)
 
     @property
     def _growth(self) -> np.ndarray:
@@ -85,9 +83,9 @@ class CollocatedMotion:
 
     @property
     def rotation(self) -> float:
-        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none, a slope allows none."""
+        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none."""
         problem, theta = self.problem, self.x[self.layout.theta[0]]
-        turns = problem.gait.motion_symmetry == NONE and problem.slope is None
+        turns = problem.gait.motion_symmetry == NONE
         return float(theta[-1] - theta[0]) + (problem.rotation or 0.0) if turns else 0.0
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:

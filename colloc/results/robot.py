@@ -52,7 +52,7 @@ def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
     problem = solution.problem
     if not problem.body.force_names:
         raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
-    if problem.slope is not None:
+    if problem.regime.slides:
         raise ProblemError(f"{problem.name} is on a slope: torques of joints that lift weight are not worked out.")
     (angles, rates), z, delta = solution.gait(t), solution.sample(t).z, solution.delta_per_period
     at = problem.law, angles, rates

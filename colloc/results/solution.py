@@ -193,7 +193,7 @@ class Solution:
         A body of length L [m] that takes T [s] a period, on a floor whose friction is f times the stated one, is slow enough if
         T is at least sqrt(L / (9.81 f Fr)). See `colloc.slow_enough`, which says what is raised.
         """
-        if self.problem.slope is not None:
+        if self.problem.regime.slides:
             raise ProblemError("on a slope it is not known how slow is slow enough.")
         at = self.problem.body, self.problem.law, self.gait, self.answer.delta_per_period
         return slow_enough(*at, loss, breaks=self.gait.corner_phases)
@@ -217,7 +217,7 @@ class Solution:
         True
         """
         p = self.problem
-        if p.slope is not None or p.froude:
+        if not p.regime.slow_on_level:
             raise ProblemError("bounds for dry friction are there for slow gaits on the level.")
         return dry_friction(p.body, p.law, self.gait, breaks=self.gait.corner_phases, turn=p.rotation or 0.0)
 

@@ -39,7 +39,7 @@ _PHASES = np.arange(64) / 64
 def check_actuators_suffice(problem: Problem) -> None:
     """A `ProblemError` if no gait of a problem keeps the limits on its joints' torques and powers, whatever its efficiency."""
     limits = _motors(problem)
-    if not limits.names or problem.slope is not None or problem.law.degree is None or _guess_keeps(problem):
+    if not limits.names or not problem.regime.slow_on_level or problem.law.degree is None or _guess_keeps(problem):
         return
     stated = " and ".join(name for name in ("torque_limit", "power_limit") if getattr(problem, name) is not None)
     distance = max((least for aim, least in problem.at_least if aim.expression == "distance"), default=0.0)

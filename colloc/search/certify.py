@@ -59,7 +59,7 @@ class Certified(NamedTuple):
 def is_trivial(answer: Answer) -> bool:
     """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
     problem = answer.problem
-    if problem.slope is not None:
+    if problem.regime.slides:
         return control_problem(problem).in_units(answer.value) < NOWHERE
     if not goes_nowhere(answer):
         return False
@@ -146,7 +146,7 @@ def gait_certificate(
     """
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
-    run = replayer(problem.slope, problem.froude)
+    run = replayer(problem.regime)
     settings |= {"quantities": problem.integrals, "limits": problem.path_limits, "run": run}
     known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
@@ -227,7 +227,7 @@ def _motion(
     if claimed is not None:
         gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
         checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
-    spent = "friction and kinetic energy" if problem.froude else "friction" if problem.slope is None else "friction and climb"
+    spent = problem.regime.spent
     return [
         *checks,
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
@@ -273,7 +273,7 @@ def _actuators(problem: Problem, fine: Replay) -> list[Check]:
 
 def _direction(problem: Problem, fine: Replay) -> list[Check]:
     """Where the way leads, if that is asked for."""
-    if problem.towards is None:
+    if not problem.regime.keeps_ahead:
         return []
     return [Check("direction", fine.across / fine.distance, ANGLE, "of the way, off the one that was asked for [rad]")]
 
@@ -286,11 +286,11 @@ def _beyond(value: float, unknown: float) -> float:
 def _one_motion(problem: Problem, fine: Replay) -> Check:
     """How far the objective depends on which of several balanced motions the body takes: where the law leaves it open, no mesh
     decides it, and as much is allowed as the law's other limit, delta, may change."""
-    if problem.slope is not None:
+    if not problem.regime.others_measured:
         meaning = "part of the period at which several motions are balanced; what they would change is not measured"
         return Check("one motion", fine.several, SEVERAL, meaning)
-    if problem.froude:
-        meaning = "relative; between the motions that follow from slow motion and from rest"
+    if problem.regime.others:
+        meaning = f"relative; between the motions {problem.regime.others}"
     elif problem.law.associated:
         meaning = "relative; the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:

@@ -69,7 +69,7 @@ def solution_of(problem: Problem, found: Certified) -> Solution:
 
 def _message(problem: Problem, answer: Answer, certificate: Certificate, failure: str) -> str:
     if problem.gait.free and is_trivial(answer):
-        if problem.slope is None:
+        if not problem.regime.slides:
             return (
                 "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point). Try another "
                 "guess, or an imposed symmetry."

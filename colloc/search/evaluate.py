@@ -52,7 +52,7 @@ def evaluate(
     (True, 0.123)
     """
     begin = time.monotonic()
-    if problem.slope is not None:
+    if problem.regime.slides:
         raise ProblemError("on a slope a gait goes where its body points: follow it with colloc.slope_motion.")
     if problem.body.schedule:
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")

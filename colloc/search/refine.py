@@ -72,7 +72,7 @@ def refine(optimum: Optimum) -> Optimum:
         Optimised to the last digit. Its `lacks` says what is missing if no mesh was fine enough.
     """
     meshes = _Meshes()
-    if optimum.problem.slope is not None and optimum.objective > -NOWHERE:
+    if optimum.problem.regime.slides and optimum.objective > -NOWHERE:
         return optimum  # relative to nothing no mesh is fine enough
     while True:
         this_run().told("refine", meshes.count, MESHES, optimum)

@@ -356,7 +356,7 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
     found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
     best = found.certificate if found.success else UNCERTIFIED
     at = problem.body, problem.law, gait, delta * gait.delta_unit
-    kept = replayer(problem.slope, problem.froude)(*at, breaks=gait.corner_phases, objective=problem.objective)
+    kept = replayer(problem.regime)(*at, breaks=gait.corner_phases, objective=problem.objective)
     breaks = "; ".join(_broken(problem, kept, ReducedProgram(space, delta).place_rows(v)))
     return Again(change, best.value, best.value_error, found.status, kept.value, kept.error * abs(kept.value), breaks)
 

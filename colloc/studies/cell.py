@@ -114,7 +114,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
     200 instants are within 3e-4 of 1,600 for the ellipse of efficiency 0.26 and delta from 1e-2 to 1e-4.
     """
     try:
-        found = replayer(problem.slope, problem.froude)(
+        found = replayer(problem.regime)(
             problem.body,
             problem.law,
             gait,

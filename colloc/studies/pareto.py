@@ -160,4 +160,4 @@ def _value(solution: Solution, aim: Objective) -> float:
         return value
     problem, gait = solution.problem, solution.gait
     at = (problem.body, problem.law, gait, solution.delta_per_period)
-    return replayer(problem.slope, problem.froude)(*at, breaks=gait.corner_phases, objective=aim).value
+    return replayer(problem.regime)(*at, breaks=gait.corner_phases, objective=aim).value

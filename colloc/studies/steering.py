@@ -146,7 +146,7 @@ def steer(
     >>> colloc.steer(problem, [0.0, 0.1], starts=1)
     <Steering of quick: +0, +5.73 degrees a period, all certified>
     """
-    if not problem.gait.free or problem.slope is not None or problem.rotation != 0:
+    if not problem.gait.free or problem.regime.slides or problem.rotation != 0:
         raise ProblemError("steering begins at a gait that is free and goes straight on the level: rotation 0, grade 0.")
     if not len(turns) or not all(is_number(turn) and abs(turn) < _LARGEST for turn in (*turns, *spot)) or 0 in spot:
         raise ProblemError(

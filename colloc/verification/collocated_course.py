@@ -8,12 +8,15 @@ of its own: on a slope that of the heading (`colloc.verification.gait_on_slope`)
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
-from colloc.gaits.sloped import checked_chain
+from colloc.gaits.inertia import Paced
+from colloc.gaits.regime import Regime
+from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.inertia import checked_mass
 from colloc.motion.collocated import CollocatedPose, stage_weights
@@ -63,14 +66,29 @@ class CourseOfGait(NamedTuple):
 
 def course(control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     """The motion of a gait without breaks, delta per period; with inertia it is sought near the one on a mesh."""
+    return course_in(control.dynamics.regime, control, gait, delta, mesh, error)
+
+
+@singledispatch
+def course_in(regime: Regime, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
+    """The same in a regime; that of another is registered with ``course_in.register``."""
+    raise NotImplementedError(f"no differential equation is known for {type(regime).__name__}: register one.")
+
+
+@course_in.register
+def _on_slope(regime: Slope, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
+    body, friction, *_ = control.dynamics
+    asked = tuple(each for each in control.aims.integrals if each.needs_forces)
+    on = GaitOnSlope(checked_chain(body, friction, regime.grade), friction, gait, delta, (), regime.grade, asked)
+    ran = on.followed(on.at_rest(gait.theta), error)
+    return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: ran.at(t)[6:])
+
+
+@course_in.register
+def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     dynamics = control.dynamics
-    body, friction, slope, froude, _, turn = dynamics
-    if slope is not None:
-        grade, asked = slope.grade, tuple(each for each in control.aims.integrals if each.needs_forces)
-        on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade, asked)
-        ran = on.followed(on.at_rest(gait.theta), error)
-        return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: ran.at(t)[6:])
-    played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=froude, turn=turn)
+    at = checked_mass(dynamics.body), dynamics.law, gait, delta
+    played = GaitWithInertia(*at, froude=regime.froude, turn=dynamics.turn)
     ran = played.settled(_along(kind_of_motion(dynamics), mesh, gait, delta).edges[:, 0], error)
     return CourseOfGait(ran.at, error)
 

@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import partial, singledispatch
 
+from colloc.gaits.inertia import Paced
+from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope
 from colloc.verification.replay import Replay, replay
 
 
-def replayer(slope: Slope | None, froude: float) -> Callable[..., Replay]:
-    """Replays a gait, with the arguments of `colloc.verification.replay.replay`."""
-    if froude:
-        from colloc.verification.inertial_replay import inertial_replay
-
-        return partial(inertial_replay, froude=froude)
-    if slope is not None:
-        from colloc.verification.slope_replay import slope_replay
-
-        return partial(slope_replay, slope=slope)
+@singledispatch
+def replayer(regime: Regime) -> Callable[..., Replay]:
+    """Replays a gait, with the arguments of `colloc.verification.replay.replay`; for another regime it is registered with
+    ``replayer.register``."""
     return replay
+
+
+@replayer.register
+def _on_slope(regime: Slope) -> Callable[..., Replay]:
+    from colloc.verification.slope_replay import slope_replay
+
+    return partial(slope_replay, slope=regime)
+
+
+@replayer.register
+def _with_inertia(regime: Paced) -> Callable[..., Replay]:
+    from colloc.verification.inertial_replay import inertial_replay
+
+    return partial(inertial_replay, froude=regime.froude)

@@ -167,7 +167,7 @@ def test_a_motion_that_is_left_open_for_long_fails_its_check():
 def test_friction_and_the_pull_have_one_unit():
     heavy = PROBLEM.with_(friction=Friction(100, 100, 100), grade=10.0)
     scaled = control_problem(heavy)
-    assert (scaled.unit, scaled.dynamics.slope, scaled.dynamics.law) == (100.0, PROBLEM.slope, PROBLEM.law)
+    assert (scaled.unit, scaled.dynamics.regime, scaled.dynamics.law) == (100.0, PROBLEM.regime, PROBLEM.law)
 
 
 def test_the_level_is_stated_as_before():
@@ -230,7 +230,7 @@ def test_what_cannot_be_asked_is_named(changed, said):
 
 
 def test_a_viscous_body_may_be_on_any_slope():
-    assert PROBLEM.with_(friction=Viscous(2.0, 1.0), grade=3.0).slope.grade == 3.0
+    assert PROBLEM.with_(friction=Viscous(2.0, 1.0), grade=3.0).regime.grade == 3.0
 
 
 def test_a_slope_that_is_not_climbed_is_said_so():
