@@ -12,7 +12,7 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.guesses import check_guess, slowed, travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.inertia import Paced
-from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each, one_sided
+from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Regime
@@ -65,7 +65,7 @@ class Problem:
         measured at unit shape speed.
     joint_limit : float, or sequence of float or (float, float)
         Largest |joint angle| [rad], at most pi, of all joints or of each, or the least and the largest of a joint, as in
-        ``((-1, 2), 1.5)`` (gaits that are series); of a smooth body, largest |tangent angle| from its mean direction, at most
+        ``((-1, 2), 1.5)``; of a smooth body, largest |tangent angle| from its mean direction, at most
         pi/2.
     smallest_shape_speed : float
         Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
@@ -332,9 +332,6 @@ class Problem:
         """That the body has gaits of the class."""
         check_symmetric(self)
         self.gait.check_joints(self.body.n_joint)
-        if self.gait.unit_speed and one_sided(self.joint_limit):
-            kind = type(self.gait).__name__
-            raise ProblemError(f"a joint_limit that differs to both sides is for series alone, not {kind}: use Harmonic.")
         if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, FreePath, Friction, Harmonic, Problem, ProblemError
+from colloc import Chain, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ProblemError
 from colloc.gaits.limits import under_one_limit
 from colloc.results.store import load, save
 from colloc.search.solve import solve
@@ -44,6 +44,20 @@ def test_mirrored_ranges_give_the_mirrored_gait(one_sided):
     assert mirrored.efficiency == pytest.approx(one_sided.efficiency, rel=1e-6)
 
 
+@pytest.mark.parametrize("gait", [pytest.param(FreePath(2.0, "bilateral"), marks=pytest.mark.slow), Polygon(3, "bilateral")])
+def test_paths_keep_both_sides_use_them_and_mirror(gait):
+    aside = Fourier([0.5, -0.5], [[0.9], [-0.9]], [[0.5], [0.5]])
+    stated = Problem("paths", gait=gait, delta=1e-2, mesh_tolerance=1e-2, smallest_shape_speed=0.4)
+    here = solve(stated.with_(joint_limit=((-1, 2), (-2, 1)), guess=aside), starts=1)
+    there = solve(stated.with_(joint_limit=((-2, 1), (-1, 2)), guess=aside.scaled(-1.0)), starts=1)
+    assert here.success
+    assert there.efficiency == pytest.approx(here.efficiency, rel=1e-9)
+    first, second = here.gait.angles(np.linspace(0, 1, 4001))
+    assert first.max() == pytest.approx(2.0, abs=1e-5)
+    assert first.min() > -1.0 - 1e-5
+    assert second.max() < 1.0 + 1e-5
+
+
 def test_a_range_that_is_even_is_a_limit():
     assert problem(((-1, 1), 2.0)).joint_limit == problem((1.0, 2.0)).joint_limit
 
@@ -63,7 +77,6 @@ def test_shapes_are_held_against_one_limit_on_either_side():
         (((-1, 2),), Harmonic(1), "give one for all joints"),
         (((-1, 2), (-1, 2)), Harmonic(1, "bilateral"), "mirrored joints"),
         (((-1, 2), (-1, 2)), Harmonic(1, "antipodal"), "both sides"),
-        (ONE_SIDED, FreePath(4.0), "series"),
     ],
 )
 def test_ranges_that_cannot_be_kept_are_refused(limit, gait, words):
