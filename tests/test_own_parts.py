@@ -28,8 +28,8 @@ DOCS = Path(__file__).resolve().parents[1] / "docs/howto"
 
 def run(page, monkeypatch):
     """All code of a page in one module; what it registers is forgotten afterwards."""
-    monkeypatch.setattr(gait_fields, "BODIES", list(gait_fields.BODIES))
-    monkeypatch.setattr(gait_fields, "CLASSES", gait_fields.CLASSES)
+    for kinds in ("BODIES", "CLASSES"):
+        monkeypatch.setattr(gait_fields, kinds, list(getattr(gait_fields, kinds)))
     module = types.ModuleType("own_parts")
     monkeypatch.setitem(sys.modules, "own_parts", module)
     for block in re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
@@ -98,7 +98,7 @@ class Tents(ClassOfGaits):
 
 @pytest.mark.parametrize("starts", [1, 2])
 def test_a_class_without_a_search_is_refused_in_words(monkeypatch, starts):
-    monkeypatch.setattr(gait_fields, "CLASSES", (*gait_fields.CLASSES, Tents))
+    monkeypatch.setattr(gait_fields, "CLASSES", [*gait_fields.CLASSES, Tents])
     with pytest.raises(ProblemError, match="no search is known for the class Tents: derive it from LinearClass"):
         solve(Problem("tents", gait=Tents(), delta=1e-2), starts=starts)
 

@@ -44,20 +44,25 @@ AnyGait: TypeAlias = Any
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
-GAITS: tuple[type, ...] = (Fourier, ArcPath, Combination, Corners, Mixture, Phases, SerpenoidSeries)
-CLASSES: tuple[type, ...] = (Harmonic, BSpline, Basis, FreePath, Polygon, Relaxed, Prescribed, Serpenoid)
+# what files can hold, and is asked for; parts of your own making are added to these lists
+GAITS: list[type] = [Fourier, ArcPath, Combination, Corners, Mixture, Phases, SerpenoidSeries]
+CLASSES: list[type] = [Harmonic, BSpline, Basis, FreePath, Polygon, Relaxed, Prescribed, Serpenoid]
 BODIES: list[type] = [Chain, Coupled, ModalBody, CrawlerBody, Concertina, Wave]
-"""Bodies that files can hold; a body of your own is added to the list."""
-PARTS: tuple[type, ...] = (Foot, FeetLaw)
-"""What bodies and laws hold."""
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
-"""Laws of friction that files can hold, Coulomb's first; a law of your own making is added to the list."""
+MOTIONS: list[type] = []
+"""Kinds of motion, `colloc.gaits.regime.Regime`, other than those that a grade and a Froude number ask for."""
+PARTS: list[type] = [Foot, FeetLaw]
+"""What bodies and laws hold."""
 
 
 def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None) -> None:
     """A `ProblemError` for a part of a problem that is of none of some kinds, or does not answer what they do."""
     if isinstance(value, type) or not isinstance(value, answers or tuple(kinds)):
-        raise ProblemError(f"{name} must be a {' or '.join(kind.__name__ for kind in kinds)}, not {type(value).__name__}.")
+        what = type(value).__name__
+        if answers is not None and type(value) in kinds:
+            lacks = [each for each in vars(answers) if each[0] != "_" and not hasattr(value, each)]
+            raise ProblemError(f"{name}: a {what} does not say its {', '.join(lacks)} ({answers.__module__}).")
+        raise ProblemError(f"{name} must be a {' or '.join(kind.__name__ for kind in kinds)}, not {what}.")
 
 
 def fields(value: Any) -> dict[str, Any]:
@@ -79,13 +84,13 @@ def _revived(value: Any) -> Any:
     """A part of a body, a law or a gait, such as a foot, from what `fields` made of it; anything else as it is."""
     if isinstance(value, list) and any(isinstance(part, dict) for part in value):
         return tuple(_revived(part) for part in value)
-    return _from((*LAWS, *PARTS, *CLASSES, *BODIES), value) if isinstance(value, dict) and KIND in value else value
+    return _from([*LAWS, *PARTS, *CLASSES, *BODIES], value) if isinstance(value, dict) and KIND in value else value
 
 
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
     values = dict(given)
     name = values.pop(KIND)
-    kind = next((kind for kind in kinds if kind.__name__ == name), None)
+    kind = next((kind for kind in reversed(kinds) if kind.__name__ == name), None)  # of one defined again the last
     if kind is None:
         raise KeyError(f"{name} is none of {', '.join(kind.__name__ for kind in kinds)}")
     return kind(**{name: _revived(value) for name, value in values.items()})
@@ -103,7 +108,7 @@ def class_from(given: dict[str, Any]) -> AnyClass:
 
 def law_from(given: dict[str, Any]) -> Law:
     """The law that `fields` described; as `gait_from`."""
-    return _from((*LAWS, FeetLaw), given)
+    return _from([*LAWS, FeetLaw], given)
 
 
 def body_from(given: dict[str, Any]) -> Body:
@@ -127,7 +132,8 @@ def problem_fields(problem: Any) -> dict[str, Any]:
 def problem_arguments(stated: dict[str, Any]) -> dict[str, Any]:
     """The arguments of the problem that `problem_fields` described; as `gait_from`."""
     kinds = {"guess": gait_from, "body": body_from, "friction": law_from, "gait": class_from}
-    return {**stated, **{name: kind(stated[name]) for name, kind in kinds.items()}}
+    own = {"motion": _from(MOTIONS, stated["motion"])} if "motion" in stated else {}
+    return {**stated, **{name: kind(stated[name]) for name, kind in kinds.items()}, **own}
 
 
 def statement_hash(stated: dict[str, Any]) -> str:

@@ -116,6 +116,8 @@ class Kind(Protocol):
     """Whether it matters what the sum of all joint angles changes by over that part; else `Passed.bend` may be 0."""
     turn: float
     """By which a period is asked to turn the body [rad]."""
+    followed: bool
+    """Whether what a mesh misses is told by a differential equation (`colloc.verification.collocated_course.course_in`)."""
 
     def along(
         self,
@@ -155,6 +157,7 @@ class SlowOnLevel:
 
     states: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
+    followed: bool = False
     lack: str = "no velocity balances the body; give another guess"
 
     def __init__(self, body: Body, friction: Law, symmetry: str, turn: float = 0.0) -> None:
@@ -213,6 +216,7 @@ class SlowOnSlope:
 
     states: tuple[str, ...] = ("theta",)
     told: tuple[str, ...] = ("theta",)
+    followed: bool = True
     lack: str = "friction does not hold the body on the slope all the way, or its joints brake; take a gentler one"
     periods: float = 1.0
     bends: bool = False
@@ -282,6 +286,7 @@ class WithInertia(SlowOnLevel):
     `colloc.mechanics.inertia`, in the axes of the tail link, so that it does not matter where the body points."""
 
     states: tuple[str, ...] = STATES
+    followed: bool = True
     lack: str = "no period with inertia was found that repeats itself; give another guess, or a smaller froude"
 
     def __init__(self, body: Chain, friction: Law, symmetry: str, froude: float, turn: float = 0.0) -> None:

@@ -78,7 +78,7 @@ class Known(NamedTuple):
 
 def gait_motion(control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float) -> Any:
     """The gait's motion on adaptive panels, a `FineMotion`; where it has states, a `CourseOfGait`."""
-    if kind_of_motion(control.dynamics).states:
+    if kind_of_motion(control.dynamics).followed:
         return course(control, gait, delta, mesh, _OF_WAY * tolerance)
     shares, (body, friction, *_) = partial(_shares, control), control.dynamics
     asked: Any = {"quantities": control.aims.integrals, "turn": control.dynamics.turn}
@@ -109,7 +109,7 @@ def mesh_error(
     `fine` is the gait's motion, if it is known. `NotConvergedError` if the balance cannot be solved at some instant."""
     if fine is None:
         fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
-    if kind_of_motion(control.dynamics).states:
+    if kind_of_motion(control.dynamics).followed:
         off, violation = course_defects(control, mesh, gait, delta, fine), constraint_violation(control.admissible, mesh, gait)
         return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
     known = Known(control, gait, delta, fine)

@@ -145,7 +145,7 @@ def planned_mesh(
     if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
     given = scheme(control.scheme)
-    if kind_of_motion(control.dynamics).states:
+    if kind_of_motion(control.dynamics).followed:
         uniform = np.linspace(0.0, control.admissible.gait.fraction, control.intervals + 1)
         first = np.union1d(mesh.edges if nested else uniform, knots)
         return _fewest(_halved(known, Mesh(rule, first), knots, tolerance, aim, most_points) for rule in _family(given))

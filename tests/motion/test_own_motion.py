@@ -1,0 +1,164 @@
+"""A kind of motion that the library does not know, in this file alone: solved, certified, kept and read like any other.
+
+A body is pushed along its tail link by a constant force, as by a propeller; it crawls slowly, on the level.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from colloc import Chain, Friction, Harmonic, Problem, ellipse, load, save
+from colloc.gaits import gait_fields
+from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.regime import Regime
+from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.densities import LENGTH, Instants
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.motion.follow import followed
+from colloc.motion.kinds import Along, SlowOnLevel, kind_in
+from colloc.numerics.arrays import namespace
+from colloc.search.solve import solve
+from colloc.verification.adaptive_motion import whole_totals
+from colloc.verification.collocated_course import CourseOfGait, course_in
+from colloc.verification.replay import Replay, replay
+from colloc.verification.replayer import replayer
+
+
+@dataclass(frozen=True)
+class Pushed(Regime):
+    """Slow, on the level, and pushed along the tail link by a force in units of the weight."""
+
+    push: float
+
+    spent = "friction less what the push does"
+
+    @property
+    def label(self):
+        return f", pushed by {self.push:g}"
+
+    def describe(self):
+        return f"pushed along its tail link by {self.push:g}"
+
+    def in_units_of(self, unit):
+        return Pushed(self.push / unit)
+
+    def pull(self, theta):
+        return namespace(theta).stack([self.push + 0 * theta, 0 * theta])
+
+
+class PushedMotion(SlowOnLevel):
+    """The balance holds instant by instant, with the push; the work is that of the joints."""
+
+    followed = True
+
+    def __init__(self, body, friction, symmetry, push):
+        super().__init__(body, friction, symmetry)
+        self._push = push
+
+    def _load(self, shapes):
+        return Pushed(self._push).pull(np.zeros((1, shapes.angles.shape[1])))
+
+    def along(self, mesh, shapes, begin, near=(None, None), tolerance=1e-12):
+        at, pushed = (self.body, self.friction, shapes.angles, shapes.rates, shapes.delta), self._load(shapes)
+        solved = solve_balance(*at, load=pushed, start=near[1], tolerance=tolerance)
+        now = chain_motion(*at, solved, pushed)
+        held = solved.residual < 1e3 * tolerance
+        return Along(begin, np.empty((0, held.size)), solved.z, now._replace(power=now.actuator_power), held, solved=solved)
+
+    def slopes(self, shapes, along):
+        at = self.body, self.friction, shapes.angles, shapes.rates, shapes.delta
+        found = chain_slopes(*at, along.solved, self._load(shapes))[1][:, : 2 * self.body.n_joint]
+        found[5] -= self._push * found[3]
+        return found, found[:, :0]
+
+    def instants(self, shapes, theta, z=None):
+        at, pushed = (self.friction, shapes.angles, shapes.rates, shapes.delta), self._load(shapes)
+        z = solve_balance(self.body, *at, load=pushed).z if z is None else z
+        return Instants(self.body, *at, z=z, unit=shapes.unit, load=pushed)
+
+
+@kind_in.register
+def _(regime: Pushed, of):
+    return PushedMotion(of.body, of.law, of.symmetry, regime.push)
+
+
+class Gait:
+    """Its differential equation: orientation, place, work of the joints, and friction's less the push's."""
+
+    def __init__(self, body, friction, path, delta, push):
+        self.at, self.path, self.delta, self.push = (body, friction), path, delta, push
+
+    def balanced(self, t, near=None):
+        shapes, pushed = (*self.path(t), self.delta), np.outer([self.push, 0.0], np.ones(t.size))
+        solved = solve_balance(*self.at, *shapes, load=pushed, start=near).require()
+        return solved, chain_motion(*self.at, *shapes, solved, pushed)
+
+    def rates(self, t, state, near):
+        solved, now = self.balanced(np.array([t]), near)
+        moved = np.exp(1j * state[0]) * complex(*now.centre[:, 0])
+        spent = now.power[0] - self.push * now.centre[0, 0]
+        return np.array([now.z[2, 0], moved.real, moved.imag, now.actuator_power[0], spent]), solved.z
+
+    def run(self, error):
+        return followed(self.rates, np.zeros(5), error, longest=4e-3)
+
+
+@course_in.register
+def _(regime: Pushed, control, gait, delta, mesh, error):
+    ran = Gait(*control.dynamics[:2], gait, delta, regime.push).run(error)
+    return CourseOfGait(lambda t: ran.at(t)[:4], error)
+
+
+@replayer.register
+def _(regime: Pushed):
+    def run(body, friction, path, delta, *, tolerance=1e-6, objective=EFFICIENCY, quantities=(), **_):
+        gait, totals = Gait(body, friction, path, delta, regime.push), whole_totals([LENGTH, *quantities], path)
+        (coarse, fine), values = (gait.run(share * tolerance) for share in (1.0, 0.1)), []
+        for ran in (coarse, fine):
+            theta, x, y, work, _ = ran.states[:, -1]
+            values.append({"distance": float(np.hypot(x, y)), "work": float(work), "rotation": float(theta)})
+        errors = {name: abs(value - values[0][name]) for name, value in values[1].items()}
+        found = values[1] | totals[0]
+        t = fine.phases % 1.0
+        solved, _ = gait.balanced(t)
+        return Replay(
+            values=found,
+            errors=errors | totals[1],
+            others={},
+            lever=1.0,
+            actuator_work=float(fine.states[4, -1]),
+            residual=float(solved.residual.max()),
+            error=float(objective.relative_error(found, errors)),
+            several=0.0,
+            instants=t.size,
+            tail=(t, solved.z),
+            objective=objective,
+        )
+
+    return run
+
+
+PROBLEM = Problem("pushed", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "antipodal"), delta=1e-2, motion=Pushed(0.1))
+
+
+@pytest.fixture
+def kept(monkeypatch):
+    monkeypatch.setattr(gait_fields, "MOTIONS", [Pushed])
+
+
+def test_a_kind_of_motion_in_one_file_is_solved_certified_kept_and_read(kept, tmp_path):
+    found = solve(PROBLEM, starts=1)
+    assert found.status == "solved", found.message
+    assert "pushed by 0.1" in repr(PROBLEM)
+    assert found.efficiency > 1.1 * replay(Chain(), Friction(), found.gait, 1e-2).efficiency
+    read = load(save(found, tmp_path / "pushed.h5"))
+    assert (read.problem.motion, read.certificate) == (Pushed(0.1), found.certificate)
+    assert read.problem.hash == PROBLEM.hash != PROBLEM.with_(motion=None).hash
+
+
+def test_without_a_push_it_is_the_motion_on_the_level():
+    at = Chain(), Friction(), ellipse(0, 2.8, 1.3), 1e-2
+    own, level = replayer(Pushed(0.0))(*at), replay(*at)
+    for name in ("distance", "work", "rotation"):
+        assert own.values[name] == pytest.approx(level.values[name], abs=1e-6)
