@@ -131,7 +131,7 @@ def member_equations(gait: AnyClass, n_joint: int) -> LocalFunction:
     """Fourier coefficients less those that the own parameters of a class give (`colloc.gaits.serpenoid`): 0 of members."""
     p = ca.SX.sym("p", gait.size(n_joint))
     given = ca.vertcat(*(value for row in gait.coefficients(p, n_joint) for value in row))
-    return local_function("members", p, ca.SX(0, 1), ca.SX.sym("delta"), p[gait.n_own :] - given)
+    return local_function("members", p, ca.SX(0, 1), ca.SX.sym("delta"), p[gait.n_own : gait.n_own + given.numel()] - given)
 
 
 def density_point(quantity: Quantity, dynamics: Dynamics, unit: float) -> LocalFunction:

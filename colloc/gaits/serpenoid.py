@@ -148,16 +148,22 @@ class Serpenoid(Harmonic):
 
     def parameters(self, gait: Fourier) -> np.ndarray:
         """The own parameters of the wave nearest to a gait, after shifting its start phase if that is free."""
-        gait, lag = gait.resized(self.harmonics), getattr(gait, "lag", None)
+        lag, start = self._begun(gait)
+        gait = gait.resized(self.harmonics)
+        wave = _at_the_middle(gait if abs(start) <= _SAME_START else shifted(gait, -start / (2 * np.pi)), lag)
+        offset = [gait.mean.mean()] if self.symmetry == NONE else []
+        return np.array([lag, *offset, *(-wave[k - 1].imag if sine else wave[k - 1].real for k, sine in self._waves)])
+
+    def _begun(self, gait: Fourier) -> tuple[float, float]:
+        """The lag of the wave nearest to a gait, and by how much of its phase it begins off that of members [rad]."""
+        lag, gait = getattr(gait, "lag", None), gait.resized(self.harmonics)
         if lag is None:
             lag = self._nearest_lag(gait)
         wave = _at_the_middle(gait, lag)
-        if self.symmetry != BILATERAL:
-            start = np.angle(1j * wave[0]) if abs(wave[0]) > 0 else 0.0
-            if abs(start) > _SAME_START:
-                wave = _at_the_middle(shifted(gait, -start / (2 * np.pi)), lag)
-        offset = [gait.mean.mean()] if self.symmetry == NONE else []
-        return np.array([lag, *offset, *(-wave[k - 1].imag if sine else wave[k - 1].real for k, sine in self._waves)])
+        return lag, 0.0 if self.symmetry == BILATERAL or wave[0] == 0 else float(np.angle(1j * wave[0]))
+
+    def in_phase(self, gait: Fourier) -> bool:
+        return abs(self._begun(gait)[1]) <= _SAME_START
 
     def _nearest_lag(self, gait: Fourier) -> float:
         """The lag at which the joints agree best on what wave they are part of."""

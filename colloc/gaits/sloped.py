@@ -60,10 +60,10 @@ class Slope(Regime):
     def class_of(self, gait_class: Any) -> Any:
         """Any class that derives from `LinearClass`, one's own too, can be here. `ProblemError` for others."""
         level = gait_class.level
-        if not (isinstance(level, LinearClass) and level.linear):
+        if not isinstance(level, LinearClass):
             raise ProblemError(
-                "on a slope gaits are sought in classes whose angles are linear in their parameters, not "
-                f"{type(level).__name__}: take Harmonic, BSpline or Basis."
+                f"on a slope gaits are sought in classes paced by time, not {type(level).__name__}: take Harmonic, BSpline or "
+                "Basis."
             )
         return _pointed(level)
 

@@ -14,10 +14,12 @@ from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import widest
 from colloc.mechanics.bodies import Pairs
+from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import remembered
 from colloc.reduced.constraints import Constraints, Function
 from colloc.reduced.given import Given
+from colloc.reduced.pointed import pointed
 
 
 class LinearSpace:
@@ -44,7 +46,8 @@ class LinearSpace:
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters ``(n,)`` of the member nearest to a gait."""
-        return self._admissible.gait.parameters(self._admissible.gait.through(gait))
+        v = self._admissible.gait.parameters(self._admissible.gait.through(gait))
+        return pointed(self.control, self.mesh, self, v)
 
     laid = parameters
 
@@ -120,15 +123,22 @@ class SerpenoidSpace(LinearSpace):
 
     def __init__(self, control: ControlProblem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
         super().__init__(control, edges, scheme, far)
-        self.n = control.admissible.gait.n_own
-        self.lower, self.upper, self.own = self.lower[: self.n], self.upper[: self.n], self.own[: self.n]
+        self._n_own = n_own = control.admissible.gait.n_own
+        told = len(kind_of_motion(control.dynamics).told)  # begins of states, which come last
+        self.own = np.concatenate([self.own[:n_own], self.own[self.own.size - told :]])
+        self.n, self.lower, self.upper = n_own + told, self.lower[self.own], self.upper[self.own]
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        return self._admissible.gait.full(v, self._admissible.n_joint)
+        own, told = np.split(v, [self._n_own])
+        return np.concatenate([self._admissible.gait.full(own, self._admissible.n_joint), told])
 
     def _slopes(self, v: np.ndarray) -> np.ndarray:
         """Of the full parameters, ``(n_full, n)``."""
-        return np.vstack([np.eye(self.n), self._admissible.gait.coefficient_slopes(v, self._admissible.n_joint)])
+        n_own, coefficients = self._n_own, self._admissible.gait.coefficient_slopes(v[: self._n_own], self._admissible.n_joint)
+        slopes = np.eye(self.n + len(coefficients), self.n)
+        slopes[n_own:, n_own:] = np.eye(self.n + len(coefficients) - n_own, self.n - n_own, -len(coefficients))
+        slopes[n_own : n_own + len(coefficients), :n_own] = coefficients
+        return slopes
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return super().at(self.full_parameters(v))

@@ -22,7 +22,6 @@ from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.serpenoid import Serpenoid
-from colloc.gaits.sloped import OnSlope
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.heading import whole_turns
@@ -30,7 +29,6 @@ from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
-from colloc.reduced.sloped import SlopeSpace
 from colloc.system.errors import ProblemError
 
 
@@ -49,7 +47,6 @@ _LINEAR = Searched(
     lambda control, gait, edges, scheme, far: LinearSpace(control, edges, scheme, far),
 )
 _ALONG_PATHS = Searched(transcribe_path, PathSpace)
-_ON_SLOPE = Searched(_LINEAR.program, lambda control, gait, edges, scheme, far: SlopeSpace(control, edges, scheme, far))
 _SERPENOID = Searched(_LINEAR.program, lambda control, gait, edges, scheme, far: SerpenoidSpace(control, edges, scheme, far))
 _MIXED = Searched(
     transcribe_path,
@@ -60,7 +57,6 @@ _MIXED = Searched(
 SEARCHED: dict[type, Searched] = {
     FreePath: _ALONG_PATHS,
     Polygon: _ALONG_PATHS,
-    OnSlope: _ON_SLOPE,
     Relaxed: _MIXED,
     Serpenoid: _SERPENOID,
     LinearClass: _LINEAR,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Basis, BSpline, Chain, Foot, Friction, Harmonic, Pad, Problem, Wheel, ellipse
+from colloc import Basis, BSpline, Chain, Foot, Friction, Harmonic, Pad, Problem, Serpenoid, Wheel, ellipse
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.gait_fields import fields, gait_from
 from colloc.reduced.program import ReducedProgram
@@ -27,6 +27,7 @@ FEET = SKEW.with_(
     grade=0.2,
 )  # fmt: skip
 
+SNAKE = SKEW.with_(name="snake", gait=Serpenoid(2), guess=None)
 SPLINE = SKEW.with_(name="spline", gait=BSpline(7, degree=3), guess=None)
 
 
@@ -48,7 +49,7 @@ def test_the_mesh_has_the_motion_of_the_differential_equation(problem):
         assert found[name] == pytest.approx(float(np.squeeze(exact)), abs=1e-5), name
 
 
-@pytest.mark.parametrize("problem", [LEVEL, FEET, SPLINE], ids=lambda p: p.name)
+@pytest.mark.parametrize("problem", [LEVEL, FEET, SPLINE, SNAKE], ids=lambda p: p.name)
 @pytest.mark.parametrize(
     ("towards", "objective", "limits"),
     [
@@ -70,7 +71,7 @@ def test_gradients_are_the_limit_of_differences(problem, towards, objective, lim
         np.testing.assert_allclose(rows[:, k], (program.rows(v + step) - program.rows(v - step)) / 2e-5, atol=3e-5)
 
 
-@pytest.mark.parametrize(("problem", "towards"), [(SKEW, None), (FEET.with_(torque_limit=5.0), 2.0)])
+@pytest.mark.parametrize(("problem", "towards"), [(SKEW, None), (SNAKE, None), (FEET.with_(torque_limit=5.0), 2.0)])
 def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towards):
     """Every equation but those that the gait has still to be found for: no turn, no way across."""
     program, v = program_at(problem.with_(towards=towards, objective="driven efficiency"), 0.05)
@@ -81,6 +82,12 @@ def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towa
     assert off == ({"rotation"} if towards is None else {"rotation", "across"})
     assert found.objective == pytest.approx(program.objective(v), abs=1e-12)
     assert found.excess[full.groups["rotation"]][0] == pytest.approx(abs(program.motion.values(v, 0.05)["rotation"]), abs=1e-9)
+
+
+def test_a_serpenoid_gait_on_a_slope_is_known_by_its_few_parameters():
+    program, v = program_at(SNAKE, 0.05)
+    assert v.size == SNAKE.gait.n_own + 1
+    np.testing.assert_allclose(program.space.parameters(gait_from(fields(program.space.member(v)))), v, atol=1e-12)
 
 
 def test_what_friction_does_not_hold_has_no_value():

@@ -211,7 +211,7 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"gait": FreePath()}, "linear in their parameters, not FreePath"),
+        ({"gait": FreePath()}, "classes paced by time, not FreePath"),
         ({"body": CrawlerBody(), "gait": None, "guess": None}, "only a Chain"),
         ({"objective": "turning"}, "the objective speaks of the rotation"),
         ({"gait": Harmonic(1), "rotation": 0.1}, "a body that a period turns has no gait that repeats"),
