@@ -79,6 +79,8 @@ def main() -> None:
     parser.add_argument("problems", nargs="*", type=Path, default=[Path("problems") / f"{name}.py" for name in DEFAULT])
     parser.add_argument("--moments", type=int, default=100)
     arguments = parser.parse_args()
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell; what is started would ignore it too
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     rng, failed = np.random.default_rng(0), 0
     whole = {problem: undisturbed(problem) for problem in arguments.problems}
     for k in range(arguments.moments):
