@@ -1,1 +1,6 @@
-"""Measurements of colloc; each module prints a table and says how to run it."""
+"""What is measured; each module is a command."""
+
+import os
+
+# processor times are those of one processor; whoever wants more says so
+os.environ.setdefault("OMP_NUM_THREADS", "1")

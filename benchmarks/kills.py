@@ -10,6 +10,7 @@ against the undisturbed file: every number and every text to the last bit, times
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import subprocess
 import sys
@@ -22,6 +23,8 @@ import numpy as np
 
 DEFAULT = ("three_link", "three_link_feet", "three_link_turning", "three_link_uphill", "wave_sine", "four_link")
 STARTS = 4
+ALL = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
+"""The environment of a command that uses all processors."""
 
 
 def contents(path: Path) -> dict[str, bytes]:
@@ -47,7 +50,7 @@ def command(problem: Path, folder: Path) -> list[str]:
 
 def stopped(problem: Path, folder: Path, asked: signal.Signals, seconds: float) -> bool:
     """Whether the command was stopped after so many seconds, before its end."""
-    process = subprocess.Popen(command(problem, folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(command(problem, folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ALL)
     try:
         process.wait(seconds)
     except subprocess.TimeoutExpired:
@@ -57,7 +60,7 @@ def stopped(problem: Path, folder: Path, asked: signal.Signals, seconds: float) 
 
 def lost(problem: Path, folder: Path, wanted: dict[str, bytes]) -> str:
     """What a solve that is taken up again in a folder leaves otherwise than an undisturbed one; empty if nothing."""
-    subprocess.run(command(problem, folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+    subprocess.run(command(problem, folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ALL, check=False)
     left = sorted(path.name for path in folder.iterdir())
     if len(left) != 1:
         return f"the files are {', '.join(left) or 'none'}"
@@ -70,7 +73,7 @@ def undisturbed(problem: Path) -> tuple[dict[str, bytes], float]:
     """The contents of the file that a solve leaves, and how long it takes [s]."""
     with tempfile.TemporaryDirectory() as name:
         begin = time.monotonic()
-        subprocess.run(command(problem, Path(name)), stdout=subprocess.DEVNULL, check=True)
+        subprocess.run(command(problem, Path(name)), stdout=subprocess.DEVNULL, env=ALL, check=True)
         return contents(next(Path(name).iterdir())), time.monotonic() - begin
 
 

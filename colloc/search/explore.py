@@ -10,10 +10,11 @@ one; the first few of both are followed to the final delta.
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -23,13 +24,14 @@ from colloc.gaits.harmonic import ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links
 from colloc.mechanics.chain import Chain
-from colloc.reduced.program import ReducedProgram, SearchSpace
+from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative
 from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
 from colloc.search.closure import closed_gait
 from colloc.search.converge import as_it_is, converged
 from colloc.search.descend import FACTOR, descend, is_viscous, levels
 from colloc.search.effort import ROUGH, SKETCH
+from colloc.search.helpers import Helpers, helping
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
 from colloc.search.small_starts import small_loops
@@ -131,10 +133,11 @@ def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], b
     >>> round(explore(problem, starts=2).optima[0].value, 2)
     0.26
     """
-    known, tried = candidates(problem, starts, goes_on)
-    if not known:
-        raise NotConvergedError("no start led to any gait of the class; give a guess.")
-    ends = _followed_to_the_end(problem, known, goes_on)
+    with helping(problem) as helpers:
+        known, tried = candidates(problem, starts, goes_on, helpers)
+        if not known:
+            raise NotConvergedError("no start led to any gait of the class; give a guess.")
+        ends = _followed_to_the_end(problem, known, goes_on, helpers)
     distinct: list[tuple[Optimum, Candidate]] = []
     for optimum, candidate in sorted(ends, key=lambda end: end[0].objective):
         twin = next((led for other, led in distinct if same_gait(problem, other, optimum)), None)
@@ -167,7 +170,9 @@ def same_gait(problem: Problem, a: Optimum, b: Optimum) -> bool:
     return are_one(one, other, problem.body, problem.law)
 
 
-def candidates(problem: Problem, asked: int | None, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
+def candidates(
+    problem: Problem, asked: int | None, goes_on: Callable[[], bool], helpers: Helpers
+) -> tuple[list[Candidate], int]:
     """What the starts lead to on a coarse mesh, best first, and how many were tried, at least one."""
     run, count = this_run(), asked or STARTS
     coarse = problem.with_(intervals=min(problem.intervals, problem.gait.coarse_intervals(problem.body.n_joint)))
@@ -181,22 +186,37 @@ def candidates(problem: Problem, asked: int | None, goes_on: Callable[[], bool])
     loops: list[Candidate] = []
     for loop in run.kept("small loops", (problem,), lambda: small_loops(problem)):
         with suppress(CollocError):
-            _follow(*space_about(coarse, closed_gait(coarse, loop, dry)), [dry], [loops])
-    starts, tried, better, best = starting_gaits(problem), 0, -ENOUGH, 0.0
+            _follow(coarse, _closed(coarse, loop, dry), [dry], [loops])
+    starts, drawn = starting_gaits(problem), list[AnyGait | None]()
+    used, tried, better, best, begin = 0, 0, -ENOUGH, 0.0, time.monotonic()
 
     def knows() -> bool:
         enough = tried >= count or (asked is None and _met_best(known[-1]) >= ENOUGH)
         return enough and tried > better + ENOUGH
 
+    def begun(start: int, number: int) -> tuple[AnyGait | None, bool]:
+        """Where a start begins, if anywhere: at the next new gait, of that number, or at a hop; and whether it is new."""
+        if not _is_new(start) and known[-1]:
+            return _shaken(problem, min((c.optimum for c in known[-1]), key=lambda f: f.objective).gait, start), False
+        while len(drawn) <= number:
+            drawn.append(None)
+            with suppress(CollocError):
+                drawn[-1] = next(starts)
+        return drawn[number], True
+
     while tried == 0 or (tried < _MOST * count and not knows() and goes_on()):
+        helpers.begin((time.monotonic() - begin) / max(tried, 1) * (count - tried))
+        ahead = range(tried, min(tried + 2 * helpers.count, _MOST * count))
+        for start, number in zip(ahead, used + np.cumsum([0, *map(_is_new, ahead)]), strict=False):
+            if helpers.has(start):
+                helpers.ask(sketched, coarse, *begun(start, int(number)), deltas)
         start, tried = tried, tried + 1
+        gait, is_new = begun(start, used)
+        used += is_new
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
-            if start // (STARTS // 2) % 2 == 0 or not known[-1]:
-                _follow(*space_about(coarse, closed_gait(coarse, next(starts), deltas[0])), deltas, known)
-            else:
-                shaken = _shaken(problem, min((c.optimum for c in known[-1]), key=lambda f: f.objective).gait, start)
-                _follow(*space_about(coarse, shaken), deltas[-1:], known[-1:])
+            helpers.await_for(sketched, coarse, gait, is_new, deltas)
+            _sketch(coarse, gait, is_new, deltas, known)
         before, best = best, min((c.optimum.objective for c in known[-1]), default=0.0)
         if start > 0 and best < before - SAME_VALUE * abs(before):
             better = start
@@ -228,9 +248,36 @@ def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
     return problem.gait.seeds.moved(gait, size, 1, np.random.default_rng([1, number]))
 
 
-def _follow(space: SearchSpace, v: np.ndarray, deltas: list[float], known: list[list[Candidate]]) -> None:
+def _is_new(start: int) -> bool:
+    """Half as many as usual starts take turns with as many hops."""
+    return start // (STARTS // 2) % 2 == 0
+
+
+def sketched(coarse: Problem, gait: AnyGait, is_new: bool, deltas: list[float]) -> None:
+    """What a start comes through, for the run that keeps it; as far as no earlier one of this process has come through it."""
+    _sketch(coarse, gait, is_new, deltas, _met_here(tuple(deltas)))
+
+
+@lru_cache(maxsize=1)
+def _met_here(deltas: tuple[float, ...]) -> list[list[Candidate]]:
+    return [[] for _ in deltas]
+
+
+def _sketch(coarse: Problem, gait: AnyGait | None, is_new: bool, deltas: list[float], known: list[list[Candidate]]) -> None:
+    """Follow a new start through all deltas, a hop through the last."""
+    if is_new and gait is not None:
+        _follow(coarse, _closed(coarse, gait, deltas[0]), deltas, known)
+    elif gait is not None:
+        _follow(coarse, gait, deltas[-1:], known[-1:])
+
+
+def _closed(coarse: Problem, gait: AnyGait, delta: float) -> AnyGait:
+    return this_run().kept("begin", (coarse, gait, delta), lambda: closed_gait(coarse, gait, delta))
+
+
+def _follow(problem: Problem, gait: AnyGait, deltas: list[float], known: list[list[Candidate]]) -> None:
     """Follow a start through the deltas until it comes through a known gait; what it finds is added to the known ones."""
-    problem = space.control.problem
+    space, v = space_about(problem, gait)
     before = None
     for delta, here in zip(deltas, known, strict=True):
         found = converged(space, v, delta, SKETCH)
@@ -258,7 +305,7 @@ def is_finite(optimum: Optimum) -> bool:
 
 
 def _followed_to_the_end(
-    problem: Problem, known: list[Candidate], goes_on: Callable[[], bool]
+    problem: Problem, known: list[Candidate], goes_on: Callable[[], bool], helpers: Helpers
 ) -> list[tuple[Optimum, Candidate]]:
     """The promising ones at the final delta, those close to the best on the whole mesh.
 
@@ -269,9 +316,13 @@ def _followed_to_the_end(
     promising = [c for c in known if -c.dry >= least]
     queue = [c for c in promising if not c.is_loop][:FOLLOWED] + [c for c in promising if c.is_loop][:FOLLOWED]
     spare = [c for c in known if is_finite(c.optimum) and c not in queue][:ENOUGH]
+    for number, candidate in enumerate(queue):
+        if helpers.has(number):
+            helpers.ask(_followed, problem, candidate.optimum)
     for number, candidate in enumerate((*queue, *spare), 1):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(optimum) for optimum, _ in ends)):
             break
+        helpers.await_for(_followed, problem, candidate.optimum)
         with suppress(CollocError):
             ends.append((_followed(problem, candidate.optimum), candidate))
         run.told("explore", number, len(queue) + len(spare), _best([optimum for optimum, _ in ends]))

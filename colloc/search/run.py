@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -83,11 +83,14 @@ class Run:
         That is solved; a file knows its problems by how they differ from that.
     progress : callable, optional
         Called with every `Progress`.
+    remembers : bool
+        What is found is kept, as `rows`, without a file too.
     """
 
     path: Path | None = None
     problem: Problem | None = None
     progress: Callable[[Progress], object] = lambda news: None
+    remembers: bool = False
     best: Optimum | None = None
     answers: list[tuple[Answer, Certificate]] = field(default_factory=list)
     found_again: int = 0
@@ -98,15 +101,16 @@ class Run:
         self._known: dict[str, Any] = {}
         self._pending: dict[str, Any] = {}
         self._problems: dict[str, Problem] = {}
-        if self.path is None:
+        if self.problem is None:
             return
-        assert self.problem is not None
         self._stated = self.problem.to_dict()
         stages = [Answer, Certificate, Check, Effort, Given, Optimum, SecondOrder, Step]
         self._codec = Codec(
             [*stages, Optimality, Realised, Relaxation, *gait_fields.GAITS, *gait_fields.CLASSES],
             {Problem: Own(self._changes, self._with_changes)},
         )
+        if self.path is None:
+            return
         try:
             rows = read_rows(self.path, ROWS).values
         except StoreError as error:
@@ -126,18 +130,39 @@ class Run:
             self._problems[key] = Problem.from_dict({name: value for name, value in stated.items() if value is not None})
         return self._problems[key]
 
+    def written(self, value: Any) -> Any:
+        """A value that a run can keep, as JSON can hold it."""
+        return self._codec.written(value)
+
+    def read(self, plain: Any) -> Any:
+        """The value that `written` wrote."""
+        return self._codec.read(plain)
+
+    @property
+    def rows(self) -> dict[str, Any]:
+        """All that is known, written, by stage and values."""
+        return self._known
+
+    def learn(self, rows: Mapping[str, Any]) -> None:
+        """Know what another run of the problem has found."""
+        self._known.update(rows)
+        self._pending.update(rows)
+
     def kept(self, stage: str, given: tuple, compute: Callable[[], Value]) -> Value:
         """What a stage makes of given values: as an earlier run found it, else computed, and kept."""
-        if self.path is None:
+        keeps = self.remembers or self.path is not None
+        if not keeps and not self._known:
             return compute()
-        key = f"{stage} {hash_of(self._codec.written(given))}"
+        key = f"{stage} {hash_of(self.written(given))}"
         if key in self._known:
             with suppress(KeyError, TypeError, ValueError):
-                found = self._codec.read(self._known[key])
+                found = self.read(self._known[key])
                 self.found_again += 1
                 return found
         value = compute()
-        self._known[key] = self._pending[key] = self._codec.written(value)
+        if not keeps:
+            return value
+        self._known[key] = self._pending[key] = self.written(value)
         if time.monotonic() - self._last > EVERY:
             self.write()
         return value

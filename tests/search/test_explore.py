@@ -15,8 +15,10 @@ from colloc.results.store import load, save
 from colloc.search import explore
 from colloc.search import solve as stages
 from colloc.search.explore import candidates
+from colloc.search.helpers import Helpers
 from colloc.search.solve import solve
 
+ALONE = Helpers(Problem("alone"))
 UNEQUAL = Problem("unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(2, 1, 1.4), gait=Harmonic(2, "none"))
 
 
@@ -68,7 +70,7 @@ def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch
     converged = explore.converged
     monkeypatch.setattr(explore, "converged", lambda *arguments: replace(converged(*arguments), violation=violation))
     problem = Problem("one_start", gait=Harmonic(1, "bilateral"))
-    known, tried = candidates(problem, 1, lambda: True)
+    known, tried = candidates(problem, 1, lambda: True, ALONE)
     assert tried == 1
     assert bool(known) == kept
 
@@ -87,7 +89,7 @@ def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch
 def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, count, better, tried):
     numbers = itertools.count()
 
-    def follow(space, v, deltas, known):
+    def follow(problem, gait, deltas, known):
         number = next(numbers)
         if number in better:
             found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0)
@@ -96,7 +98,7 @@ def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, coun
     monkeypatch.setattr(explore, "_follow", follow)
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
-    found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True)
+    found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, ALONE)
     assert number == tried
     assert found[0].optimum.objective == -max(better.values())
 
@@ -105,9 +107,9 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
     """New starts and hops take turns, and what a hop begins from depends on what came before alone."""
     begun = {}
 
-    def follow(space, v, deltas, known):
+    def follow(problem, gait, deltas, known):
         number = len(begun)
-        begun[number] = (v, len(deltas))
+        begun[number] = (gait, len(deltas))
         found = SimpleNamespace(objective=-1.0 if number == 0 else -2.0, gait=ellipse(0, 1.0, 0.1 * number), delta=1.0)
         known[-1].append(explore.Candidate(found))
 
@@ -115,19 +117,19 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     problem = Problem("turns", gait=Harmonic(1, "bilateral"))
-    candidates(problem, 18, lambda: True)
+    candidates(problem, 18, lambda: True, ALONE)
     fewer, begun = begun, {}
-    candidates(problem, 40, lambda: True)
+    candidates(problem, 40, lambda: True, ALONE)
     assert [deltas for _, deltas in begun.values()] == [2] * 16 + [1] * 16 + [2] * 8
     assert len(fewer) == 18
-    for number, (v, deltas) in fewer.items():
+    for number, (gait, deltas) in fewer.items():
         assert deltas == begun[number][1]
-        np.testing.assert_array_equal(v, begun[number][0])
+        np.testing.assert_array_equal(gait.cos, begun[number][0].cos)
 
 
 @pytest.mark.parametrize(("asked", "tried"), [(None, 8), (32, 32)], ids=["by default", "as many as were asked for"])
 def test_the_search_ends_once_eight_starts_have_met_the_best_gait_unless_more_are_asked_for(monkeypatch, asked, tried):
-    def follow(space, v, deltas, known):
+    def follow(problem, gait, deltas, known):
         if not known[-1]:
             known[-1].append(explore.Candidate(SimpleNamespace(objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0)))
         known[-1][0].joined()
@@ -135,7 +137,7 @@ def test_the_search_ends_once_eight_starts_have_met_the_best_gait_unless_more_ar
     monkeypatch.setattr(explore, "_follow", follow)
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
-    assert candidates(Problem("same", gait=Harmonic(1, "bilateral")), asked, lambda: True)[1] == tried
+    assert candidates(Problem("same", gait=Harmonic(1, "bilateral")), asked, lambda: True, ALONE)[1] == tried
 
 
 def certified(value, holds=True, finite=True):

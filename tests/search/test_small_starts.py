@@ -8,6 +8,7 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Polygon, Problem, Viscous, replay
 from colloc.results.distinct_optima import distance
 from colloc.search.explore import candidates
+from colloc.search.helpers import Helpers
 from colloc.search.small_starts import small_loops
 
 PROBLEMS = {
@@ -17,6 +18,8 @@ PROBLEMS = {
     "limits": Problem("limits", body=Chain((0.3, 0.3, 0.4)), gait=Harmonic(1), joint_limit=(0.5, 2.0)),
     "polygon": Problem("polygon", friction=Friction(0.4, 1, 2), gait=Polygon(8)),
 }
+
+ALONE = Helpers(Problem("alone"))
 
 
 @pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
@@ -56,7 +59,7 @@ def test_viscous_drag_has_none():
 def test_a_small_gait_at_the_fold_is_found_where_it_is_the_best():
     """Two harmonics, joints up to pi: 0.37 at the fold, 0.35 for gaits of any size."""
     problem = Problem("fold", gait=Harmonic(2))
-    known, _ = candidates(problem, 8, lambda: True)
+    known, _ = candidates(problem, 8, lambda: True, ALONE)
     best = known[0].optimum.gait
     assert -known[0].dry > 0.36
     assert best.shape_speed < 2 * problem.smallest_shape_speed

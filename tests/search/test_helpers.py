@@ -1,0 +1,73 @@
+"""Other processes compute ahead what a search asks for: its answer does not depend on them, nor on what becomes of them."""
+
+import time
+from types import SimpleNamespace
+
+import pytest
+
+import colloc
+from benchmarks.kills import contents
+from colloc import Harmonic, Problem
+from colloc.search import helpers
+from colloc.search.run import Run
+
+PROBLEM = Problem("quick", gait=Harmonic(1, "none"), delta=1e-2, delta_start=0.1, intervals=12, mesh_tolerance=1e-3)
+DIES = "import sys, pickle; pickle.load(sys.stdin.buffer); print(flush=True); sys.stdin.readline()"
+
+
+@pytest.fixture
+def learnt(monkeypatch):
+    """Processes are begun at once; a list of how much each task of theirs has found."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    monkeypatch.setattr(helpers, "_WORTH", 0.0)
+    learn, numbers = Run.learn, []
+
+    def counted(run, rows):
+        numbers.append(len(rows))
+        learn(run, rows)
+
+    monkeypatch.setattr(Run, "learn", counted)
+    return numbers
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    path = tmp_path_factory.mktemp("alone") / "quick.h5"
+    assert colloc.solve(PROBLEM, starts=8, output=path).status == "solved"
+    return contents(path)
+
+
+def test_the_file_is_the_same_to_the_last_bit(alone, learnt, tmp_path, monkeypatch):
+    await_for, until = helpers.Helpers.await_for, time.monotonic() + 60.0
+
+    def patient(some, *task):
+        while some.waiting and time.monotonic() < until:
+            time.sleep(0.01)
+        await_for(some, *task)
+
+    monkeypatch.setattr(helpers.Helpers, "await_for", patient)
+    colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")
+    assert sum(found > 0 for found in learnt) > 1
+    assert contents(tmp_path / "quick.h5") == alone
+
+
+@pytest.mark.parametrize(
+    "command", [pytest.param("raise SystemExit(1)", marks=pytest.mark.slow), DIES], ids=["at once", "at its first task"]
+)
+def test_so_it_is_if_they_die(alone, learnt, tmp_path, monkeypatch, command):
+    monkeypatch.setattr(helpers, "_COMMAND", command)
+    colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")
+    assert not any(learnt)
+    assert contents(tmp_path / "quick.h5") == alone
+
+
+def test_none_is_begun_for_what_this_process_alone_knows_nor_for_little(learnt, monkeypatch):
+    with helpers.helping(SimpleNamespace(law=lambda: 0)) as some:
+        some.begin(1e3)
+        assert some.count == 0
+    monkeypatch.setattr(helpers, "_WORTH", 2.0)
+    with helpers.helping(PROBLEM) as some:
+        some.begin(1.9)
+        assert some.count == 0
+        some.begin(2.1)
+        assert some.count == 2
