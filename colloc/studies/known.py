@@ -142,12 +142,21 @@ def known(table: str | os.PathLike[str] | None = None) -> tuple[Known, ...]:
     path = resources.files("colloc.studies") / "known.json" if table is None else Path(table)
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
-        listed = ("parameters", "edges", "dry")
-        return tuple(Known(**row | {name: None if row[name] is None else tuple(row[name]) for name in listed}) for row in rows)
+        return tuple(_row(row) for row in rows)
     except OSError as error:
         raise StoreError(f"cannot read {path}: {error.strerror or error}.") from None
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise StoreError(f"{path} is no table of known gaits: {error}.") from None
+
+
+def _row(fields: dict[str, Any]) -> Known:
+    """A row that has a gait, whatever that achieves."""
+    dry = None if fields["dry"] is None else tuple(map(float, fields["dry"]))
+    lists = {name: tuple(map(float, fields[name])) for name in ("parameters", "edges")}
+    row = Known(**fields | lists | {"dry": dry} | {name: float(fields[name]) for name in _NUMBERS})
+    if not np.isfinite(row.gait.angles(np.zeros(1))).all():
+        raise ValueError(f"the gait of {row.statement['name']} has no finite angles")
+    return row
 
 
 def row_of(solution: Solution, command: str) -> Known:

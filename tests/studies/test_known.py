@@ -1,6 +1,7 @@
 """The table of known gaits: what it says comes out of a replay, and only what is certified and better gets in."""
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -115,3 +116,22 @@ def test_bounds_under_dry_friction_are_saved_and_checked_again(tmp_path, capsys)
     colloc.save(solution, result)
     assert main(["verify", str(result)]) == 4
     assert "under dry friction, which is not what is found" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        {"parameters": []},
+        {"parameters": [None] * 3},
+        {"value": {}},
+        {"dry": [[]]},
+        {"statement": {}},
+        {"parameters": [float("nan")] * 3},
+    ],
+    ids=lambda fields: " ".join(fields),
+)
+def test_a_table_with_a_row_that_is_none_is_refused_in_a_sentence(broken, tmp_path, capsys):
+    row = next(row for row in ROWS if row.statement["name"] == "three_link")
+    (tmp_path / "mine.json").write_text(json.dumps([asdict(row) | broken]))
+    assert main(["referee", "--table", str(tmp_path / "mine.json")]) == 2
+    assert "is no table of known gaits" in capsys.readouterr().err
