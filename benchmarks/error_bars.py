@@ -29,7 +29,7 @@ from colloc.results.solution import Solution
 from colloc.search.explore import begin_at
 from colloc.search.solve import confirmed
 from colloc.system.errors import NotConvergedError
-from colloc.verification.replay import Path as GaitPath
+from colloc.verification.played import Path as GaitPath
 from colloc.verification.replay import replay
 
 DELTA = 1e-4

@@ -197,6 +197,7 @@ def test_a_protocol_has_few_members():
 
 COLLOCATED = re.compile(r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|collocation|reduced|search)\b")
 ADAPTIVE = (
+    "played",
     "replay",
     "panels",
     "adaptive_motion",

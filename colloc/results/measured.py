@@ -12,7 +12,8 @@ from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimit, PathLimits, Quantity
 from colloc.mechanics.law import Law
-from colloc.verification.replay import MixedPath, Path, Replay, replay
+from colloc.verification.played import MixedPath, Path, Replay
+from colloc.verification.replay import replay
 
 PARTS_OF_DELTA = (1.0, 0.1, 0.01)
 """At which a gait's value is to be known."""

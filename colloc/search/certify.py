@@ -15,7 +15,7 @@ from colloc.results.answer import EVALUATED, REALISED, Answer
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.measured import astray, measured
 from colloc.verification.mesh_error import mesh_error
-from colloc.verification.replay import MixedPath, Path, Replay
+from colloc.verification.played import MixedPath, Path, Replay
 from colloc.verification.replayer import replayer
 
 EXACT, VIOLATION, CLOSURE, WORK = 1e-6, 1e-8, 1e-9, 1e-7

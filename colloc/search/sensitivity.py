@@ -32,7 +32,7 @@ from colloc.search.effort import FINE, ROUGH
 from colloc.search.solve import finished
 from colloc.search.spaces import remeshed, space_about, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
-from colloc.verification.replay import Replay
+from colloc.verification.played import Replay
 from colloc.verification.replayer import replayer
 
 CHANGE = 0.1

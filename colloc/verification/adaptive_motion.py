@@ -17,7 +17,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
 from colloc.numerics.schemes import Scheme, scheme
-from colloc.verification.replay import Path
+from colloc.verification.played import Path
 
 PANEL_RULE = scheme("gauss-5")
 _TO_MIDDLE = PANEL_RULE.integrals(np.array([0.5]))[0]

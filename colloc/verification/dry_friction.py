@@ -17,7 +17,8 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.dry_balance import dry_balance
-from colloc.verification.replay import Path, replay
+from colloc.verification.played import Path
+from colloc.verification.replay import replay
 
 DRY = 1e-6
 """Of the largest mean rate: the delta of the replay, which is corrected for."""

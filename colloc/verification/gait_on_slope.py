@@ -31,7 +31,7 @@ from colloc.motion.follow import Course, followed
 from colloc.motion.on_slope import balance_on_slope
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import fine_motion
-from colloc.verification.replay import Path
+from colloc.verification.played import Path
 
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly. Those of

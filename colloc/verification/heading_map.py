@@ -16,7 +16,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.system.arguments import check_finite
 from colloc.verification.gait_on_slope import SlopeMotion
-from colloc.verification.replay import Path
+from colloc.verification.played import Path
 from colloc.verification.slope import gait_on_slope
 
 _NEUTRAL = 10.0

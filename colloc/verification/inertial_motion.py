@@ -29,7 +29,7 @@ from colloc.motion.follow import Course, followed
 from colloc.system.arguments import check_finite, is_whole
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.replay import Path
+from colloc.verification.played import Path
 
 _ROUGH = 1e-4
 """Error of the runs that say how the momenta at the end depend on those at the start, over the size of the momenta."""

@@ -18,7 +18,7 @@ from colloc.mechanics.inertia import checked_inertia, kinetic_energy, tail_veloc
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
 from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion, passed
-from colloc.verification.replay import Path, Replay
+from colloc.verification.played import Path, Replay
 
 _APART = 1e-2
 """Momenta [body lengths per period] by which motions differ that are not one."""

@@ -13,7 +13,7 @@ import numpy as np
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.verification.adaptive_motion import FineMotion, rates_at
-from colloc.verification.replay import Path
+from colloc.verification.played import Path
 
 SLOW = 30.0
 """A point counts as at rest below this many delta."""

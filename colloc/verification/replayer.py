@@ -8,7 +8,8 @@ from functools import partial, singledispatch
 from colloc.gaits.inertia import Paced
 from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope
-from colloc.verification.replay import Replay, replay
+from colloc.verification.played import Replay
+from colloc.verification.replay import replay
 
 
 @singledispatch

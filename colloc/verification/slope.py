@@ -12,7 +12,7 @@ from colloc.mechanics.law import Law
 from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 from colloc.verification.gait_on_slope import GaitOnSlope, SlopeMotion
-from colloc.verification.replay import Path
+from colloc.verification.played import Path
 
 _LOOSER = 30.0
 

@@ -21,7 +21,7 @@ from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.gait_on_slope import SlopeMotion
-from colloc.verification.replay import Replay
+from colloc.verification.played import Replay
 from colloc.verification.slope import gait_on_slope
 
 _FIRST, _TENTH, _LEAST = 0.1, 0.1, 1e-12

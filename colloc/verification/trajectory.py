@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.system.errors import ProblemError
-from colloc.verification.replay import Path
+from colloc.verification.played import Path
 
 _PHASES = np.linspace(0.0, 1.0, 20001)
 _MOST_SAMPLES = 2_000_000
@@ -53,7 +53,7 @@ def timed(
     Parameters
     ----------
     path : callable
-        Joint angles and rates at phases, see `colloc.verification.replay.Path`.
+        Joint angles and rates at phases, see `colloc.verification.played.Path`.
     rate : float
         Samples a second.
     period : float, optional

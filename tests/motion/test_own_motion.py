@@ -21,7 +21,8 @@ from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
 from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.collocated_course import CourseOfGait, course_in
-from colloc.verification.replay import Replay, replay
+from colloc.verification.played import Replay
+from colloc.verification.replay import replay
 from colloc.verification.replayer import replayer
 
 

@@ -1,0 +1,86 @@
+"""What is played, a path through shapes in time, and what a period of it comes to, by whatever method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.gaits.period import Period
+
+Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
+MixedPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""Of a relaxed gait: joint angles; rates ``(n_direction, n_joint, n_time)`` in every direction; their shares of the time
+``(n_direction, n_time)``, of sum 1."""
+
+
+@dataclass(frozen=True)
+class Replay(Period):
+    """A gait replayed over one period: the quantities of a `Period`, and what tells how far they can be trusted.
+
+    The distance is that of the centre of mass, by `colloc.gaits.period` where a turn is asked for. Errors are what halving the
+    panels would change, summed as magnitudes, and the residual. Of laws with equal coefficients there are no other motions.
+
+    Attributes
+    ----------
+    lever : float
+        Largest distance of a point of the body from its centre of mass [body lengths].
+    actuator_work : float
+        Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
+    residual : float
+        Largest force or torque left over, at any instant, in units of the largest friction coefficient.
+    error : float
+        Relative error of the objective, for the same reasons.
+    several : float
+        Part of the period at which several motions are balanced; 0 for equal coefficients, where there is one.
+    shares : (n_share,)
+        Largest shares of the actuators' limits; none unless limits were given.
+    instants : int
+    tail : ((n,), (3, n))
+        Phases and tail velocities there.
+    objective : Objective
+        That the replay is to measure; the efficiency unless another was asked for.
+    across : float
+        On a slope the way across the direction that counts.
+    multipliers : tuple of complex
+        With inertia, by what small changes of the momenta are multiplied in a period.
+    """
+
+    lever: float
+    actuator_work: float
+    residual: float
+    error: float
+    several: float
+    instants: int
+    tail: tuple[np.ndarray, np.ndarray] = field(compare=False)
+    shares: np.ndarray = field(default_factory=lambda: np.empty(0), compare=False)
+    objective: Objective = EFFICIENCY
+    across: float = 0.0
+    multipliers: tuple[complex, ...] = ()
+
+    def __repr__(self) -> str:
+        value = f"{self.objective.short} = {self.value:.6g} +- {self.error * abs(self.value):.0e}"
+        return f"<Replay at {self.instants} instants: {value}, d = {self.distance:.6g}, W = {self.work:.6g}>"
+
+    def tail_velocity(self, t: np.ndarray) -> np.ndarray:
+        """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""
+        known, z = self.tail
+        return np.stack([np.interp(t, known, row, period=1.0) for row in z])
+
+    @property
+    def value(self) -> float:
+        """Of the objective."""
+        return self.objective(self.values)
+
+    @property
+    def ambiguity(self) -> float:
+        """How much other balanced motions could change it, relative, at most."""
+        return self.ambiguity_of(self.objective)
+
+    @property
+    def turning(self) -> float:
+        """How much the distance depends on the point of the body that is followed, relative: rotation times lever over it."""
+        return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
