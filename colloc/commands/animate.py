@@ -29,6 +29,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seconds", type=float, default=4.0, metavar="S", help="a period takes (default: 4)")
     parser.add_argument("--fps", type=float, default=20.0, metavar="N", help="pictures a second (default: 20)")
     parser.add_argument("--width", type=int, default=900, metavar="PIXELS", help="default: 900")
+    parser.add_argument(
+        "--from-rest", action="store_true", help="with inertia: the first periods of a body that is at rest before"
+    )
     parser.add_argument("--no-arrows", action="store_true", help="do not draw friction")
     parser.add_argument("--output", metavar="PATH", help="folder or file (default: beside the result)")
     add_printing(parser)
@@ -45,6 +48,7 @@ def _animate(options: argparse.Namespace) -> int:
     solution = load(source)
     path = output_path(options.output, source.with_suffix(f".{output_kind(options, ('gif', 'mp4'))}"))
     settings = {"periods": options.periods, "seconds": options.seconds, "fps": options.fps, "width": options.width}
+    settings["from_rest"] = options.from_rest
     from colloc.pictures.movie import write_movie  # heavy imports only now: a bad option is refused at once
 
     write_movie(solution, path, **settings, arrows=not options.no_arrows, quiet=options.quiet or options.json)

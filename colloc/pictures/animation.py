@@ -10,20 +10,25 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from colloc.pictures.figure import draw_shape_path
-from colloc.pictures.motion_frames import Frames, frames
+from colloc.pictures.motion_frames import Frames, frames, frames_of
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
 from colloc.results.motion import turned
 from colloc.results.solution import Solution
 
 
-def pictures(solution: Solution, count: int, periods: int, *, arrows: bool = True, width: int = 900) -> Iterator[np.ndarray]:
+def pictures(
+    solution: Solution, count: int, periods: int, *, arrows: bool = True, width: int = 900, from_rest: bool = False
+) -> Iterator[np.ndarray]:
     """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes, of an even width [pixels];
-    with arrows friction is drawn."""
-    shown = frames(solution, count + 1, periods=periods)
+    with arrows friction is drawn. A body with inertia can be shown from rest (`colloc.Solution.from_rest`)."""
+    if from_rest:
+        shown = frames_of(solution, solution.from_rest(np.linspace(0.0, periods, periods * count + 1)))
+    else:
+        shown = frames(solution, count + 1, periods=periods)
     with styled():
         scene = _Scene(solution, shown, arrows, width)
         for k in range(periods * count):
-            yield scene.picture(*divmod(k, count))
+            yield scene.picture(*divmod(k, shown.t.size - 1))
 
 
 class _Scene:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, Body
-from colloc.results.motion import RigidMotion, turned
+from colloc.results.motion import RigidMotion, SampledMotion, turned
 from colloc.results.solution import Solution
 
 _ARROW = 0.12
@@ -16,7 +16,7 @@ _ARROW = 0.12
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """One period of a motion, from phase 0 to 1, both included."""
+    """One period of a motion, from phase 0 to 1, both included; or several, from rest."""
 
     t: np.ndarray  # (n_time,)
     angles: np.ndarray  # (n_joint, n_time)
@@ -60,9 +60,13 @@ def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
     """Sample a solution's motion at `count` instants, both ends of the period included, and the friction that acts on it at
     about so many arrows along the body; `periods` are shown in a row."""
+    return frames_of(solution, solution.sample(np.linspace(0.0, 1.0, count)), arrows, periods)
+
+
+def frames_of(solution: Solution, motion: SampledMotion, arrows: int = ARROWS, periods: int = 1) -> Frames:
+    """The same of any motion of a solution's gait, which is repeated so many times."""
     problem = solution.problem
     body, delta = problem.body, solution.delta_per_period
-    motion = solution.sample(np.linspace(0.0, 1.0, count))
     ends = lab_outline(body, motion.angles, motion.theta, motion.tail)
     places, forces = body.rubbing(problem.law, motion.angles, motion.rates, delta, motion.z, arrows)
     period = RigidMotion(float(motion.theta[-1] - motion.theta[0]), complex(*(motion.centre[:, -1] - motion.centre[:, 0])))

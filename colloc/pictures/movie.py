@@ -73,6 +73,7 @@ def write_movie(
     fps: float = 20.0,
     width: int = 900,
     arrows: bool = True,
+    from_rest: bool = False,
     quiet: bool = True,
 ) -> Path:
     """Write the motion as GIF or MP4, by the suffix of `path`.
@@ -92,6 +93,8 @@ def write_movie(
         Pixels.
     arrows : bool
         Draw friction.
+    from_rest : bool
+        Show the first periods of a body with inertia, which is at rest before, instead of those that are all alike.
     quiet : bool
         Say nothing while it is drawn, also on a terminal.
 
@@ -110,7 +113,7 @@ def write_movie(
     solution.gait  # noqa: B018  raises where there is none
     if path.suffix == ".mp4":
         _ffmpeg()  # before anything is drawn
-    drawn = pictures(solution, count, periods, arrows=arrows, width=2 * (width // 2))
+    drawn = pictures(solution, count, periods, arrows=arrows, width=2 * (width // 2), from_rest=from_rest)
     with StatusLine(enabled=not quiet) as line:
         counted = _counted(drawn, periods * count, line)
         (write_mp4 if path.suffix == ".mp4" else write_gif)(path, counted, fps)

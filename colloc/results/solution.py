@@ -15,13 +15,14 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import Sliding
+from colloc.mechanics.inertia import checked_mass, tail_velocity
 from colloc.motion.slow_enough import slow_enough
 from colloc.numerics.mesh import Mesh
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.arc import PHASES, Arc, arc
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
-from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
+from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame, turned
 from colloc.results.relaxation import Relaxation
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
@@ -271,6 +272,26 @@ class Solution:
     def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion at phases t, any real numbers, period after period: `CollocatedMotion.sample`."""
         return self.motion.sample(t)
+
+    def from_rest(self, t: np.ndarray) -> SampledMotion:
+        """The motion at ascending phases t, 0 and more, of a body with inertia that is at rest before its joints begin.
+
+        Raises
+        ------
+        ProblemError
+            If the problem states no pace: without inertia the first period is like all others.
+        """
+        from colloc.verification.inertial_motion import motion_from_rest  # loads what integrates, which few need
+
+        p, chain = self.problem, self.problem.body
+        if not p.froude:
+            raise ProblemError(f"{p.name} has no inertia, and is under way at once: from rest is for problems with a froude.")
+        played = p.law, self.gait, self.delta_per_period, p.froude
+        ran = motion_from_rest(chain, *played, periods=max(1, int(np.ceil(t[-1]))), breaks=self.gait.corner_phases)
+        states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
+        (angles, rates), theta, centre = self.gait(t % 1.0), states[3], states[4:6]
+        z = tail_velocity(checked_mass(chain), angles, rates, states[:3])
+        return SampledMotion(t, angles, rates, z, theta, centre, centre - turned(np.array(chain.centre(angles)), theta))
 
     def holding(self, motion: SampledMotion) -> np.ndarray:
         """Which feet of the body hold at instants of its motion, slower than 3 delta, ``(n_foot, n_time)``; no rows for a body

@@ -36,7 +36,6 @@ def inertial_replay(
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
     quantities: Iterable[Quantity | str] = (),
-    **_: object,
 ) -> Replay:
     """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`.
 

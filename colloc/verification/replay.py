@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -100,6 +101,7 @@ def replay(
     quantities: Iterable[Quantity | str] = (),
     limits: Iterable[PathLimit] | PathLimits = (),
     turn: float = 0.0,
+    froude: float = 0.0,
 ) -> Replay:
     """Distance, work, rotation and length of a path over one period, to a relative error in the efficiency, or an objective.
 
@@ -131,6 +133,9 @@ def replay(
         Of which the largest shares are asked for; with limits of 1 these are the largest values themselves.
     turn : float
         Net rotation that the path is asked for [rad]: the distance is the chord of an arc that turns by as much.
+    froude : float
+        Froude number L/(g T^2) at which the path is played; 0 is so slow that inertia does not matter. At another one only
+        `tolerance`, `breaks`, `objective`, `quantities` and `turn` count (`colloc.verification.inertial_replay`).
 
     Raises
     ------
@@ -147,6 +152,11 @@ def replay(
     >>> round(measured.efficiency, 4)
     0.26
     """
+    if froude:
+        from colloc.verification.inertial_replay import inertial_replay  # which makes replays like this one
+
+        played: Any = {"froude": froude, "tolerance": tolerance, "breaks": breaks, "objective": objective}
+        return inertial_replay(body, friction, path, delta, quantities=quantities, turn=turn, **played)  # type: ignore[arg-type]
     if instants < 4 or instants % 2:
         raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
     friction = body.law(friction)

@@ -28,6 +28,4 @@ def _on_slope(regime: Slope) -> Callable[..., Replay]:
 
 @replayer.register
 def _with_inertia(regime: Paced) -> Callable[..., Replay]:
-    from colloc.verification.inertial_replay import inertial_replay
-
-    return partial(inertial_replay, froude=regime.froude)
+    return partial(replay, froude=regime.froude)

@@ -14,6 +14,7 @@ from colloc.motion.compiled_momenta import momenta_at
 from colloc.motion.kinds import WithInertia
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.pictures.animation import pictures
 from colloc.reduced.program import ReducedProgram
 from colloc.search.converge import converged
 from colloc.search.effort import ROUGH
@@ -182,10 +183,27 @@ def test_a_gait_that_is_given_is_evaluated_at_its_pace():
     played = colloc.inertial_motion(stated.body, stated.law, ROUND, 1e-2, 0.1)
     assert found.success
     assert found.efficiency == pytest.approx(played.efficiency, rel=1e-4)
+    again = colloc.replay(stated.body, stated.law, ROUND, 1e-2, froude=0.1, tolerance=1e-5)
+    assert again.efficiency == pytest.approx(played.efficiency, rel=2e-5)
     told = "\n".join(summary_lines(found, None, verbose=True))
     assert "played at the Froude number 0.1" in told
     slowly = colloc.replay(stated.body, stated.law, ROUND, 1e-2).efficiency
     assert f"played slowly   {slowly:.4f}" in told
+
+
+def test_a_body_that_begins_at_rest_comes_to_move_as_certified():
+    """Its centre of mass is at rest at first, and after some periods goes as far in each as in the motion of equal periods."""
+    found = colloc.evaluate(colloc.Problem("paced", froude=0.1, delta=1e-2), ROUND)
+    moved = found.from_rest(np.arange(0.0, 6.001, 0.01))
+    ways = np.hypot(*np.diff(moved.centre[:, ::100], axis=1))
+    assert np.hypot(*(moved.centre[:, 1] - moved.centre[:, 0])) < 1e-3
+    assert ways[0] < 0.9 * ways[-1]
+    assert ways[-1] == pytest.approx(found.distance, rel=1e-3)
+    settled, alike = moved.z[:, 500:600], found.sample(moved.t[500:600]).z
+    np.testing.assert_allclose(settled, alike, atol=2e-2)
+    assert len(list(pictures(found, 2, 2, width=200, from_rest=True))) == 4
+    with pytest.raises(colloc.ProblemError, match="has no inertia"):
+        colloc.evaluate(colloc.Problem("slow", delta=1e-2), ROUND).from_rest(moved.t)
 
 
 def test_bounds_of_slow_gaits_are_not_told_of_fast_ones():
