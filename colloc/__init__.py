@@ -41,15 +41,18 @@ bind(
     {
         "card": "colloc.pictures.solution_card:solution_card",
         "plot": "colloc.pictures.solution_figure:solution_figure",
-        "plot_gait": "colloc.pictures.solution_figure:draw_gait",
+        "plot_panel": "colloc.pictures.publication:draw_panel",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
         "robot": "colloc.results.robot:Robot",
         "plot_robot": "colloc.pictures.robot_figure:robot_figure",
+        "plot_robot_panel": "colloc.pictures.robot_figure:draw_robot",
         "sensitivity": "colloc.search.sensitivity:sensitivity",
         "export": "colloc.pictures.export:write_export",
         "plot_steering": "colloc.pictures.steering_figure:steering_figure",
+        "plot_steering_panel": "colloc.pictures.steering_figure:draw_steering",
         "plot_front": "colloc.pictures.front_figure:front_figure",
+        "plot_front_values": "colloc.pictures.front_figure:draw_front",
     }
 )
 

@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import colloc
+from colloc.gaits.fitted_gait import fitted_gait
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy")
@@ -109,6 +110,11 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
     axes = Figure().add_subplot()
     assert three_link.plot(ax=axes) is axes
     assert axes.collections  # the path
+    for panel in ("power", "mesh", "shape-1-2"):
+        axes = Figure().add_subplot()
+        assert three_link.plot(axes, panel) is axes
+    with pytest.raises(colloc.ProblemError, match="there is no panel 'pwoer'; there are gait, filmstrip, lab, angles"):
+        three_link.plot(axes, "pwoer")
     assert three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200).stat().st_size > 1000
     with pytest.raises(colloc.ProblemError, match=r"should end in \.gif or \.mp4"):
         three_link.animate(tmp_path / "x.avi")
@@ -120,6 +126,13 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
     np.testing.assert_array_equal(frame.tail_velocity_omega, motion.z[2])
     assert dataset.power.attrs["units"] == "weight length/period"
     assert dataset.attrs["efficiency"] == three_link.certificate.efficiency
+
+
+def test_labelled_angles_come_back_as_the_gait_they_are_of(three_link):
+    angles = three_link.to_xarray().joint_angles
+    back = fitted_gait(angles.transpose(), 2, period=1.0).gait  # whatever the order of their dimensions
+    t = np.linspace(0.0, 1.0, 50)
+    np.testing.assert_allclose(back.angles(t), three_link.gait.angles(t), atol=1e-9)
 
 
 def test_a_gait_is_exported_from_python_as_by_the_command(three_link, tmp_path, capsys):

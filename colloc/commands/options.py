@@ -9,7 +9,7 @@ import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from colloc.commands.ending import show
 from colloc.gaits.problem import Problem
@@ -93,6 +93,18 @@ def robot_options(options: argparse.Namespace) -> dict[str, float]:
     if options.length is None or options.mass is None:
         raise ProblemError(f"a robot needs --length and --mass; --{'length' if options.length is None else 'mass'} is missing.")
     return {name: getattr(options, name) for name in ("length", "mass", "gravity")}
+
+
+def add_pace(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
+    """The period of a robot, and what its motors can do."""
+    parser.add_argument("--period", type=float, required=required, metavar="S", help="seconds a period takes")
+    parser.add_argument("--max-speed", type=float, nargs="+", metavar="V", help="of the joints [rad/s], one or one each")
+    parser.add_argument("--max-torque", type=float, nargs="+", metavar="M", help="of the joints [N m], one or one each")
+
+
+def pace_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Its values by name."""
+    return {name: getattr(options, name) for name in ("period", "max_speed", "max_torque")}
 
 
 def add_printing(parser: argparse.ArgumentParser) -> None:

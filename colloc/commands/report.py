@@ -10,7 +10,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.commands.ending import OK, run
-from colloc.commands.options import add_printing, add_result, add_robot, new_parser, output_path, robot_options, tell
+from colloc.commands.options import (
+    add_pace,
+    add_printing,
+    add_result,
+    add_robot,
+    new_parser,
+    output_path,
+    pace_options,
+    robot_options,
+    tell,
+)
 from colloc.gaits.problem_file import Reference
 from colloc.pictures.report_page import write_report
 from colloc.results.robot import Robot
@@ -34,7 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--problem", metavar="FILE.py", help="problem file whose REFERENCE to hold the result against")
     parser.add_argument("--figures", action="store_true", help="also write publication figures, PDF and PNG, one panel each")
     add_robot(parser)
-    parser.add_argument("--period", type=float, metavar="S", help="of the robot: seconds a period takes")
+    add_pace(parser)
     parser.add_argument("--output", metavar="PATH", help="folder, or .html file (default: beside the result)")
     add_printing(parser)
     return parser
@@ -66,10 +76,12 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _robot(solution: Solution, options: argparse.Namespace) -> Robot | None:
-    size = robot_options(options)
-    if bool(size) != (options.period is not None):
+    size, pace = robot_options(options), pace_options(options)
+    if not size and not any(value is not None for value in pace.values()):
+        return None
+    if not size or options.period is None:
         raise ProblemError("the page of a robot needs --length, --mass and --period.")
-    return Robot(solution, **size, period=options.period) if size else None
+    return Robot(solution, **size, **pace)
 
 
 def _reference(problem_file: str | None) -> Reference | None:

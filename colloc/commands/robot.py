@@ -10,7 +10,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.commands.ending import OK, run
-from colloc.commands.options import add_printing, add_result, add_robot, new_parser, output_path, robot_options, tell
+from colloc.commands.options import (
+    add_pace,
+    add_printing,
+    add_result,
+    add_robot,
+    new_parser,
+    output_path,
+    pace_options,
+    robot_options,
+    tell,
+)
 from colloc.commands.verify import check_trusted
 from colloc.results.robot import Robot
 from colloc.results.store import load
@@ -28,9 +38,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("robot", "What a gait does on a robot: speed, work, power, torques, the shortest period.", _EPILOG)
     add_result(parser)
     add_robot(parser, required=True)
-    parser.add_argument("--period", type=float, required=True, metavar="S", help="seconds a period takes")
-    parser.add_argument("--max-speed", type=float, nargs="+", metavar="V", help="of the joints [rad/s], one or one each")
-    parser.add_argument("--max-torque", type=float, nargs="+", metavar="M", help="of the joints [N m], one or one each")
+    add_pace(parser, required=True)
     parser.add_argument("--figure", action="store_true", help="also draw torque, speed and power over time")
     parser.add_argument("--output", metavar="PATH", help="folder or .png file of the figure (default: beside the result)")
     add_printing(parser)
@@ -46,8 +54,7 @@ def _robot(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
     check_trusted(solution, options.result)
-    motors = {"max_speed": options.max_speed, "max_torque": options.max_torque}
-    robot = Robot(solution, **robot_options(options), period=options.period, **motors)
+    robot = Robot(solution, **robot_options(options), **pace_options(options))
     facts, lines = dict(robot.facts), robot.lines()
     if options.figure or options.output:
         path = output_path(options.output, source.with_suffix(".robot.png"))

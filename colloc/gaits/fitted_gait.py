@@ -12,7 +12,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -39,7 +39,8 @@ _OTHERS = "_per_s", "_n_m", "_w"
 """Ends of names of columns that are no angles."""
 
 Given = Fourier | np.ndarray | str | os.PathLike[str] | Callable[[np.ndarray], np.ndarray]
-"""A series; angles ``(n_joint, n_time)`` at equal steps of a period; a CSV file; or a function of phases ``(n_time,)``."""
+"""A series; angles ``(n_joint, n_time)`` at equal steps of a period, or labelled by xarray; a CSV file; or a function of phases
+``(n_time,)``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +125,9 @@ def fitted_gait(
     elif callable(given):
         time, period = np.arange(_PHASES) / _PHASES, 1.0
         angles = _numbers(name, given.angles(time) if isinstance(given, GaitFunction) else given(time))
+    elif {"joint"} < set(getattr(given, "dims", ())):  # labelled, as `Solution.to_xarray` has them
+        labelled = cast(Any, given).transpose("joint", ...)
+        angles, time = _numbers(name, labelled), np.asarray(labelled[labelled.dims[-1]], dtype=float)
     else:
         angles = _numbers(name, given)
         time = np.arange(angles.shape[1], dtype=float)

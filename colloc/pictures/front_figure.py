@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from colloc.pictures.style import BLUE, VERMILION, snapshot_colours, styled
@@ -13,27 +14,37 @@ _PHASES = np.linspace(0.0, 1.0, 1001)
 
 def front_figure(front: ParetoFront) -> Figure:
     """Left the front, right the paths of its gaits in the plane of the first two joints, in the same colours."""
-    first, second = front.objectives
-    values, colours = front.values, snapshot_colours(len(front.points))
     planar = front.problem.body.n_joint > 1
     with styled():
         figure = Figure(figsize=(7.2 if planar else 3.8, 3.4))
         axes, *plane = figure.subplots(1, 1 + planar, squeeze=False)[0]
-        axes.plot(values[:, 1], values[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
-        axes.scatter(values[:, 1], values[:, 0], c=colours, s=28, zorder=2)
-        failed = ~np.array([point.success for point in front.points])
-        axes.plot(values[failed, 1], values[failed, 0], "x", color=VERMILION, ms=9, label="not certified")
-        axes.set(xlabel=second.label, ylabel=first.label)
-        axes.set_title(front.problem.name)
-        if failed.any():
-            axes.legend()
+        draw_front(axes, front)
         for panel in plane:
-            last = front.points[-1].gait.angles(_PHASES)
-            for point, colour in zip(front.points, colours, strict=True):
-                path = point.gait.angles(_PHASES)
-                # a mirror image is the same gait
-                mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
-                panel.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
-            what = front.problem.body.quantity
-            panel.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]", aspect="equal")
+            _draw_paths(panel, front)
     return figure
+
+
+def draw_front(axes: Axes, front: ParetoFront) -> Axes:
+    """The two objectives of every gait; returns the axes."""
+    first, second = front.objectives
+    values = front.values
+    axes.plot(values[:, 1], values[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
+    axes.scatter(values[:, 1], values[:, 0], c=snapshot_colours(len(front.points)), s=28, zorder=2)
+    failed = ~np.array([point.success for point in front.points])
+    axes.plot(values[failed, 1], values[failed, 0], "x", color=VERMILION, ms=9, label="not certified")
+    axes.set(xlabel=second.label, ylabel=first.label)
+    axes.set_title(front.problem.name)
+    if failed.any():
+        axes.legend()
+    return axes
+
+
+def _draw_paths(axes: Axes, front: ParetoFront) -> None:
+    last = front.points[-1].gait.angles(_PHASES)
+    for point, colour in zip(front.points, snapshot_colours(len(front.points)), strict=True):
+        path = point.gait.angles(_PHASES)
+        # a mirror image is the same gait
+        mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
+        axes.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
+    what = front.problem.body.quantity
+    axes.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]", aspect="equal")

@@ -22,8 +22,10 @@ from colloc.pictures.figure import (
     set_log,
 )
 from colloc.pictures.relaxed_figure import draw_mixture, draw_realised, draw_shares
+from colloc.pictures.solution_figure import draw_gait
 from colloc.pictures.style import BLUE, GREY, ORANGE, VERMILION, save, styled
 from colloc.results.solution import Solution
+from colloc.system.errors import ProblemError
 from colloc.verification.mesh_error import mesh_error
 
 COLUMN, PAGE = 3.4, 7.0
@@ -36,7 +38,12 @@ class Panel(NamedTuple):
 
     width: float
     height: float
-    draw: Callable[[Axes], None]
+    draw: Callable[[Axes], object]
+
+    def draw_on(self, axes: Axes) -> Axes:
+        """Draw it there, and return the axes."""
+        self.draw(axes)
+        return axes
 
     def figure(self) -> Figure:
         """The panel alone."""
@@ -99,6 +106,19 @@ def panels(solution: Solution) -> dict[str, Panel]:
         found["shares"] = Panel(COLUMN, 2.2, lambda axes: draw_shares(axes, relaxed.gait))
         found["realised"] = Panel(COLUMN, 2.4, lambda axes: draw_realised(axes, relaxed))
     return found
+
+
+def draw_panel(axes: Axes, solution: Solution, panel: str = "gait") -> Axes:
+    """Draw the panel of that name, and return the axes. `ProblemError` if there is none."""
+    found = {"gait": Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))} | panels(solution)
+    return chosen(found, panel).draw_on(axes)
+
+
+def chosen(found: dict[str, Panel], name: str) -> Panel:
+    """The panel of that name. `ProblemError` if there is none."""
+    if name not in found:
+        raise ProblemError(f"there is no panel {name!r}; there are {', '.join(found)}.")
+    return found[name]
 
 
 def _plane(solution: Solution, angles: np.ndarray, j: int) -> Callable[[Axes], None]:

@@ -7,7 +7,7 @@ from functools import partial
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from colloc.pictures.publication import COLUMN, Panel
+from colloc.pictures.publication import COLUMN, Panel, chosen
 from colloc.pictures.style import SERIES, Picture, styled
 from colloc.results.robot import Robot
 
@@ -22,6 +22,11 @@ def robot_figure(robot: Robot) -> Figure:
             panel.draw(axes)
             axes.label_outer()
     return figure
+
+
+def draw_robot(axes: Axes, robot: Robot, panel: str = "torque") -> Axes:
+    """Draw the panel of that name, and return the axes. `ProblemError` if there is none."""
+    return chosen(robot_panels(robot), panel).draw_on(axes)
 
 
 def robot_panels(robot: Robot) -> dict[str, Panel]:

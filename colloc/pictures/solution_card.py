@@ -1,16 +1,26 @@
-"""A solution as a small HTML card: what a notebook shows of it."""
+"""A solution as a small HTML card: what a notebook shows of it, a film and the numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from html import escape
 
+import numpy as np
+
 from colloc.gaits.objective import EFFICIENCY
+from colloc.pictures.motion_frames import frames
 from colloc.results.solution import Solution
+
+_FRAMES, _PERIODS, _SECONDS = 24, 2, 3.0
+"""Of the film: frames and seconds a period."""
+_POINTS = 30
+"""That draw a body, at most."""
+_WIDTH, _TALLEST = 320, 200
+"""Of the film [pixels]."""
 
 
 def solution_card(solution: Solution) -> str:
-    """Verdict, numbers and checks as HTML; all text is escaped."""
+    """Verdict, film, numbers and checks as HTML; all text is escaped."""
     checks = solution.certificate.checks if solution.certificate.replayed else ()
     failed = sum(not check.passed for check in checks)
     tally = f"{len(checks)} checks, {'all hold' if failed == 0 else f'{failed} failed'}"
@@ -20,17 +30,69 @@ def solution_card(solution: Solution) -> str:
     parts = [
         f"<div><b>{escape(solution.problem.name)}</b> {escape(solution.status)}</div>",
         f"<div>{escape(solution.message)}</div>" if solution.message else "",
+        film(solution),
         _table(_facts(solution)),
+        f"<div>δ = {solution.answer.delta:.0e}; {escape(solution.standing[0])}</div>",
         f"<details{' open' if failed else ''}><summary>{tally}</summary>{listed}</details>" if checks else "",
     ]
     return f"<div>{''.join(parts)}</div>"
+
+
+def film(solution: Solution) -> str:
+    """Two periods from above as an SVG that moves by itself, in the colour of the text around it; feet that hold are filled."""
+    shown = frames(solution, _FRAMES + 1, arrows=1, periods=_PERIODS)
+    chosen = np.linspace(0, shown.ends.shape[1] - 1, min(_POINTS, shown.ends.shape[1])).round().astype(int)
+    low, high = shown.window
+    scale = min(_WIDTH / (high - low)[0], _TALLEST / (high - low)[1])
+    size = np.ceil(scale * (high - low)).astype(int)
+
+    def pixels(points: np.ndarray) -> np.ndarray:
+        """Of all periods in a row, ``(2, ..., n_time)``; y points down."""
+        flat = points.reshape(2, -1, points.shape[-1])[..., :-1]
+        moved = [before.of(flat.reshape(2, -1)).reshape(flat.shape) for before in shown.before]
+        x, y = np.concatenate(moved, axis=-1)
+        return np.stack([scale * (x - low[0]), scale * (high[1] - y)])
+
+    clock = f'dur="{_PERIODS * _SECONDS:g}s" repeatCount="indefinite"'
+    width = max(scale * solution.problem.body.drawn_width, 4.0)
+    body, centre, feet = pixels(shown.ends[:, chosen]), pixels(shown.centre[:, None]), pixels(shown.feet.mean(axis=1))
+    places = [_points(body[..., k]) for k in range(body.shape[-1])]
+    line = 'fill="none" stroke="currentColor" stroke-linecap="round" stroke-linejoin="round"'
+    drawn = [
+        f'<polyline points="{places[0]}" {line} stroke-width="{width:.1f}" opacity="0.15"/>',
+        f'<polyline points="{_points(centre[:, 0])}" {line} stroke-width="1" opacity="0.4"/>',
+        f'<polyline points="{places[0]}" {line} stroke-width="{width:.1f}">'
+        f'<animate attributeName="points" values="{";".join(places)}" {clock}/></polyline>',
+        _disc(body[:, -1], clock, f'r="{0.8 * width + 2:.1f}" fill="currentColor"'),
+    ]
+    for foot, holds in zip(feet.transpose(1, 0, 2), np.tile(shown.holding[:, :-1], _PERIODS), strict=True):
+        full = ";".join("1" if held else "0" for held in holds)
+        fill = f'<animate attributeName="fill-opacity" calcMode="discrete" values="{full}" {clock}/>'
+        drawn.append(_disc(foot, clock, 'r="4" fill="#d55e00" stroke="#d55e00" stroke-width="1.5"', fill))
+    return (
+        f'<svg width="{size[0]}" height="{size[1]}" viewBox="0 0 {size[0]} {size[1]}" role="img" style="max-width:100%" '
+        f'aria-label="{escape(solution.problem.name)} as it moves, two periods">{"".join(drawn)}</svg>'
+    )
+
+
+def _points(places: np.ndarray) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in places.T)
+
+
+def _disc(places: np.ndarray, clock: str, look: str, inside: str = "") -> str:
+    """A circle whose centre runs through places, ``(2, n_time)``."""
+    moves = "".join(
+        f'<animate attributeName="{name}" values="{";".join(f"{value:.1f}" for value in row)}" {clock}/>'
+        for name, row in zip(("cx", "cy"), places, strict=True)
+    )
+    return f'<circle cx="{places[0, 0]:.1f}" cy="{places[1, 0]:.1f}" {look}>{moves}{inside}</circle>'
 
 
 def _facts(solution: Solution) -> list[tuple[str, str]]:
     """Names and values."""
     certificate, best = solution.certificate, solution.problem.objective
     if not certificate.replayed:
-        return [(f"{best.name} (not replayed)", f"{solution.value:.5f}"), ("δ", f"{solution.answer.delta:.0e}")]
+        return [(f"{best.name} (not replayed)", f"{solution.value:.5f}")]
     own = [] if best == EFFICIENCY else [(EFFICIENCY.label, f"{certificate.efficiency:.5f}")]
     return [
         (best.label, f"{certificate.value:.5f} ± {certificate.value_error:.0e}"),
@@ -39,8 +101,6 @@ def _facts(solution: Solution) -> list[tuple[str, str]]:
         ("distance d", f"{certificate.distance:.5f}"),
         ("work W", f"{certificate.work:.5f}"),
         *([("course", solution.turning)] if solution.turning else []),
-        ("δ", f"{solution.answer.delta:.0e}"),
-        ("search", solution.standing[0]),
     ]
 
 

@@ -175,9 +175,10 @@ class Robot:
         """The motion over a period as an xarray Dataset whose units are SI ones."""
         return motion_dataset(self.columns, {name: value for name, value in self.facts.items() if value is not None})
 
-    def plot(self) -> Any:
-        """Torque, speed and power of every joint over a period, as a matplotlib Figure."""
-        return bound("plot_robot")(self)
+    def plot(self, ax: Any = None, panel: str = "torque") -> Any:
+        """Torque, speed and power of every joint over a period, as a matplotlib Figure; with `ax`, a matplotlib Axes, one of
+        them there, "torque", "speed" or "power", and the Axes is returned."""
+        return bound("plot_robot")(self) if ax is None else bound("plot_robot_panel")(ax, self, panel)
 
     @cached_property
     def facts(self) -> dict[str, Any]:

@@ -311,13 +311,15 @@ class Solution:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         return self.motion.sliding(motion.angles, motion.rates, motion.z).power[0]
 
-    def plot(self, ax: Any = None) -> Any:
+    def plot(self, ax: Any = None, panel: str = "gait") -> Any:
         """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it.
 
-        With `ax`, a matplotlib Axes, the gait alone is drawn there, and the Axes returned: its path in the plane of two shape
-        coordinates, of one or more than two their course in time.
+        With `ax`, a matplotlib Axes, one panel is drawn there, and the Axes returned: the gait (its path in the plane of two
+        shape coordinates, of one or more than two their course in time), or another one of ``colloc report --figures``:
+        "filmstrip", "lab", "angles", "speeds", "power", "convergence", "mesh", "shape-1-2". `ProblemError` if there is none of
+        that name.
         """
-        return bound("plot")(self) if ax is None else bound("plot_gait")(ax, self)
+        return bound("plot")(self) if ax is None else bound("plot_panel")(ax, self, panel)
 
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write the motion as GIF or MP4, by the ending of `path`; options as for `colloc.pictures.movie.write_movie`."""

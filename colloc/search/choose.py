@@ -95,7 +95,8 @@ def _message(problem: Problem, answer: Answer, certificate: Certificate, failure
         better = "more efficient" if problem.objective == EFFICIENCY else "better"
         text = (
             f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: the gait shrinks as far "
-            f"as it may, smaller ones are {better} still. Lower the bound (and delta with it) to see how far that goes."
+            f"as it may, smaller ones are {better} still. For a gait that a robot can make raise the bound; to see how far "
+            "smaller ones go, lower it (and delta with it)."
         )
     return f"{text} {lowered}".strip()
 

@@ -29,8 +29,8 @@ def evaluate(
     problem : Problem
         Whose body, friction, limits and objective are meant; its class of gaits is left out.
     gait : any gait, array, path of a CSV file, or callable
-        Joint angles: a series, ``(n_joint, n_time)`` at equal steps of a period, a file with a column of times, or a function
-        of phases ``(n_time,)``.
+        Joint angles: a series, ``(n_joint, n_time)`` at equal steps of a period, an xarray DataArray with a dimension "joint"
+        and one of times, a file with a column of times, or a function of phases ``(n_time,)``.
     period, harmonics, degrees
         See `colloc.gaits.fitted_gait.fitted_gait`.
 

@@ -56,9 +56,10 @@ class ParetoFront:
         """Whether every point is."""
         return all(point.success for point in self.points)
 
-    def plot(self) -> Any:
-        """The front as a matplotlib Figure."""
-        return bound("plot_front")(self)
+    def plot(self, ax: Any = None) -> Any:
+        """The front and its gaits as a matplotlib Figure; with `ax`, a matplotlib Axes, the front there, and the Axes is
+        returned."""
+        return bound("plot_front")(self) if ax is None else bound("plot_front_values")(ax, self)
 
     def __repr__(self) -> str:
         first, second = (aim.name for aim in self.objectives)

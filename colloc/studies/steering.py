@@ -99,9 +99,10 @@ class Steering:
             ],
         }
 
-    def plot(self) -> Any:
-        """Efficiency against the turn, and the tracks, as a matplotlib Figure."""
-        return bound("plot_steering")(self)
+    def plot(self, ax: Any = None, panel: str = "cost") -> Any:
+        """Efficiency against the turn, and the tracks, as a matplotlib Figure; with `ax`, a matplotlib Axes, one of them there,
+        "cost" or "tracks", and the Axes is returned."""
+        return bound("plot_steering")(self) if ax is None else bound("plot_steering_panel")(ax, self, panel)
 
     def __repr__(self) -> str:
         told = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)

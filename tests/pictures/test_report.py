@@ -351,6 +351,12 @@ def test_a_notebook_shows_a_card(three_link):
     text = " ".join(card.text)
     for words in ("three_link", "solved", "0.26003", "checks, all hold", "distance d"):
         assert words in text
+    frames = [frame.split() for frame in re.search(r'points" values="([^"]+)"', three_link._repr_html_())[1].split(";")]
+    head = np.array([[float(x) for x in frame[-1].split(",")] for frame in frames])
+    half = len(frames) // 2
+    steps = head[half:] - head[:half]  # the second period repeats the first one, a distance further on
+    assert np.ptp(steps, axis=0).max() <= 0.3  # pixels, of tenths
+    assert abs(steps[0]).max() > 5
     failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     assert "not converged" in " ".join(outline(failed._repr_html_()).text)
 
