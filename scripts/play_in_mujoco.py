@@ -13,12 +13,12 @@ writes that as a GIF. Needs ``pip install colloc[engines]``.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -29,6 +29,16 @@ from colloc.mechanics.inertia import checked_mass
 from colloc.mechanics.law import Law
 from colloc.results.robot_model import mjcf
 from colloc.results.solution import Solution
+from colloc.system.errors import CollocError
+
+if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+    os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a screen
+try:
+    import mujoco
+except ImportError:
+    sys.exit("colloc: this needs MuJoCo, which is not installed: pip install 'colloc[engines]'.")
+except AttributeError:
+    sys.exit("colloc: MuJoCo cannot draw with the OpenGL that MUJOCO_GL names: set another one, or none.")
 
 FROUDE = (0.002, 0.005, 0.02, 0.05, 0.15, 0.4)
 POINTS, DELTA, TOLERANCE, MOST_PERIODS, ALIKE = 100, 1e-2, 1e-8, 40, 1e-5
@@ -156,13 +166,22 @@ def compared(solution: Solution, froude: float, delta: float = DELTA) -> dict[st
     return {"distance": distance, "work": work, "own_distance": own.distance, "own_work": own.work, "apart": apart}
 
 
+def _renderer(model: mujoco.MjModel) -> mujoco.Renderer:
+    try:
+        return mujoco.Renderer(model, *SIZE)
+    except (AttributeError, ImportError, mujoco.FatalError):
+        raise CollocError(
+            "MuJoCo finds no OpenGL to draw with: install EGL or OSMesa and set MUJOCO_GL=egl or osmesa, or leave --film out."
+        ) from None
+
+
 def with_contacts(solution: Solution, froude: float, film: Path | None = None) -> tuple[float, float]:
     """Distance [body lengths] and work [weight x length] of the last period in MuJoCo's own contacts, of a robot of 1 m."""
     period = float(np.sqrt(1.0 / (9.81 * froude)))
     model = mujoco.MjModel.from_xml_string(mjcf(solution.robot(1.0, 1.0, period)))
     data, steps = mujoco.MjData(model), round(period / model.opt.timestep)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    renderer, frames = (mujoco.Renderer(model, *SIZE) if film else None), []
+    renderer, frames = _renderer(model) if film else None, []
     camera = mujoco.MjvCamera()
     camera.distance, camera.elevation, camera.azimuth = 1.4, -55.0, 90.0
     start, work = np.zeros(3), 0.0

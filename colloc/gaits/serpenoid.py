@@ -44,9 +44,10 @@ class SerpenoidSeries(Fourier):
     def lines(self) -> list[str]:
         """The wave in words, then the formula."""
         amplitude = float(np.hypot(self.cos[0, 0], self.sin[0, 0]))
+        offset = np.round(self.mean[0], 4) + 0.0
         waves = abs(self.lag) * (self.n_joint + 1) / (2 * np.pi)
         towards = "head" if self.lag > 0 else "tail"
-        told = f"serpenoid: amplitude {amplitude:.4f} rad, offset {self.mean[0]:+.4f} rad, lag {self.lag:+.4f} rad a joint"
+        told = f"serpenoid: amplitude {amplitude:.4f} rad, offset {offset:+.4f} rad, lag {self.lag:+.4f} rad a joint"
         return [f"{told} ({waves:.3f} waves along the body, towards the {towards})", *super().lines()]
 
 

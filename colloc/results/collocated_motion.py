@@ -34,6 +34,9 @@ class CollocatedMotion:
     delta: float
     """Regularisation speed per period."""
 
+    def __repr__(self) -> str:
+        return f"<CollocatedMotion of {self.problem.name}: sample(t), or Solution.to_xarray with units>"
+
     def sliding(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> Sliding:
         """The body with given tail velocities."""
         delta = np.full((1, z.shape[1]), self.delta)

@@ -37,6 +37,8 @@ _MOMENT = 1e-5
 """Of a period, over which velocities of links are differentiated."""
 _PACE = 0.01
 """Relative difference of the Froude numbers of a robot and of the gait, up to which it is played at the pace that it is for."""
+_LITTLE = 1e-3
+"""Share of the efficiency below which what inertia takes is not told apart."""
 _INSTANTS, _A_SIDE = 2000, 8
 """Of a period at least, and of every side of a polygon."""
 
@@ -292,7 +294,8 @@ class Robot:
         if lost is None:
             does = f"What inertia does {pace} could not be computed"
         else:
-            does = f"Inertia {'takes' if lost >= 0 else 'adds'} {100 * abs(lost):.2g} % of the efficiency {pace}"
+            share = f"{100 * abs(lost):.2g} %" if abs(lost) > _LITTLE else f"less than {100 * _LITTLE:g} %"
+            does = f"Inertia {'takes' if lost >= 0 else 'adds'} {share} of the efficiency {pace}"
         more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
         said.append(f"All this is slow motion. {does}{more}.")
         return said
