@@ -101,7 +101,8 @@ def at_rest(
         if violation > ROUGH.kkt_error and abs(violation - worse) < _SLOW * worse and not result.on_edge:
             break  # the rows contradict each other near here
         ends.append(v)
-        if len(ends) > 2 and np.abs(v - ends[-3]).max() < _SLOW * np.abs(v - before).max():
+        # the first round, with instants held, may have left an optimum that the second comes back to
+        if len(ends) > 3 and np.abs(v - ends[-3]).max() < _SLOW * np.abs(v - before).max():
             break  # between two worst instants of one cell, where only finer cells help
     return Rested(v, result.objective, conditions, iterations, evaluations, curvature)
 

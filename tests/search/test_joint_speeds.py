@@ -61,6 +61,12 @@ def test_faster_motors_go_farther():
     assert ways[2] > 1.2 * ways[0]
 
 
+def test_a_flat_top_that_the_second_round_comes_back_to_is_no_end():
+    """Instants that move far make the first round overshoot; the rounds that follow them settle."""
+    stated = Problem("flat", gait=Harmonic(2), speed_limit=(7, 11), objective="distance", delta=1e-2, mesh_tolerance=1e-3)
+    assert solve(stated, starts=1).status == "solved"
+
+
 def test_derivatives_of_the_rows_are_those_of_differences():
     problem = Problem("rows", gait=Serpenoid(2), body=Chain((0.25,) * 4), friction=Friction(2, 1, 1.5), speed_limit=(5, 6, 7))
     space, v = space_near(problem, problem.guess)
