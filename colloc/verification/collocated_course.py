@@ -78,10 +78,10 @@ def course_in(regime: Regime, control: ControlProblem, gait: Any, delta: float, 
 @course_in.register
 def _on_slope(regime: Slope, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     body, friction, *_ = control.dynamics
-    asked = tuple(each for each in control.aims.integrals if each.needs_forces)
-    on = GaitOnSlope(checked_chain(body, friction, regime.grade), friction, gait, delta, (), regime.grade, asked)
-    ran = on.followed(on.at_rest(gait.theta), error)
-    return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: ran.at(t)[6:])
+    asked = [each for each in control.aims.integrals if each.needs_forces]
+    on = GaitOnSlope(checked_chain(body, friction, regime.grade), friction, gait, delta, (), regime.grade)
+    ran = on.followed(np.array([gait.theta]), error)
+    return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
 
 
 @course_in.register

@@ -17,6 +17,7 @@ which is measured on both sides: the left one from the moments in the joints.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -25,17 +26,17 @@ import numpy as np
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants, Quantity
+from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.motion.follow import Course, followed
 from colloc.motion.on_slope import balance_on_slope
 from colloc.system.errors import NotConvergedError
-from colloc.verification.adaptive_motion import fine_motion
+from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion
 from colloc.verification.played import Path
 
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
-"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly. Those of
-quantities are 1."""
+"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
 _OMEGA = 2
 _PANELS = 40
 _OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0}
@@ -66,10 +67,9 @@ class SlopeMotion:
     several : float
         Part of the time at which several motions are balanced, by the solver's steps; 0 for laws that leave one. One of them is
         followed, and no error says what the others would change.
-    phases, states : (n,), (6 + k, n)
+    phases, states : (n,), (6, n)
         Where the solver stepped, counted from the first start, and its unknowns: theta, way up and aside, work against
-        friction and of the joints, logarithm of the steering, and k quantities that are asked for; all but theta from the first
-        start.
+        friction and of the joints, logarithm of the steering, all but theta from the first start.
     """
 
     grade: float
@@ -110,12 +110,6 @@ class GaitOnSlope(NamedTuple):
     delta: float
     breaks: tuple[float, ...]
     grade: float
-    quantities: tuple[Quantity, ...] = ()
-    """That forces are needed for."""
-
-    def at_rest(self, theta: float) -> np.ndarray:
-        """The unknowns ``(6 + k,)`` at the begin."""
-        return np.append(theta, np.zeros(5 + len(self.quantities)))
 
     def course(self, tolerance: float) -> float:
         """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
@@ -124,34 +118,44 @@ class GaitOnSlope(NamedTuple):
         return float(np.angle(way)) if abs(way) > tolerance else 0.0
 
     def followed(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
-        """The unknowns through a period, from those at its begin; no step is longer than `longest`."""
-        units = np.append(_UNKNOWNS, np.ones(len(self.quantities)))
-        return followed(self._rates, begin, tolerance * units, self.breaks, longest)
+        """The unknowns ``(6,)`` through a period, from those at its begin, of which theta is the first; no step is longer than
+        `longest`."""
+        return followed(self._rates, np.append(begin, np.zeros(6 - begin.size)), tolerance * _UNKNOWNS, self.breaks, longest)
+
+    def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
+        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the steps of the solver."""
+        if not quantities:
+            return np.empty((0, ends.size))
+        edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
+        h = np.diff(edges)
+        t = (edges[:-1, None] + h[:, None] * PANEL_RULE.c).ravel()
+        now, _ = self.instants(t, ran.at(t)[0])
+        parts = [h * (each.at(now)[0].reshape(h.size, -1) @ PANEL_RULE.b) for each in quantities]
+        upto = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
+        return upto[:, np.searchsorted(edges, ends)]
 
     def pull(self, theta: np.ndarray) -> np.ndarray:
         """Of the weight, in the body's axes, ``(2, n)``."""
         return Slope(self.grade).pull(theta[None])
 
-    def several(self, ran: SlopeMotion) -> float:
-        """Part of the time of a run at which several motions are balanced."""
+    def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
+        """Part of the time at which several motions are balanced, from phases and orientations there, ``(n,)``."""
         if self.friction.associated:
             return 0.0
-        angles, rates = self.path(ran.phases % 1.0)
-        load = self.pull(ran.states[0])
-        several = all_balanced_velocities(self.body, self.friction, angles, rates, self.delta, load).number > 1
-        return float(np.diff(ran.phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(ran.phases[-1])
+        angles, rates = self.path(phases % 1.0)
+        several = all_balanced_velocities(self.body, self.friction, angles, rates, self.delta, self.pull(theta)).number > 1
+        return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
 
     def run(self, course: float, heading: float, periods: int, tolerance: float, longest: float = np.inf) -> SlopeMotion:
         """The motion through periods from a heading, without its error; no step is longer than `longest`."""
-        state = self.at_rest(heading - course)
-        ends, phases, states = [state], [], []
+        ends, phases, states = [np.append(heading - course, np.zeros(5))], [], []
         for period in range(periods):
             t, through, _ = self.followed(ends[-1], tolerance, longest)
             ends.append(through[:, -1])
             phases.append(period + t)
             states.append(through)
         theta, *sums = np.stack(ends, axis=1)
-        climb, aside, friction_work, joint_work, steering = np.diff(sums[:5])
+        climb, aside, friction_work, joint_work, steering = np.diff(sums)
         unknown = np.concatenate(phases), np.concatenate(states, axis=1)
         works = friction_work, joint_work
         return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, np.nan, *unknown)
@@ -168,10 +172,11 @@ class GaitOnSlope(NamedTuple):
                 "may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
             )
         moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
-        unknowns = [now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], on_theta[_OMEGA, 0]]
-        at = self.instants(*shapes[:2], np.array([theta]), solved.z)
-        return np.array([*unknowns, *(each.at(at)[0, 0] for each in self.quantities)]), solved.z
+        unknowns = now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], on_theta[_OMEGA, 0]
+        return np.array(unknowns), solved.z
 
-    def instants(self, angles: np.ndarray, rates: np.ndarray, theta: np.ndarray, z: np.ndarray) -> Instants:
-        """What formulas see of balanced instants."""
-        return Instants(self.body, self.friction, angles, rates, self.delta, z=z, load=self.pull(theta))
+    def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
+        """What formulas see at phases, from the orientations there ``(n,)``, and what balance leaves over, ``(n,)``."""
+        at, load = (self.body, self.friction, *self.path(phases), self.delta), self.pull(theta)
+        solved = solve_balance(*at, load=load)
+        return Instants(*at, z=solved.z, load=load), solved.residual

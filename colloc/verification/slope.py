@@ -97,4 +97,4 @@ def slope_motion(
     heading = (heading or 0.0) if theta is None else theta + course
     loose = on.run(course, heading, periods, _LOOSER * tolerance).states[:5, -1]
     ran = on.run(course, heading, periods, tolerance)
-    return replace(ran, error=float(np.abs(ran.states[:5, -1] - loose).max()), several=on.several(ran))
+    return replace(ran, error=float(np.abs(ran.states[:5, -1] - loose).max()), several=on.several(ran.phases, ran.states[0]))

@@ -16,11 +16,10 @@ from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import LENGTH, PathLimit, PathLimits, Quantity, limits_of, quantities_of
-from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
+from colloc.motion.follow import Course
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.played import Replay
 from colloc.verification.slope import gait_on_slope
 
@@ -53,43 +52,42 @@ def slope_replay(
     """
     asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
     followed = tuple(each for each in asked if each.needs_forces)
-    on = gait_on_slope(body, friction, gait, delta, slope.grade, breaks)._replace(quantities=followed)
+    on, limits = gait_on_slope(body, friction, gait, delta, slope.grade, breaks), limits_of(limits, body.n_joint)
     totals, total_errors = whole_totals([each for each in asked if not each.needs_forces], gait)
-    aim, limits = _FIRST * tolerance, limits_of(limits, body.n_joint)
+    aim, before = _FIRST * tolerance, None
 
-    def run(aim: float) -> tuple[SlopeMotion, complex, dict[str, float]]:
-        ran = on.run(0.0, gait.theta, 1, aim, _LONGEST / instants)
-        way = complex(ran.climb[0], ran.aside[0]) * complex(np.exp(-1j * slope.ahead))
-        work = float(ran.friction_work[0] + slope.grade * ran.climb[0])
-        sums = dict(zip((each.name for each in followed), ran.states[6:, -1].tolist(), strict=True))
-        return ran, way, {"distance": way.real, "work": work, "rotation": ran.turn} | sums | totals
+    def run(aim: float) -> tuple[Course, complex, dict[str, float]]:
+        ran = on.followed(np.array([gait.theta]), aim, _LONGEST / instants)
+        theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
+        way = complex(climb, aside) * complex(np.exp(-1j * slope.ahead))
+        found = {"distance": way.real, "work": float(spent + slope.grade * climb), "rotation": float(theta)}
+        sums = on.totals(ran, followed, np.ones(1))[:, 0].tolist()
+        return ran, way, found | {each.name: total for each, total in zip(followed, sums, strict=True)}
 
-    before = run(aim)[2]
     while True:
         if aim < _LEAST:
             raise NotConvergedError(f"the motion on the slope cannot be replayed to a relative error of {tolerance:.0e}.")
-        aim *= _TENTH
         ran, way, period = run(aim)
-        errors = {name: abs(value - before[name]) for name, value in period.items() if name not in totals}
-        error, before = float(objective.relative_error(period, errors)), period
-        if not error > tolerance:
-            break
-    phases = ran.phases % 1.0
-    angles, rates = gait(phases)
-    solved = solve_balance(on.body, friction, angles, rates, delta, load=on.pull(ran.states[0]))
-    done = limits.at(on.instants(angles, rates, ran.states[0], solved.z)) if limits.names else np.empty((0, phases.size))
-    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
+        if before is not None:
+            errors = {name: abs(value - before[name]) for name, value in period.items()}
+            error = float(objective.relative_error(period | totals, errors))
+            if not error > tolerance:
+                break
+        aim, before = _TENTH * aim, period
+    now, residual = on.instants(ran.phases % 1.0, ran.states[0])
+    done = limits.at(now) if limits.names else np.empty((0, ran.phases.size))
+    (x, y), (gx, gy) = body.outline(now.angles), body.centre(now.angles)
     return Replay(
-        values=period,
+        values=period | totals,
         errors=errors | total_errors,
         others={},
         lever=float(np.hypot(x - gx, y - gy).max()),
-        actuator_work=float(ran.joint_work[0]),
-        residual=float(solved.residual.max()),
+        actuator_work=float(ran.states[4, -1]),
+        residual=float(residual.max()),
         error=error,
-        several=on.several(ran),
+        several=on.several(ran.phases, ran.states[0]),
         instants=ran.phases.size,
-        tail=(phases, solved.z),
+        tail=(ran.phases % 1.0, now.z),
         shares=limits.sizes(done).max(axis=1),
         objective=objective,
         across=way.imag,
