@@ -29,14 +29,12 @@ from colloc.motion.follow import Course, followed
 from colloc.system.arguments import check_finite, is_whole
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.played import Path
+from colloc.verification.played import Path, to_tolerance
 
 _ROUGH = 1e-4
 """Error of the runs that say how the momenta at the end depend on those at the start, over the size of the momenta."""
 _APART = 1e-3
 """How far the runs of that start from each other."""
-_FIRST, _TENTH, _LEAST = 1.0, 0.1, 1e-12
-"""Error of the first run over the relative one that is asked for, of each next over the last, and the smallest tried."""
 _CLOSED = 10.0
 """Gap between the momenta at start and end that is left open, over the error of a run."""
 _MOST_PERIODS = 30
@@ -234,20 +232,17 @@ def inertial_motion(
     (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
     played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at, turn=turn)
     start, slopes = played.closed(played.slow_momenta())
-    totals, total_errors = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
-    aim, before = _FIRST * tolerance, None
-    while aim >= _LEAST:
-        phases, states, _ = played.settled(start, aim, slopes)
-        start = states[_MOMENTA, 0]
-        now = passed(states[:, -1], turn)
-        if before is not None:
-            errors = {name: abs(now[name] - before[name]) for name in now} | total_errors
-            values, multipliers = now | totals, np.linalg.eigvals(slopes)
-            found = InertialMotion(values, errors, {}, froude, multipliers, phases=phases, states=states)
-            if found.error_of(objective) <= tolerance:
-                return found
-        aim, before = _TENTH * aim, now
-    raise NotConvergedError(f"the motion with inertia cannot be replayed to a relative error of {tolerance:.0e}.")
+    totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
+
+    def run(aim: float) -> tuple[Course, dict[str, float]]:
+        nonlocal start
+        ran = played.settled(start, aim, slopes)
+        start = ran.states[_MOMENTA, 0]
+        return ran, passed(ran.states[:, -1], turn)
+
+    ran, values, errors = to_tolerance(run, tolerance, objective, tolerance, totals)
+    multipliers = np.linalg.eigvals(slopes)
+    return InertialMotion(values, errors, {}, froude, multipliers, phases=ran.phases, states=ran.states)
 
 
 class FromRest(NamedTuple):

@@ -18,7 +18,7 @@ from colloc.mechanics.inertia import checked_inertia, kinetic_energy, tail_veloc
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
 from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion, passed
-from colloc.verification.played import Path, Replay
+from colloc.verification.played import Path, Replay, lever
 
 _APART = 1e-2
 """Momenta [body lengths per period] by which motions differ that are not one."""
@@ -56,13 +56,12 @@ def inertial_replay(
     ends = ran.states[:, -1], played.run(from_rest, tolerance).states[:, -1] if several else ran.states[:, -1]
     z = tail_velocity(chain, angles, rates, ran.states[:3])
     energy = froude * kinetic_energy(chain, angles, rates, z)[0]
-    (x, y), (gx, gy) = chain.outline(angles), chain.centre(angles)
     here, there = (passed(end, turn) for end in ends)
     return Replay(
         values=ran.values,
         errors=ran.errors,
         others={name: abs(there[name] - here[name]) for name in here},
-        lever=float(np.hypot(x - gx, y - gy).max()),
+        lever=float(lever(chain, angles).max()),
         actuator_work=ran.work + float(energy[-1] - energy[0]),
         residual=float(np.abs(ran.states[:3, -1] - ran.states[:3, 0]).max()),
         error=ran.error_of(objective),

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period
+from colloc.mechanics.bodies import Body
+from colloc.system.errors import NotConvergedError
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
 MixedPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 """Of a relaxed gait: joint angles; rates ``(n_direction, n_joint, n_time)`` in every direction; their shares of the time
 ``(n_direction, n_time)``, of sum 1."""
+Ran = TypeVar("Ran")
+Numbers = dict[str, float]
+_TENTH, _LEAST = 0.1, 1e-12
+"""Error of each run over that of the last, and the smallest tried."""
 
 
 @dataclass(frozen=True)
@@ -84,3 +91,33 @@ class Replay(Period):
     def turning(self) -> float:
         """How much the distance depends on the point of the body that is followed, relative: rotation times lever over it."""
         return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
+
+
+def to_tolerance(
+    run: Callable[[float], tuple[Ran, Numbers]],
+    first: float,
+    objective: Objective,
+    tolerance: float,
+    known: tuple[Numbers, Numbers],
+) -> tuple[Ran, Numbers, Numbers]:
+    """A differential equation solved with ever smaller errors a step, until the last tenth of them changes an objective by less
+    than a relative error: what ran last, the numbers of its period, and their errors.
+
+    `run` takes an error, `first` to begin with, and gives what ran and its numbers; `known` are other numbers, and their
+    errors. `NotConvergedError` if rounding hides the accuracy that is asked for.
+    """
+    aim, before = first, None
+    while aim >= _LEAST:
+        ran, now = run(aim)
+        if before is not None:
+            errors = {name: abs(value - before[name]) for name, value in now.items()} | known[1]
+            if not objective.relative_error(now | known[0], errors) > tolerance:
+                return ran, now | known[0], errors
+        aim, before = _TENTH * aim, now
+    raise NotConvergedError(f"the motion cannot be replayed to a relative error of {tolerance:.0e}.")
+
+
+def lever(body: Body, angles: np.ndarray) -> np.ndarray:
+    """Largest distance of a point of the body from its centre of mass, ``(n_time,)``."""
+    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
+    return np.asarray(np.hypot(x - gx, y - gy).max(axis=0))

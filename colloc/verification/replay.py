@@ -27,7 +27,7 @@ from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
 from colloc.verification.panels import WHOLE, Panels, begun, changes, halves, increments, left_over, travelled
-from colloc.verification.played import MixedPath, Path, Replay
+from colloc.verification.played import MixedPath, Path, Replay, lever
 
 _ONE_SIDED = 1e-12
 _NARROWEST = 1e-10
@@ -77,11 +77,9 @@ def _evaluated(
         return np.asarray(sum(share * getattr(motion, name) for share, motion in zip(shares, motions, strict=True)))
 
     centre = mean("centre")
-    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
-    lever = np.hypot(x - gx, y - gy).max(axis=0)
     z = mean("z")
     seen = z, z[2] - turn, centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), densities
-    values: tuple[np.ndarray, ...] = (*seen, residual, lever, used, apart)
+    values: tuple[np.ndarray, ...] = (*seen, residual, lever(body, angles), used, apart)
     return tuple(value.T.reshape(*t.shape, *value.shape[:-1]) for value in values)
 
 

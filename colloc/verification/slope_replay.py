@@ -18,13 +18,12 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import LENGTH, PathLimit, PathLimits, Quantity, limits_of, quantities_of
 from colloc.mechanics.law import Law
 from colloc.motion.follow import Course
-from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.played import Replay
+from colloc.verification.played import Replay, lever, to_tolerance
 from colloc.verification.slope import gait_on_slope
 
-_FIRST, _TENTH, _LEAST = 0.1, 0.1, 1e-12
-"""Error of the first run over the relative one that is asked for, of each next over the last, and the smallest tried."""
+_FIRST = 0.1
+"""Error of the first run over the relative one that is asked for."""
 _LONGEST = 4.0
 """Longest step, in instants of a uniform grid."""
 
@@ -53,42 +52,31 @@ def slope_replay(
     asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
     followed = tuple(each for each in asked if each.needs_forces)
     on, limits = gait_on_slope(body, friction, gait, delta, slope.grade, breaks), limits_of(limits, body.n_joint)
-    totals, total_errors = whole_totals([each for each in asked if not each.needs_forces], gait)
-    aim, before = _FIRST * tolerance, None
+    totals = whole_totals([each for each in asked if not each.needs_forces], gait)
 
-    def run(aim: float) -> tuple[Course, complex, dict[str, float]]:
+    def run(aim: float) -> tuple[tuple[Course, float], dict[str, float]]:
         ran = on.followed(np.array([gait.theta]), aim, _LONGEST / instants)
         theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
         way = complex(climb, aside) * complex(np.exp(-1j * slope.ahead))
         found = {"distance": way.real, "work": float(spent + slope.grade * climb), "rotation": float(theta)}
         sums = on.totals(ran, followed, np.ones(1))[:, 0].tolist()
-        return ran, way, found | {each.name: total for each, total in zip(followed, sums, strict=True)}
+        return (ran, way.imag), found | {each.name: total for each, total in zip(followed, sums, strict=True)}
 
-    while True:
-        if aim < _LEAST:
-            raise NotConvergedError(f"the motion on the slope cannot be replayed to a relative error of {tolerance:.0e}.")
-        ran, way, period = run(aim)
-        if before is not None:
-            errors = {name: abs(value - before[name]) for name, value in period.items()}
-            error = float(objective.relative_error(period | totals, errors))
-            if not error > tolerance:
-                break
-        aim, before = _TENTH * aim, period
+    (ran, across), values, errors = to_tolerance(run, _FIRST * tolerance, objective, tolerance, totals)
     now, residual = on.instants(ran.phases % 1.0, ran.states[0])
     done = limits.at(now) if limits.names else np.empty((0, ran.phases.size))
-    (x, y), (gx, gy) = body.outline(now.angles), body.centre(now.angles)
     return Replay(
-        values=period | totals,
-        errors=errors | total_errors,
+        values=values,
+        errors=errors,
         others={},
-        lever=float(np.hypot(x - gx, y - gy).max()),
+        lever=float(lever(body, now.angles).max()),
         actuator_work=float(ran.states[4, -1]),
         residual=float(residual.max()),
-        error=error,
+        error=float(objective.relative_error(values, errors)),
         several=on.several(ran.phases, ran.states[0]),
         instants=ran.phases.size,
         tail=(ran.phases % 1.0, now.z),
         shares=limits.sizes(done).max(axis=1),
         objective=objective,
-        across=way.imag,
+        across=across,
     )

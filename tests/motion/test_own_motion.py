@@ -21,7 +21,7 @@ from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
 from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.collocated_course import CourseOfGait, course_in
-from colloc.verification.played import Replay
+from colloc.verification.played import Replay, to_tolerance
 from colloc.verification.replay import replay
 from colloc.verification.replayer import replayer
 
@@ -115,22 +115,23 @@ def _(regime: Pushed, control, gait, delta, mesh, error):
 def _(regime: Pushed):
     def run(body, friction, path, delta, *, tolerance=1e-6, objective=EFFICIENCY, quantities=(), **_):
         gait, totals = Gait(body, friction, path, delta, regime.push), whole_totals([LENGTH, *quantities], path)
-        (coarse, fine), values = (gait.run(share * tolerance) for share in (1.0, 0.1)), []
-        for ran in (coarse, fine):
+
+        def followed_to(error):
+            ran = gait.run(error)
             theta, x, y, work, _ = ran.states[:, -1]
-            values.append({"distance": float(np.hypot(x, y)), "work": float(work), "rotation": float(theta)})
-        errors = {name: abs(value - values[0][name]) for name, value in values[1].items()}
-        found = values[1] | totals[0]
-        t = fine.phases % 1.0
+            return ran, {"distance": float(np.hypot(x, y)), "work": float(work), "rotation": float(theta)}
+
+        ran, values, errors = to_tolerance(followed_to, tolerance, objective, tolerance, totals)
+        t = ran.phases % 1.0
         solved, _ = gait.balanced(t)
         return Replay(
-            values=found,
-            errors=errors | totals[1],
+            values=values,
+            errors=errors,
             others={},
             lever=1.0,
-            actuator_work=float(fine.states[4, -1]),
+            actuator_work=float(ran.states[4, -1]),
             residual=float(solved.residual.max()),
-            error=float(objective.relative_error(found, errors)),
+            error=float(objective.relative_error(values, errors)),
             several=0.0,
             instants=t.size,
             tail=(t, solved.z),
