@@ -21,8 +21,7 @@ from colloc.pictures.style import SERIES, save, styled, subplots
 from colloc.results.solution import Solution
 from colloc.search.solve import solve
 from colloc.system.errors import NotConvergedError
-from colloc.verification.gait_on_slope import SlopeMotion
-from colloc.verification.slope import slope_motion
+from colloc.verification.slope import SlopeMotion, slope_motion
 
 SCENES = (
     ("equal friction", Friction(), 1, (0.0, 0.05, 0.1, 0.15, 0.2)),

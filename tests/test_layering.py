@@ -202,7 +202,6 @@ ADAPTIVE = (
     "panels",
     "adaptive_motion",
     "followed_motion",
-    "gait_on_slope",
     "slope",
     "slope_replay",
     "heading_map",

@@ -1,7 +1,7 @@
 r"""How wrong a collocated motion with states is, interval by interval.
 
 What the scheme says of every interval (`colloc.motion.kinds`) is held against the differential equation, solved with steps
-of its own: on a slope that of the heading (`colloc.verification.gait_on_slope`), with inertia that of the momenta
+of its own: on a slope that of the heading (`colloc.verification.slope`), with inertia that of the momenta
 (`colloc.verification.inertial_motion`).
 """
 
@@ -34,8 +34,8 @@ from colloc.motion.kinds import (
 )
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import totals_along
-from colloc.verification.gait_on_slope import GaitOnSlope
 from colloc.verification.inertial_motion import GaitWithInertia
+from colloc.verification.slope import GaitOnSlope
 
 
 class Defects(NamedTuple):

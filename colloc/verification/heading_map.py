@@ -15,9 +15,8 @@ import numpy as np
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.system.arguments import check_finite
-from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.played import Path
-from colloc.verification.slope import gait_on_slope
+from colloc.verification.slope import SlopeMotion, gait_on_slope
 
 _NEUTRAL = 10.0
 """Turns within so many times the tolerance are none."""

@@ -1,20 +1,188 @@
-"""A gait followed on a slope, as people ask for it: what can be asked, and the error of the answer."""
+r"""A gait on a slope: the heading becomes an unknown of its own, because the weight pulls down the slope while the body turns.
+
+On a plane whose inclination has the tangent g, the *grade*, a body presses on the ground with a force of 1 and its weight pulls
+it down along the fall line with g. With theta the angle of the tail link from straight uphill, the pull in the body's axes is
+``-g e^(-i theta)``, and the balance at an instant gives velocities that depend on theta:
+
+    d theta/dt = omega(q, q', theta),      d x/dt = e^(i theta) c(q, q', theta),
+
+c being the velocity of the centre of mass in the body's axes, and x its place in the plane, its real part uphill. On the level
+theta is a sum; here this is an ordinary differential equation, and is solved as one. The joints work against friction and lift
+the body,
+
+    work of the joints = work against friction + g climb,
+
+which is measured on both sides: the left one from the moments in the joints.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.sloped import checked_chain
+from colloc.gaits.sloped import Slope, checked_chain
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import Instants, Quantity
+from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
+from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.motion.follow import Course, followed
+from colloc.motion.on_slope import balance_on_slope
 from colloc.system.arguments import check_finite
-from colloc.system.errors import ProblemError
-from colloc.verification.gait_on_slope import GaitOnSlope, SlopeMotion
+from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion
 from colloc.verification.played import Path
 
+_UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
+"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
+_OMEGA = 2
 _LOOSER = 30.0
+_PANELS = 40
+_OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0}
+"""Shares in the error of the motion on the level: its way alone is asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class SlopeMotion:
+    """A gait on a slope, period by period.
+
+    Attributes
+    ----------
+    grade : float
+        Tangent of the inclination.
+    course : float
+        Direction in which the gait goes on the level, from that of the tail link at phase 0 [rad].
+    headings : (n_period + 1,)
+        At the start of every period and the end of the last: the direction in which the gait would go from there on the level,
+        from straight uphill, positive to the left [rad].
+    climb, aside : (n_period,)
+        Way of the centre of mass up the fall line, and to the left of it [body lengths along the slope].
+    friction_work, joint_work : (n_period,)
+        Work against friction, and of the joints by their moments [pressing force x body length].
+    steering : (n_period,)
+        Derivative of the heading at the end of a period with respect to that at its start; always positive.
+    error : float
+        Of headings, ways and works at the end: how much they change where steps are allowed 30 times the error.
+    several : float
+        Part of the time at which several motions are balanced, by the solver's steps; 0 for laws that leave one. One of them is
+        followed, and no error says what the others would change.
+    phases, states : (n,), (6, n)
+        Where the solver stepped, counted from the first start, and its unknowns: theta, way up and aside, work against
+        friction and of the joints, logarithm of the steering, all but theta from the first start.
+    """
+
+    grade: float
+    course: float
+    headings: np.ndarray
+    climb: np.ndarray
+    aside: np.ndarray
+    friction_work: np.ndarray
+    joint_work: np.ndarray
+    steering: np.ndarray
+    error: float
+    several: float
+    phases: np.ndarray
+    states: np.ndarray
+
+    def __repr__(self) -> str:
+        count = f"{self.climb.size} period{'s' * (self.climb.size > 1)} on a grade of {self.grade:g}"
+        ends = f"heading {self.headings[0]:.4f} -> {self.headings[-1]:.4f}"
+        return f"<SlopeMotion of {count}: climb {self.climb.sum():.6g}, work of the joints {self.joint_work.sum():.6g}, {ends}>"
+
+    @property
+    def turn(self) -> float:
+        """Of the heading, over all periods [rad]."""
+        return float(self.headings[-1] - self.headings[0])
+
+    @property
+    def stable(self) -> bool:
+        """Whether headings beside this one come closer to it."""
+        return bool(np.prod(self.steering) < 1.0)
+
+
+class GaitOnSlope(NamedTuple):
+    """A gait of a body, and the slope it is on."""
+
+    body: Chain
+    friction: Law
+    path: Path
+    delta: float
+    breaks: tuple[float, ...]
+    grade: float
+
+    def course(self, tolerance: float) -> float:
+        """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
+        edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), self.breaks)
+        way = fine_motion(self.body, self.friction, self.path, self.delta, edges, tolerance, lambda period: _OF_WAY).path[-1]
+        return float(np.angle(way)) if abs(way) > tolerance else 0.0
+
+    def followed(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
+        """The unknowns ``(6,)`` through a period, from those at its begin, of which theta is the first; no step is longer than
+        `longest`."""
+        return followed(self._rates, np.append(begin, np.zeros(6 - begin.size)), tolerance * _UNKNOWNS, self.breaks, longest)
+
+    def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
+        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the steps of the solver."""
+        if not quantities:
+            return np.empty((0, ends.size))
+        edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
+        h = np.diff(edges)
+        t = (edges[:-1, None] + h[:, None] * PANEL_RULE.c).ravel()
+        now, _ = self.instants(t, ran.at(t)[0])
+        parts = [h * (each.at(now)[0].reshape(h.size, -1) @ PANEL_RULE.b) for each in quantities]
+        upto = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
+        return upto[:, np.searchsorted(edges, ends)]
+
+    def pull(self, theta: np.ndarray) -> np.ndarray:
+        """Of the weight, in the body's axes, ``(2, n)``."""
+        return Slope(self.grade).pull(theta[None])
+
+    def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
+        """Part of the time at which several motions are balanced, from phases and orientations there, ``(n,)``."""
+        if self.friction.associated:
+            return 0.0
+        angles, rates = self.path(phases % 1.0)
+        several = all_balanced_velocities(self.body, self.friction, angles, rates, self.delta, self.pull(theta)).number > 1
+        return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
+
+    def run(self, course: float, heading: float, periods: int, tolerance: float, longest: float = np.inf) -> SlopeMotion:
+        """The motion through periods from a heading, without its error; no step is longer than `longest`."""
+        ends, phases, states = [np.append(heading - course, np.zeros(5))], [], []
+        for period in range(periods):
+            t, through, _ = self.followed(ends[-1], tolerance, longest)
+            ends.append(through[:, -1])
+            phases.append(period + t)
+            states.append(through)
+        theta, *sums = np.stack(ends, axis=1)
+        climb, aside, friction_work, joint_work, steering = np.diff(sums)
+        unknown = np.concatenate(phases), np.concatenate(states, axis=1)
+        works = friction_work, joint_work
+        return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, np.nan, *unknown)
+
+    def _rates(self, t: float, state: np.ndarray, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next balance may start."""
+        shapes, theta = (*self.path(np.array([t])), self.delta), state[0]
+        solved, now, _, on_theta = balance_on_slope(
+            self.body, self.friction, Slope(self.grade), shapes, np.array([theta]), start=near
+        )
+        if not solved.converged.all():
+            raise NotConvergedError(
+                f"no balance at phase {t:.4f} on a slope of grade {self.grade:g} (residual {solved.residual[0]:.1e}): friction "
+                "may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
+            )
+        moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
+        unknowns = now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], on_theta[_OMEGA, 0]
+        return np.array(unknowns), solved.z
+
+    def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
+        """What formulas see at phases, from the orientations there ``(n,)``, and what balance leaves over, ``(n,)``."""
+        at, load = (self.body, self.friction, *self.path(phases), self.delta), self.pull(theta)
+        solved = solve_balance(*at, load=load)
+        return Instants(*at, z=solved.z, load=load), solved.residual
 
 
 def gait_on_slope(

@@ -1,6 +1,6 @@
 """Independent replay of a gait on a slope: the differential equation of its heading, by Adams' method with steps of its own.
 
-It shares nothing with collocation but the law of friction (`colloc.verification.gait_on_slope`). The equation is solved with
+It shares nothing with collocation but the law of friction (`colloc.verification.slope`). The equation is solved with
 ever smaller errors a step until the last tenth of them changes the objective by less than is allowed. The work of the joints is
 taken from work against friction and the climb, and beside it from the moments in the joints.
 """
