@@ -22,6 +22,7 @@ from colloc.laws.own_law import OwnLaw as OwnLaw
 from colloc.laws.fitted_friction import fitted_friction as fitted_friction, FittedFriction as FittedFriction
 from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
+from colloc.gaits.inertia import Free as Free
 from colloc.gaits.bspline import BSpline as BSpline
 from colloc.gaits.columns import Basis as Basis
 from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath

@@ -40,6 +40,7 @@ class Layout:
         """``(n, 1)``: where quantities of the solved part of the period are; of the rotation its end and its begin."""
         ends = {"distance": [self.distance[0, -1]], "work": [self.work[0, -1]], "rotation": self.theta[0, [-1, 0]]}
         own = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
+        own["period"] = self.parameters[-1]  # its logarithm
         return np.concatenate([(ends | own)[name] for name in names])[:, None]
 
 

@@ -51,10 +51,12 @@ def point_function(formulation: str, body: Body, friction: Law, regime: Regime =
 
     Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links. With
     inertia the momenta, too: they, not the balance, have to be those that the body has, and before the last outputs are their
-    rates.
+    rates; at a free pace the logarithm of the period comes last.
     """
     if regime.froude:
-        return _point_with_inertia(checked_mass(body), friction, regime.froude * unit**2)
+        log_period = ca.SX.sym("log_period", int(regime.free_pace))
+        froude = ca.exp(-2.0 * log_period) if regime.free_pace else regime.froude
+        return _point_with_inertia(checked_mass(body), friction, froude * unit**2, log_period)
     return _full_point(body, friction, regime) if formulation == FULL else _map_point(body, friction)
 
 
@@ -81,7 +83,7 @@ def _full_point(body: Body, friction: Law, regime: Regime) -> LocalFunction:
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
 
 
-def _point_with_inertia(body: Chain, friction: Law, froude: float) -> LocalFunction:
+def _point_with_inertia(body: Chain, friction: Law, froude: float | ca.SX, log_period: ca.SX) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     forces, states, posture = (
         ca.SX.sym("forces", len(body.force_names)),
@@ -92,7 +94,7 @@ def _point_with_inertia(body: Chain, friction: Law, froude: float) -> LocalFunct
     own = momenta(body, posture, body.velocity(posture, rates, z))
     changes = about_centre(body, angles, force) / froude + turning(z, states)
     out = ca.vertcat(laws, own - states, changes, forward(theta, centre), power)
-    return local_function("point", ca.vertcat(theta, angles, rates, z, forces, states), ca.SX(0, 1), delta, out)
+    return local_function("point", ca.vertcat(theta, angles, rates, z, forces, states, log_period), ca.SX(0, 1), delta, out)
 
 
 def across_point(dynamics: Dynamics) -> LocalFunction:
@@ -184,6 +186,7 @@ def period_block(control: ControlProblem, aims: Sequence[Objective], sign: float
     turn, fraction = control.dynamics.turn, control.admissible.gait.fraction
     whole = dict.fromkeys(names, 1 / fraction) | {"distance": chord_per_way(turn) / fraction}
     period = {name: part[0] - part[1] + turn if name == "rotation" else whole[name] * part for name, part in parts.items()}
+    period |= {name: ca.exp(parts[name]) for name in names if name == "period"}
     out = ca.vertcat(*(sign * aim(period) for aim in aims))
     function = local_function("period", ca.vertcat(*parts.values()), ca.SX(0, 1), ca.SX.sym("delta"), out)
     return function, layout.of_period(names), np.empty((0, 1))

@@ -84,8 +84,9 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
 
     sites = np.empty(mesh.n_point, dtype=int)
     sites[mesh.points] = mesh.sites
+    paces = np.repeat(layout.parameters[-1:], mesh.n_point, axis=1)[: dynamics.regime.free_pace]
     point_gather = np.concatenate(
-        [layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces, layout.momenta[:, sites]]
+        [layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces, layout.momenta[:, sites], paces]
     )
     blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
     for check in checks:
@@ -149,8 +150,8 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
 def _variable_bounds(control: ControlProblem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
     gait, body, limit, *_ = control.admissible
-    upper[layout.parameters[:, 0]] = gait.largest_parameters(body, widest(limit))
-    lower[layout.parameters] = -upper[layout.parameters]
+    own = layout.parameters[:, 0]
+    lower[own], upper[own] = gait.bounds(body, widest(limit))
     if layout.forces.size:
         most = body.largest_forces(control.dynamics.law)
         lower[layout.forces], upper[layout.forces] = -most, most

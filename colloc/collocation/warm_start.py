@@ -39,12 +39,12 @@ def balanced_variables(
     centre, weight, points = np.array(now.centre), unit * stage_weights(mesh), mesh.points
     pose = CollocatedPose.on_mesh(mesh, unit * z[OMEGA] - kind.turn, unit * centre, first_theta(kind, begin))
     power = (weight * now.power[points]).sum(axis=1)
-    shares = kind.shares(Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(power.sum())))
+    shares = kind.shares(Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(power.sum()), begin))
     heading = float(np.angle(shares["distance"].side))
     ahead = (pose.place * np.exp(-1j * heading)).real
     climbed = (pose.place * np.conj(shares["work"].side)).real
     # where the orientation is no state the plane is turned so that the gait goes along +x
-    theta_0 = 0.0 if kind.told else -heading
+    theta_0 = 0.0 if "theta" in kind.told else -heading
     x[layout.distance[0, 1:]] = ahead[1:]
     x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
     x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta

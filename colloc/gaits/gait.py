@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced, symmetric_samples
+from colloc.mechanics.inertia import GRAVITY
 from colloc.system.errors import ProblemError
 
 _SEED_HARMONICS = 2
@@ -41,6 +42,8 @@ class GaitFunction:
     """Whether it is a sum of functions of the phase with coefficients, a Fourier series for one."""
     theta: float | None = None
     """Where the tail link points at phase 0, of a gait for a slope (`colloc.gaits.sloped`)."""
+    log_period: float | None = None
+    """Logarithm of the period [sqrt(length / gravity)], of a gait that says its pace (`colloc.gaits.inertia`)."""
     coordinate = "joint"
     """What the gait's body calls a shape coordinate."""
 
@@ -90,7 +93,11 @@ class GaitFunction:
 
     @property
     def pointing(self) -> list[str]:
-        """A line that says where it points, if it does."""
+        """A line that says where it points, or how fast it is played, if it does."""
+        if self.log_period is not None:
+            period = np.exp(self.log_period)
+            said = f"a period takes {period:.5g} sqrt(L/g), {period / np.sqrt(GRAVITY):.3g} s for a body of 1 m"
+            return [f"{said}: Froude number {period**-2:.4g}"]
         if self.theta is None:
             return []
         turned = np.degrees(np.angle(np.exp(1j * self.theta)))

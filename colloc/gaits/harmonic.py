@@ -29,6 +29,8 @@ class Fourier(GaitFunction):
     cos, sin : (n_joint, n_harmonic)
     theta : float, optional
         On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
+    log_period : float, optional
+        At a free pace: logarithm of the period [sqrt(length / gravity)].
 
     Examples
     --------
@@ -42,6 +44,7 @@ class Fourier(GaitFunction):
     cos: np.ndarray
     sin: np.ndarray
     theta: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
+    log_period: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
 
     is_series = True
 

@@ -2,46 +2,108 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.gaits.linear import LinearClass
 from colloc.gaits.regime import Regime
 from colloc.gaits.symmetry import ANTIPODAL, NONE
-from colloc.mechanics.bodies import FULL
+from colloc.gaits.told import Telling, telling
+from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.inertia import GRAVITY, checked_mass
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
 
+class Free(NamedTuple):
+    """A range of Froude numbers L/(g T^2) in which the pace of a gait is sought with it.
+
+    Parameters
+    ----------
+    low, high : float
+        Above 0; where they are one the pace is given.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> colloc.Problem("mine", froude=colloc.Free(0.01, 1), objective="distance / (work + 0.1 * period)")
+    <Problem mine: best distance / (work + 0.1 * period), 2 joints, friction (1, 1, 1), Froude number 0.01 to 1, 1 harmonic, \
+symmetry none, delta 1e-04>
+    """
+
+    low: float
+    high: float
+
+
+class AtFreePace(Telling):
+    """What a free pace changes in a class that is linear in its parameters: members say how long a period takes."""
+
+    tells = "log_period"
+    pace: Free
+
+    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        return self._bounds(body, limit, *(-0.5 * np.log(self.pace[::-1])))
+
+    def parameters(self, gait: Any) -> np.ndarray:
+        """The parameter vector of the member nearest to a gait; at the middle of the range if that does not say its pace."""
+        periods = -0.5 * np.log(self.pace)
+        said = periods.mean() if gait.log_period is None else np.clip(gait.log_period, periods[1], periods[0])
+        return np.append(self.level.parameters(gait), said)
+
+
 @dataclass(frozen=True)
 class Paced(Regime):
-    """On the level, at a Froude number L/(g T^2), at which inertia counts."""
+    """On the level, at a Froude number L/(g T^2), at which inertia counts, or at one in a range, whose middle it is."""
 
     froude: float  # type: ignore[misc]
+    free: Free | None = None
 
     spent = "friction and kinetic energy"
     others = "that follow from slow motion and from rest"
     pace = "what is heavy takes time to move"
 
     @property
+    def free_pace(self) -> bool:  # type: ignore[override]
+        return self.free is not None
+
+    @property
     def label(self) -> str:
-        return f", Froude number {self.froude:g}"
+        return f", Froude number {' to '.join(f'{each:g}' for each in self.free or (self.froude,))}"
+
+    def at(self, gait: Any) -> Paced:
+        if self.free is None:
+            return self
+        if gait.log_period is None and self.free.low == self.free.high:
+            return Paced(self.froude)
+        if gait.log_period is None:
+            raise ProblemError("the gait does not say its pace: give it a log_period, or the problem one Froude number.")
+        return Paced(float(np.exp(-2.0 * gait.log_period)))
+
+    def class_of(self, gait_class: Any) -> Any:
+        level = gait_class.level
+        if self.free is None:
+            return level
+        if not (isinstance(level, LinearClass) and level.linear):
+            raise ProblemError(f"a free pace is sought with a gait of a class Harmonic, not {type(level).__name__}.")
+        return telling(AtFreePace, level, pace=self.free)
 
     def describe(self) -> str:
+        if self.free is not None:
+            return f"played at the best Froude number from {self.free.low:.4g} to {self.free.high:.4g}"
         period = 1 / np.sqrt(GRAVITY * self.froude)
         return f"played at the Froude number {self.froude:.4g}: a body of 1 m takes {period:.3g} s a period"
 
     def in_units_of(self, unit: float) -> Paced:
-        return Paced(self.froude / unit)  # it drives momenta
+        return replace(self, froude=self.froude / unit)  # it drives momenta; where time counts the unit is 1
 
     def check(self, problem: Any) -> None:
-        froude = self.froude
-        if not is_number(froude) or froude < 0:
+        if self.free and not problem.uses("period"):
             raise ProblemError(
-                f"froude must be a number that is not negative, length over (gravity times period^2), not {froude!r}."
+                f"a free pace needs an objective that says what time is worth, not {problem.objective.name!r}: "
+                "'distance / (work + 0.1 * period)' counts a standing power of 0.1 weight x sqrt(length x gravity)."
             )
         checked_mass(problem.body)
         if problem.grade:
@@ -59,3 +121,20 @@ class Paced(Regime):
             raise ProblemError(f"with inertia there is only the formulation {FULL!r}.")
         if scheme(problem.scheme).left:
             raise ProblemError(f"with inertia a gauss-N or radau-N scheme is needed, not {problem.scheme}.")
+
+
+def paced_from(froude: Any, *, timed: bool) -> Paced:
+    """How a problem states its pace: a number, or a range; `timed`: something asked for speaks of the period, which is then
+    a parameter of the gait. `ProblemError` if it is none."""
+    if isinstance(froude, (tuple, list)):
+        if len(froude) != 2 or not all(map(is_number, froude)) or not 0 < froude[0] <= froude[1]:
+            raise ProblemError(
+                "froude=Free(low, high) needs two numbers above 0, the smaller one first, not "
+                f"{' and '.join(map(repr, froude))}."
+            )
+        return Paced(float(np.sqrt(froude[0] * froude[1])), Free(*map(float, froude)))
+    if not is_number(froude) or froude < 0:
+        raise ProblemError(
+            f"froude must be a number that is not negative, length over (gravity times period^2), not {froude!r}."
+        )
+    return Paced(froude, Free(froude, froude) if timed else None)

@@ -44,6 +44,8 @@ class Combination(GaitFunction):
         Their coefficients.
     theta : float, optional
         On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
+    log_period : float, optional
+        At a free pace: logarithm of the period [sqrt(length / gravity)].
 
     Examples
     --------
@@ -56,6 +58,7 @@ class Combination(GaitFunction):
     basis: Any
     table: np.ndarray
     theta: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
+    log_period: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
 
     is_series = True
 
@@ -209,6 +212,11 @@ class LinearClass(ClassOfGaits):
         matrix = self.angle_matrix(self.instants, body.n_joint)
         # parameters are linear in the angles at the instants
         return largest * limit * np.abs(np.linalg.pinv(matrix.reshape(-1, matrix.shape[2]))).sum(axis=1)
+
+    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the most that parameters of gaits whose angles keep a limit may be, ``(n_parameter,)`` each."""
+        largest = self.largest_parameters(body, limit)
+        return -largest, largest
 
     def angle_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
         """``(n_time, n_joint, n_parameter)``: joint angles at phases t per parameter."""

@@ -23,6 +23,7 @@ QUANTITIES = {
     "work": "work against friction over a period",
     "rotation": "net rotation over a period, counter-clockwise [rad]",
     **{name: quantity.meaning for name, quantity in INTEGRALS.items()},
+    "period": "time that a period takes, of a body with inertia [sqrt(length / gravity)]",
 }
 """What every expression may speak of."""
 _SAMPLES = (
@@ -128,6 +129,8 @@ class Objective:
     @cached_property
     def degree(self) -> float | None:
         """The power of the friction coefficients that the value is proportional to; None if to none."""
+        if "period" in self.uses:  # it depends on the ratio of weight to friction
+            return None
         degrees, powers = {"work": 1.0}, []
         for each in self.integrals:
             if each.friction_degree is None:

@@ -11,7 +11,7 @@ from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.guesses import check_guess, slowed, travelling_wave
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.inertia import Paced
+from colloc.gaits.inertia import Free, paced_from
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
@@ -83,7 +83,7 @@ class Problem:
         Relative error of the objective to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     objective : Objective or str
         What is maximised (`colloc.gaits.objective`): "efficiency", "speed", "turning", "driven efficiency", or an expression
-        of distance, work, rotation, length and driven_work of a period.
+        of distance, work, rotation, length, driven_work and, with inertia, period.
     rotation : float or None
         Net rotation over a period [rad], counter-clockwise; None leaves it free. Other values than 0 need a class without
         symmetry.
@@ -102,9 +102,10 @@ class Problem:
         "work" that of the joints, and where the body points is sought with the gait.
     towards : float, optional
         Direction on a slope whose way counts instead of the climb, with none across it, from straight uphill to the left [rad].
-    froude : float
+    froude : float or Free
         Froude number L/(g T^2) at which gaits are played: length over gravity and the period squared; 0 is so slow that inertia
-        does not matter (docs/howto/pace.md). What counts is its ratio to the coefficient of friction.
+        does not matter (docs/howto/pace.md). What counts is its ratio to the coefficient of friction. ``Free(low, high)``: the
+        pace is sought with the gait, where the objective speaks of the "period" [sqrt(length / gravity)].
     motion : Regime, optional
         A kind of motion of your own, instead of `grade` and `froude` (`colloc.gaits.regime`).
     shrinking : bool
@@ -148,7 +149,7 @@ class Problem:
     limits: tuple[PathLimit, ...] = field(default=(), metadata=STATED_IF_SET)
     grade: float = field(default=0.0, metadata=STATED_IF_SET)
     towards: float | None = field(default=None, metadata=STATED_IF_SET)
-    froude: float = field(default=0.0, metadata=STATED_IF_SET)
+    froude: float | Free = field(default=0.0, metadata=STATED_IF_SET)
     motion: Regime | None = field(default=None, metadata=STATED_IF_SET)
     shrinking: bool = field(default=False, metadata=STATED_IF_SET)
 
@@ -161,6 +162,8 @@ class Problem:
         schedule = self.body.schedule
         self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
         self._check_parts()
+        object.__setattr__(self, "objective", objective_from(self.objective))
+        object.__setattr__(self, "at_least", least_values(self.at_least))
         regime = self.regime
         object.__setattr__(self, "gait", regime.class_of(self.gait))
         object.__setattr__(self, "grade", float(self.grade))
@@ -222,8 +225,8 @@ class Problem:
             raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")
 
     def _check_aims(self) -> None:
-        object.__setattr__(self, "objective", objective_from(self.objective))
-        object.__setattr__(self, "at_least", least_values(self.at_least))
+        if self.uses("period") and not self.froude:
+            raise ProblemError("what is asked for speaks of the period: state the pace, froude=0.05 or froude=Free(0.001, 1).")
         if self.rotation is not None and not is_number(self.rotation):
             raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
         if self.rotation == 0 and self.uses("rotation"):
@@ -281,7 +284,8 @@ class Problem:
         slope = slope_from(self.body, self.friction, self.grade, self.towards)
         if self.motion is not None and (slope is not None or self.froude != 0):
             raise ProblemError("a kind of motion of your own takes the place of grade and froude: leave these out.")
-        return self.motion or (Paced(self.froude) if self.froude != 0 else slope or LEVEL)
+        paced = self.froude != 0
+        return self.motion or (paced_from(self.froude, timed=self.uses("period")) if paced else slope or LEVEL)
 
     @property
     def scene(self) -> str:

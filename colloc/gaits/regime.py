@@ -25,6 +25,8 @@ class Regime:
 
     froude: ClassVar[float] = 0.0
     """Froude number at which gaits are played."""
+    free_pace: ClassVar[bool] = False
+    """Whether the pace is sought with the gait, whose last parameter it is."""
     slides: ClassVar[bool] = False
     """Whether the body may slide back, so that there may be no gait that is worth anything."""
     spent: ClassVar[str] = "friction"
@@ -62,6 +64,10 @@ class Regime:
     def class_of(self, gait_class: Any) -> Any:
         """What a class of gaits is here."""
         return gait_class.level
+
+    def at(self, gait: Any) -> Self:
+        """The regime of a gait, which may say its pace."""
+        return self
 
     def in_units_of(self, unit: float) -> Self:
         """The same in forces divided by a unit."""

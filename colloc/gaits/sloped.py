@@ -9,8 +9,7 @@ the weight.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from functools import cache
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.regime import Regime
 from colloc.gaits.symmetry import BILATERAL, NONE
+from colloc.gaits.told import Telling, telling
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law, rate_independent
@@ -65,7 +65,7 @@ class Slope(Regime):
                 f"on a slope gaits are sought in classes paced by time, not {type(level).__name__}: take Harmonic, BSpline or "
                 "Basis."
             )
-        return _pointed(level)
+        return telling(OnSlope, level)
 
     def pull(self, theta: Array) -> Array:
         """Of the weight, in the body's axes, ``(2, n_time)``, with its tail link at angles theta ``(1, n_time)`` from straight
@@ -89,10 +89,10 @@ class Slope(Regime):
         return f"slope of grade {self.grade:g}: d is {way}, W the work of the joints"
 
 
-class OnSlope(LinearClass):
-    """What a slope changes in a class that is linear in its parameters: one more says where the tail link points at phase 0.
-    Classes on slopes derive from it first and then from the class they are on the level (`Slope.class_of`)."""
+class OnSlope(Telling):
+    """What a slope changes in a class that is linear in its parameters: members say where the tail link points at phase 0."""
 
+    tells = "theta"
     delta_start = 0.02
     """At more the body creeps down faster than it crawls up."""
 
@@ -109,32 +109,8 @@ class OnSlope(LinearClass):
         """Bilateral gaits keep every heading (docs/howto/slopes.md), others have to be told to."""
         return BILATERAL if self.symmetry == BILATERAL else NONE
 
-    @property
-    def level(self) -> Any:
-        return type(self).__bases__[1](**_fields(self))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _pointed, (self.level,)
-
-    def series(self, harmonics: int) -> Any:
-        return self.level.series(harmonics)
-
-    def _basis(self, n_joint: int) -> np.ndarray:
-        """No angle depends on where the body points."""
-        basis = super()._basis(n_joint)
-        return np.column_stack([basis, np.zeros(len(basis))])
-
-    def largest_parameters(self, body: Body, limit: float) -> np.ndarray:
-        return np.append(self.level.largest_parameters(body, limit), _ANY_ANGLE)
-
-    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
-        """The gait of a parameter vector, which points nowhere yet if that does not."""
-        gait = self.level.member(parameters[:-1], n_joint)
-        return gait if np.isnan(parameters[-1]) else replace(gait, theta=float(parameters[-1]))
-
-    def through(self, gait: Any) -> Any:
-        near = self.level.through(gait)
-        return replace(near, theta=gait.theta) if gait.is_series else near
+    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        return self._bounds(body, limit, -_ANY_ANGLE, _ANY_ANGLE)
 
     def parameters(self, gait: Any) -> np.ndarray:
         """The parameter vector of the member nearest to a gait; its last one is NaN if that does not say where it points, or
@@ -142,33 +118,6 @@ class OnSlope(LinearClass):
         if gait.theta is None or not self.in_phase(gait):
             return np.append(self.level.parameters(gait), np.nan)
         return np.append(self.level.nearest(gait), gait.theta)
-
-    # where searches begin: where a body points is not drawn
-    def first_guess(self, gait: Any) -> Any:
-        return self.level.first_guess(gait)
-
-    def dimension(self, n_joint: int) -> int:
-        return self.level.dimension(n_joint)
-
-    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
-        return self.level.drawn(unit, n_joint)
-
-    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
-        return self.level.moved(gait, step, fall, rng)
-
-
-def _fields(gait_class: Any) -> dict[str, Any]:
-    return {f.name: getattr(gait_class, f.name) for f in fields(gait_class)}
-
-
-@cache
-def _on_slopes(kind: Any) -> Any:
-    return type(kind.__name__, (OnSlope, kind), {"__doc__": kind.__doc__})
-
-
-def _pointed(gait_class: Any) -> Any:
-    kind: Any = type(gait_class)
-    return _on_slopes(kind)(**_fields(gait_class))
 
 
 def _checked_grade(grade: object) -> float:

@@ -33,7 +33,7 @@ SUMMED = (*FUNCTIONS, "sum")
 """What it may use; ``sum`` is over the joints."""
 _OF_FORCES = {"moment", "power", "idle"}
 _WITH_PACE, _WITH_FRICTION = ("rate", "power", "idle"), ("moment", "power", "idle")
-_TAKEN = ("distance", "work", "rotation", "across", "efficiency", "value", "instants")
+_TAKEN = ("distance", "work", "rotation", "across", "period", "efficiency", "value", "instants")
 
 
 @dataclass(frozen=True, eq=False)

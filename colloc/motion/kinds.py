@@ -30,7 +30,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import STATES, checked_mass, momenta
+from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
 from colloc.mechanics.law import Law
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
@@ -82,21 +82,24 @@ class Along(NamedTuple):
 class Passed(NamedTuple):
     """What the solved part of a period comes to: displacement from the initial orientation 0 or, where the orientation is a
     state, in the plane; rotation, change of the sum of all joint angles [rad], work against friction. Displacement and rotation
-    are seen from axes that turn evenly (`Kind.turn`)."""
+    are seen from axes that turn evenly (`Kind.turn`). And what the gait tells of it."""
 
     displacement: complex
     rotation: float
     bend: float
     work: float
+    told: np.ndarray = np.empty(0)
 
 
 class Share(NamedTuple):
-    """What makes a number of a period grow: a way along a direction, the size of which counts; rotation, bend, work."""
+    """What makes a number of a period grow: a way along a direction, the size of which counts; rotation, bend, work; and what
+    the gait tells."""
 
     side: complex = 0.0
     rotation: float = 0.0
     bend: float = 0.0
     work: float = 0.0
+    told: float = 0.0
 
 
 class Kind(Protocol):
@@ -107,7 +110,7 @@ class Kind(Protocol):
     states: tuple[str, ...]
     """States of a period that are solved for."""
     told: tuple[str, ...]
-    """Those of them whose begin a gait says, in its last parameters; a period closes the others."""
+    """What a gait says in its last parameters: the begin of some of them, a period closing the others, or its pace."""
     periods: float
     """A whole period over the part that is solved."""
     lack: str
@@ -289,9 +292,21 @@ class WithInertia(SlowOnLevel):
     followed: bool = True
     lack: str = "no period with inertia was found that repeats itself; give another guess, or a smaller froude"
 
-    def __init__(self, body: Chain, friction: Law, symmetry: str, froude: float, turn: float = 0.0) -> None:
+    def __init__(self, body: Chain, friction: Law, symmetry: str, froude: float | None, turn: float = 0.0) -> None:
+        """None: gaits say their pace."""
         super().__init__(body, friction, symmetry, turn)
         self._chain, self._froude, self._image = body, froude, momenta_image(symmetry)
+        self.told = ("log_period",) if froude is None else ()
+
+    def counted(self, passed: Passed) -> dict[str, float]:
+        return super().counted(passed) | {name: float(np.exp(passed.told[0])) for name in self._timed}
+
+    def shares(self, passed: Passed) -> dict[str, Share]:
+        return super().shares(passed) | {name: Share(told=float(np.exp(passed.told[0]))) for name in self._timed}
+
+    @property
+    def _timed(self) -> tuple[str, ...]:
+        return ("period",) if self.told else ()
 
     def along(
         self,
@@ -303,14 +318,14 @@ class WithInertia(SlowOnLevel):
     ) -> Along:
         """Where Newton's method does not lead from the slow motion to the one with inertia, as on feet that hold, it is reached
         through more viscous friction; not beside a motion that is known, where a search had better take a shorter step."""
-        held = False
+        held, froude = False, self._froude_at(shapes, begin)
         if near[0] is not None:
-            states, out, held = self._closed(mesh, shapes, near[0])
+            states, out, held = self._closed(mesh, shapes, near[0], froude)
         if not held:
-            states, out, held = self._closed(mesh, shapes, self._slow_momenta(shapes))
+            states, out, held = self._closed(mesh, shapes, self._slow_momenta(shapes), froude)
         if not held and near[0] is None and shapes.delta * shapes.unit < _VISCOUS:
             wetter = self.along(mesh, shapes._replace(delta=_WETTER * shapes.delta), begin)
-            states, out, held = self._closed(mesh, shapes, wetter.states)
+            states, out, held = self._closed(mesh, shapes, wetter.states, froude)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
@@ -324,49 +339,55 @@ class WithInertia(SlowOnLevel):
         posture = body.posture(angles)
         return momenta(body, posture, body.velocity(posture, rates, z))
 
-    def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, froude: float) -> tuple[np.ndarray, np.ndarray, bool]:
         """The momenta that repeat every period, by Newton's method from others ``(3, n_point)``; what the body does with them
         (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any."""
         out = near
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal out
-            out, found = self._rates(shapes, states)
+            out, found = self._rates(shapes, states, froude)
             return found
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, near[:, 0], near)
         return states, out, held
 
     def alone(
-        self, mesh: Mesh, shapes: Shapes, begins: np.ndarray, near: np.ndarray
+        self, mesh: Mesh, shapes: Shapes, along: Along, begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Every interval by itself, from given momenta at its begin ``(3, n)``: what the body does with those at the points,
         the momenta at its end ``(3, n)``, and where there are any, ``(n,)``; sought near momenta at the points."""
-        equations = self._equations(mesh, shapes.unit)
-        states, ends, found = equations.alone(lambda states: self._rates(shapes, states)[1], begins, near)
-        return self._rates(shapes, states)[0], ends, found
+        equations, froude = self._equations(mesh, shapes.unit), self._froude_at(shapes, along.begin)
+        states, ends, found = equations.alone(lambda states: self._rates(shapes, states, froude)[1], begins, near)
+        return self._rates(shapes, states, froude)[0], ends, found
 
-    def _rates(self, shapes: Shapes, states: np.ndarray) -> tuple[np.ndarray, Rates]:
-        out, slopes = momenta_along_states(self._chain, self.friction, shapes[:3], states, self._froude_at(shapes))
+    def _rates(self, shapes: Shapes, states: np.ndarray, froude: float) -> tuple[np.ndarray, Rates]:
+        out, slopes = momenta_along_states(self._chain, self.friction, shapes[:3], states, froude)
         return out, Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
 
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
         return CollocatedStates(mesh, np.ones(len(STATES), dtype=bool), self._image, unit)
 
-    def _froude_at(self, shapes: Shapes) -> float:
+    def _froude_at(self, shapes: Shapes, begin: np.ndarray) -> float:
         """Momentum grows by what friction gives it in a unit of time, and has as much to grow."""
-        return self._froude * shapes.unit**2
+        froude = float(np.exp(-2.0 * begin[0])) if self._froude is None else self._froude
+        return froude * shapes.unit**2
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
-        _, slopes = momenta_at(self._chain, self.friction, shapes[:3], along.states, self._froude_at(shapes))
-        return slopes[:, : -len(STATES)], slopes[:, -len(STATES) :]
+        """A pace that is told has a column after those of the momenta: in a longer period friction changes them by more."""
+        froude, k = self._froude_at(shapes, along.begin), len(STATES)
+        out, slopes = momenta_at(self._chain, self.friction, shapes[:3], along.states, froude)
+        on_pace = np.zeros((len(out), len(self.told), out.shape[1]))
+        on_pace[_MORE] = 2.0 * (out[_MORE] - turning(along.z, along.states))[:, None]
+        return slopes[:, :-k], np.concatenate([slopes[:, -k:], on_pace], axis=1)
 
     def through_pose(
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
     ) -> np.ndarray:
         on_out[:, 0] += pose.on_rates(on_theta)
-        on_out[:, 4:] = self._pulled_back(mesh, on_out, on_states)[1].reshape(on_out[:, 4:].shape)
-        return np.empty((len(on_out), 0))
+        on_rates = self._pulled_back(mesh, on_out, on_states)[1]
+        on_out[:, 4:] = on_rates.reshape(on_out[:, 4:].shape)
+        return np.einsum("mrt,rkt->mk", on_rates, on_states[_MORE, len(STATES) :])
 
     def on_ends(self, mesh: Mesh, on_out: np.ndarray, on_states: np.ndarray) -> np.ndarray:
         """Derivatives ``(m, 3, n)`` of m numbers with respect to what is added to the momenta at the ends of the intervals,
@@ -375,8 +396,9 @@ class WithInertia(SlowOnLevel):
 
     def _pulled_back(self, mesh: Mesh, on_out: np.ndarray, on_states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         given = on_out[:, :4].reshape(len(on_out), 4, -1)
-        of_states = np.einsum("mrt,rkt->mkt", given, on_states[OUTPUTS][:4])
-        return self._equations(mesh).pulled_back(on_states[_MORE], of_states)
+        on_momenta = on_states[:, : len(STATES)]
+        of_states = np.einsum("mrt,rkt->mkt", given, on_momenta[OUTPUTS][:4])
+        return self._equations(mesh).pulled_back(on_momenta[_MORE], of_states)
 
 
 def through_motion(
@@ -390,7 +412,7 @@ def through_motion(
     """Derivatives of m numbers of a period with respect to (rotation rate, velocity of the centre, power, rates of states) at
     the stages, ``(m, 4 + more, n, s)``, and to the begins that are told, ``(m, n_told)``; `on_states` as of `Kind.slopes`,
     `by_theta` is what they depend on the orientation by themselves, ``(m, n, s)``."""
-    side, rotation, _, work = (np.array(column) for column in zip(*shares, strict=True))
+    side, rotation, _, work, _ = (np.array(column) for column in zip(*shares, strict=True))
     weight = stage_weights(mesh)
     on_theta, on_centre = pose.on_pose(side)
     rows = np.zeros((side.size, len(on_states[OUTPUTS]), *weight.shape))
@@ -413,7 +435,8 @@ def _on_slope(regime: Slope, of: Dynamics) -> Kind:
 
 @kind_in.register
 def _with_inertia(regime: Paced, of: Dynamics) -> Kind:
-    return WithInertia(checked_mass(of.body), of.law, of.symmetry, regime.froude, of.turn)
+    pace = None if regime.free else regime.froude
+    return WithInertia(checked_mass(of.body), of.law, of.symmetry, pace, of.turn)
 
 
 def kind_of_motion(dynamics: Dynamics) -> Kind:

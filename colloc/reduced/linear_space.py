@@ -37,8 +37,7 @@ class LinearSpace:
         self.n = self._matrix.shape[2]
         self._pace = np.ones(self.mesh.n_point)
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
-        self.upper = gait.largest_parameters(body, widest(limit))
-        self.lower = -self.upper
+        self.lower, self.upper = gait.bounds(body, widest(limit))
         self.own = np.arange(self.n)
 
     def member(self, v: np.ndarray) -> AnyGait:

@@ -82,7 +82,7 @@ class ReducedMotion:
         pose = CollocatedPose.on_mesh(mesh, omega, np.array([cx, cy]), first)
         work = float((self._weight * power[mesh.points]).sum())
         bend = self._bend(rates, pace) if self.kind.bends else 0.0
-        passed = Passed(complex(pose.place[-1]), float(pose.theta[-1]) - first, bend, work)
+        passed = Passed(complex(pose.place[-1]), float(pose.theta[-1]) - first, bend, work, begin)
         found = _State(v.copy(), delta, angles, rates, pace, along, out, pose, passed)
         if not self.kind.states or along.held.all():  # a search goes on from states that there are
             self._last = found
@@ -100,7 +100,8 @@ class ReducedMotion:
             if last is None:
                 return None, None
             states = last.along.states.copy()
-            states[: begin.size] += (begin - last.along.begin)[:, None]
+            for name, moved in zip(self.kind.told, begin - last.along.begin, strict=True):
+                states[[name == state for state in self.kind.states]] += moved
             return states, last.z
         near, slopes, _ = self._near
         moved = np.concatenate([angles - near.angles, rates - near.rates])
@@ -180,7 +181,7 @@ class ReducedMotion:
         on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS]) + on_points[:, :-1].transpose(0, 2, 1)
         found = self.shapes.pulled_back(s.v, on_shape, on_pace)
         if kind.told:
-            found[:, -len(kind.told) :] += on_begin
+            found[:, -len(kind.told) :] += on_begin + np.array([share.told for share in shares])[:, None]
         return found
 
     def _slopes(self, s: _State) -> tuple[np.ndarray, np.ndarray]:

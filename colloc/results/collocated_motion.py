@@ -75,7 +75,7 @@ class CollocatedMotion:
         at_points = np.empty_like(growth)
         at_points[:, mesh.points] = momenta[:, mesh.sites]
         chain, (angles, _, z) = checked_mass(self.problem.body), self._points
-        return self.problem.froude * about_tail(chain, angles, growth - turning(z, at_points))
+        return self.problem.regime.at(self.gait).froude * about_tail(chain, angles, growth - turning(z, at_points))
 
     @property
     def _theta(self) -> np.ndarray:

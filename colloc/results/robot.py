@@ -67,7 +67,7 @@ def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
 def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Torques of the motors that change how the links move, at phases with tail velocities z."""
     problem, (angles, rates) = solution.problem, solution.gait(t)
-    body, froude = checked_mass(problem.body), problem.froude
+    body, froude = checked_mass(problem.body), solution.froude
     link = body.velocity(body.posture(angles), rates, z)
     states = momenta(body, body.posture(angles), link)
     grows = momentum_rates(body, problem.law, angles, rates, states, delta=solution.delta_per_period, froude=froude).rates
@@ -126,10 +126,10 @@ class Robot:
     def __post_init__(self) -> None:
         check_finite(positive=True, **{name: getattr(self, name) for name in ("length", "mass", "period", "gravity")})
         problem, n = self.solution.problem, self.solution.gait.n_joint
-        if problem.froude and abs(self.froude / problem.froude - 1.0) > _PACE:
-            needed = math.sqrt(self.length / (self.gravity * problem.froude))
+        if (own := self.solution.froude) and abs(self.froude / own - 1.0) > _PACE:
+            needed = math.sqrt(self.length / (self.gravity * own))
             raise ProblemError(
-                f"{problem.name} is the best gait for the Froude number {problem.froude:.4g}: a robot of {self.length:g} m has "
+                f"{problem.name} is the best gait for the Froude number {own:.4g}: a robot of {self.length:g} m has "
                 f"to take {needed:.4g} s a period, not {self.period:g}: solve again with froude={self.froude:.4g}."
             )
         for name, unit in (("max_speed", "speed"), ("max_torque", "torque")):

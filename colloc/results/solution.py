@@ -184,9 +184,10 @@ class Solution:
     @property
     def played_slowly(self) -> float:
         """The objective of the same gait played so slowly that inertia does not matter."""
-        at = self.problem.body, self.problem.law, self.gait, self.answer.delta_per_period
-        aims = {"objective": self.problem.objective, "turn": self.problem.rotation or 0.0}
-        return replay(*at, breaks=self.gait.corner_phases, **aims).value  # type: ignore[arg-type]
+        p, at = self.problem, self.answer.delta_per_period
+        asked: Any = {"quantities": p.objective.integrals, "turn": p.rotation or 0.0, "breaks": self.gait.corner_phases}
+        period = {"period": self.froude**-0.5} if self.froude else {}
+        return float(p.objective({**replay(p.body, p.law, self.gait, at, **asked).values, **period}))
 
     def slow_enough(self, loss: float = 0.01) -> float:
         """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than the part `loss`.
@@ -273,6 +274,11 @@ class Solution:
         """The motion at phases t, any real numbers, period after period: `CollocatedMotion.sample`."""
         return self.motion.sample(t)
 
+    @property
+    def froude(self) -> float:
+        """Froude number L/(g T^2) at which the gait is played; 0: slowly."""
+        return self.problem.regime.at(self.gait).froude
+
     def from_rest(self, t: np.ndarray) -> SampledMotion:
         """The motion at ascending phases t, 0 and more, of a body with inertia that is at rest before its joints begin.
 
@@ -286,7 +292,7 @@ class Solution:
         p, chain = self.problem, self.problem.body
         if not p.froude:
             raise ProblemError(f"{p.name} has no inertia, and is under way at once: from rest is for problems with a froude.")
-        played = p.law, self.gait, self.delta_per_period, p.froude
+        played = p.law, self.gait, self.delta_per_period, self.froude
         ran = motion_from_rest(chain, *played, periods=max(1, int(np.ceil(t[-1]))), breaks=self.gait.corner_phases)
         states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
         (angles, rates), theta, centre = self.gait(t % 1.0), states[3], states[4:6]

@@ -257,7 +257,7 @@ def _reached(problem: Problem, fine: Replay) -> list[Check]:
     """Values that have to be reached."""
     checks = []
     for aim, least in problem.at_least:
-        lacks = max(least - aim(fine.values), 0.0) / max(abs(least), 1e-300)
+        lacks = max(least - aim(fine.values), 0.0) / (abs(least) or 1.0)
         checks.append(Check(f"least {aim.name}", lacks, GAP, f"relative, below {least:g}, in replay"))
     return checks
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
@@ -62,7 +63,9 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
     if problem.gait.unit_speed:
         delta *= path_length(gait)
     own = problem.gait.seeds
-    space, v = space_near(problem.with_(gait=own, guess=gait, intervals=_INTERVALS + 4 * own.harmonics, **_ELSE_FREE), gait)
+    paced = {"objective": EFFICIENCY, "froude": problem.regime.froude} if problem.regime.free_pace else {}
+    settings = {"gait": own, "guess": gait, "intervals": _INTERVALS + 4 * own.harmonics} | _ELSE_FREE | paced
+    space, v = space_near(problem.with_(**settings), gait)
     program, area = ReducedProgram(space, delta), own.enclosed_area(problem.body.n_joint)
     program.place_rows(np.zeros_like(v))  # near no limit of the angles: those are kept by the search that begins here
     return space.member(minimised(_Nearest(program, v, area), v, np.inf, _ACCURACY, _STEPS).v)

@@ -57,6 +57,7 @@ def evaluate(
     if problem.body.schedule:
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")
     fitted = fitted_gait(gait, problem.body.n_joint, period=period, harmonics=harmonics, degrees=degrees)
+    problem.regime.at(fitted.gait)  # refuses one that does not say a pace which the problem leaves open
     solution = _evaluated(problem, fitted)
     solution.seconds = time.monotonic() - begin
     return solution

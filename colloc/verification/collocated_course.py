@@ -88,7 +88,7 @@ def _on_slope(regime: Slope, control: ControlProblem, gait: Any, delta: float, m
 def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     dynamics = control.dynamics
     at = checked_mass(dynamics.body), dynamics.law, gait, delta
-    played = GaitWithInertia(*at, froude=regime.froude, turn=dynamics.turn)
+    played = GaitWithInertia(*at, froude=regime.at(gait).froude, turn=dynamics.turn)
     ran = played.settled(_along(kind_of_motion(dynamics), mesh, gait, delta).edges[:, 0], error)
     return CourseOfGait(ran.at, error)
 
@@ -108,8 +108,8 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     at_edges = exact.at(mesh.edges)
     momenta, (angle, *place) = at_edges[:-4], at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
-    true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()))
-    found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()))
+    true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()), own.begin)
+    found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()), own.begin)
     known, summed, followed = {}, {}, iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
     now = kind.instants(Shapes(angles, rates, delta), pose.theta_on(mesh), own.z)
     for each in control.aims.integrals:
@@ -124,7 +124,7 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     if isinstance(kind, WithInertia):
         shapes = Shapes(angles, rates, delta)
-        out, ends, alone = kind.alone(mesh, shapes, momenta[:, :-1], exact.at(mesh.times)[:-4])
+        out, ends, alone = kind.alone(mesh, shapes, own, momenta[:, :-1], exact.at(mesh.times)[:-4])
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
         here, spent_alone = np.exp(1j * angle[:-1]), (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
         # an error of rotation turns everything after it, and by half of it the direction that counts

@@ -207,7 +207,7 @@ def inertial_motion(
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
     objective : Objective
-        Of distance, work, rotation and what shapes and their rates sum up to.
+        Of distance, work, rotation, period [sqrt(length / gravity)] and what shapes and their rates sum up to.
     turn : float
         Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that turns by as much.
     quantities : iterable of Quantity or str
@@ -238,7 +238,7 @@ def inertial_motion(
         nonlocal start
         ran = played.settled(start, aim, slopes)
         start = ran.states[_MOMENTA, 0]
-        return ran, passed(ran.states[:, -1], turn)
+        return ran, passed(ran.states[:, -1], turn) | {"period": float(froude) ** -0.5}
 
     ran, values, errors = to_tolerance(run, tolerance, objective, tolerance, totals)
     multipliers = np.linalg.eigvals(slopes)

@@ -155,6 +155,8 @@ def replay(
 
         played: Any = {"froude": froude, "tolerance": tolerance, "breaks": breaks, "objective": objective}
         return inertial_replay(body, friction, path, delta, quantities=quantities, turn=turn, **played)  # type: ignore[arg-type]
+    if "period" in objective.uses:
+        raise ProblemError(f"the objective {objective.name!r} speaks of the period: give the froude at which it is played.")
     if instants < 4 or instants % 2:
         raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
     friction = body.law(friction)

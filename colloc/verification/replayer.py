@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial, singledispatch
+from typing import Any
 
 from colloc.gaits.inertia import Paced
 from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.law import Law
 from colloc.verification.played import Replay
 from colloc.verification.replay import replay
 
@@ -28,4 +31,8 @@ def _on_slope(regime: Slope) -> Callable[..., Replay]:
 
 @replayer.register
 def _with_inertia(regime: Paced) -> Callable[..., Replay]:
-    return partial(replay, froude=regime.froude)
+    return partial(_at_pace, regime)
+
+
+def _at_pace(regime: Paced, body: Body, friction: Law, path: Any, delta: float, **asked: Any) -> Replay:
+    return replay(body, friction, path, delta, froude=regime.at(path).froude, **asked)

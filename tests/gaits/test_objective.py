@@ -10,7 +10,7 @@ from colloc import Harmonic, Objective, Problem, ProblemError
 from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.objective import DRIVEN, EFFICIENCY, NAMED, QUANTITIES, SPEED, TURNING
 
-PERIOD = {"distance": 0.31, "work": 1.3, "rotation": 0.7, "length": 8.0, "driven_work": 1.5}
+PERIOD = {"distance": 0.31, "work": 1.3, "rotation": 0.7, "length": 8.0, "driven_work": 1.5, "period": 3.0}
 EXPRESSIONS = [
     *NAMED,
     "distance / (work + 0.1 * length)",

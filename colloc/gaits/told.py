@@ -1,0 +1,79 @@
+"""Classes of gaits whose members say one number more than how the joints move: where they point, how long a period takes.
+
+The number is the last parameter, and no joint angle depends on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import cache
+from typing import Any, ClassVar
+
+import numpy as np
+
+from colloc.gaits.linear import LinearClass
+from colloc.mechanics.bodies import Body
+
+
+class Telling(LinearClass):
+    """What saying a number changes in a class that is linear in its parameters; members whose last parameter is NaN do not say
+    it yet. Such classes derive from a child of this one first and then from the class that they are without (`telling`)."""
+
+    tells: ClassVar[str]
+    """What members call the number."""
+    _own: ClassVar[tuple[tuple[str, Any], ...]]
+
+    @property
+    def level(self) -> Any:
+        return type(self).__bases__[1](**{f.name: getattr(self, f.name) for f in fields(self)})  # type: ignore[arg-type]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made, (type(self).__bases__[0], self.level, self._own)
+
+    def series(self, harmonics: int) -> Any:
+        return self.level.series(harmonics)
+
+    def _basis(self, n_joint: int) -> np.ndarray:
+        """No angle depends on the number."""
+        basis = super()._basis(n_joint)
+        return np.column_stack([basis, np.zeros(len(basis))])
+
+    def _bounds(self, body: Body, limit: float, least: float, most: float) -> tuple[np.ndarray, np.ndarray]:
+        lower, upper = self.level.bounds(body, limit)
+        return np.append(lower, least), np.append(upper, most)
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
+        gait = self.level.member(parameters[:-1], n_joint)
+        return gait if np.isnan(parameters[-1]) else replace(gait, **{self.tells: float(parameters[-1])})
+
+    def through(self, gait: Any) -> Any:
+        near = self.level.through(gait)
+        return replace(near, **{self.tells: getattr(gait, self.tells)}) if gait.is_series else near
+
+    # where searches begin: the number is not drawn
+    def first_guess(self, gait: Any) -> Any:
+        return self.level.first_guess(gait)
+
+    def dimension(self, n_joint: int) -> int:
+        return self.level.dimension(n_joint)
+
+    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
+        return self.level.drawn(unit, n_joint)
+
+    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
+        return self.level.moved(gait, step, fall, rng)
+
+
+def telling(kind: type[Telling], gait_class: Any, **own: Any) -> Any:
+    """A class of gaits whose members say a number, with attributes of its own."""
+    return _made(kind, gait_class, tuple(own.items()))
+
+
+def _made(kind: Any, gait_class: Any, own: tuple[tuple[str, Any], ...]) -> Any:
+    without: Any = type(gait_class)
+    return _type(kind, without, own)(**{f.name: getattr(gait_class, f.name) for f in fields(gait_class)})
+
+
+@cache
+def _type(kind: Any, gait_class: Any, own: tuple[tuple[str, Any], ...]) -> Any:
+    return type(gait_class.__name__, (kind, gait_class), {"__doc__": gait_class.__doc__, "_own": own, **dict(own)})

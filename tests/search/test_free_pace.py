@@ -1,0 +1,99 @@
+"""The pace of a gait sought with it, where time is worth something: against fixed paces, and what cannot be asked."""
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc.commands.summary import summary_lines
+from colloc.reduced.program import ReducedProgram
+from colloc.search.converge import converged
+from colloc.search.effort import FINE
+from colloc.search.spaces import space_near
+
+ROUND, STANDING_POWER = colloc.ellipse(A0=0, A1=2.2, B1=1.3), "distance / (work + 0.1 * period)"
+
+
+def problem(froude, **fields):
+    usual = {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "delta": 1e-2, "objective": STANDING_POWER}
+    return colloc.Problem("free", froude=froude, **(usual | fields))
+
+
+def played(found):
+    """The Froude number of a gait that is found."""
+    return np.exp(-2 * found.gait.log_period)
+
+
+def best(stated):
+    """On the first mesh."""
+    return converged(*space_near(stated, stated.guess), stated.delta, FINE)
+
+
+@pytest.mark.parametrize("objective", [STANDING_POWER, "distance / period", "distance / work + 0 * period"])
+def test_gradients_are_those_of_differences(objective):
+    space, v = space_near(problem(colloc.Free(0.01, 1.0), objective=objective, gait=colloc.Harmonic(1), rotation=None), ROUND)
+    program, step = ReducedProgram(space, 1e-2), 1e-5
+    differences = [(program.objective(v + step * e) - program.objective(v - step * e)) / (2 * step) for e in np.eye(v.size)]
+    np.testing.assert_allclose(program.gradient(v), differences, atol=2e-6 * np.abs(differences).max())
+
+
+def test_the_best_pace_is_that_of_the_best_fixed_one():
+    """Between slow, where standing takes most, and fast, where inertia does; and by the envelope theorem the value of the best
+    gait is stationary in the pace."""
+    found = best(problem(colloc.Free(0.01, 1.0)))
+    froude = played(found)
+    assert found.optimal
+    assert 0.011 < froude < 0.9
+    values = [best(problem(froude * factor, guess=found.gait)).value for factor in (0.8, 1 / 1.01, 1.0, 1.01, 1.25)]
+    assert values[2] == pytest.approx(found.value, rel=1e-9)
+    assert values[2] > max(values) - 1e-12
+    assert abs(values[3] - values[1]) / (2e-2 * values[2]) < 1e-3
+
+
+def test_it_is_certified_kept_and_told(tmp_path):
+    found = colloc.solve(problem(colloc.Free(0.01, 1.0), mesh_tolerance=2e-4), starts=1)
+    assert found.status == "solved", found.message
+    assert found.answer.program == found.problem.formulation, "IPOPT confirms it, with the pace among its variables"
+    kept = colloc.load(colloc.save(found, tmp_path / "free.h5"))
+    assert (kept.froude, kept.problem.hash) == (found.froude, found.problem.hash)
+    told = "\n".join(summary_lines(kept, None, verbose=True))
+    assert "best Froude number from 0.01 to 1" in told
+    assert f"Froude number {found.froude:.4g}" in told
+
+
+def test_a_range_of_one_pace_is_that_pace():
+    free, fixed = best(problem(colloc.Free(0.05, 0.05))), best(problem(0.05))
+    assert free.optimal
+    assert played(free) == pytest.approx(0.05, rel=1e-12)
+    assert free.value == pytest.approx(fixed.value, rel=1e-9)
+
+
+def test_speed_under_a_limit_of_power_takes_all_of_it():
+    limited = best(problem(colloc.Free(0.001, 1.0), objective="distance / period", at_least={"0.1 - work / period": 0.0}))
+    period = limited.program().period(limited.v)
+    assert limited.optimal
+    assert period["work"] / period["period"] == pytest.approx(0.1, rel=1e-6)
+    assert 0.001 < played(limited) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"froude": (1.0, 0.1)}, "the smaller one first"),
+        ({"froude": (-1.0, 0.1)}, "above 0"),
+        ({"froude": (0.1, np.inf)}, "two numbers"),
+        ({"froude": (0.1, 1.0), "objective": "efficiency"}, "what time is worth"),
+        ({"froude": (0.1, 1.0), "gait": colloc.FreePath(2.0)}, "of a class Harmonic"),
+        ({"froude": (0.1, 1.0), "grade": 0.1}, "inertia"),
+        ({"froude": (0.1, 1.0, 2.0)}, "two numbers"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_a_sentence(fields, said):
+    with pytest.raises(colloc.ProblemError, match=said):
+        problem(**fields)
+
+
+def test_a_period_has_a_length_with_inertia_alone():
+    with pytest.raises(colloc.ProblemError, match="state the pace"):
+        problem(0.0)
+    with pytest.raises(colloc.ProblemError, match="does not say its pace"):
+        colloc.evaluate(problem(colloc.Free(0.1, 1.0)), ROUND)
