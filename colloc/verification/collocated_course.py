@@ -38,22 +38,6 @@ from colloc.verification.inertial_motion import GaitWithInertia
 from colloc.verification.slope import GaitOnSlope
 
 
-class Defects(NamedTuple):
-    """What collocation adds to a motion, ``(n_interval,)`` each: to the rotation, to the way in the plane (complex), to the
-    work against friction, to velocities of the tail between the points, to the objective relative to it. Then the last as a
-    whole, what the differential equation may miss of it, and the rotation that is missed, times the body's reach over the
-    distance."""
-
-    rotation: np.ndarray
-    displacement: np.ndarray
-    work: np.ndarray
-    velocity: np.ndarray
-    value: np.ndarray
-    total: float
-    unresolved: float
-    turning: float
-
-
 class CourseOfGait(NamedTuple):
     """A gait's motion by the differential equation: momenta if they are states, theta, place, work against friction,
     ``(4 or 7, n)``, at phases in order, seen from axes that turn evenly; and about the error of these."""
@@ -98,8 +82,9 @@ def _along(kind: Kind, mesh: Mesh, gait: Any, delta: float) -> Along:
     return kind.along(mesh, Shapes(angles, rates, delta), begin_of(kind, gait))
 
 
-def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> Defects:
-    """Errors of collocating a gait whose motion has states, delta per period."""
+def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> dict[str, Any]:
+    """Errors of collocating a gait whose motion has states, delta per period, by the names of
+    `colloc.verification.mesh_error.MeshError`: of the work against friction, and none of velocities."""
     kind, objective = kind_of_motion(control.dynamics), control.aims.objective
     own = _along(kind, mesh, gait, delta)
     pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA] - kind.turn, own.now.centre, first_theta(kind, own.begin))
@@ -142,13 +127,13 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     value += sum(aims[name] * kind.periods * (summed[name] - known[name]) for name in known)
     if not own.held.all():
         value = np.nan * value
-    return Defects(
-        rotation,
-        displacement,
-        energy,
-        np.full(mesh.n, np.nan),
-        value,
-        float(objective(other) / objective(period) - 1),
-        float(exact.error * sum(map(abs, aims.values()))),
-        turned if control.admissible.gait.symmetry == NONE else 0.0,
-    )
+    return {
+        "rotation": rotation,
+        "displacement": np.abs(displacement),
+        "work": energy,
+        "velocity": np.full(mesh.n, np.nan),
+        "value": value,
+        "total": float(objective(other) / objective(period) - 1),
+        "unresolved": float(exact.error * sum(map(abs, aims.values()))),
+        "turning": turned if control.admissible.gait.symmetry == NONE else 0.0,
+    }

@@ -110,8 +110,8 @@ def mesh_error(
     if fine is None:
         fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
     if kind_of_motion(control.dynamics).followed:
-        off, violation = course_defects(control, mesh, gait, delta, fine), constraint_violation(control.admissible, mesh, gait)
-        return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
+        violation = constraint_violation(control.admissible, mesh, gait)
+        return MeshError(**course_defects(control, mesh, gait, delta, fine), violation=violation)
     known = Known(control, gait, delta, fine)
     own = _collocated_intervals(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])
     exact = control.aims.objective(_period(control, _fine_part(known)))

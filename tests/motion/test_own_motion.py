@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ellipse, load, save
+from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, load, save
 from colloc.gaits import gait_fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
@@ -164,3 +164,16 @@ def test_without_a_push_it_is_the_motion_on_the_level():
     own, level = replayer(Pushed(0.0))(*at), replay(*at)
     for name in ("distance", "work", "rotation"):
         assert own.values[name] == pytest.approx(level.values[name], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"motion": "fast"}, "motion must be a Regime or Pushed, not str"),
+        ({"grade": 0.1}, "takes the place of grade and froude"),
+        ({"froude": 0.1}, "takes the place of grade and froude"),
+    ],
+)
+def test_what_is_no_kind_of_motion_or_two_at_once_is_refused(kept, changes, said):
+    with pytest.raises(ProblemError, match=said):
+        PROBLEM.with_(**changes)
