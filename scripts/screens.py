@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,24 +19,11 @@ from PIL import Image
 
 from colloc.commands.report import main as report
 from colloc.commands.solve import main as solve
+from scripts.browser import BROWSERS, DARK, OPTIONS, browser
 
 ROOT = Path(__file__).resolve().parents[1]
 TARGET = ROOT / "results/curated"
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-OPTIONS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--allow-file-access-from-files",
-    "--virtual-time-budget=3000",
-]
-_DARK = "--blink-settings=preferredColorScheme=0"
+_OPTIONS = (*OPTIONS, "--allow-file-access-from-files", "--virtual-time-budget=3000")
 _COLOURS = 128
 _HOST = """<meta charset="utf-8"><style>body{{font:16px/1.5 sans-serif;max-width:900px;margin:32px auto;color:#1f2328}}
 pre{{background:#f6f8fa;padding:16px;overflow:auto;border-radius:6px}}code{{font-size:85%;background:#eff1f3;padding:.2em .4em}}
@@ -63,11 +49,11 @@ def tutorial_problem() -> str:
     return next(block for block in re.findall(r"^```python[^\n]*\n(.*?)^```", text, re.M | re.S) if "PROBLEM" in block)
 
 
-def photograph(browser: str, screen: Screen, target: Path, folder: Path) -> None:
+def photograph(program: str, screen: Screen, target: Path, folder: Path) -> None:
     """Write a picture of a page, cut where nothing follows."""
     shot = folder / "shot.png"
     size = f"--window-size={screen.window[0]},{screen.window[1]}"
-    command = [browser, *OPTIONS, *screen.options, f"--user-data-dir={folder / 'profile'}", size, f"--screenshot={shot}"]
+    command = [program, *_OPTIONS, *screen.options, f"--user-data-dir={folder / 'profile'}", size, f"--screenshot={shot}"]
     subprocess.run([*command, screen.page], check=True, capture_output=True)
     image = Image.open(shot).convert("RGB")
     pixels = np.asarray(image)
@@ -85,8 +71,8 @@ def photograph(browser: str, screen: Screen, target: Path, folder: Path) -> None
 
 def main() -> int:
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    browser = next((found for found in map(shutil.which, BROWSERS) if found), None)
-    if browser is None:
+    program = browser()
+    if program is None:
         print(f"no browser: install one of {', '.join(BROWSERS)}.", file=sys.stderr)
         return 2
     with tempfile.TemporaryDirectory() as name:
@@ -105,15 +91,15 @@ def main() -> int:
             "report": Screen(page, (1120, 4400), 900),
             "screens/report_top": Screen(page, (1120, 1120), 900),
             "screens/report_phone": Screen(page, (400, 9000), 400),
-            "screens/report_dark": Screen(page, (1120, 4400), 900, (_DARK,)),
+            "screens/report_dark": Screen(page, (1120, 4400), 900, (DARK,)),
             "screens/readme": Screen(f"file://{folder / 'readme.html'}", (1000, 4200), 800),
         }.items():
-            photograph(browser, screen, TARGET / f"{target}.png", folder)
+            photograph(program, screen, TARGET / f"{target}.png", folder)
         # with the pictures just made
         subprocess.run([sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", site], check=True, cwd=ROOT)
         for name, height in (("index", 2400), ("gallery", 2400), ("known", 3200)):
             screen = Screen(f"file://{site / name}.html", (1280, height), 900)
-            photograph(browser, screen, TARGET / f"screens/{name.replace('index', 'home')}.png", folder)
+            photograph(program, screen, TARGET / f"screens/{name.replace('index', 'home')}.png", folder)
     return 0
 
 

@@ -203,7 +203,7 @@ def efficiencies(name):
     return [value for cell in cells for value in numbers(cell)]
 
 
-@pytest.mark.parametrize("page", [f"docs/{name}.md" for name in ("known", "gait_classes", "bound")])
+@pytest.mark.parametrize("page", [f"docs/{name}.md" for name in ("known", "gait_classes")])
 def test_efficiencies_are_those_of_the_curated_tables(page):
     """Of the table that a row links to, if it does; else of gallery, gaits without contact or bounds, or kept potentials."""
     general = [row["efficiency"] for row in GALLERY.values() if "efficiency" in row]

@@ -1,6 +1,8 @@
 """The site of the documentation: what its hooks make of a page."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,6 +11,7 @@ import pytest
 pytest.importorskip("mkdocs")
 pytest.importorskip("latex2mathml")
 from scripts import docs_site
+from scripts.browser import browser, complaints
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -50,6 +53,31 @@ def test_a_long_formula_scrolls_in_its_own_line_and_one_in_a_text_stays_there():
     assert re.search(r'<span style="display: block; overflow-x: auto"><math [^>]*display="block".*</math></span>', alone)
     assert "overflow" not in inside
     assert inside.startswith("so <math")
+
+
+@pytest.fixture
+def program():
+    return browser() or pytest.skip("no browser is installed here: chromium, chromium-browser or google-chrome")
+
+
+@pytest.mark.slow
+def test_in_a_browser_no_page_is_too_wide_dark_is_dark_and_the_search_finds(program, three_link, tmp_path):
+    subprocess.run([sys.executable, "-m", "mkdocs", "build", "-q", "-d", tmp_path], cwd=ROOT, check=True)
+    three_link.report(tmp_path / "report.html")
+    axe = ROOT / "build/package/axe.min.js"  # of .ci/run, where npm is
+    text = axe.read_text(encoding="utf-8") if axe.exists() else ""
+    assert [line for dark in (False, True) for line in complaints(program, tmp_path, text, dark=dark)] == []
+
+
+@pytest.mark.slow
+def test_the_browser_sees_what_is_wrong_with_a_page(program, tmp_path):
+    (tmp_path / "wide.html").write_text('<body style="background: #fff"><p style="width: 500px">wide</p>', encoding="utf-8")
+    (tmp_path / "search").mkdir()
+    (tmp_path / "index.html").write_text('<input data-md-component="search-query">', encoding="utf-8")
+    said = complaints(program, tmp_path, dark=True)
+    assert any(re.fullmatch(r"wide.html at 360: 1\d\d pixels too wide", line) for line in said)
+    assert "wide.html at 1280: light on a dark system" in said
+    assert "index.html: the search finds nothing for friction" in said
 
 
 def test_the_site_is_dark_where_the_reader_s_system_is():
