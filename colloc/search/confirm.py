@@ -107,6 +107,8 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, _OPTIONS)
     before = solver.measured(x, delta, *_multipliers(reduced, conditions, program))
+    if before.optimal:
+        solver.expect_little()
     here = replace(before, status=STATIONARY, kkt_error=optimum.kkt_error, complementarity=optimum.complementarity)
     failed = replace(before, status=NOT_STATIONARY, iterations=optimum.iterations)
     if optimum.violation > RADIUS:  # no gait within reach is admissible

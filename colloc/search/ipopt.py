@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -33,6 +34,8 @@ LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
 """With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along
 negative curvature would otherwise carry them away for good. The price is up to 120 short steps a level. The velocity map
 needs no such leash and is slowed by it."""
+_CONFIRMING = 30
+"""Steps at a point where the conditions hold: one to four confirm it, and more than these lead away."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +95,15 @@ class Solver:
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
         self._stop = StopRequest(self.oracles.nlp)  # held here: CasADi does not keep it alive
-        settings |= {**self.oracles.options, "iteration_callback": self._stop}
-        self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
+        self._settings = settings | {**self.oracles.options, "iteration_callback": self._stop}
+
+    @cached_property
+    def _solver(self) -> ca.Function:
+        return ca.nlpsol("colloc", "ipopt", self.oracles.nlp, self._settings)
+
+    def expect_little(self) -> None:
+        """Before IPOPT is first asked: the conditions hold where it begins, and it gets as many steps as that is worth."""
+        self._settings["ipopt.max_iter"] = _CONFIRMING
 
     def solve(
         self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None = None, radius: float = np.inf
