@@ -18,6 +18,8 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
+from colloc.gaits.regime import LEVEL, Regime
+from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import LENGTH, Quantity, quantities_of
@@ -87,6 +89,8 @@ class GaitWithInertia:
         Phases in (0, 1), ascending, at which the rates jump.
     turn : float
         That a period is asked for [rad].
+    regime : Regime
+        Whose weight pulls, as on a slope; then orientations are from straight uphill.
     """
 
     def __init__(
@@ -99,9 +103,10 @@ class GaitWithInertia:
         froude: float,
         breaks: tuple[float, ...] = (),
         turn: float = 0.0,
+        regime: Regime = LEVEL,
     ) -> None:
         self.body, self.friction, self.path, self.delta = body, friction, path, delta
-        self.froude, self.breaks, self.turn = froude, breaks, turn
+        self.froude, self.breaks, self.turn, self._regime = froude, breaks, turn, regime
         self._momenta = MomentaAt(body, friction, delta, froude)
 
     def slow_momenta(self) -> np.ndarray:
@@ -112,14 +117,16 @@ class GaitWithInertia:
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
     def run(self, start: np.ndarray, aim: float) -> Course:
-        """`InertialMotion.states` from the momenta `start` through a period."""
+        """`InertialMotion.states` through a period from a state ``(7,)``, or from momenta ``(3,)`` at the origin."""
 
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
             _, _, omega, vx, vy, power, *rates = self._at(t, state[_MOMENTA])
             moved = np.exp(1j * state[_THETA]) * complex(vx, vy)
+            if (pull := self._regime.pull(state[None, _THETA, None])) is not None:
+                rates[:2] += pull[:, 0] / self.froude
             return np.array([*rates, omega - self.turn, moved.real, moved.imag, power]), None
 
-        return followed(slope, np.concatenate([start, np.zeros(4)]), aim, self.breaks)
+        return followed(slope, np.append(start, np.zeros(7 - start.size)), aim, self.breaks)
 
     def mapped(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Momenta after a period ``(3,)`` and their derivatives ``(3, 3)`` with respect to those before it, by differences."""
@@ -266,8 +273,10 @@ def motion_from_rest(
     periods: int = 3,
     tolerance: float = 1e-5,
     breaks: np.ndarray | tuple[float, ...] = (),
+    grade: float = 0.0,
+    theta: float = 0.0,
 ) -> FromRest:
-    """Play a gait from rest: how a body with inertia comes to the motion in which all periods are alike.
+    """Play a gait from rest: how a body with inertia comes to the motion in which all periods are alike, or glides downhill.
 
     Its momenta are zero at first, while its joints already turn at the gait's rates.
 
@@ -279,6 +288,11 @@ def motion_from_rest(
         How many.
     tolerance : float
         About the error of the states after a period.
+    grade : float
+        Tangent of the inclination of a slope. There gravity, in the Froude number too, is that which presses the body on the
+        ground, and +x is straight uphill; friction need not hold the body.
+    theta : float
+        Angle of the tail link from +x at first [rad].
 
     Raises
     ------
@@ -299,18 +313,17 @@ def motion_from_rest(
     if not is_whole(periods) or periods < 1:
         raise ProblemError(f"periods must be a whole number of at least 1, not {periods!r}.")
     (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
-    played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at)
+    check_finite(grade=grade, theta=theta)
+    regime = Slope(float(grade)) if grade else LEVEL
+    played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at, regime=regime)
     courses: list[tuple[np.ndarray, np.ndarray]] = []
     passed, start = [], np.zeros(7)
+    start[_THETA] = theta
     for _ in range(periods):
-        course = played.run(start[_MOMENTA], tolerance)
-        states = course.states.copy()
-        # each period is followed from the origin: turned and moved to where the one before ended
-        theta, place = start[_THETA], np.exp(1j * start[_THETA]) * (states[4] + 1j * states[5])
-        passed.append([np.hypot(*states[_PLACE, -1]), states[_WORK, -1], states[_THETA, -1]])
-        states[_THETA:] += np.array([theta, start[4], start[5], start[_WORK]])[:, None]
-        states[_PLACE] = start[_PLACE, None] + np.stack([place.real, place.imag])
-        courses.append((course.phases + len(courses), states))
-        start = states[:, -1]
+        course = played.run(start, tolerance)
+        courses.append((course.phases + len(courses), course.states))
+        before, start = start, course.states[:, -1]
+        gone = start - before
+        passed.append([np.hypot(*gone[_PLACE]), gone[_WORK], gone[_THETA]])
     phases, states = (np.concatenate(parts, axis=-1) for parts in zip(*courses, strict=True))
     return FromRest(phases, states, np.array(passed))

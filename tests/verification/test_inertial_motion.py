@@ -189,3 +189,34 @@ def test_periods_from_rest_become_alike_and_are_joined_without_a_gap():
     assert abs(x[-1] + 1j * y[-1] - moved) < 1e-4, "the way is that of the velocities, whatever the body has turned before"
     with pytest.raises(colloc.ProblemError, match="whole number"):
         colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=0)
+
+
+def test_a_stiff_body_glides_down_a_slope_that_is_steeper_than_friction():
+    """At g (sin - mu cos); what its weight does goes into friction and kinetic energy."""
+    stiff, mu, grade, froude = colloc.ellipse(A0=0, A1=0, B1=0), 0.3, 0.5, 0.2
+    ran = colloc.motion_from_rest(CHAIN, colloc.Friction(mu, mu, mu), stiff, 1e-4, froude, periods=2, grade=grade, theta=np.pi)
+    speed, _, _, theta, x, y, work = ran.states[:, -1]
+    assert speed == pytest.approx(2 * (grade - mu) / froude, rel=1e-3)
+    assert x == pytest.approx(-speed, rel=1e-3)
+    assert (theta, y) == (pytest.approx(np.pi), pytest.approx(0.0, abs=1e-12))
+    assert -grade * x == pytest.approx(work + 0.5 * froude * speed**2, rel=1e-4)
+
+
+def test_on_a_slope_slow_motion_is_approached_as_the_froude_number():
+    at = CHAIN, ANISOTROPIC, LEANING, 3e-2
+    slow = colloc.slope_motion(*at, 0.2, theta=0.4).states[:3, -1]
+    off = [
+        np.abs(colloc.motion_from_rest(*at, froude, periods=1, grade=0.2, theta=0.4).states[3:6, -1] - slow).max()
+        for froude in (4e-3, 1e-3)
+    ]
+    assert off[1] < 2e-3
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.25)
+
+
+def test_on_the_level_it_does_not_matter_where_a_body_points_at_first():
+    ran, turned = (
+        colloc.motion_from_rest(CHAIN, ANISOTROPIC, LEANING, 1e-2, 0.05, periods=2, theta=theta) for theta in (0.0, 1.0)
+    )
+    np.testing.assert_allclose(turned.periods, ran.periods, atol=1e-4)
+    (x, y), (u, v) = ran.states[4:6, -1], turned.states[4:6, -1]
+    assert u + 1j * v == pytest.approx((x + 1j * y) * np.exp(1j), abs=1e-4)
