@@ -57,6 +57,7 @@ def test_a_body_named_from_its_other_end_moves_the_same_way():
     np.testing.assert_allclose(*power, rtol=1e-8)
     assert Chain(weights=(0.4, 0.2, 0.4)).symmetric
     assert not Chain(weights=(0.4, 0.4, 0.2)).symmetric
+    assert not Chain(inertias=(0.01, 0.01, 0.02)).symmetric
 
 
 @pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
