@@ -167,6 +167,8 @@ class Problem:
         regime = self.regime
         object.__setattr__(self, "gait", regime.class_of(self.gait))
         object.__setattr__(self, "grade", float(self.grade))
+        if isinstance(self.froude, (list, tuple)):
+            object.__setattr__(self, "froude", Free(*self.froude))
         usual = self.body.usual
         start = (self.gait.delta_start or usual.delta_start) if self.law.regularised else usual.delta
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=formulations(self.body)[0])

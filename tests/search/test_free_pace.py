@@ -54,6 +54,7 @@ def test_it_is_certified_kept_and_told(tmp_path):
     assert found.status == "solved", found.message
     assert found.answer.program == found.problem.formulation, "IPOPT confirms it, with the pace among its variables"
     kept = colloc.load(colloc.save(found, tmp_path / "free.h5"))
+    assert kept.problem.froude == colloc.Free(0.01, 1.0)
     assert (kept.froude, kept.problem.hash) == (found.froude, found.problem.hash)
     told = "\n".join(summary_lines(kept, None, verbose=True))
     assert "best Froude number from 0.01 to 1" in told
