@@ -38,15 +38,17 @@ _PATIENCE = 600.0
 _LOOK = """<!DOCTYPE html><meta name="color-scheme" content="light dark"><iframe style="height:800px;border:0"></iframe><script>
 const {pages, widths, dark, searched, axe} = ASKED, frame = document.querySelector("iframe"), said = [];
 const wait = ms => new Promise(done => setTimeout(done, ms));
-const open = page => new Promise(done => { frame.onload = () => done(frame.contentDocument); frame.src = page; });
+const open = (page, width) => new Promise(done => {
+  frame.style.width = width + "px";
+  frame.onload = () => setTimeout(() => done(frame.contentDocument), 50);
+  frame.src = page;
+});
 const behind = page => {
   const colours = [page.body, page.documentElement].map(each => getComputedStyle(each).backgroundColor);
   return (colours.find(colour => !/, 0\\)$/.test(colour)) || (dark ? "rgb(0,0,0)" : "rgb(255,255,255)")).match(/[0-9.]+/g);
 };
-async function look(page, name, width) {
-  frame.style.width = width + "px";
-  await wait(50);
-  const over = page.documentElement.scrollWidth - width, at = name + " at " + width + ": ";
+async function look(name, width) {
+  const page = await open(name, width), over = page.documentElement.scrollWidth - width, at = name + " at " + width + ": ";
   if (over > 0) said.push(at + over + " pixels too wide");
   const [red, green, blue] = behind(page), light = (+red + +green + +blue) / 3 > 128;
   if (light === dark) said.push(at + (light ? "light on a dark system" : "dark on a light system"));
@@ -57,7 +59,7 @@ async function look(page, name, width) {
     said.push(at + each.id + " (" + each.impact + "), " + each.nodes[0].html.slice(0, 200));
 }
 async function search(name, words) {
-  const page = await open(name), field = page.querySelector("[data-md-component=search-query]");
+  const page = await open(name, 1280), field = page.querySelector("[data-md-component=search-query]");
   field.focus(); field.value = words;
   for (let k = 0; k < 100 && !page.querySelector(".md-search-result__item a"); k++) {
     field.dispatchEvent(new KeyboardEvent("keyup")); await wait(100);
@@ -66,10 +68,7 @@ async function search(name, words) {
 }
 (async () => {
   try {
-    for (const name of pages) {
-      const page = await open(name);
-      for (const width of widths) await look(page, name, width);
-    }
+    for (const name of pages) for (const width of widths) await look(name, width);
     if (searched) await search(searched, "friction");
   } catch (error) { said.push(String(error)); }
   fetch("/said", {method: "POST", body: JSON.stringify(said)});
@@ -120,7 +119,13 @@ def complaints(program: str, folder: Path, axe: str = "", *, dark: bool = False)
     answer."""
     pages = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.html"))]
     searched = "index.html" if (folder / "search").exists() else ""
-    asked = {"pages": pages, "widths": WIDTHS, "dark": dark, "searched": searched, "axe": axe}
+    asked = {
+        "pages": pages,
+        "widths": WIDTHS[:1] if dark and not axe else WIDTHS,
+        "dark": dark,
+        "searched": searched,
+        "axe": axe,
+    }
     with _Server(folder) as server, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         server.look = _LOOK.replace("ASKED", json.dumps(asked).replace("</", "<\\/")).encode()
         threading.Thread(target=server.serve_forever, daemon=True).start()
