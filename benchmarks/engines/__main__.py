@@ -31,7 +31,7 @@ from colloc.mechanics.inertia import GRAVITY
 from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, save, styled, subplots
 from colloc.system.row_file import cached
 
-GAITS = "three_link", "three_link_two_harmonics", "three_link_feet", "wheeled_snake"
+GAITS = "three_link", "three_link_two_harmonics", "three_link_feet", "five_link", "wheeled_snake"
 FROUDE = 0.002, 0.05
 """Slow, 1 m in 7.1 s a period, and fast, in 1.4 s."""
 STEPS = (1e-3, 2.5e-4)
