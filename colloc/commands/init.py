@@ -31,8 +31,6 @@ _FLOOR = {
 _TEMPLATE = '''\
 """{links} links: change what is yours, then `colloc solve {file}`."""
 
-from math import radians
-
 from colloc import {names}
 
 PROBLEM = Problem(
@@ -45,8 +43,8 @@ PROBLEM = Problem(
     # "bilateral": the body run backwards in time looks the same from its head; it never turns, and half a period is enough.
     # It needs lengths that read the same from both ends. Others: "antipodal" (the second half mirrors the first), "none"
     gait=Harmonic(harmonics=2, symmetry="{symmetry}"),
-    # the largest angle of a joint
-    joint_limit=radians(180),
+    # the largest angle of a joint [rad], at most pi. In degrees: `from math import radians` above, and radians(100) here
+    joint_limit=3.14,
     # No guess is needed: travelling waves, known gaits and random ones are tried. guess=Fourier(mean, cos, sin) adds yours.
 )
 '''
