@@ -44,8 +44,8 @@ class Helpers:
     def __init__(self, problem: Problem) -> None:
         self._problem, self._run = problem, this_run()
         self._processes: list[subprocess.Popen[bytes]] = []
-        self._waiting: dict[str, bool] = {}
-        self._found: dict[str, SimpleQueue[bytes]] = {}
+        self._waiting: dict[str, SimpleQueue[bytes]] = {}
+        self._asked: dict[str, SimpleQueue[bytes]] = {}
         self._next: SimpleQueue[str] = SimpleQueue()
 
     def begin(self, seconds: float) -> None:
@@ -80,14 +80,18 @@ class Helpers:
 
     def ask(self, function: Callable[..., object], *given: Any) -> None:
         """Have a function of a module called with values that a run can keep."""
-        if self._processes and (task := self._task(function, given)) not in self._found:
-            self._found[task], self._waiting[task] = SimpleQueue(), True
+        if self._processes and (task := self._task(function, given)) not in self._asked:
+            self._asked[task] = self._waiting[task] = SimpleQueue()
             self._next.put(task)
 
     def await_for(self, function: Callable[..., object], *given: Any) -> None:
         """Wait for what was asked, if a helper has begun with it; what it found is known to the run then."""
-        if self._processes and (task := self._task(function, given)) in self._found and not self._waiting.pop(task, False):
-            self._run.learn(json.loads(self._found[task].get() or b"{}"))
+        if not self._processes:
+            return
+        task = self._task(function, given)
+        answer = self._asked.pop(task, None)
+        if answer is not None and self._waiting.pop(task, None) is None:
+            self._run.learn(json.loads(answer.get() or b"{}"))
 
     def end(self) -> None:
         """End them, whatever they do."""
@@ -109,7 +113,8 @@ class Helpers:
             process.stdin.flush()
             alive = process.stdout.readline()
             while alive and (task := self._next.get()):
-                if not self._waiting.pop(task, False):
+                answer = self._waiting.pop(task, None)
+                if answer is None:
                     continue  # the search has come to it first
                 alive = b""
                 try:
@@ -117,7 +122,7 @@ class Helpers:
                     process.stdin.flush()
                     alive = process.stdout.readline()
                 finally:
-                    self._found[task].put(alive)
+                    answer.put(alive)
 
 
 @contextmanager

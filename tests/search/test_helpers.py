@@ -9,6 +9,7 @@ import colloc
 from benchmarks.kills import contents
 from colloc import Harmonic, Problem
 from colloc.search import helpers
+from colloc.search.explore import sketched
 from colloc.search.run import Run
 
 PROBLEM = Problem("quick", gait=Harmonic(1, "none"), delta=1e-2, delta_start=0.1, intervals=12, mesh_tolerance=1e-3)
@@ -71,3 +72,17 @@ def test_none_is_begun_for_what_this_process_alone_knows_nor_for_little(learnt, 
         assert some.count == 0
         some.begin(2.1)
         assert some.count == 2
+
+
+def test_what_is_asked_for_twice_is_waited_for_once(learnt):
+    start = PROBLEM, PROBLEM.guess, True, [0.1, 0.01]
+    with Run(problem=PROBLEM).under_way(60.0), helpers.helping(PROBLEM) as some:
+        some.begin(1e3)
+        for _ in range(2):
+            some.ask(sketched, *start)
+        while some.waiting:
+            time.sleep(0.01)
+        for _ in range(2):
+            some.await_for(sketched, *start)
+    assert len(learnt) == 1
+    assert learnt[0] > 0
