@@ -24,7 +24,8 @@ from colloc.system.arguments import check_finite
 from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 
-_FEWEST = 3
+_FEWEST, _MOST = 3, 1e9
+"""Samples, at least, and the largest number that may be one."""
 _NAMES = {
     "speed": ("speed",),
     "along": ("along", "forward", "forwards"),
@@ -167,6 +168,8 @@ def _read(table: str | os.PathLike[str] | np.ndarray) -> tuple[str, np.ndarray]:
 def _check(name: str, speed: np.ndarray, coefficients: np.ndarray) -> None:
     if (speed < 0).any():
         raise ProblemError(f"{name}: speed {speed.min():g} is negative; give speeds of sliding without their direction.")
+    if max(speed.max(), coefficients.max()) > _MOST:
+        raise ProblemError(f"{name}: speeds and coefficients must be below {_MOST:g}; is a column in the wrong place?")
     if speed.max() == 0:
         raise ProblemError(f"{name}: all speeds are 0; friction is a matter of sliding.")
     if (coefficients <= 0).any():
