@@ -89,7 +89,7 @@ def _besides(solution: Solution) -> list[str]:
         lines.append(
             f"  played slowly   {solution.played_slowly:.6f} ({problem.objective.short} of the same gait without inertia)"
         )
-    if (held := solution.share_held).size:
+    if (held := solution.share_held).any():
         shares = ", ".join(f"{100 * share:.0f}" for share in held)
         lines.append(f"  feet hold       {shares} % of the period, from the tail")
     if problem.rotation != 0:
