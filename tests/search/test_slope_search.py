@@ -151,11 +151,12 @@ def test_what_joints_give_back_and_can_do_counts_on_slopes(uphill):
 @pytest.mark.slow
 def test_a_gait_keeps_what_its_joints_can_do_on_a_slope(uphill):
     free, most = (
-        solve(PROBLEM.with_(objective="driven efficiency", guess=uphill.gait, torque_limit=limit), 1) for limit in (1.0, 0.07)
+        solve(PROBLEM.with_(objective="driven efficiency", guess=uphill.gait, torque_limit=limit), 1) for limit in (1.0, 0.0602)
     )
     for found in (free, most):
         assert found.status == "solved", found.message
-    assert free.certificate.value > most.certificate.value
+    # the best gait asks for 0.061; with 0.059 no gait near it climbs
+    assert free.certificate.value > 1.1 * most.certificate.value
 
 
 def test_a_motion_that_is_left_open_for_long_fails_its_check():
