@@ -35,8 +35,8 @@ from colloc.system.errors import ProblemError
 
 _SMOOTHER = 2.0
 """Times delta, at which a balance is solved first that cannot be solved at delta itself."""
-_BESIDE, _STILL = (-1e-4, 1e-4), 1e-300
-"""Changes of the fastest angle [rad] to instants from whose balance one is sought that cannot be found otherwise."""
+_AWAY = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
+"""How far from an instant a balance is followed to it, in the time in which velocities change by about delta."""
 
 
 Found = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -127,8 +127,8 @@ def solve_balance(
         Steps allowed to an instant in each attempt.
     method : {"auto", "newton", "fixed_point", "direct", "natural"}
         "auto" damps Newton and falls back on the paper's fixed point: from the start, by natural steps, with each link at rest,
-        from the balances of a larger delta and of instants beside it, and at last from afar. "direct" and "natural" are single
-        attempts, the others are for comparison.
+        from the balance of a larger delta, followed from instants beside it, and at last from afar. "direct" and "natural" are
+        single attempts, the others are for comparison.
 
     Returns
     -------
@@ -204,9 +204,12 @@ def _balanced(
     def smoother(there: Moving) -> np.ndarray:
         return _balanced(solved, there._replace(delta=_SMOOTHER * there.delta), None, tolerance, max_iterations, "direct")[0]
 
-    def beside(there: Moving, shift: float) -> np.ndarray:
-        bent = there._replace(angles=there.angles + shift * there.rates / np.abs(there.rates).max(axis=0, initial=_STILL))
-        return _balanced(solved, bent, None, tolerance, max_iterations, "direct")[0]
+    def followed(there: Moving, side: float) -> np.ndarray | None:
+        fastest, z = np.maximum(np.abs(there.rates).max(axis=0), there.delta), None
+        for away in _AWAY:
+            beside = there._replace(angles=there.angles + side * away * there.delta / fastest**2 * there.rates)
+            z = _balanced(solved, beside, z, tolerance, max_iterations, "direct")[0]
+        return z
 
     def ways() -> Iterator[tuple[Callable[[Moving], np.ndarray | None], str]]:
         # beside a fold, or with feet nearly on a line, the residual has valleys in which it must rise before it falls
@@ -218,10 +221,9 @@ def _balanced(
             # several rest nearly, each where the others let it
             yield smoother, "natural"
         if method != "direct":
-            # past a fold there is another balance, which instants a little earlier or later have too
-            for shift in _BESIDE:
-                yield partial(beside, shift=shift), "natural"
-        if method != "direct":
+            # past a fold there is another balance, of which instants before or after it may know more
+            for side in (-1.0, 1.0):
+                yield partial(followed, side=side), "natural"
             yield lambda there: None, method
 
     for begun, how in ways():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad_vec
 
+from benchmarks.zoo import feet_problem
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -221,8 +222,12 @@ BESIDE_A_FOLD = [
         Chain((0.5, 0.5), feet=3), Friction(0.3424415961365978, 1.0, 4.962750564244436), 1e-4,
         [0.5236097], [-15.35957115],
     ),
+    (
+        feet_problem(25).body, feet_problem(25).friction, 1e-4,
+        [-1.5005173, -2.18419046], [-4.88692124, 7.64204799],
+    ),
 ]  # fmt: skip
-CASES = ["five links", "four links", "backward friction", "on feet"]
+CASES = ["five links", "four links", "backward friction", "on six feet", "on three feet"]
 
 
 @pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=CASES)
