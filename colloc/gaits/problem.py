@@ -65,8 +65,7 @@ class Problem:
         measured at unit shape speed.
     joint_limit : float, or sequence of float or (float, float)
         Largest |joint angle| [rad], at most pi, of all joints or of each, or the least and the largest of a joint, as in
-        ``((-1, 2), 1.5)``; of a smooth body, largest |tangent angle| from its mean direction, at most
-        pi/2.
+        ``((-1, 2), 1.5)``; of a smooth body, largest |tangent angle| from its mean direction, at most pi/2.
     smallest_shape_speed : float
         Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
         2 pi. It keeps the search away from gaits
