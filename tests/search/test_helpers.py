@@ -18,13 +18,13 @@ DIES = "import sys, pickle; pickle.load(sys.stdin.buffer); print(flush=True); sy
 
 @pytest.fixture
 def learnt(monkeypatch):
-    """Processes are begun at once; a list of how much each task of theirs has found."""
+    """Processes are begun at once; of each task of theirs how much it has found, and the run that learnt it."""
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     monkeypatch.setattr(helpers, "_WORTH", 0.0)
     learn, numbers = Run.learn, []
 
     def counted(run, rows):
-        numbers.append(len(rows))
+        numbers.append((len(rows), run))
         learn(run, rows)
 
     monkeypatch.setattr(Run, "learn", counted)
@@ -48,7 +48,8 @@ def test_the_file_is_the_same_to_the_last_bit(alone, learnt, tmp_path, monkeypat
 
     monkeypatch.setattr(helpers.Helpers, "await_for", patient)
     colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")
-    assert sum(found > 0 for found in learnt) > 1
+    assert sum(found > 0 for found, _ in learnt) > 1
+    assert learnt[0][1].found_again > 1
     assert contents(tmp_path / "quick.h5") == alone
 
 
@@ -58,7 +59,7 @@ def test_the_file_is_the_same_to_the_last_bit(alone, learnt, tmp_path, monkeypat
 def test_so_it_is_if_they_die(alone, learnt, tmp_path, monkeypatch, command):
     monkeypatch.setattr(helpers, "_COMMAND", command)
     colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")
-    assert not any(learnt)
+    assert not any(found for found, _ in learnt)
     assert contents(tmp_path / "quick.h5") == alone
 
 
@@ -85,4 +86,4 @@ def test_what_is_asked_for_twice_is_waited_for_once(learnt):
         for _ in range(2):
             some.await_for(sketched, *start)
     assert len(learnt) == 1
-    assert learnt[0] > 0
+    assert learnt[0][0] > 0
