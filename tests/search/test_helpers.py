@@ -49,7 +49,7 @@ def test_the_file_is_the_same_to_the_last_bit(alone, learnt, tmp_path, monkeypat
     monkeypatch.setattr(helpers.Helpers, "await_for", patient)
     colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")
     assert sum(found > 0 for found, _ in learnt) > 1
-    assert learnt[0][1].found_again > 1
+    assert learnt[0][1].found_again > 0.5 * sum(found for found, _ in learnt)
     assert contents(tmp_path / "quick.h5") == alone
 
 
