@@ -32,7 +32,6 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc import Chain, FreePath, Friction, Harmonic, Problem
-from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, harmonics_within, shifted
 from colloc.gaits.starts import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
@@ -143,7 +142,7 @@ def row(archive: Archive) -> dict:
     problem, outcomes = archive.problem, list(archive.of_search(LATIN_HYPERCUBE, 0).values())
     found = basins(problem, outcomes)
     return {
-        "law": list(fields(problem.friction).values()),
+        "law": [getattr(problem.friction, mu) for mu in ("mu_t", "mu_f", "mu_b")],
         "symmetry": problem.gait.symmetry,
         "delta": problem.delta,
         "starts": len(outcomes),
