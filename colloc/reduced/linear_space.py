@@ -12,7 +12,7 @@ from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, followed, held_shares, moving, near_peaks
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.limits import widest
+from colloc.gaits.limits import Limit, widest
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
@@ -39,6 +39,7 @@ class LinearSpace:
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
         self.lower, self.upper = gait.bounds(body, widest(limit))
         self.own = np.arange(self.n)
+        self._peaks = remembered(partial(self._near_peaks, limit))
 
     def member(self, v: np.ndarray) -> AnyGait:
         return self._admissible.member(v)
@@ -69,7 +70,7 @@ class LinearSpace:
         """Shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed."""
         gait, n_joint, limit = self.member(v), self._admissible.n_joint, self._admissible.joint_limit
         placed, kinds, low, high, excess = list[_Placed](), dict[str, np.ndarray](), [], [], -np.inf
-        for check, (cells, times) in zip(self.checks, near_peaks(gait, self.mesh, self.checks, limit), strict=True):
+        for check, (cells, times) in zip(self.checks, self._peaks(v), strict=True):
             kinds[check.name] = cells
             if not cells.size:
                 continue
@@ -88,6 +89,9 @@ class LinearSpace:
             return Constraints(kinds, lower, upper, excess, *self._rows(at_worst))
 
         return Constraints(kinds, lower, upper, excess, *self._rows(lambda v: placed), moving_on)
+
+    def _near_peaks(self, limit: Limit, v: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        return near_peaks(self.member(v), self.mesh, self.checks, limit)
 
     def _rows(self, placed: Callable[[np.ndarray], list[_Placed]]) -> tuple[Function, Function]:
         """Values and slopes of the rows, with checks where they stand for parameters v."""

@@ -94,7 +94,13 @@ class Exploration:
 
 
 def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
-    """The optimum at the first delta that the search comes to from a gait; where that is a viscous one, at the next delta."""
+    """The optimum at the first delta that the search comes to from a gait; where that is a viscous one, at the next delta.
+
+    A gait that is nearly an optimum at the problem's delta is not led there from a larger one: it begins there.
+    """
+    near = _at_the_end(problem, gait)
+    if near is not None:
+        return near
     space, v = space_near(problem, closed_gait(problem, gait, problem.delta_start))
     this_run().told("explore", 0, 1, as_it_is(space, v, problem.delta_start))
     for delta in levels(problem, problem.delta_start):
@@ -102,6 +108,20 @@ def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
         if not is_viscous(found):
             break
     return found
+
+
+def _at_the_end(problem: Problem, gait: AnyGait) -> Optimum | None:
+    """The optimum at the problem's delta that a gait is a sketch of, if it is one: nearer than that [rad]."""
+    space, v = space_near(problem, gait)
+    here, near = as_it_is(space, v, problem.delta), SKETCH.kkt_error
+    steep = here.kkt_error * near > CLOSE * abs(here.objective)
+    if steep or not here.violation < near or problem.delta == problem.delta_start:
+        return None
+    with suppress(NotConvergedError):
+        found = converged(space, v, problem.delta, ROUGH)
+        if found.optimal and np.abs(found.v - v).max() < near and not is_viscous(found):
+            return found
+    return None
 
 
 def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], bool] = lambda: True) -> Exploration:

@@ -5,12 +5,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import Harmonic, NotConvergedError, Polygon, Problem, ellipse
+from colloc import Friction, Harmonic, NotConvergedError, Polygon, Problem, ellipse
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.search.confirm import RADIUS, confirm
 from colloc.search.converge import at_rest, conditions_on_kink
+from colloc.search.descend import descend
 from colloc.search.effort import FINE
+from colloc.search.explore import begin_at
+from colloc.search.refine import refine
+from colloc.search.solve import solve
 from tests.shared.stages import optimum_near
 
 PROBLEM = Problem("plain", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=40, mesh_tolerance=0)
@@ -88,15 +92,25 @@ def test_a_kink_may_be_missed_by_more_where_the_slopes_beside_it_are_small(slope
 
 def test_a_gait_that_a_finer_mesh_finds_no_member_near_goes_on_from_about_it(monkeypatch):
     problem = Problem("sides", gait=Polygon(4, "bilateral"))
-    member, asked = PathSpace.parameters, []
+    begun, asked = descend(begin_at(problem, problem.guess)), []
 
-    def near_once(space, gait):
+    def near_none(space, gait):
         asked.append(space)
-        if len(asked) > 1:
-            raise NotConvergedError("found none near the guess.")
-        return member(space, gait)
+        raise NotConvergedError("found none near the guess.")
 
-    monkeypatch.setattr(PathSpace, "parameters", near_once)
-    found = optimum_near(problem)
-    assert len(asked) > 1
+    monkeypatch.setattr(PathSpace, "parameters", near_none)
+    found = refine(begun)
+    assert asked
     assert (found.optimal, found.lacks) == (True, "")
+
+
+@pytest.mark.parametrize("changed", [{}, {"mu_b": 2.0}], ids=["symmetric", "unequal"])
+def test_a_solve_that_begins_at_its_answer_stays_there_at_one_delta(changed):
+    friction = Friction(**changed)
+    problem = Problem("again", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), friction=friction, delta=1e-3)
+    found = solve(problem, 1)
+    again = solve(problem.with_(guess=found.gait), 1)
+    assert found.history[0].delta == problem.delta_start
+    assert {step.delta for step in again.history} == {problem.delta}
+    assert again.value == pytest.approx(found.value, rel=problem.mesh_tolerance)
+    assert again.success
