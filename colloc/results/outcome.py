@@ -14,6 +14,8 @@ from colloc.gaits.gait_fields import fields as gait_fields
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED
 
 TRIVIAL, ERROR, TIME_LIMIT, CRASHED = "trivial gait", "error", "time limit", "crashed"
+PASSED_OVER = "passed over"
+"""No better than what was known, before its mesh was refined: not certified."""
 UNITS = {
     "efficiency": "1/weight",
     "efficiency_error": "1/weight",
@@ -27,7 +29,7 @@ UNITS = {
 """Of the numbers of an outcome, for files."""
 RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 """What may end otherwise when it is tried again."""
-STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, TIME_LIMIT, ERROR, CRASHED)
+STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, PASSED_OVER, TIME_LIMIT, ERROR, CRASHED)
 _LONGEST_MESSAGE = 1000
 
 

@@ -53,6 +53,7 @@ def solve(
     search: str = REDUCED,
     keep: Path | None = None,
     progress: Callable[[Progress], object] = lambda news: None,
+    worth: Callable[[Optimum], bool] = lambda first: True,
 ) -> Solution:
     """The best gait of a problem's class that so many starts lead to, certified.
 
@@ -70,6 +71,8 @@ def solve(
         File in which everything found is kept until the end; a solve of the same problem goes on from what is there.
     progress : callable, optional
         Called with every `colloc.search.run.Progress`.
+    worth : callable, optional
+        Whether the best gait, at the final delta and before its mesh is refined, is worth an answer. By default it is.
 
     Returns
     -------
@@ -90,7 +93,7 @@ def solve(
     begin, run = time.monotonic(), Run(keep, problem, progress)
     try:
         with run.under_way(seconds):
-            solution = _solved(problem, starts, search, begin + _EXPLORING * seconds)
+            solution = _solved(problem, starts, search, begin + _EXPLORING * seconds, worth)
     except KeyboardInterrupt:
         heeded()
         over = time.monotonic() - begin >= seconds
@@ -99,7 +102,7 @@ def solve(
     return solution
 
 
-def _solved(problem: Problem, starts: int | None, search: str, until: float) -> Solution:
+def _solved(problem: Problem, starts: int | None, search: str, until: float, worth: Callable[[Optimum], bool]) -> Solution:
     """The stages, in order. After the time `until` nothing else is explored."""
 
     def goes_on() -> bool:
@@ -114,6 +117,10 @@ def _solved(problem: Problem, starts: int | None, search: str, until: float) -> 
         solution = realised_solution(explored.optima[0])
     else:
         explored = _explored(problem, starts, goes_on)
+        first = descend(explored.optima[0])
+        if not worth(first):
+            return Solution(problem, unconfirmed(first))
+        explored = replace(explored, optima=(first, *explored.optima[1:]))
         solution = choose(problem, _certified_best(problem, explored))
     solution.starts, solution.others = explored.starts, explored.others
     return solution

@@ -11,9 +11,10 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
+from colloc.results.outcome import CRASHED, ERROR, PASSED_OVER, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
 from colloc.search.certify import is_trivial
+from colloc.search.optimum import Optimum
 from colloc.search.run import Progress
 from colloc.search.solve import FULL, REDUCED, solve
 from colloc.system.errors import ProblemError
@@ -31,20 +32,34 @@ def run_start(
 
 
 def run_guess(
-    problem: Problem, start_from: Callable[[], AnyGait], start: int, time_limit: float, *, literal: bool = False
+    problem: Problem,
+    start_from: Callable[[], AnyGait],
+    start: int,
+    time_limit: float,
+    *,
+    literal: bool = False,
+    worth: Callable[[Optimum], bool] = lambda end: True,
 ) -> Outcome:
     """Solve and certify a problem from the gait that `start_from` makes, as start number `start`; raises nothing.
 
-    With `literal`, IPOPT searches on the full program (`colloc.search.literal`).
+    With `literal`, IPOPT searches on the full program (`colloc.search.literal`). Where the search ends at the final delta in
+    what is not `worth` it, that is passed over.
     """
-    begin, cpu = time.perf_counter(), time.process_time()
+    begin, cpu, passed = time.perf_counter(), time.process_time(), list[Optimum]()
+
+    def counts(end: Optimum) -> bool:
+        if not worth(end):
+            passed.append(end)
+        return not passed
+
     guess, seen = problem.guess, list[Progress]()
     outcome = Outcome(start, ERROR, "", guess, guess)
     try:
         guess = start_from()
         outcome = Outcome(start, ERROR, "", guess, guess)
         search = FULL if literal else REDUCED
-        solution = solve(problem.with_(guess=guess), 1, seconds=time_limit, search=search, progress=seen.append)
+        how = {"search": search, "progress": seen.append, "worth": counts}
+        solution = solve(problem.with_(guess=guess), 1, seconds=time_limit, **how)  # type: ignore[arg-type]
         if solution.interrupted:
             if time.perf_counter() - begin < time_limit:
                 raise KeyboardInterrupt
@@ -52,6 +67,7 @@ def run_guess(
             outcome = replace(outcome, status=TIME_LIMIT, message=f"gave up after {time_limit:g} s; {where}.")
         else:
             outcome = _outcome(start, guess, solution)
+            outcome = replace(outcome, status=PASSED_OVER, message="") if passed else outcome
     except Exception as error:
         outcome = replace(outcome, status=ERROR, message=f"{type(error).__name__}: {error}")
     return replace(outcome, seconds=time.perf_counter() - begin, cpu_seconds=time.process_time() - cpu)

@@ -11,10 +11,11 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait, fields, statement_hash
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
-from colloc.results.distinct_optima import fourier_series, phase_distance
+from colloc.results.distinct_optima import SAME_GAIT, distance, fourier_series, phase_distance
 from colloc.results.outcome import ERROR, Outcome
 from colloc.results.solution import SOLVED
 from colloc.search.closure import closed_gait
+from colloc.search.optimum import Optimum
 from colloc.search.spaces import space_near
 from colloc.studies.campaign import run_guess
 from colloc.system.errors import CollocError
@@ -134,7 +135,8 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
 def visit(work: Work, found: dict[Index, AnyGait]) -> Visit:
     """Solve a cell from its starts; `found` holds the best gaits of earlier cells of the task, by cell.
 
-    A gait from elsewhere is a start while it does better, as it is, than all that was found. If the best of them promises more
+    A gait from elsewhere is a start while it does better, as it is, than all that was found; the best ones come first. What
+    leads to the gait that is certified by then, or to no better one, is passed over. If the best from elsewhere promises more
     than the search from it keeps, it is tried once more from the problem's own delta_start.
     """
     problem, attempts = work.problem, list[Attempt]()
@@ -147,19 +149,32 @@ def visit(work: Work, found: dict[Index, AnyGait]) -> Visit:
         if key in work.tried or key in {a.key for a in attempts}:
             return
         stated = problem.with_(delta_start=delta_start)
-        attempts.append(Attempt(origin, key, run_guess(stated, lambda: gait, len(attempts), work.time_limit)))
+        attempts.append(Attempt(origin, key, run_guess(stated, lambda: gait, len(attempts), work.time_limit, worth=worth)))
+
+    def enough() -> float:
+        """What a gait has to do to be better than all that was found."""
+        best = best_attempt(attempts)
+        return (1 + BETTER) * max(work.incumbent, 0.0 if best is None else best.outcome.value)
+
+    def worth(end: Optimum) -> bool:
+        best = best_attempt(attempts)
+        if best is None:
+            return end.value > enough() or not work.incumbent
+        known, found = (fourier_series(problem, gait) for gait in (best.outcome.gait, end.gait))
+        return end.value > enough() and distance(known, found, problem.body, problem.law) > SAME_GAIT
 
     def promising(key: str) -> bool:
-        best = best_attempt(attempts)
-        return scores[key] > (1 + BETTER) * max(work.incumbent, 0.0 if best is None else best.outcome.value)
+        return scores[key] > enough()
 
+    warm = _distinct_untried(work, members, scores)
+    for key in warm[: work.warm_starts if work.first else 0]:
+        solve(WARM, members[key], min(work.warm_delta_start, problem.delta_start))
     if work.first:
         solve(GUESS, problem.guess, problem.delta_start)
         for number in work.cold if problem.gait.free else ():
             solve(COLD, start_gait(problem, LATIN_HYPERCUBE, work.seed, number), problem.delta_start)
-    warm = _distinct_untried(work, members, scores)
-    for rank, key in enumerate(warm):
-        if promising(key) or (work.first and rank < work.warm_starts):
+    for key in warm:
+        if promising(key):
             solve(WARM, members[key], min(work.warm_delta_start, problem.delta_start))
     if warm and (promising(warm[0]) or not (work.incumbent or best_attempt(attempts))):
         solve(RESCUE, members[warm[0]], problem.delta_start)

@@ -19,7 +19,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
-from colloc.results.outcome import CRASHED, Outcome
+from colloc.results.outcome import CRASHED, PASSED_OVER, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, Work, start_key
@@ -58,7 +58,7 @@ def outcome(start, guess, gait, efficiency, status=SOLVED):
     return Outcome(start, status, "", guess, gait, efficiency, 1e-7, 0.1, 0.5, 1e-4, 3, 0.1, 0.1)
 
 
-def landscape(stated, start_from, start, time_limit):
+def landscape(stated, start_from, start, time_limit, **_):
     """In place of a solve: two basins, parted by the amplitude of the first joint; only 0.9 of the way is kept each time."""
     guess = start_from()
     good = guess.cos[0, 0] > 1.5
@@ -191,7 +191,7 @@ def test_cells_that_an_earlier_colloc_finished_without_their_guess_are_missing(f
 def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_again_and_then_marked(
     fake, tmp_path, monkeypatch, capsys
 ):
-    def stubborn(stated, start_from, start, time_limit):
+    def stubborn(stated, start_from, start, time_limit, **_):
         # in the cell (1, 1) every search ends in the poor basin; elsewhere the guess is good
         if (stated.friction.mu_t, stated.friction.mu_b) == (2.0, 2.0):
             return outcome(start, guess := start_from(), guess, 0.22)
@@ -252,7 +252,7 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
             raise ZeroDivisionError("not here")
         return problem(x, y)
 
-    monkeypatch.setattr(study_cell, "run_guess", lambda *a: 1 / 0)
+    monkeypatch.setattr(study_cell, "run_guess", lambda *a, **_: 1 / 0)
     run = StudyRun(grid(problem=stated), tmp_path)
     finished(run)
     table = study_table(run).variables
@@ -282,7 +282,7 @@ def test_what_was_solved_stays_when_the_rest_is_tried_again(fake, tmp_path, monk
 def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path, monkeypatch):
     solved = []
 
-    def counted(stated, start_from, start, time_limit):
+    def counted(stated, start_from, start, time_limit, **_):
         solved.append((stated.hash, stated.delta_start, start_key(start_from())))
         return landscape(stated, start_from, start, time_limit)
 
@@ -301,6 +301,20 @@ def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path
         assert again == {a.key for a in first.attempts} - {attempt.key}
 
 
+def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_gait_of_all_its_starts():
+    stated = Problem("two", ellipse(0.0, 2.0, 1.0), gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12)
+    elsewhere = ellipse(0.0, 2.85, 1.3)
+    work = Work((0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 1e-2, 300.0, 1)
+    done = study_cell.visit(work, {})
+    assert [a.outcome.status for a in done.attempts if a.origin == WARM] == [SOLVED]
+    passed = [a for a in done.attempts if a.outcome.status == PASSED_OVER]
+    assert GUESS in {a.origin for a in passed}
+    best = study_cell.best_attempt(done.attempts).outcome.value
+    alone = [study_cell.run_guess(stated, lambda a=a: a.outcome.guess, 0, 300.0) for a in passed]
+    assert {end.status for end in alone} == {SOLVED}
+    assert max(end.value for end in alone) <= best * (1 + study_cell.BETTER)
+
+
 def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
     append_records(tmp_path, [Record("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})])
     (kept,) = read_journal(tmp_path).records
@@ -310,7 +324,7 @@ def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
 def test_a_gait_that_promises_more_than_was_found_is_measured_as_finely_as_a_certificate_does(monkeypatch):
     """So that a cell is not marked for what a coarse replay has seen too large."""
     stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
-    monkeypatch.setattr(study_cell, "run_guess", lambda s, start, number, limit: outcome(number, start(), start(), 0.01))
+    monkeypatch.setattr(study_cell, "run_guess", lambda s, start, number, limit, **_: outcome(number, start(), start(), 0.01))
     monkeypatch.setattr(study_cell, "value_as_it_is", lambda p, g, *grid: 0.2 if grid else 0.21)
     work = Work((0,), stated, True, (), (elsewhere,), (), 0.0, frozenset(), 1, 1e-2, 300.0, 1)
     assert list(study_cell.visit(work, {}).scores.values()) == [0.2]
@@ -374,7 +388,7 @@ def in_class(kind, guess=None, intervals=20):
 
 
 def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_kept_exactly(tmp_path, monkeypatch):
-    def next_to(stated, start_from, start, time_limit):
+    def next_to(stated, start_from, start, time_limit, **_):
         guess = start_from()
         gait = study_cell.member(stated, guess)
         return outcome(start, guess, gait, study_cell.value_as_it_is(stated, gait))
