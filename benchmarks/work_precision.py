@@ -1,6 +1,6 @@
 """Work and precision of schemes, on uniform and on refined meshes: python -m benchmarks.work_precision [--path]
 
-The isotropic one-harmonic three-link optimum at delta = 1e-4, from a good guess and delta = 1e-3 on. Every solve is held
+The isotropic one-harmonic three-link optimum at delta = 1e-4, from a good guess. Every solve is held
 against the optimum itself, as the finest refined solve finds it by independent replay, and against a replay of its own
 gait. Outcomes are kept in results/work_precision.json, so an interrupted run goes on where it stopped. Writes
 results/work_precision.md and results/work_precision.png and .pdf.

@@ -14,6 +14,7 @@ from scipy import sparse
 from colloc.collocation.program import GaitProgram
 from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
+from colloc.numerics.sqp import remembered
 from colloc.search.certify import EXACT
 from colloc.system.interruption import interrupted, interruptible
 
@@ -96,6 +97,7 @@ class Solver:
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
         self._stop = StopRequest(self.oracles.nlp)  # held here: CasADi does not keep it alive
         self._settings = settings | {**self.oracles.options, "iteration_callback": self._stop}
+        self._values_and_slopes = remembered(self._evaluated)
 
     @cached_property
     def _solver(self) -> ca.Function:
@@ -149,6 +151,13 @@ class Solver:
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
         return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
 
+    def _evaluated(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
+        """Objective, its gradient ``(n,)``, rows ``(m,)`` and their Jacobian ``(m, n)`` at variables, then parameters."""
+        x, parameters = np.split(at, [self.transcription.layout.n])
+        f, gradient = self.oracles.options["grad_f"](x, parameters)
+        g, jacobian = self.oracles.options["jac_g"](x, parameters)
+        return float(f), gradient.full().ravel(), g.full().ravel(), as_sparse(jacobian)
+
     def _parameters(self, x: np.ndarray, delta: float) -> np.ndarray:
         t = self.transcription
         return self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]]))
@@ -168,9 +177,9 @@ class Solver:
         """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's gradient, given all others."""
         t = self.transcription
         free, equality = t.lower < t.upper, np.flatnonzero(t.constraint_lower == t.constraint_upper)
-        jacobian = as_sparse(self.oracles.options["jac_g"](x, parameters)[1])
+        _, gradient, _, jacobian = self._values_and_slopes(np.concatenate([x, parameters]))
         lam_g = np.where(t.constraint_lower == t.constraint_upper, 0.0, lam_g)
-        gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel() + jacobian.T @ lam_g + lam_x
+        gradient = gradient + jacobian.T @ lam_g + lam_x
         lam_g[equality] = estimated_multipliers(jacobian[equality][:, free], gradient[free])
         return lam_x, lam_g
 
@@ -178,7 +187,7 @@ class Solver:
         """Jacobian of the equations in the free variables at x, and their row numbers among all constraints."""
         t = self.transcription
         equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
-        jacobian = as_sparse(self.oracles.options["jac_g"](x, self._parameters(x, delta))[1])
+        jacobian = self._values_and_slopes(np.concatenate([x, self._parameters(x, delta)]))[3]
         return jacobian[equality][:, t.lower < t.upper], equality
 
     def _measured(
@@ -193,11 +202,9 @@ class Solver:
     ) -> NlpResult:
         t = self.transcription
         lower, upper = bounds
-        f, gradient = self.oracles.options["grad_f"](x, parameters)
-        g, jacobian = self.oracles.options["jac_g"](x, parameters)
-        g = np.array(g).ravel()
+        f, gradient, g, jacobian = self._values_and_slopes(np.concatenate([x, parameters]))
         free = t.lower < t.upper
-        stationarity = np.array(gradient).ravel() + np.array(jacobian.T @ lam_g).ravel() + lam_x
+        stationarity = gradient + jacobian.T @ lam_g + lam_x
         outside = np.maximum(np.maximum(t.constraint_lower - g, g - t.constraint_upper), 0.0)
         bounds_outside = np.maximum(np.maximum(lower - x, x - upper), 0.0)
         products = [
@@ -209,7 +216,7 @@ class Solver:
             x,
             lam_x,
             lam_g,
-            float(f),
+            f,
             float(np.abs(stationarity[free]).max()),
             float(max(outside.max(), bounds_outside.max())),
             max(products),
