@@ -26,7 +26,7 @@ from colloc.results.relaxation import Optimality, Relaxation
 from colloc.results.solution import Solution
 from colloc.search.converge import converged
 from colloc.search.descend import levels
-from colloc.search.effort import SKETCH, Effort
+from colloc.search.effort import ROUGH, SKETCH, Effort
 from colloc.search.explore import ENOUGH, FOLLOWED, PROMISING, Exploration, starting_gaits
 from colloc.search.optimum import Optimum
 from colloc.search.prescribed import realised
@@ -43,7 +43,8 @@ _IDLE = 1e-7
 _MESHES, _GAIN = 3, 2e-5
 """At the final delta, and what one must gain to be followed by another."""
 _ROUGH = Effort(1e-2)
-"""For small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value."""
+"""On the way: for small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value. The
+answer is as exact as its certificate asks for."""
 
 
 def directions_tried(n_joint: int) -> np.ndarray:
@@ -203,7 +204,7 @@ def refine_relaxed(found: Optimum) -> Optimum:
         run.told("refine", count, _MESHES, found)
         before = found.objective
         ready = with_turned_directions(found, problem.intervals)
-        found = converged(*ready, found.delta, _ROUGH).after(*found.history)
+        found = converged(*ready, found.delta, ROUGH).after(*found.history)
         if found.objective > before - _GAIN:
             break
     return found

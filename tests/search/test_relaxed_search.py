@@ -32,6 +32,7 @@ def solution():
 def test_the_isotropic_body_reaches_more_than_any_class_of_smooth_gaits(solution):
     # 0.405 is the best large gait of the classes of docs/gait_classes.md at any delta
     assert solution.status == "solved"
+    assert solution.relaxed.certificate.passed, solution.message
     assert solution.relaxed.certificate.efficiency > 0.43
     assert solution.measured.distance > 0.5
 
