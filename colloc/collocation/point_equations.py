@@ -56,7 +56,7 @@ def point_function(formulation: str, body: Body, friction: Law, regime: Regime =
     if regime.froude:
         log_period = ca.SX.sym("log_period", int(regime.free_pace))
         froude = ca.exp(-2.0 * log_period) if regime.free_pace else regime.froude
-        return _point_with_inertia(checked_mass(body), friction, froude * unit**2, log_period)
+        return _point_with_inertia(checked_mass(body), friction, regime, froude * unit**2, log_period)
     return _full_point(body, friction, regime) if formulation == FULL else _map_point(body, friction)
 
 
@@ -83,7 +83,7 @@ def _full_point(body: Body, friction: Law, regime: Regime) -> LocalFunction:
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
 
 
-def _point_with_inertia(body: Chain, friction: Law, froude: float | ca.SX, log_period: ca.SX) -> LocalFunction:
+def _point_with_inertia(body: Chain, friction: Law, regime: Regime, froude: float | ca.SX, log_period: ca.SX) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     forces, states, posture = (
         ca.SX.sym("forces", len(body.force_names)),
@@ -92,8 +92,13 @@ def _point_with_inertia(body: Chain, friction: Law, froude: float | ca.SX, log_p
     )
     laws, force, centre, power = body.with_forces(friction, angles, rates, z, forces, delta)
     own = momenta(body, posture, body.velocity(posture, rates, z))
-    changes = about_centre(body, angles, force) / froude + turning(z, states)
-    out = ca.vertcat(laws, own - states, changes, forward(theta, centre), power)
+    pull = regime.pull(theta)
+    pushed = about_centre(body, angles, force)
+    if pull is not None:
+        pushed += ca.vertcat(pull, 0)
+        power -= ca.sum1(pull * centre)
+    changes = pushed / froude + turning(z, states)
+    out = ca.vertcat(laws, own - states, changes, forward(theta - regime.ahead, centre), power)
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces, states, log_period), ca.SX(0, 1), delta, out)
 
 

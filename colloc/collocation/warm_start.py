@@ -55,7 +55,7 @@ def balanced_variables(
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     if layout.momenta.size:
-        x[layout.momenta[:, mesh.sites]] = along.states[:, points]
+        x[layout.momenta[:, mesh.sites]] = along.states[: len(layout.momenta), points]
         x[layout.momenta[:, mesh.edge_sites]] = along.edges
     if layout.forces.size:
         x[layout.forces] = body.forces(friction, angles, rates, z, slow)

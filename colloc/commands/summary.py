@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from colloc.gaits.problem_file import Reference
 from colloc.results.answer import EVALUATED, PRESCRIBED, REALISED, REDUCED
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
+from colloc.system.errors import NotConvergedError
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
@@ -85,10 +87,10 @@ def _besides(solution: Solution) -> list[str]:
     if found.dry is not None:
         lines.append(f"  dry friction    between {found.dry[0]:.8f} and {found.dry[1]:.8f}, with no delta")
     lines += [f"  {each.name.replace('_', ' '):<15s} {found.values[each.name]:.6f}" for each in problem.integrals]
-    if problem.froude:
-        lines.append(
-            f"  played slowly   {solution.played_slowly:.6f} ({problem.objective.short} of the same gait without inertia)"
-        )
+    with suppress(NotConvergedError):  # of what a slope holds only while it moves
+        if problem.froude:
+            slowly = f"{solution.played_slowly:.6f} ({problem.objective.short} of the same gait without inertia)"
+            lines.append(f"  played slowly   {slowly}")
     if (held := solution.share_held).any():
         shares = ", ".join(f"{100 * share:.0f}" for share in held)
         lines.append(f"  feet hold       {shares} % of the period, from the tail")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from colloc.gaits.linear import LinearClass
-from colloc.gaits.regime import Regime
+from colloc.gaits.regime import LEVEL, Regime
+from colloc.gaits.sloped import Slope
 from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.gaits.told import Telling, telling
 from colloc.mechanics.bodies import FULL, Body
@@ -56,7 +57,7 @@ class AtFreePace(Telling):
 
 @dataclass(frozen=True)
 class Paced(Regime):
-    """On the level, at a Froude number L/(g T^2), at which inertia counts, or at one in a range, whose middle it is."""
+    """At a Froude number L/(g T^2), at which inertia counts, or at one in a range, whose middle it is."""
 
     froude: float  # type: ignore[misc]
     free: Free | None = None
@@ -70,20 +71,24 @@ class Paced(Regime):
         return self.free is not None
 
     @property
-    def label(self) -> str:
-        return f", Froude number {' to '.join(f'{each:g}' for each in self.free or (self.froude,))}"
+    def slowly(self) -> Regime:
+        return LEVEL
 
-    def at(self, gait: Any) -> Paced:
+    @property
+    def label(self) -> str:
+        return f"{super().label}, Froude number {' to '.join(f'{each:g}' for each in self.free or (self.froude,))}"
+
+    def at(self, gait: Any) -> Self:
         if self.free is None:
             return self
         if gait.log_period is None and self.free.low == self.free.high:
-            return Paced(self.froude)
+            return replace(self, free=None)
         if gait.log_period is None:
             raise ProblemError("the gait does not say its pace: give it a log_period, or the problem one Froude number.")
-        return Paced(float(np.exp(-2.0 * gait.log_period)))
+        return replace(self, froude=float(np.exp(-2.0 * gait.log_period)), free=None)
 
     def class_of(self, gait_class: Any) -> Any:
-        level = gait_class.level
+        level = super().class_of(gait_class)
         if self.free is None:
             return level
         if not (isinstance(level, LinearClass) and level.linear):
@@ -91,13 +96,14 @@ class Paced(Regime):
         return telling(AtFreePace, level, pace=self.free)
 
     def describe(self) -> str:
+        where = f"{ground}; " if (ground := super().describe()) else ""
         if self.free is not None:
-            return f"played at the best Froude number from {self.free.low:.4g} to {self.free.high:.4g}"
+            return f"{where}played at the best Froude number from {self.free.low:.4g} to {self.free.high:.4g}"
         period = 1 / np.sqrt(GRAVITY * self.froude)
-        return f"played at the Froude number {self.froude:.4g}: a body of 1 m takes {period:.3g} s a period"
+        return f"{where}played at the Froude number {self.froude:.4g}: a body of 1 m takes {period:.3g} s a period"
 
-    def in_units_of(self, unit: float) -> Paced:
-        return replace(self, froude=self.froude / unit)  # it drives momenta; where time counts the unit is 1
+    def in_units_of(self, unit: float) -> Self:
+        return replace(super().in_units_of(unit), froude=self.froude / unit)  # where time counts the unit is 1
 
     def check(self, problem: Any) -> None:
         if self.free and not problem.uses("period"):
@@ -106,10 +112,9 @@ class Paced(Regime):
                 "'distance / (work + 0.1 * period)' counts a standing power of 0.1 weight x sqrt(length x gravity)."
             )
         checked_mass(problem.body)
-        if problem.grade:
-            raise ProblemError("on a slope inertia is not known yet: leave froude or grade out.")
         if not problem.gait.free:
             raise ProblemError("a prescribed motion is played with inertia by colloc.inertial_motion: leave froude out.")
+        super().check(problem)
         if not problem.gait.unit_speed and problem.gait.symmetry not in (NONE, ANTIPODAL):
             raise ProblemError(
                 f"gaits of symmetry {problem.gait.symmetry} run backwards in half of their period, as nothing with inertia "
@@ -123,18 +128,41 @@ class Paced(Regime):
             raise ProblemError(f"with inertia a gauss-N or radau-N scheme is needed, not {problem.scheme}.")
 
 
-def paced_from(froude: Any, *, timed: bool) -> Paced:
+@dataclass(frozen=True)
+class PacedOnSlope(Paced, Slope):
+    """The same on a slope."""
+
+    grade: float = 0.0  # type: ignore[misc]
+    froude: float = 0.0  # type: ignore[misc]
+
+    spent = "friction, climb and kinetic energy"
+    others_measured = True
+
+    @property
+    def slowly(self) -> Regime:
+        return Slope(self.grade, self.towards)
+
+    def class_of(self, gait_class: Any) -> Any:
+        if self.free is not None:
+            raise ProblemError("the pace is not sought on a slope: state one Froude number, and ask for nothing of the period.")
+        return super().class_of(gait_class)
+
+
+def paced_from(froude: Any, slope: Slope | None, *, timed: bool) -> Paced:
     """How a problem states its pace: a number, or a range; `timed`: something asked for speaks of the period, which is then
     a parameter of the gait. `ProblemError` if it is none."""
+    free = None
     if isinstance(froude, (tuple, list)):
         if len(froude) != 2 or not all(map(is_number, froude)) or not 0 < froude[0] <= froude[1]:
             raise ProblemError(
                 "froude=Free(low, high) needs two numbers above 0, the smaller one first, not "
                 f"{' and '.join(map(repr, froude))}."
             )
-        return Paced(float(np.sqrt(froude[0] * froude[1])), Free(*map(float, froude)))
-    if not is_number(froude) or froude < 0:
+        free, froude = Free(*map(float, froude)), float(np.sqrt(froude[0] * froude[1]))
+    elif not is_number(froude) or froude < 0:
         raise ProblemError(
             f"froude must be a number that is not negative, length over (gravity times period^2), not {froude!r}."
         )
-    return Paced(froude, Free(froude, froude) if timed else None)
+    elif timed:
+        free = Free(froude, froude)
+    return Paced(froude, free) if slope is None else PacedOnSlope(**vars(slope), froude=froude, free=free)

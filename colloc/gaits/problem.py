@@ -286,8 +286,9 @@ class Problem:
         slope = slope_from(self.body, self.friction, self.grade, self.towards)
         if self.motion is not None and (slope is not None or self.froude != 0):
             raise ProblemError("a kind of motion of your own takes the place of grade and froude: leave these out.")
-        paced = self.froude != 0
-        return self.motion or (paced_from(self.froude, timed=self.uses("period")) if paced else slope or LEVEL)
+        if self.froude == 0:
+            return self.motion or slope or LEVEL
+        return paced_from(self.froude, slope, timed=self.uses("period"))
 
     @property
     def scene(self) -> str:

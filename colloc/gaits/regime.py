@@ -27,6 +27,8 @@ class Regime:
     """Froude number at which gaits are played."""
     free_pace: ClassVar[bool] = False
     """Whether the pace is sought with the gait, whose last parameter it is."""
+    grade: ClassVar[float] = 0.0
+    """Tangent of the inclination of the ground; +x is straight uphill."""
     slides: ClassVar[bool] = False
     """Whether the body may slide back, so that there may be no gait that is worth anything."""
     spent: ClassVar[str] = "friction"
@@ -58,6 +60,11 @@ class Regime:
         """For lines that say what a problem asks."""
         return ""
 
+    @property
+    def slowly(self) -> Regime:
+        """The same, so slow that inertia does not matter."""
+        return self
+
     def check(self, problem: Any) -> None:
         """A `ProblemError` for what cannot be asked of a problem."""
 
@@ -72,6 +79,10 @@ class Regime:
     def in_units_of(self, unit: float) -> Self:
         """The same in forces divided by a unit."""
         return self
+
+    def counted(self, way: complex) -> complex:
+        """What counts of the way of a period, and the way across that: on the level it is as long as it is."""
+        return complex(abs(way))
 
     def pull(self, theta: Array) -> Array | None:
         """An outside force on the centre of mass of a body at orientations theta ``(1, n_time)``, in its axes, ``(2,

@@ -10,7 +10,7 @@ the weight.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class Slope(Regime):
     """A slope: the tangent of its inclination, and the direction whose way counts, from straight uphill to the left [rad];
     None: the climb counts, whatever the way aside."""
 
-    grade: float
+    grade: float  # type: ignore[misc]
     towards: float | None = None
 
     slides = True
@@ -52,20 +52,23 @@ class Slope(Regime):
 
     @property
     def label(self) -> str:
-        return f", grade {self.grade:g}"
+        return f"{super().label}, grade {self.grade:g}"
 
-    def in_units_of(self, unit: float) -> Slope:
-        return replace(self, grade=self.grade / unit)  # the weight's pull is a force, too
+    def in_units_of(self, unit: float) -> Self:
+        return replace(super().in_units_of(unit), grade=self.grade / unit)  # the weight's pull is a force, too
 
     def class_of(self, gait_class: Any) -> Any:
         """Any class that derives from `LinearClass`, one's own too, can be here. `ProblemError` for others."""
-        level = gait_class.level
+        level = super().class_of(gait_class)
         if not isinstance(level, LinearClass):
             raise ProblemError(
                 f"on a slope gaits are sought in classes paced by time, not {type(level).__name__}: take Harmonic, BSpline or "
                 "Basis."
             )
         return telling(OnSlope, level)
+
+    def counted(self, way: complex) -> complex:
+        return way * np.exp(-1j * self.ahead)
 
     def pull(self, theta: Array) -> Array:
         """Of the weight, in the body's axes, ``(2, n_time)``, with its tail link at angles theta ``(1, n_time)`` from straight

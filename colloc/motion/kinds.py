@@ -5,6 +5,7 @@ r"""Kinds of motion: which states a period has besides the shape, their rates at
 | slow, on the level | none: the balance holds instant by instant | orientation, place, work |
 | slow, on a slope | the orientation theta, on which the weight's pull depends | place, work |
 | with inertia, on the level | the momenta Vx, Vy, H, which repeat every period | orientation, place, work |
+| with inertia, on a slope | momenta and orientation | place, work |
 
 A kind answers for a balance with its derivatives, for the motion along a mesh, and for the numbers of a period. Whoever
 collocates a motion asks it, and not whether there is a slope.
@@ -20,14 +21,13 @@ import numpy as np
 
 from colloc.gaits.control_problem import Dynamics
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.inertia import Paced
+from colloc.gaits.inertia import Paced, PacedOnSlope
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
@@ -142,11 +142,11 @@ class Kind(Protocol):
 
     def through_pose(
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
-    ) -> np.ndarray:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Add what m numbers owe to the orientation to their derivatives `on_out` with respect to (rotation rate, velocity of
         the centre, power, and rates of states) at the stages, ``(m, 4 + more, n, s)``, from those with respect to the
-        orientation, ``(m, n, s)``, and those of the outputs with respect to the states; and give those with respect to the
-        begins that are told, ``(m, n_told)``."""
+        orientation, ``(m, n, s)``, and those of the outputs with respect to the states; and give those with respect to what
+        is told, ``(m, n_told)``, and to what is added to the states at the ends of the intervals, ``(m, n_state, n)``."""
 
     def counted(self, passed: Passed) -> dict[str, float]:
         """What a whole period comes to."""
@@ -193,9 +193,9 @@ class SlowOnLevel:
 
     def through_pose(
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
-    ) -> np.ndarray:
+    ) -> tuple[np.ndarray, np.ndarray]:
         on_out[:, 0] += pose.on_rates(on_theta)
-        return np.empty((len(on_out), 0))
+        return np.empty((len(on_out), 0)), np.empty((len(on_out), 0, mesh.n))
 
     def _axis(self, passed: Passed) -> complex:
         return complex(np.exp(1j * heading(self._symmetry, passed.displacement, passed.rotation, passed.bend)))
@@ -214,16 +214,42 @@ class SlowOnLevel:
         return {"distance": distance, "work": Share(work=self.periods), "rotation": Share(rotation=1.0)}
 
 
-class SlowOnSlope:
+class _WithStates:
+    """How numbers of a period depend on states, which are solved for together."""
+
+    states: tuple[str, ...]
+    told: tuple[str, ...]
+    followed: bool = True
+    _grow: np.ndarray
+    """Which rows of `Kind.slopes` are the rates of the states."""
+
+    def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
+        return CollocatedStates(mesh, unit=unit)
+
+    def through_pose(
+        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        m, k, turns = len(on_out), len(self.states), [name == "theta" for name in self.states]
+        if not any(turns):
+            on_out[:, 0] += pose.on_rates(on_theta)
+        of_states = np.einsum("mrt,rkt->mkt", on_out[:, :4].reshape(m, 4, -1), on_states[OUTPUTS, :k][:4])
+        of_states[:, turns] += on_theta.reshape(m, 1, -1)
+        on_begin, on_rates, on_ends = self._equations(mesh).pulled_back(on_states[self._grow, :k], of_states)
+        on_out[:, self._grow - OMEGA] += on_rates.reshape(m, k, *on_theta.shape[1:])
+        on_more = np.einsum("mrt,rkt->mk", on_rates, on_states[self._grow, k:])
+        return np.concatenate([on_begin[:, turns], on_more], axis=1), on_ends
+
+
+class SlowOnSlope(_WithStates):
     """One state, the orientation, from straight uphill. Distance is along the direction that counts; joints lift the body."""
 
     states: tuple[str, ...] = ("theta",)
     told: tuple[str, ...] = ("theta",)
-    followed: bool = True
     lack: str = "friction does not hold the body on the slope all the way, or its joints brake; take a gentler one"
     periods: float = 1.0
     bends: bool = False
     turn: float = 0.0
+    _grow = np.array([OMEGA])
 
     def __init__(self, body: Body, friction: Law, slope: Slope) -> None:
         self.body, self.friction, self._slope = body, friction, slope
@@ -249,7 +275,7 @@ class SlowOnSlope:
             balanced = bool((now.solved.residual < _ACCEPTED * tolerance).all())
             return Rates(z[None, OMEGA], now.on_theta[None, None, OMEGA], balanced)
 
-        states, _, held = CollocatedStates(mesh, unit=shapes.unit).solved(rates, begin, states)
+        states, _, held = self._equations(mesh, shapes.unit).solved(rates, begin, states)
         slopes = now.on_shape, now.on_theta[:, None]
         return Along(begin, states, now.solved.z, now.now, np.full(mesh.n_point, held), slopes)
 
@@ -262,18 +288,9 @@ class SlowOnSlope:
         assert along.slopes is not None
         return along.slopes
 
-    def through_pose(
-        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
-    ) -> np.ndarray:
-        at_points = on_out.reshape(*on_out.shape[:2], -1)
-        of_theta = on_theta.reshape(len(on_theta), 1, -1) + np.einsum("mrt,rkt->mkt", at_points, on_states[OUTPUTS])
-        on_begin, on_rates, _ = CollocatedStates(mesh).pulled_back(on_states[None, OMEGA], of_theta)
-        on_out[:, 0] += on_rates.reshape(on_theta.shape)
-        return on_begin
-
     def counted(self, passed: Passed) -> dict[str, float]:
         """Not a number where the joints brake."""
-        way = passed.displacement * np.exp(-1j * self._slope.ahead)
+        way = self._slope.counted(passed.displacement)
         work = passed.work + self._slope.grade * passed.displacement.real
         found = {"distance": way.real, "work": work, "rotation": passed.rotation, "across": way.imag}
         return {name: float(value) if work > 0 else np.nan for name, value in found.items()}
@@ -284,29 +301,34 @@ class SlowOnSlope:
         return {"distance": Share(ahead), "work": Share(self._slope.grade, work=1.0), "rotation": turned, "across": across}
 
 
-class WithInertia(SlowOnLevel):
-    """Three states, the momenta: what friction changes them by over a period is nothing. They are those of
-    `colloc.mechanics.inertia`, in the axes of the tail link, so that it does not matter where the body points."""
+class WithInertia(_WithStates):
+    """Three states, the momenta, and on a slope the orientation: what friction and weight change momenta by over a period is
+    nothing. They are those of `colloc.mechanics.inertia`, in the axes of the tail link, so that on the level it does not matter
+    where the body points."""
 
-    states: tuple[str, ...] = STATES
-    followed: bool = True
     lack: str = "no period with inertia was found that repeats itself; give another guess, or a smaller froude"
 
-    def __init__(self, body: Chain, friction: Law, symmetry: str, froude: float | None, turn: float = 0.0) -> None:
-        """None: gaits say their pace."""
-        super().__init__(body, friction, symmetry, turn)
-        self._chain, self._froude, self._image = body, froude, momenta_image(symmetry)
-        self.told = ("log_period",) if froude is None else ()
+    def __init__(self, slow: SlowOnLevel | SlowOnSlope, regime: Regime, image: np.ndarray | None = None) -> None:
+        """Of a body that would move as the kind `slow` says if it had no mass; `image` as of
+        `colloc.motion.heading.momenta_image`."""
+        self.body, self.friction, self.turn, self.periods, self.bends = (
+            slow.body,
+            slow.friction,
+            slow.turn,
+            slow.periods,
+            slow.bends,
+        )
+        self._slow, self._regime, self._image, self._chain = slow, regime, image, checked_mass(slow.body)
+        self._timed = ("period",) if regime.free_pace else ()
+        self.states, self.told = STATES + slow.states, slow.told + ("log_period",) * regime.free_pace
+        self._grow = np.array([6, 7, 8] + [OMEGA] * len(slow.states))
+        self.instants = slow.instants
 
     def counted(self, passed: Passed) -> dict[str, float]:
-        return super().counted(passed) | {name: float(np.exp(passed.told[0])) for name in self._timed}
+        return self._slow.counted(passed) | {name: float(np.exp(passed.told[-1])) for name in self._timed}
 
     def shares(self, passed: Passed) -> dict[str, Share]:
-        return super().shares(passed) | {name: Share(told=float(np.exp(passed.told[0]))) for name in self._timed}
-
-    @property
-    def _timed(self) -> tuple[str, ...]:
-        return ("period",) if self.told else ()
+        return self._slow.shares(passed) | {name: Share(told=float(np.exp(passed.told[-1]))) for name in self._timed}
 
     def along(
         self,
@@ -318,87 +340,81 @@ class WithInertia(SlowOnLevel):
     ) -> Along:
         """Where Newton's method does not lead from the slow motion to the one with inertia, as on feet that hold, it is reached
         through more viscous friction; not beside a motion that is known, where a search had better take a shorter step."""
-        held, froude = False, self._froude_at(shapes, begin)
+        held = False
         if near[0] is not None:
-            states, out, held = self._closed(mesh, shapes, near[0], froude)
+            states, out, held = self._closed(mesh, shapes, near[0], begin)
         if not held:
-            states, out, held = self._closed(mesh, shapes, self._slow_momenta(shapes), froude)
+            states, out, held = self._closed(mesh, shapes, self._slow_states(mesh, shapes, begin), begin)
         if not held and near[0] is None and shapes.delta * shapes.unit < _VISCOUS:
             wetter = self.along(mesh, shapes._replace(delta=_WETTER * shapes.delta), begin)
-            states, out, held = self._closed(mesh, shapes, wetter.states, froude)
+            states, out, held = self._closed(mesh, shapes, wetter.states, begin)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
-        first = states[:, 0] - CollocatedStates(mesh, unit=shapes.unit).integrals(rates)[0][:, 0]
+        first = states[: len(STATES), 0] - CollocatedStates(mesh, unit=shapes.unit).integrals(rates)[0][:, 0]
         edges = np.stack([sums(row, start) for row, start in zip(gained, first, strict=True)])
         return Along(begin, states, z, now, np.full(mesh.n_point, held), edges=edges)
 
-    def _slow_momenta(self, shapes: Shapes) -> np.ndarray:
-        body, angles, rates = self._chain, shapes.angles, shapes.rates
-        z = body.solve(self.friction, angles, rates, shapes.delta).z
-        posture = body.posture(angles)
-        return momenta(body, posture, body.velocity(posture, rates, z))
+    def _slow_states(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray) -> np.ndarray:
+        body, slow = self._chain, self._slow.along(mesh, shapes, begin)
+        posture = body.posture(shapes.angles)
+        return np.concatenate([momenta(body, posture, body.velocity(posture, shapes.rates, slow.z)), slow.states])
 
-    def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, froude: float) -> tuple[np.ndarray, np.ndarray, bool]:
-        """The momenta that repeat every period, by Newton's method from others ``(3, n_point)``; what the body does with them
-        (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any."""
-        out = near
+    def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """The states with momenta that repeat every period, by Newton's method from others ``(n_state, n_point)``; what the
+        body does with them (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any."""
+        out, first = near, np.append(near[: len(STATES), 0], begin[: near.shape[0] - len(STATES)])
+
+        froude = self._froude_at(shapes, begin)
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal out
             out, found = self._rates(shapes, states, froude)
             return found
 
-        states, _, held = self._equations(mesh, shapes.unit).solved(rates, near[:, 0], near)
+        states, _, held = self._equations(mesh, shapes.unit).solved(rates, first, near)
         return states, out, held
 
     def alone(
         self, mesh: Mesh, shapes: Shapes, along: Along, begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Every interval by itself, from given momenta at its begin ``(3, n)``: what the body does with those at the points,
-        the momenta at its end ``(3, n)``, and where there are any, ``(n,)``; sought near momenta at the points."""
+        """Every interval by itself, from given states at its begin ``(n_state, n)``: what the body does with those at the
+        points, the states at its end ``(n_state, n)``, and where there are any, ``(n,)``; sought near states at the points."""
         equations, froude = self._equations(mesh, shapes.unit), self._froude_at(shapes, along.begin)
         states, ends, found = equations.alone(lambda states: self._rates(shapes, states, froude)[1], begins, near)
         return self._rates(shapes, states, froude)[0], ends, found
 
     def _rates(self, shapes: Shapes, states: np.ndarray, froude: float) -> tuple[np.ndarray, Rates]:
-        out, slopes = momenta_along_states(self._chain, self.friction, shapes[:3], states, froude)
-        return out, Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
+        at = self._chain, self.friction, shapes[:3], states[: len(STATES)], froude
+        out, slopes = self._pulled(*momenta_along_states(*at), states, froude)
+        return out, Rates(out[self._grow], slopes[self._grow], bool(np.isfinite(out).all()))
+
+    def _pulled(self, out: np.ndarray, slopes: np.ndarray, states: np.ndarray, froude: float) -> tuple[np.ndarray, np.ndarray]:
+        """With the weight's pull, and derivatives along the orientation after those along momenta."""
+        for theta in states[len(STATES) :]:
+            pull: Any = self._regime.pull(theta[None]) / froude  # type: ignore[operator]
+            out[_MORE][:2] += pull
+            on_theta = np.zeros((len(out), 1, theta.size))
+            on_theta[_MORE][:2, 0] = pull[1], -pull[0]  # the pull turns against theta
+            slopes = np.concatenate([slopes, on_theta], axis=1)
+        return out, slopes
 
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
-        return CollocatedStates(mesh, np.ones(len(STATES), dtype=bool), self._image, unit)
+        return CollocatedStates(mesh, np.array([name in STATES for name in self.states]), self._image, unit)
 
     def _froude_at(self, shapes: Shapes, begin: np.ndarray) -> float:
         """Momentum grows by what friction gives it in a unit of time, and has as much to grow."""
-        froude = float(np.exp(-2.0 * begin[0])) if self._froude is None else self._froude
+        froude = float(np.exp(-2.0 * begin[-1])) if self._timed else self._regime.froude
         return froude * shapes.unit**2
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         """A pace that is told has a column after those of the momenta: in a longer period friction changes them by more."""
-        froude, k = self._froude_at(shapes, along.begin), len(STATES)
-        out, slopes = momenta_at(self._chain, self.friction, shapes[:3], along.states, froude)
-        on_pace = np.zeros((len(out), len(self.told), out.shape[1]))
-        on_pace[_MORE] = 2.0 * (out[_MORE] - turning(along.z, along.states))[:, None]
-        return slopes[:, :-k], np.concatenate([slopes[:, -k:], on_pace], axis=1)
-
-    def through_pose(
-        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
-    ) -> np.ndarray:
-        on_out[:, 0] += pose.on_rates(on_theta)
-        on_rates = self._pulled_back(mesh, on_out, on_states)[1]
-        on_out[:, 4:] = on_rates.reshape(on_out[:, 4:].shape)
-        return np.einsum("mrt,rkt->mk", on_rates, on_states[_MORE, len(STATES) :])
-
-    def on_ends(self, mesh: Mesh, on_out: np.ndarray, on_states: np.ndarray) -> np.ndarray:
-        """Derivatives ``(m, 3, n)`` of m numbers with respect to what is added to the momenta at the ends of the intervals,
-        from those of `through_pose`."""
-        return self._pulled_back(mesh, on_out, on_states)[2]
-
-    def _pulled_back(self, mesh: Mesh, on_out: np.ndarray, on_states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        given = on_out[:, :4].reshape(len(on_out), 4, -1)
-        on_momenta = on_states[:, : len(STATES)]
-        of_states = np.einsum("mrt,rkt->mkt", given, on_momenta[OUTPUTS][:4])
-        return self._equations(mesh).pulled_back(on_momenta[_MORE], of_states)
+        froude, momenta, k = self._froude_at(shapes, along.begin), along.states[: len(STATES)], 2 * self._chain.n_joint
+        now = momenta_at(self._chain, self.friction, shapes[:3], momenta, froude)
+        out, slopes = self._pulled(*now, along.states, froude)
+        on_pace = np.zeros((len(out), len(self._timed), out.shape[1]))
+        on_pace[_MORE] = 2.0 * (out[_MORE] - turning(along.z, momenta))[:, None]
+        return slopes[:, :k], np.concatenate([slopes[:, k:], on_pace], axis=1)
 
 
 def through_motion(
@@ -408,18 +424,17 @@ def through_motion(
     shares: Iterable[Share],
     on_states: np.ndarray,
     by_theta: np.ndarray | float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of m numbers of a period with respect to (rotation rate, velocity of the centre, power, rates of states) at
-    the stages, ``(m, 4 + more, n, s)``, and to the begins that are told, ``(m, n_told)``; `on_states` as of `Kind.slopes`,
-    `by_theta` is what they depend on the orientation by themselves, ``(m, n, s)``."""
+    the stages, ``(m, 4 + more, n, s)``, then those that `Kind.through_pose` gives; `on_states` as of `Kind.slopes`, `by_theta`
+    is what they depend on the orientation by themselves, ``(m, n, s)``."""
     side, rotation, _, work, _ = (np.array(column) for column in zip(*shares, strict=True))
     weight = stage_weights(mesh)
     on_theta, on_centre = pose.on_pose(side)
     rows = np.zeros((side.size, len(on_states[OUTPUTS]), *weight.shape))
     rows[:, 0], rows[:, 3] = (part[:, None, None] * weight for part in (rotation, work))
     rows[:, 1:3] = on_centre
-    on_begin = kind.through_pose(mesh, pose, on_theta + by_theta, rows, on_states)
-    return rows, on_begin
+    return rows, *kind.through_pose(mesh, pose, on_theta + by_theta, rows, on_states)
 
 
 @singledispatch
@@ -435,8 +450,12 @@ def _on_slope(regime: Slope, of: Dynamics) -> Kind:
 
 @kind_in.register
 def _with_inertia(regime: Paced, of: Dynamics) -> Kind:
-    pace = None if regime.free else regime.froude
-    return WithInertia(checked_mass(of.body), of.law, of.symmetry, pace, of.turn)
+    return WithInertia(SlowOnLevel(of.body, of.law, of.symmetry, of.turn), regime, momenta_image(of.symmetry))
+
+
+@kind_in.register
+def _with_inertia_on_slope(regime: PacedOnSlope, of: Dynamics) -> Kind:
+    return WithInertia(SlowOnSlope(of.body, of.law, regime), regime)
 
 
 def kind_of_motion(dynamics: Dynamics) -> Kind:

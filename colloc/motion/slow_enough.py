@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.gaits.inertia import Paced
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
@@ -65,8 +66,8 @@ class GaitOnMesh:
         NotConvergedError
             If none is found.
         """
-        at = self._body, self._friction, NONE
-        kind = WithInertia(*at, froude) if froude else SlowOnLevel(*at)
+        slow = SlowOnLevel(self._body, self._friction, NONE)
+        kind = WithInertia(slow, Paced(froude)) if froude else slow
         states = None if near is None or not near.states.size else near.states
         along = kind.along(self._mesh, Shapes(self._angles, self._rates, delta), np.empty(0), (states, None))
         if not along.held.all():

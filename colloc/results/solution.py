@@ -28,7 +28,7 @@ from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.system.versions import versions
 from colloc.verification.dry_friction import DryFriction, dry_friction
-from colloc.verification.replay import replay
+from colloc.verification.replayer import replayer
 
 if TYPE_CHECKING:
     import pandas
@@ -183,11 +183,12 @@ class Solution:
 
     @property
     def played_slowly(self) -> float:
-        """The objective of the same gait played so slowly that inertia does not matter."""
+        """The objective of the same gait played so slowly that inertia does not matter; `NotConvergedError` if a slope does not
+        hold it then."""
         p, at = self.problem, self.answer.delta_per_period
         asked: Any = {"quantities": p.objective.integrals, "turn": p.rotation or 0.0, "breaks": self.gait.corner_phases}
         period = {"period": self.froude**-0.5} if self.froude else {}
-        return float(p.objective({**replay(p.body, p.law, self.gait, at, **asked).values, **period}))
+        return float(p.objective({**replayer(p.regime.slowly)(p.body, p.law, self.gait, at, **asked).values, **period}))
 
     def slow_enough(self, loss: float = 0.01) -> float:
         """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than the part `loss`.
@@ -293,7 +294,8 @@ class Solution:
         if not p.froude:
             raise ProblemError(f"{p.name} has no inertia, and is under way at once: from rest is for problems with a froude.")
         played = p.law, self.gait, self.delta_per_period, self.froude
-        ran = motion_from_rest(chain, *played, periods=max(1, int(np.ceil(t[-1]))), breaks=self.gait.corner_phases)
+        begun: Any = {"grade": p.grade, "theta": getattr(self.gait, "theta", None) or 0.0, "breaks": self.gait.corner_phases}
+        ran = motion_from_rest(chain, *played, periods=max(1, int(np.ceil(t[-1]))), **begun)
         states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
         (angles, rates), theta, centre = self.gait(t % 1.0), states[3], states[4:6]
         z = tail_velocity(checked_mass(chain), angles, rates, states[:3])

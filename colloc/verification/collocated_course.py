@@ -18,7 +18,6 @@ from colloc.gaits.inertia import Paced
 from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import NONE
-from colloc.mechanics.inertia import checked_mass
 from colloc.motion.collocated import CollocatedPose, stage_weights
 from colloc.motion.kinds import (
     OMEGA,
@@ -34,7 +33,7 @@ from colloc.motion.kinds import (
 )
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import totals_along
-from colloc.verification.inertial_motion import GaitWithInertia
+from colloc.verification.inertial_motion import gait_with_inertia
 from colloc.verification.slope import GaitOnSlope
 
 
@@ -71,8 +70,8 @@ def _on_slope(regime: Slope, control: ControlProblem, gait: Any, delta: float, m
 @course_in.register
 def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     dynamics = control.dynamics
-    at = checked_mass(dynamics.body), dynamics.law, gait, delta
-    played = GaitWithInertia(*at, froude=regime.at(gait).froude, turn=dynamics.turn)
+    at, regime = (dynamics.body, dynamics.law, gait, delta), regime.at(gait)
+    played = gait_with_inertia(*at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime)
     ran = played.settled(_along(kind_of_motion(dynamics), mesh, gait, delta).edges[:, 0], error)
     return CourseOfGait(ran.at, error)
 
@@ -91,7 +90,7 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     angles, rates = gait(mesh.times)
     spent = (stage_weights(mesh) * own.now.power[mesh.points]).sum(axis=1)
     at_edges = exact.at(mesh.edges)
-    momenta, (angle, *place) = at_edges[:-4], at_edges[-4:-1]
+    angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
     true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()), own.begin)
     found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()), own.begin)
@@ -109,17 +108,21 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     if isinstance(kind, WithInertia):
         shapes = Shapes(angles, rates, delta)
-        out, ends, alone = kind.alone(mesh, shapes, own, momenta[:, :-1], exact.at(mesh.times)[:-4])
+        known_states = np.arange(len(kind.states))  # momenta, and theta if it is one
+        edge_states, at_points = at_edges[known_states], exact.at(mesh.times)[known_states]
+        out, ends, alone = kind.alone(mesh, shapes, own, edge_states[:, :-1], at_points)
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
         here, spent_alone = np.exp(1j * angle[:-1]), (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
         # an error of rotation turns everything after it, and by half of it the direction that counts
         rest = (place[0] - place[0][0]) + 1j * (place[1] - place[1][0])
         rotation, energy = local.rotations - theta, spent_alone - work
-        displacement = here * local.displacements - (x + 1j * y) + 1j * rotation * (0.5 * rest[-1] - rest[1:])
+        displacement = here * local.displacements - (x + 1j * y)
+        if not kind.states[3:]:
+            displacement += 1j * rotation * (0.5 * rest[-1] - rest[1:])
         shares, (_, on_states) = kind.shares(true), kind.slopes(shapes, own)
-        rows, _ = through_motion(kind, mesh, pose, shares.values(), on_states)
+        *_, on_ends = through_motion(kind, mesh, pose, shares.values(), on_states)
         weights = np.array([aims.get(name, 0.0) for name in shares])
-        value += np.einsum("m,mkn,kn->n", weights, kind.on_ends(mesh, rows, on_states), ends - momenta[:, 1:])
+        value += np.einsum("m,mkn,kn->n", weights, on_ends, ends - edge_states[:, 1:])
         value[~alone] = 1.0
     for name, share in kind.shares(true).items():
         turns = rotation if name == "rotation" else 0.0

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -91,6 +91,8 @@ class GaitWithInertia:
         That a period is asked for [rad].
     regime : Regime
         Whose weight pulls, as on a slope; then orientations are from straight uphill.
+    theta : float
+        Angle of the tail link at first [rad].
     """
 
     def __init__(
@@ -104,13 +106,14 @@ class GaitWithInertia:
         breaks: tuple[float, ...] = (),
         turn: float = 0.0,
         regime: Regime = LEVEL,
+        theta: float = 0.0,
     ) -> None:
         self.body, self.friction, self.path, self.delta = body, friction, path, delta
-        self.froude, self.breaks, self.turn, self._regime = froude, breaks, turn, regime
+        self.froude, self.breaks, self.turn, self.regime, self.theta = froude, breaks, turn, regime, theta
         self._momenta = MomentaAt(body, friction, delta, froude)
 
     def slow_momenta(self) -> np.ndarray:
-        """Those at the start of the period if the gait is played slowly, ``(3,)``: where to begin."""
+        """Those at the start of the period if the gait is played slowly on the level, ``(3,)``: where to begin."""
         angles, rates = self.path(np.full(1, _ONE_SIDED))
         z = solve_balance(self.body, self.friction, angles, rates, self.delta).require().z
         posture = self.body.posture(angles)
@@ -120,22 +123,22 @@ class GaitWithInertia:
         """`InertialMotion.states` through a period from a state ``(7,)``, or from momenta ``(3,)`` at the origin."""
 
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            _, _, omega, vx, vy, power, *rates = self._at(t, state[_MOMENTA])
+            _, _, omega, vx, vy, power, *rates = self._at(t, state)
             moved = np.exp(1j * state[_THETA]) * complex(vx, vy)
-            if (pull := self._regime.pull(state[None, _THETA, None])) is not None:
-                rates[:2] += pull[:, 0] / self.froude
             return np.array([*rates, omega - self.turn, moved.real, moved.imag, power]), None
 
-        return followed(slope, np.append(start, np.zeros(7 - start.size)), aim, self.breaks)
+        return followed(slope, np.append(start, [self.theta, 0.0, 0.0, 0.0][start.size - 3 :]), aim, self.breaks)
 
     def mapped(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Momenta after a period ``(3,)`` and their derivatives ``(3, 3)`` with respect to those before it, by differences."""
-        begin = start[:, None] + _APART * np.concatenate([np.zeros((3, 1)), np.eye(3)], axis=1)
+        apart = np.concatenate([np.zeros((1, 3)), _APART * np.eye(3)])
+        begin = np.column_stack([start + apart, np.full(4, self.theta)])[:, : 3 + self.regime.slides]
+        rows = [-3, -2, -1, 2][: begin.shape[1]]
 
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            return np.concatenate([self._at(t, momenta)[-3:] for momenta in state.reshape(4, 3)]), None
+            return np.concatenate([self._at(t, each)[rows] for each in state.reshape(begin.shape)]), None
 
-        end = followed(slope, begin.T.ravel(), _ROUGH, self.breaks).states[:, -1].reshape(4, 3).T
+        end = followed(slope, begin.ravel(), _ROUGH, self.breaks).states[:, -1].reshape(begin.shape)[:, :3].T
         return end[:, 0], (end[:, 1:] - end[:, :1]) / _APART
 
     def closed(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -166,21 +169,43 @@ class GaitWithInertia:
             start = start + _newton_step(gap, slopes)
         raise NotConvergedError(f"at a Froude number of {self.froude:g} the periods do not become alike; try a smaller one.")
 
-    def _at(self, t: float, momenta: np.ndarray) -> np.ndarray:
-        """What `colloc.motion.compiled_momenta` says of a phase and momenta ``(3,)``."""
+    def _at(self, t: float, state: np.ndarray) -> np.ndarray:
+        """What `colloc.motion.compiled_momenta` says of a phase and momenta, with the weight's pull."""
         angles, rates = self.path(np.array([t]))
-        return self._momenta(angles[:, 0], rates[:, 0], momenta)
+        now = self._momenta(angles[:, 0], rates[:, 0], state[_MOMENTA])
+        if self.regime.slides:
+            now[-3:-1] += self.regime.pull(state[None, _THETA, None])[:, 0] / self.froude  # type: ignore[index]
+        return now
 
-
-def passed(end: np.ndarray, turn: float) -> dict[str, float]:
-    """Distance, work and rotation of a period that ends in a state ``(7,)``, if a turn is asked for."""
-    distance = chord_per_way(turn) * float(np.hypot(*end[_PLACE]))
-    return {"distance": distance, "work": float(end[_WORK]), "rotation": float(end[_THETA]) + turn}
+    def passed(self, states: np.ndarray) -> dict[str, float]:
+        """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the last."""
+        gone = states[:, -1] - states[:, 0]
+        way = self.regime.counted(complex(*gone[_PLACE]))
+        work = float(gone[_WORK] + self.regime.grade * gone[_PLACE][0])
+        return {"distance": chord_per_way(self.turn) * way.real, "work": work, "rotation": float(gone[_THETA]) + self.turn}
 
 
 def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """To where a period changes nothing."""
     return np.linalg.solve(np.eye(3) - slopes, gap)
+
+
+def gait_with_inertia(
+    body: Body,
+    friction: Law,
+    gait: Path,
+    delta: float,
+    *,
+    froude: float,
+    breaks: np.ndarray | tuple[float, ...],
+    turn: float = 0.0,
+    regime: Regime = LEVEL,
+) -> GaitWithInertia:
+    """A gait of a body, or a `ProblemError` that says why it cannot be played with inertia."""
+    (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
+    theta = float(getattr(gait, "theta", None) or 0.0)
+    how: Any = {"froude": float(froude), "breaks": at, "turn": turn, "regime": regime, "theta": theta}
+    return GaitWithInertia(chain, friction, joints, delta, **how)
 
 
 def inertial_motion(
@@ -195,6 +220,7 @@ def inertial_motion(
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
     quantities: Iterable[Quantity | str] = (),
+    regime: Regime = LEVEL,
 ) -> InertialMotion:
     """Play a gait with inertia, once the body has settled to a motion in which all periods are alike.
 
@@ -219,6 +245,9 @@ def inertial_motion(
         Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that turns by as much.
     quantities : iterable of Quantity or str
         What shapes and their rates sum up to and is asked for besides.
+    regime : Regime
+        On a slope `problem.regime`, or `colloc.gaits.sloped.Slope`: the gait says where it points, distance and work are as
+        of `colloc.slope_motion`.
 
     Raises
     ------
@@ -236,8 +265,7 @@ def inertial_motion(
     (0.136, True)
     """
     check_finite(positive=True, froude=froude, delta=delta)
-    (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
-    played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at, turn=turn)
+    played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime)
     start, slopes = played.closed(played.slow_momenta())
     totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
 
@@ -245,7 +273,7 @@ def inertial_motion(
         nonlocal start
         ran = played.settled(start, aim, slopes)
         start = ran.states[_MOMENTA, 0]
-        return ran, passed(ran.states[:, -1], turn) | {"period": float(froude) ** -0.5}
+        return ran, played.passed(ran.states) | {"period": float(froude) ** -0.5}
 
     ran, values, errors = to_tolerance(run, tolerance, objective, tolerance, totals)
     multipliers = np.linalg.eigvals(slopes)
@@ -312,10 +340,9 @@ def motion_from_rest(
     check_finite(positive=True, froude=froude, delta=delta, tolerance=tolerance)
     if not is_whole(periods) or periods < 1:
         raise ProblemError(f"periods must be a whole number of at least 1, not {periods!r}.")
-    (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
     check_finite(grade=grade, theta=theta)
     regime = Slope(float(grade)) if grade else LEVEL
-    played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at, regime=regime)
+    played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, regime=regime)
     courses: list[tuple[np.ndarray, np.ndarray]] = []
     passed, start = [], np.zeros(7)
     start[_THETA] = theta

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.gaits.regime import Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Quantity
-from colloc.mechanics.inertia import checked_inertia, kinetic_energy, tail_velocity
+from colloc.mechanics.inertia import kinetic_energy, tail_velocity
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
-from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion, passed
+from colloc.verification.inertial_motion import gait_with_inertia, inertial_motion
 from colloc.verification.played import Path, Replay, lever
 
 _APART = 1e-2
@@ -30,33 +31,36 @@ def inertial_replay(
     gait: Path,
     delta: float,
     *,
-    froude: float,
+    regime: Regime,
     tolerance: float = 1e-6,
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
     quantities: Iterable[Quantity | str] = (),
+    **_: object,
 ) -> Replay:
-    """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`.
+    """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`; the
+    regime says its pace.
 
     Of the result the residual is the change of the momenta in a period; the work of the joints is that against friction and
     what the body gains in kinetic energy.
     """
-    settings: Any = {"tolerance": tolerance, "breaks": breaks, "objective": objective, "turn": turn, "quantities": quantities}
-    ran = inertial_motion(body, friction, gait, delta, froude, **settings)
+    settings: Any = {"breaks": breaks, "turn": turn, "regime": regime}
+    ran = inertial_motion(
+        body, friction, gait, delta, regime.froude, tolerance=tolerance, objective=objective, quantities=quantities, **settings
+    )
     phases = ran.phases % 1.0
-    chain, joints = checked_inertia(body, gait)
-    angles, rates = joints(phases)
-    at = tuple(sorted(float(t) for t in breaks))
-    played = GaitWithInertia(chain, friction, joints, delta, froude=froude, breaks=at, turn=turn)
+    played = gait_with_inertia(body, friction, gait, delta, froude=regime.froude, **settings)
+    chain, (angles, rates) = played.body, played.path(phases)
     from_rest = ran.states[:3, 0]
     with suppress(NotConvergedError):  # Newton's method need not lead to any from there
         from_rest = played.closed(np.zeros(3))[0]
     several = float(np.abs(from_rest - ran.states[:3, 0]).max() > _APART)
-    ends = ran.states[:, -1], played.run(from_rest, tolerance).states[:, -1] if several else ran.states[:, -1]
+    other: Any = played.run(from_rest, tolerance) if several else ran
     z = tail_velocity(chain, angles, rates, ran.states[:3])
-    energy = froude * kinetic_energy(chain, angles, rates, z)[0]
-    here, there = (passed(end, turn) for end in ends)
+    energy = regime.froude * kinetic_energy(chain, angles, rates, z)[0]
+    here, there = (played.passed(each.states) for each in (ran, other))
+    way = ran.states[4:6, -1] - ran.states[4:6, 0]
     return Replay(
         values=ran.values,
         errors=ran.errors,
@@ -69,5 +73,6 @@ def inertial_replay(
         instants=ran.phases.size,
         tail=(phases, z),
         objective=objective,
+        across=regime.counted(complex(*way)).imag,
         multipliers=tuple(map(complex, ran.multipliers)),
     )

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import Body
@@ -153,7 +154,7 @@ def replay(
     if froude:
         from colloc.verification.inertial_replay import inertial_replay  # which makes replays like this one
 
-        played: Any = {"froude": froude, "tolerance": tolerance, "breaks": breaks, "objective": objective}
+        played: Any = {"regime": Paced(froude), "tolerance": tolerance, "breaks": breaks, "objective": objective}
         return inertial_replay(body, friction, path, delta, quantities=quantities, turn=turn, **played)  # type: ignore[arg-type]
     if "period" in objective.uses:
         raise ProblemError(f"the objective {objective.name!r} speaks of the period: give the froude at which it is played.")

@@ -1,4 +1,4 @@
-"""What replays gaits: on the level, on a slope, or with inertia."""
+"""What replays gaits: on the level, on a slope, and with inertia."""
 
 from __future__ import annotations
 
@@ -35,4 +35,6 @@ def _with_inertia(regime: Paced) -> Callable[..., Replay]:
 
 
 def _at_pace(regime: Paced, body: Body, friction: Law, path: Any, delta: float, **asked: Any) -> Replay:
-    return replay(body, friction, path, delta, froude=regime.at(path).froude, **asked)
+    from colloc.verification.inertial_replay import inertial_replay
+
+    return inertial_replay(body, friction, path, delta, regime=regime.at(path), **asked)

@@ -57,7 +57,7 @@ def slope_replay(
     def run(aim: float) -> tuple[tuple[Course, float], dict[str, float]]:
         ran = on.followed(np.array([gait.theta]), aim, _LONGEST / instants)
         theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
-        way = complex(climb, aside) * complex(np.exp(-1j * slope.ahead))
+        way = slope.counted(complex(climb, aside))
         found = {"distance": way.real, "work": float(spent + slope.grade * climb), "rotation": float(theta)}
         sums = on.totals(ran, followed, np.ones(1))[:, 0].tolist()
         return (ran, way.imag), found | {each.name: total for each, total in zip(followed, sums, strict=True)}

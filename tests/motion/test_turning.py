@@ -137,7 +137,7 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     gait = space.member(v)
     per_period = delta * gait.delta_unit
     run, law = (inertial_replay, problem.law) if problem.froude else (replay, problem.law)
-    more = {"froude": problem.froude} if problem.froude else {}
+    more = {"regime": problem.regime} if problem.froude else {}
     fine = run(BODY, law, gait, per_period, breaks=gait.corner_phases, tolerance=1e-6, turn=turn, **more)
     error = mesh_error(control_problem(problem), full.phase_mesh(gait), gait, per_period, 1e-7)
     assert values["distance"] / values["work"] / fine.efficiency - 1 == pytest.approx(error.total, abs=3e-6)

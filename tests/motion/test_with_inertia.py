@@ -7,6 +7,7 @@ import colloc
 from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.summary import summary_lines
 from colloc.gaits.control_problem import control_problem
+from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import objective_from
 from colloc.mechanics.inertia import kinetic_energy, momentum_rates
 from colloc.mechanics.native_kernel import numpy_instead
@@ -143,7 +144,9 @@ def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_f
         ({"gait": colloc.Harmonic(1, "bilateral"), "body": colloc.Chain(), "guess": None, "rotation": 0.0}, "run backwards"),
         ({"gait": colloc.FreePath(2.0)}, "leaves the pace open"),
         ({"body": colloc.ModalBody(), "guess": None}, "of a ModalBody"),
-        ({"grade": 0.1, "rotation": 0.0}, "on a slope inertia"),
+        ({"grade": 0.1, "rotation": 1.0}, "on a slope a body that a period turns"),
+        ({"grade": 2.0, "rotation": 0.0}, "slides down for ever"),
+        ({"grade": 0.1, "rotation": 0.0, "froude": colloc.Free(0.01, 0.1)}, "not sought on a slope"),
         ({"torque_limit": 0.1}, "single joints"),
         ({"scheme": "lobatto-4"}, "gauss-N"),
         ({"formulation": "implicit velocity"}, "only the formulation"),
@@ -239,9 +242,9 @@ def test_a_motion_that_does_not_follow_from_rest_is_another_one(monkeypatch):
 
     closed = GaitWithInertia.closed
     at = colloc.Chain(), colloc.Friction(), ROUND, 1e-2
-    one = inertial_replay(*at, froude=0.1, tolerance=1e-4)
+    one = inertial_replay(*at, regime=Paced(0.1), tolerance=1e-4)
     monkeypatch.setattr(GaitWithInertia, "closed", other_from_rest)
-    two = inertial_replay(*at, froude=0.1, tolerance=1e-4)
+    two = inertial_replay(*at, regime=Paced(0.1), tolerance=1e-4)
     assert (one.several, one.ambiguity) == (0.0, 0.0)
     assert two.several == 1.0
     assert two.ambiguity > 1e-3

@@ -1,0 +1,83 @@
+"""Gaits with inertia on a slope: against differences, the limits slow and level, a body that sets out from rest, and files."""
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc.gaits.control_problem import control_problem
+from colloc.gaits.inertia import PacedOnSlope
+from colloc.gaits.sloped import Slope
+from colloc.motion.kinds import kind_of_motion
+from colloc.reduced.motion import ReducedMotion
+from colloc.search.spaces import space_near
+from colloc.verification.inertial_motion import inertial_motion
+
+LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[1.17], [0.12]], sin=[[0.0], [-0.91]], theta=0.7)
+BODY, FRICTION, DELTA = colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(1.7, 1.0, 1.3), 1e-2
+
+
+def problem(**fields):
+    usual = {"gait": colloc.Harmonic(1), "guess": LEANING, "grade": 0.2, "froude": 0.1, "delta": DELTA}
+    return colloc.Problem("gliding", **({"body": BODY, "friction": FRICTION} | usual | fields))
+
+
+def motion_of(stated):
+    space, v = space_near(stated, LEANING)
+    return ReducedMotion(kind_of_motion(control_problem(stated).dynamics), space.mesh, space), v
+
+
+def played(grade, froude, towards=None):
+    return inertial_motion(BODY, FRICTION, LEANING, DELTA, froude, tolerance=1e-6, regime=Slope(grade, towards))
+
+
+def test_a_collocated_period_is_the_one_that_is_followed_from_instant_to_instant():
+    motion, v = motion_of(problem(towards=0.4, intervals=120))
+    collocated, followed = motion.values(v, DELTA), played(0.2, 0.1, 0.4)
+    for name in ("distance", "work", "rotation"):
+        assert collocated[name] == pytest.approx(followed.values[name], abs=2e-5)
+
+
+def test_gradients_are_those_of_differences():
+    motion, v = motion_of(problem(towards=0.4))
+    gradients, step = motion.gradients(v, DELTA), 1e-5 * np.linspace(-1.0, 1.0, v.size)
+    after, before = (motion.values(v + sign * step, DELTA) for sign in (1, -1))
+    for name in ("distance", "work", "rotation", "across"):
+        assert gradients[name] @ step == pytest.approx(0.5 * (after[name] - before[name]), rel=1e-6, abs=1e-12)
+
+
+def test_slower_and_slower_it_is_the_slow_motion_on_a_slope_to_first_order():
+    slow, off = motion_of(problem(froude=0.0)), []
+    for froude in (4e-4, 2e-4):
+        motion, v = motion_of(problem(froude=froude))
+        off.append(motion.values(v, DELTA)["distance"] - slow[0].values(v, DELTA)["distance"])
+    assert off[0] / off[1] == pytest.approx(2.0, abs=0.1)
+
+
+def test_the_flatter_the_slope_the_nearer_it_is_to_the_level():
+    level = inertial_motion(BODY, FRICTION, LEANING, DELTA, 0.1, tolerance=1e-6)
+    flat = played(1e-9, 0.1)
+    assert flat.work == pytest.approx(level.work, rel=1e-5)
+    assert np.hypot(*flat.states[4:6, -1]) == pytest.approx(level.distance, rel=1e-5)
+    assert flat.states[3, -1] - flat.states[3, 0] == pytest.approx(level.rotation, abs=1e-5)
+
+
+@pytest.fixture(scope="module")
+def found():
+    stated = problem(body=colloc.Chain(), friction=colloc.Friction(), grade=0.05, froude=0.03)
+    return colloc.solve(stated, starts=1)
+
+
+def test_a_gait_is_found_and_certified_and_kept(found, tmp_path):
+    assert found.status == "solved", found.message
+    assert {check.name for check in found.certificate.checks} >= {"stability", "net rotation"}
+    read = colloc.load(colloc.save(found, tmp_path / "gliding.h5"))
+    assert (read.problem.regime, read.certificate) == (PacedOnSlope(grade=0.05, froude=0.03), found.certificate)
+    assert read.gait.theta == found.gait.theta
+
+
+def test_from_rest_a_body_comes_to_the_same_periods(found):
+    far = found.from_rest(np.linspace(0.0, 4.0, 400))
+    last = far.centre[0, -1] - np.interp(3.0, far.t, far.centre[0])
+    first = np.interp(1.0, far.t, far.centre[0])
+    assert last == pytest.approx(found.distance, rel=0.05)
+    assert abs(first - found.distance) > 2 * abs(last - found.distance)
