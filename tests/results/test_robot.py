@@ -160,6 +160,12 @@ def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, 
     assert "cost of transport" not in report_page(three_link)
 
 
+def test_the_mean_square_of_a_sine_is_half_of_its_amplitude_s(three_link, robot):
+    gait = three_link.gait
+    amplitudes = 2 * np.pi / SIZE["period"] * np.hypot(gait.cos[:, 0], gait.sin[:, 0])
+    np.testing.assert_allclose(robot.facts["rms_speed_rad_per_s"], amplitudes / np.sqrt(2), rtol=1e-9)
+
+
 def test_the_motion_has_units(robot):
     dataset = robot.to_xarray()
     assert [dataset[f"joint_{name}"].units for name in ("torques", "speeds", "powers")] == ["N m", "rad/s", "W"]
