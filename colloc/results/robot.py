@@ -11,12 +11,13 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import GRAVITY, checked_mass, inertial_moments, momenta, momentum_rates, tail_velocity
 from colloc.mechanics.law import rate_independent
 from colloc.mechanics.links import LinkVelocity
@@ -49,28 +50,30 @@ def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
     Raises
     ------
     ProblemError
-        If the body has no joints that forces on its parts would turn or it is on a slope.
+        If the body has no joints that forces on its parts would turn.
     """
     problem = solution.problem
     if not problem.body.force_names:
         raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
-    if problem.regime.slides:
-        raise ProblemError(f"{problem.name} is on a slope: torques of joints that lift weight are not worked out.")
-    (angles, rates), z, delta = solution.gait(t), solution.sample(t).z, solution.delta_per_period
+    motion, body, delta = solution.sample(t), problem.body, solution.delta_per_period
+    (angles, rates), z, load = solution.gait(t), motion.z, problem.regime.pull(motion.theta[None])
     at = problem.law, angles, rates
     if not problem.froude:
-        z = problem.body.solve(*at, delta, start=z).z
-    friction = np.asarray(joint_moments(problem.body, at[0], angles, problem.body.forces(*at, z, delta), delta))
-    return friction + _of_inertia(solution, t, z) if problem.froude else friction
+        balanced = body.solve if load is None else partial(solve_balance, body, load=load)  # type: ignore[arg-type]
+        z = balanced(*at, delta, start=z).z
+    moments = np.asarray(joint_moments(body, at[0], angles, body.forces(*at, z, delta), delta, load))
+    return moments + _of_inertia(solution, t, z, load) if problem.froude else moments
 
 
-def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None) -> np.ndarray:
     """Torques of the motors that change how the links move, at phases with tail velocities z."""
     problem, (angles, rates) = solution.problem, solution.gait(t)
     body, froude = checked_mass(problem.body), solution.froude
     link = body.velocity(body.posture(angles), rates, z)
     states = momenta(body, body.posture(angles), link)
     grows = momentum_rates(body, problem.law, angles, rates, states, delta=solution.delta_per_period, froude=froude).rates
+    if load is not None:
+        grows[:2] += load / froude
 
     def later(by: float) -> LinkVelocity:
         then, pace = solution.gait(t + by)
@@ -103,8 +106,8 @@ class Robot:
     Raises
     ------
     ProblemError
-        If a number is not positive, the body has no joints, it is on a slope, the gait is for another pace, or
-        `max_speed` or `max_torque` is given where torques depend on the pace.
+        If a number is not positive, the body has no joints, the gait is for another pace, or `max_speed` or `max_torque` is
+        given where torques depend on the pace.
 
     Examples
     --------
@@ -127,7 +130,7 @@ class Robot:
         check_finite(positive=True, **{name: getattr(self, name) for name in ("length", "mass", "period", "gravity")})
         problem, n = self.solution.problem, self.solution.gait.n_joint
         if (own := self.solution.froude) and abs(self.froude / own - 1.0) > _PACE:
-            needed = math.sqrt(self.length / (self.gravity * own))
+            needed = math.sqrt(self.length / (self.pressing * own))
             raise ProblemError(
                 f"{problem.name} is the best gait for the Froude number {own:.4g}: a robot of {self.length:g} m has "
                 f"to take {needed:.4g} s a period, not {self.period:g}: solve again with froude={self.froude:.4g}."
@@ -142,14 +145,19 @@ class Robot:
                     )
 
     @property
+    def pressing(self) -> float:
+        """The part of gravity that presses the robot on the ground [m/s^2]: less than all of it on a slope."""
+        return self.gravity * math.cos(math.atan(self.solution.problem.grade))
+
+    @property
     def torque_unit(self) -> float:
         """m g L [N m], which is that of work too [J]."""
-        return self.mass * self.gravity * self.length
+        return self.mass * self.pressing * self.length
 
     @property
     def froude(self) -> float:
         """L / (g T^2)."""
-        return self.length / (self.gravity * self.period**2)
+        return self.length / (self.pressing * self.period**2)
 
     def torques(self, t: np.ndarray) -> np.ndarray:
         """Of the joints [N m] at phases t ``(n_time,)``, ``(n_joint, n_time)``."""
@@ -201,7 +209,7 @@ class Robot:
             "motor_work_per_period_J": self.period * float(_mean(np.maximum(powers, 0.0)).sum()),
             "mean_power_W": work / self.period,
             "peak_power_W": float(total.max()),
-            "cost_of_transport": measured.work / measured.distance,
+            "cost_of_transport": measured.work / measured.distance * self.pressing / self.gravity,
             "froude_number": self.froude,
             "peak_torque_N_m": np.abs(torques).max(axis=1).tolist(),
             "rms_torque_N_m": np.sqrt(_mean(torques**2)).tolist(),
@@ -217,7 +225,11 @@ class Robot:
         at = problem.body, problem.law, solution.gait, solution.answer.delta_per_period
         found: dict[str, Any] = {}
         if problem.froude:
-            return {"played_slowly": solution.played_slowly}
+            with suppress(NotConvergedError):
+                found["played_slowly"] = solution.played_slowly
+            return found
+        if problem.regime.slides:
+            return found
         with suppress(NotConvergedError):
             found["inertia_takes"] = inertial_loss(*at, self.froude, breaks=solution.gait.corner_phases)
         with suppress(NotConvergedError):
@@ -287,8 +299,11 @@ class Robot:
                 "of this period."
             )
         if problem.froude:
-            slowly = f"{problem.objective.short} {f['played_slowly']:.4g} instead of {self.solution.measured.value:.4g}"
-            return [*said, f"Torques and power include inertia; played slowly the gait would have {slowly}."]
+            said.append("Torques and power include inertia")
+            if (slowly := f.get("played_slowly")) is not None:
+                value = f"{problem.objective.short} {slowly:.4g} instead of {self.solution.measured.value:.4g}"
+                said[-1] += f"; played slowly the gait would have {value}"
+            return [*said[:-1], f"{said[-1]}."]
         pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
         lost, slow = f.get("inertia_takes"), f.get("slow_enough_period_s")
         if lost is None:

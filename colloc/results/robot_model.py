@@ -58,8 +58,11 @@ def mjcf(robot: Robot, *, planar: bool = False) -> str:
     chain, half, law = _chain(robot), 0.5 * _height(robot), robot.solution.problem.law
     root = Element("mujoco", model=robot.solution.problem.name)
     SubElement(root, "compiler", angle="radian", autolimits="true")
-    gravity = 0.0 if planar else -robot.gravity
-    SubElement(root, "option", timestep="0.001", gravity=f"0 0 {gravity:.9g}", cone="elliptic", integrator="implicitfast")
+    pull = robot.solution.problem.regime.pull(np.array([[getattr(robot.solution.gait, "theta", None) or 0.0]]))
+    ahead, aside = (0.0, 0.0) if pull is None else pull[:, 0]  # the floor is level, and gravity leans
+    g = 0.0 if planar else robot.pressing
+    gravity = " ".join(f"{g * part + 0.0:.9g}" for part in (ahead, aside, -1.0))
+    SubElement(root, "option", timestep="0.001", gravity=gravity, cone="elliptic", integrator="implicitfast")
     look = SubElement(root, "asset")
     colours = {"rgb1": "0.55 0.57 0.6", "rgb2": "0.45 0.47 0.5", "width": "100", "height": "100"}
     SubElement(look, "texture", colours, name="squares", type="2d", builtin="checker")

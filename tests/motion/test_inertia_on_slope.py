@@ -9,6 +9,8 @@ from colloc.gaits.inertia import PacedOnSlope
 from colloc.gaits.sloped import Slope
 from colloc.motion.kinds import kind_of_motion
 from colloc.reduced.motion import ReducedMotion
+from colloc.results.robot import joint_torques
+from colloc.results.robot_model import mjcf
 from colloc.search.spaces import space_near
 from colloc.verification.inertial_motion import inertial_motion
 
@@ -81,3 +83,23 @@ def test_from_rest_a_body_comes_to_the_same_periods(found):
     first = np.interp(1.0, far.t, far.centre[0])
     assert last == pytest.approx(found.distance, rel=0.05)
     assert abs(first - found.distance) > 2 * abs(last - found.distance)
+
+
+@pytest.fixture(scope="module")
+def slow():
+    gait = colloc.Harmonic(1, "bilateral")
+    return colloc.solve(colloc.Problem("uphill", gait=gait, delta=DELTA, grade=0.1, mesh_tolerance=3e-4), starts=1)
+
+
+@pytest.mark.parametrize("which", ["found", pytest.param("slow", marks=pytest.mark.slow)])
+def test_torques_of_a_robot_lift_its_weight_too(which, request):
+    solution, t = request.getfixturevalue(which), np.linspace(0.0, 1.0, 801)[:-1]
+    power = (joint_torques(solution, t) * solution.gait(t)[1]).sum(axis=0)
+    assert power.mean() == pytest.approx(solution.work, rel=1e-3)
+    grade, cosine = solution.problem.grade, np.cos(np.arctan(solution.problem.grade))
+    pace = solution.froude or 0.01
+    robot = solution.robot(length=1.0, mass=2.0, period=(1.0 / (9.81 * cosine * pace)) ** 0.5)
+    assert robot.facts["work_per_period_J"] == pytest.approx(2.0 * 9.81 * cosine * solution.work)
+    x, y, z = (float(part) for part in mjcf(robot).split('gravity="')[1].split('"')[0].split())
+    assert np.hypot(x, y) / abs(z) == pytest.approx(grade)
+    assert np.hypot(np.hypot(x, y), z) == pytest.approx(9.81)
