@@ -118,7 +118,7 @@ def _at_the_end(problem: Problem, gait: AnyGait) -> Optimum | None:
     if steep or not here.violation < near or problem.delta == problem.delta_start:
         return None
     with suppress(NotConvergedError):
-        found = converged(space, v, problem.delta, ROUGH)
+        found = here if here.optimal else converged(space, v, problem.delta, ROUGH)
         if found.optimal and np.abs(found.v - v).max() < near and not is_viscous(found):
             return found
     return None

@@ -101,13 +101,14 @@ def _finer(optimum: Optimum, meshes: _Meshes) -> Optimum | None:
     if plan is not None:
         meshes.count, meshes.kept = meshes.count + 1, np.concatenate([meshes.kept, plan.kept])
         space = remeshed(space, optimum.gait, plan.edges, plan.scheme)
-        effort = FINE if meshes.count > _SAME_AIM else ROUGH
+        known = optimum.iterations == 0  # the search began at it, and no mesh will move it far
+        effort = FINE if known or meshes.count > _SAME_AIM else ROUGH
         try:
             v = space.parameters(optimum.gait)
         except NotConvergedError:
             v = space.laid(optimum.gait)  # breaks a row a little, as its own mesh lets it
-    known = optimum.curvature if optimum.v.size == v.size else None
-    return converged(space, v, optimum.delta, effort, known).after(*optimum.history)
+    curvature = optimum.curvature if optimum.v.size == v.size else None
+    return converged(space, v, optimum.delta, effort, curvature).after(*optimum.history)
 
 
 def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:
