@@ -201,7 +201,6 @@ ADAPTIVE = (
     "replay",
     "panels",
     "adaptive_motion",
-    "followed_motion",
     "slope",
     "slope_replay",
     "heading_map",

@@ -36,7 +36,7 @@ class Panels(NamedTuple):
     rotation as it is seen from axes that turn evenly by the turn that is asked for, velocity of the centre of mass in the body
     frame (complex), power, power of the joints ``(n, 5)``; densities of k quantities ``(n, 5, k)``; residual and lever
     ``(n, 5)``; shares of the actuators' limits ``(n, 5, n_share)``; and how far all balanced motions lie apart
-    ``(n, 5, 3 + k)`` (`colloc.verification.followed_motion.FollowedMotion`).
+    ``(n, 5, 3 + k)`` (`colloc.motion.followed_motion.FollowedMotion`).
     At last what halving the panel changed that each is half of ``(n, 5)`` (see `changes`)."""
 
     left: np.ndarray

@@ -7,7 +7,7 @@ These errors add up as magnitudes: kinks of stick and slip lie anywhere between 
 well cancel by accident.
 
 With unequal coefficients several velocities may balance an instant. The replay then follows one branch in time, and says how
-far the others would lead (`colloc.verification.followed_motion`).
+far the others would lead (`colloc.motion.followed_motion`).
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import LENGTH, Instants, PathLimit, PathLimits, Quantity, limits_of, quantities_of
 from colloc.mechanics.law import Law
+from colloc.motion.followed_motion import FORWARDS, followed_motion
 from colloc.system.errors import ProblemError
-from colloc.verification.followed_motion import FORWARDS, followed_motion
 from colloc.verification.panels import WHOLE, Panels, begun, changes, halves, increments, left_over, travelled
 from colloc.verification.played import MixedPath, Path, Replay, lever
 

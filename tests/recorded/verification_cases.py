@@ -6,11 +6,11 @@ from colloc import Chain, Corners, Fourier, Friction, Harmonic, ModalBody, Polyg
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.objective import Objective
 from colloc.mechanics.densities import DRIVEN_WORK, torque_and_power
+from colloc.motion.followed_motion import BACKWARDS, followed_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.measured import measured
 from colloc.verification.adaptive_motion import fine_motion
-from colloc.verification.followed_motion import BACKWARDS, followed_motion
 from colloc.verification.heading_map import heading_map
 from colloc.verification.kinks import kink_phases
 from colloc.verification.mesh_error import mesh_error

@@ -10,8 +10,8 @@ from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.motion.followed_motion import BACKWARDS, FORWARDS, followed_motion
 from colloc.system.errors import NotConvergedError
-from colloc.verification.followed_motion import BACKWARDS, FORWARDS, followed_motion
 from colloc.verification.replay import replay
 
 BODY = Chain()
