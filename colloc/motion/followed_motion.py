@@ -21,6 +21,8 @@ from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
 
 FORWARDS, BACKWARDS = 1, -1
+_SAME = 1e-5
+"""Velocities that differ by less, relative to the largest, are one."""
 
 
 class FollowedMotion(NamedTuple):
@@ -76,6 +78,22 @@ def followed_motion(
     for now, previous in _order(found.number > 1, sense):
         z[:, now] = _nearest(found.z[:, :, now], found.sign[:, now], z[:, previous] if before is None else before[:, now])
     return FollowedMotion(z, apart)
+
+
+def on_one_branch(body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
+    """The motion followed in time, ``(3, n_time)``, from balanced velocities z that were solved for one by one.
+
+    Those are kept where they are the same when each is solved for from the one before: else some lie on one branch and some on
+    another, as a solver's steps fell.
+    """
+    if friction.associated or not body.looks_for_all_velocities:
+        return z
+    before = np.concatenate([z[:, :1], z[:, :-1]], axis=1)
+    again = body.solve(friction, angles, rates, delta, start=before).z
+    if not np.abs(again - z).max() > _SAME * np.abs(z).max():
+        return z
+    followed = followed_motion(body, friction, angles, rates, delta)
+    return z if followed is None else followed.z
 
 
 def _order(several: np.ndarray, sense: int) -> Iterator[tuple[int, int]]:

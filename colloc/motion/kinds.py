@@ -34,6 +34,7 @@ from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
 from colloc.mechanics.law import Law
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
+from colloc.motion.followed_motion import on_one_branch
 from colloc.motion.heading import heading, heading_shares, momenta_image
 from colloc.motion.on_slope import balance_on_slope
 from colloc.motion.states import CollocatedStates, Rates
@@ -179,6 +180,9 @@ class SlowOnLevel:
     ) -> Along:
         at = self.friction, shapes.angles, shapes.rates, shapes.delta
         solved = self.body.solve(*at, start=near[1], tolerance=tolerance)
+        if near[1] is None and solved.converged.all():
+            followed = on_one_branch(self.body, *at, solved.z)
+            solved = solved if followed is solved.z else self.body.solve(*at, start=followed, tolerance=tolerance)
         held = solved.residual < _ACCEPTED * tolerance
         return Along(begin, np.empty((0, held.size)), solved.z, self.body.motion(*at, solved), held, solved=solved)
 

@@ -16,6 +16,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
+from colloc.motion.followed_motion import on_one_branch
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.played import Path
 
@@ -58,9 +59,12 @@ def rates_at(
     turn: float = 0.0,
 ) -> Rates:
     """Solved velocities of a path at phases t of any shape, per period, and densities; `near` ``(3, ...)``: tail velocities to
-    start from."""
+    start from. Without them phases ascend, and one branch is followed in time where several motions are balanced."""
     angles, rates = path(t.ravel())
-    start = None if near is None else near.reshape(3, -1)
+    if near is None:
+        start = on_one_branch(body, friction, angles, rates, delta, body.solve(friction, angles, rates, delta).require().z)
+    else:
+        start = near.reshape(3, -1)
     solved = body.solve(friction, angles, rates, delta, start=start).require()
     now = body.motion(friction, angles, rates, delta, solved)
     at = Instants(body, friction, angles, rates, delta, z=now.z)
@@ -208,7 +212,14 @@ def fine_motion(
         half = 0.5 * np.repeat(width[chosen], 2)
         start = np.repeat(left[chosen], 2)
         start[1::2] += half[1::2]
-        new_rates, new = solved(start, half, (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1))
+        if friction.associated:
+            near = (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1)
+        else:  # no mean of branches is near any of them
+            nodes = left[:, None] + width[:, None] * PANEL_RULE.c
+            wanted = start[:, None] + half[:, None] * PANEL_RULE.c
+            before = np.maximum(np.searchsorted(nodes.ravel(), wanted) - 1, 0)
+            near = rates.z.reshape(3, -1)[:, before]
+        new_rates, new = solved(start, half, near)
         middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
         # the whole panel, and its polynomials half way, against the two halves
         spin, move = new[0][0::2] + new[0][1::2], new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2]
