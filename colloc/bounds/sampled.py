@@ -71,7 +71,6 @@ class Budget:
 
 
 QUICK = Budget()
-THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4)
 FOUR_LINKS = Budget(5, None, 6, 40, 80, starts=400, tolerance=1e-3, first=5, smoothing=1e-4, together=2)
 """Functions of two joint angles at a time: 81 unknowns do better than 108 that are products of three."""
 FIVE_LINKS = replace(FOUR_LINKS, intervals=3, first=3, tolerance=3e-3)

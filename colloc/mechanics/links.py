@@ -156,10 +156,6 @@ class Links:
         """Link tangent angles in the body frame, ``(n_link, n_time)``, from joint angles ``(n_joint, n_time)``."""
         return namespace(angles).matmul(self._joint_sum(TAIL), angles)
 
-    def relative_turning(self, rates: np.ndarray, link: int) -> np.ndarray:
-        """How fast the links turn relative to one of them, ``(n_link, n_time)``."""
-        return self._joint_sum(link) @ rates
-
     def posture(self, angles: Array, reference: int | None = TAIL) -> Posture:
         """Directions and midpoints of the links in the body frame, from joint angles ``(n_joint, n_time)``."""
         xp = namespace(angles)

@@ -164,7 +164,3 @@ class TensorSpline:
 def _products(values: np.ndarray, more: np.ndarray) -> np.ndarray:
     """Of each of the values ``(n, m)`` with each of more ``(n, k)``, ``(n, m k)``."""
     return (values[:, :, None] * more[:, None]).reshape(len(values), -1)
-
-
-def _unit(joint: int, n_joint: int) -> tuple[int, ...]:
-    return tuple(int(j == joint) for j in range(n_joint))

@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from colloc.system.replaced_file import replaced_file
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
-"""The palette of Okabe and Ito."""
+BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+"""Of the palette of Okabe and Ito."""
 GREY, INK = "#777777", "#1d2329"
 SERIES = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, GREY, "#8a7a00")
 """Colours of links or joints; the palette's yellow is darkened to be read on white."""
