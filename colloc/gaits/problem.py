@@ -17,7 +17,7 @@ from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_va
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.gaits.sloped import slope_from
-from colloc.gaits.symmetry import NONE, check_symmetric
+from colloc.gaits.symmetry import ANTIPODAL, NONE, check_symmetric
 from colloc.mechanics.bodies import FULL, Body, formulations
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import PathLimit, PathLimits, Quantity, stated_limit, torque_and_power
@@ -347,6 +347,13 @@ class Problem:
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
                 "reverse the motion (the scallop theorem). Give the body three links, mu_b different from mu_f, or the problem "
                 "a froude."
+            )
+        alike = self.body.n_joint == 1 and self.law.reversible and self.body.symmetric
+        if alike and self.gait.symmetry == ANTIPODAL and not self.grade:
+            raise ProblemError(
+                "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: the body moves along its own axis of "
+                "symmetry, and as far back while it is bent to the other side. Take the class without symmetry, links that "
+                "differ, or mu_b different from mu_f."
             )
 
     @property

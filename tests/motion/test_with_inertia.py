@@ -261,6 +261,21 @@ def test_kinetic_energy_is_that_of_dense_points():
     assert kinetic_energy(body, angles, rates, z)[0, 0] == pytest.approx(expected, rel=1e-5)
 
 
+def test_two_equal_links_go_nowhere_by_an_antipodal_gait_and_such_a_problem_is_refused():
+    """They move along their axis of symmetry, and as far back while bent to the other side; links that differ do not."""
+    gait = colloc.Fourier(mean=[0.0], cos=[[1.1, 0.0, 0.3]], sin=[[0.0, 0.0, 0.4]])
+
+    def distance(body):
+        whole = objective_from("distance + work")  # no error is small beside no distance
+        return colloc.replay(body, colloc.Friction(2.0), gait, 1e-2, froude=0.1, tolerance=1e-4, objective=whole).distance
+
+    assert distance(colloc.Chain((0.5, 0.5))) < 1e-6 < 1e-4 < distance(colloc.Chain((0.4, 0.6)))
+    stated = {"friction": colloc.Friction(2.0), "gait": colloc.Harmonic(3, "antipodal"), "guess": None, "rotation": 0.0}
+    with pytest.raises(colloc.ProblemError, match="own axis of symmetry"):
+        problem(body=colloc.Chain((0.5, 0.5)), **stated)
+    assert problem(body=colloc.Chain((0.4, 0.6)), **stated).froude == 0.1
+
+
 def test_where_no_motion_is_found_the_search_says_so(monkeypatch):
     closed = WithInertia._closed
     monkeypatch.setattr(WithInertia, "_closed", lambda *arguments: (*closed(*arguments)[:2], False))
