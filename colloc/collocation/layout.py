@@ -12,6 +12,7 @@ from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
+from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 
 RADIANS = 2 * np.pi
@@ -35,12 +36,14 @@ class Layout:
     n: int
     integrals: tuple[Quantity, ...] = ()
     """What `totals` are of, over the solved part of the period."""
+    pace: int = -1
+    """Which of the parameters is the logarithm of the period, if one is."""
 
     def of_period(self, names: Iterable[str]) -> np.ndarray:
         """``(n, 1)``: where quantities of the solved part of the period are; of the rotation its end and its begin."""
         ends = {"distance": [self.distance[0, -1]], "work": [self.work[0, -1]], "rotation": self.theta[0, [-1, 0]]}
         own = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
-        own["period"] = self.parameters[-1]  # its logarithm
+        own["period"] = self.parameters[self.pace]  # its logarithm
         return np.concatenate([(ends | own)[name] for name in names])[:, None]
 
 
@@ -66,7 +69,8 @@ def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = No
     for name, (rows, columns) in sizes.items():
         indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
         start += rows * columns
-    return Layout(n=start, **indices, integrals=control.aims.integrals)
+    pace = -len(kind_of_motion(control.dynamics).told)  # which comes first of what a gait tells
+    return Layout(n=start, **indices, integrals=control.aims.integrals, pace=pace)
 
 
 def distance_and_work(control: ControlProblem, layout: Layout, x: np.ndarray) -> tuple[float, float]:

@@ -84,7 +84,7 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
 
     sites = np.empty(mesh.n_point, dtype=int)
     sites[mesh.points] = mesh.sites
-    paces = np.repeat(layout.parameters[-1:], mesh.n_point, axis=1)[: dynamics.regime.free_pace]
+    paces = np.repeat(layout.parameters[[layout.pace]], mesh.n_point, axis=1)[: dynamics.regime.free_pace]
     point_gather = np.concatenate(
         [layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces, layout.momenta[:, sites], paces]
     )

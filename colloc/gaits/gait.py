@@ -93,15 +93,16 @@ class GaitFunction:
 
     @property
     def pointing(self) -> list[str]:
-        """A line that says where it points, or how fast it is played, if it does."""
+        """Lines that say how fast it is played and where it points, if it does."""
+        found = []
         if self.log_period is not None:
             period = np.exp(self.log_period)
             said = f"a period takes {period:.5g} sqrt(L/g), {period / np.sqrt(GRAVITY):.3g} s for a body of 1 m"
-            return [f"{said}: Froude number {period**-2:.4g}"]
-        if self.theta is None:
-            return []
-        turned = np.degrees(np.angle(np.exp(1j * self.theta)))
-        return [f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)"]
+            found.append(f"{said}: Froude number {period**-2:.4g}")
+        if self.theta is not None:
+            turned = np.degrees(np.angle(np.exp(1j * self.theta)))
+            found.append(f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)")
+        return found
 
     def named(self, coordinate: str) -> Any:
         """The gait of a body that calls its shape coordinates so."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.regime import LEVEL, Regime
-from colloc.gaits.sloped import Slope
+from colloc.gaits.sloped import OnSlope, Slope
 from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.gaits.told import Telling, telling
 from colloc.mechanics.bodies import FULL, Body
@@ -50,9 +50,14 @@ class AtFreePace(Telling):
 
     def parameters(self, gait: Any) -> np.ndarray:
         """The parameter vector of the member nearest to a gait; at the middle of the range if that does not say its pace."""
+        return np.append(self.without.parameters(gait), self._said(gait))
+
+    def nearest(self, gait: Any) -> np.ndarray:
+        return np.append(self.without.nearest(gait), self._said(gait))
+
+    def _said(self, gait: Any) -> float:
         periods = -0.5 * np.log(self.pace)
-        said = periods.mean() if gait.log_period is None else np.clip(gait.log_period, periods[1], periods[0])
-        return np.append(self.level.parameters(gait), said)
+        return float(periods.mean() if gait.log_period is None else np.clip(gait.log_period, periods[1], periods[0]))
 
 
 @dataclass(frozen=True)
@@ -96,11 +101,10 @@ class Paced(Regime):
         return telling(AtFreePace, level, pace=self.free)
 
     def describe(self) -> str:
-        where = f"{ground}; " if (ground := super().describe()) else ""
         if self.free is not None:
-            return f"{where}played at the best Froude number from {self.free.low:.4g} to {self.free.high:.4g}"
+            return f"played at the best Froude number from {self.free.low:.4g} to {self.free.high:.4g}"
         period = 1 / np.sqrt(GRAVITY * self.froude)
-        return f"{where}played at the Froude number {self.froude:.4g}: a body of 1 m takes {period:.3g} s a period"
+        return f"played at the Froude number {self.froude:.4g}: a body of 1 m takes {period:.3g} s a period"
 
     def in_units_of(self, unit: float) -> Self:
         return replace(super().in_units_of(unit), froude=self.froude / unit)  # where time counts the unit is 1
@@ -142,10 +146,12 @@ class PacedOnSlope(Paced, Slope):
     def slowly(self) -> Regime:
         return Slope(self.grade, self.towards)
 
+    def describe(self) -> str:
+        return f"{self.slowly.describe()}; {super().describe().split(':')[0]}"
+
     def class_of(self, gait_class: Any) -> Any:
-        if self.free is not None:
-            raise ProblemError("the pace is not sought on a slope: state one Froude number, and ask for nothing of the period.")
-        return super().class_of(gait_class)
+        self.slowly.class_of(gait_class)  # refuses what has no place on a slope
+        return telling(OnSlope, Paced(self.froude, self.free).class_of(gait_class))
 
 
 def paced_from(froude: Any, slope: Slope | None, *, timed: bool) -> Paced:

@@ -119,8 +119,8 @@ class OnSlope(Telling):
         """The parameter vector of the member nearest to a gait; its last one is NaN if that does not say where it points, or
         would, started in another phase."""
         if gait.theta is None or not self.in_phase(gait):
-            return np.append(self.level.parameters(gait), np.nan)
-        return np.append(self.level.nearest(gait), gait.theta)
+            return np.append(self.without.parameters(gait), np.nan)
+        return np.append(self.without.nearest(gait), gait.theta)
 
 
 def _checked_grade(grade: object) -> float:

@@ -24,44 +24,49 @@ class Telling(LinearClass):
     _own: ClassVar[tuple[tuple[str, Any], ...]]
 
     @property
-    def level(self) -> Any:
+    def without(self) -> Any:
+        """The class that does not say it."""
         return type(self).__bases__[1](**{f.name: getattr(self, f.name) for f in fields(self)})  # type: ignore[arg-type]
 
+    @property
+    def level(self) -> Any:
+        return self.without.level
+
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made, (type(self).__bases__[0], self.level, self._own)
+        return _made, (type(self).__bases__[0], self.without, self._own)
 
     def series(self, harmonics: int) -> Any:
-        return self.level.series(harmonics)
+        return self.without.series(harmonics)
 
     def _basis(self, n_joint: int) -> np.ndarray:
         """No angle depends on the number."""
-        basis = super()._basis(n_joint)
+        basis = self.without._basis(n_joint)
         return np.column_stack([basis, np.zeros(len(basis))])
 
     def _bounds(self, body: Body, limit: float, least: float, most: float) -> tuple[np.ndarray, np.ndarray]:
-        lower, upper = self.level.bounds(body, limit)
+        lower, upper = self.without.bounds(body, limit)
         return np.append(lower, least), np.append(upper, most)
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
-        gait = self.level.member(parameters[:-1], n_joint)
+        gait = self.without.member(parameters[:-1], n_joint)
         return gait if np.isnan(parameters[-1]) else replace(gait, **{self.tells: float(parameters[-1])})
 
     def through(self, gait: Any) -> Any:
-        near = self.level.through(gait)
+        near = self.without.through(gait)
         return replace(near, **{self.tells: getattr(gait, self.tells)}) if gait.is_series else near
 
     # where searches begin: the number is not drawn
     def first_guess(self, gait: Any) -> Any:
-        return self.level.first_guess(gait)
+        return self.without.first_guess(gait)
 
     def dimension(self, n_joint: int) -> int:
-        return self.level.dimension(n_joint)
+        return self.without.dimension(n_joint)
 
     def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
-        return self.level.drawn(unit, n_joint)
+        return self.without.drawn(unit, n_joint)
 
     def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
-        return self.level.moved(gait, step, fall, rng)
+        return self.without.moved(gait, step, fall, rng)
 
 
 def telling(kind: type[Telling], gait_class: Any, **own: Any) -> Any:

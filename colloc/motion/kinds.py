@@ -93,8 +93,8 @@ class Passed(NamedTuple):
 
 
 class Share(NamedTuple):
-    """What makes a number of a period grow: a way along a direction, the size of which counts; rotation, bend, work; and what
-    the gait tells."""
+    """What makes a number of a period grow: a way along a direction, the size of which counts; rotation, bend, work; and the
+    first that the gait tells."""
 
     side: complex = 0.0
     rotation: float = 0.0
@@ -241,7 +241,7 @@ class _WithStates:
         on_begin, on_rates, on_ends = self._equations(mesh).pulled_back(on_states[self._grow, :k], of_states)
         on_out[:, self._grow - OMEGA] += on_rates.reshape(m, k, *on_theta.shape[1:])
         on_more = np.einsum("mrt,rkt->mk", on_rates, on_states[self._grow, k:])
-        return np.concatenate([on_begin[:, turns], on_more], axis=1), on_ends
+        return np.concatenate([on_more, on_begin[:, turns]], axis=1), on_ends
 
 
 class SlowOnSlope(_WithStates):
@@ -324,15 +324,15 @@ class WithInertia(_WithStates):
         )
         self._slow, self._regime, self._image, self._chain = slow, regime, image, checked_mass(slow.body)
         self._timed = ("period",) if regime.free_pace else ()
-        self.states, self.told = STATES + slow.states, slow.told + ("log_period",) * regime.free_pace
+        self.states, self.told = STATES + slow.states, ("log_period",) * regime.free_pace + slow.told
         self._grow = np.array([6, 7, 8] + [OMEGA] * len(slow.states))
         self.instants = slow.instants
 
     def counted(self, passed: Passed) -> dict[str, float]:
-        return self._slow.counted(passed) | {name: float(np.exp(passed.told[-1])) for name in self._timed}
+        return self._slow.counted(passed) | {name: float(np.exp(passed.told[0])) for name in self._timed}
 
     def shares(self, passed: Passed) -> dict[str, Share]:
-        return self._slow.shares(passed) | {name: Share(told=float(np.exp(passed.told[-1]))) for name in self._timed}
+        return self._slow.shares(passed) | {name: Share(told=float(np.exp(passed.told[0]))) for name in self._timed}
 
     def along(
         self,
@@ -360,14 +360,14 @@ class WithInertia(_WithStates):
         return Along(begin, states, z, now, np.full(mesh.n_point, held), edges=edges)
 
     def _slow_states(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray) -> np.ndarray:
-        body, slow = self._chain, self._slow.along(mesh, shapes, begin)
+        body, slow = self._chain, self._slow.along(mesh, shapes, begin[len(self._timed) :])
         posture = body.posture(shapes.angles)
         return np.concatenate([momenta(body, posture, body.velocity(posture, shapes.rates, slow.z)), slow.states])
 
     def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
         """The states with momenta that repeat every period, by Newton's method from others ``(n_state, n_point)``; what the
         body does with them (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any."""
-        out, first = near, np.append(near[: len(STATES), 0], begin[: near.shape[0] - len(STATES)])
+        out, first = near, np.append(near[: len(STATES), 0], begin[len(self._timed) :])
 
         froude = self._froude_at(shapes, begin)
 
@@ -408,7 +408,7 @@ class WithInertia(_WithStates):
 
     def _froude_at(self, shapes: Shapes, begin: np.ndarray) -> float:
         """Momentum grows by what friction gives it in a unit of time, and has as much to grow."""
-        froude = float(np.exp(-2.0 * begin[-1])) if self._timed else self._regime.froude
+        froude = float(np.exp(-2.0 * begin[0])) if self._timed else self._regime.froude
         return froude * shapes.unit**2
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:

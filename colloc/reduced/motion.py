@@ -181,7 +181,8 @@ class ReducedMotion:
         on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS]) + on_points[:, :-1].transpose(0, 2, 1)
         found = self.shapes.pulled_back(s.v, on_shape, on_pace)
         if kind.told:
-            found[:, -len(kind.told) :] += on_begin + np.array([share.told for share in shares])[:, None]
+            found[:, -len(kind.told) :] += on_begin
+            found[:, -len(kind.told)] += [share.told for share in shares]
         return found
 
     def _slopes(self, s: _State) -> tuple[np.ndarray, np.ndarray]:

@@ -146,7 +146,6 @@ def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_f
         ({"body": colloc.ModalBody(), "guess": None}, "of a ModalBody"),
         ({"grade": 0.1, "rotation": 1.0}, "on a slope a body that a period turns"),
         ({"grade": 2.0, "rotation": 0.0}, "slides down for ever"),
-        ({"grade": 0.1, "rotation": 0.0, "froude": colloc.Free(0.01, 0.1)}, "not sought on a slope"),
         ({"torque_limit": 0.1}, "single joints"),
         ({"scheme": "lobatto-4"}, "gauss-N"),
         ({"formulation": "implicit velocity"}, "only the formulation"),

@@ -84,7 +84,6 @@ def test_speed_under_a_limit_of_power_takes_all_of_it():
         ({"froude": (0.1, np.inf)}, "two numbers"),
         ({"froude": (0.1, 1.0), "objective": "efficiency"}, "what time is worth"),
         ({"froude": (0.1, 1.0), "gait": colloc.FreePath(2.0)}, "of a class Harmonic"),
-        ({"froude": (0.1, 1.0), "grade": 0.1}, "not sought on a slope"),
         ({"froude": (0.1, 1.0, 2.0)}, "two numbers"),
     ],
 )
