@@ -12,7 +12,7 @@ VALUES = {
     "BSpline", "Basis",
     "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FeetLaw", "Foot",
     "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Period", "Polygon",
-    "Coupled", "Known", "Paced", "PathLimit", "PathLimits", "PotentialSpace", "Quantity", "Regime", "Slope",
+    "Coupled", "Known", "Paced", "PacedOnSlope", "PathLimit", "PathLimits", "PotentialSpace", "Quantity", "Regime", "Slope",
     "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "Saved", "TensorSpline",
     "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
 }
