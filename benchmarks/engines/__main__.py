@@ -31,7 +31,7 @@ from colloc.mechanics.inertia import GRAVITY
 from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, save, styled, subplots
 from colloc.system.row_file import cached
 
-GAITS = "three_link", "three_link_two_harmonics", "three_link_feet", "five_link", "wheeled_snake"
+GAITS = "three_link", "three_link_two_harmonics", "three_link_feet", "five_link", "serpenoid_snake", "wheeled_snake"
 FROUDE = 0.002, 0.05
 """Slow, 1 m in 7.1 s a period, and fast, in 1.4 s."""
 STEPS = (1e-3, 2.5e-4)
@@ -85,7 +85,8 @@ def table(outcomes: Sequence[Outcome], at: Sequence[Any]) -> str:
         row = [task.name, f"{task.froude:g}", f"{distance:.5f} ± {d_error:.0e}", f"{work:.5f} ± {w_error:.0e}"]
         rows.append(row + [cells.get((task, engine.NAME), "no friction with a direction") for engine in at])
     pace = {engine.NAME: [o.pace for o in outcomes if o.engine == engine.NAME] for engine in at}
-    said = [f"- **{e.NAME}**: {e.SETTINGS}; {np.median(pace[e.NAME]):.2g} s of processor time a second." for e in at]
+    played = [e for e in at if pace[e.NAME]]
+    said = [f"- **{e.NAME}**: {e.SETTINGS}; {np.median(pace[e.NAME]):.2g} s of processor time a second." for e in played]
     told = "`python -m benchmarks.engines`: errors of distance, work [%] at steps of 1 \\| 0.25 ms."
     columns = ["gait", "Fr", "distance", "work", *pace]
     return "\n\n".join([told, markdown_table(columns, rows), "\n".join(said)]) + "\n"
