@@ -84,20 +84,20 @@ def on_one_branch(body: Body, friction: Law, angles: np.ndarray, rates: np.ndarr
     """The motion followed in time, ``(3, n_time)``, from balanced velocities z that were solved for one by one.
 
     Each is solved for again from the one before, round the period, until none changes: where several motions are balanced, some
-    lay on one branch and some on another, as a solver's steps fell. Costs one more solve where there is one motion.
+    lay on one branch and some on another, as a solver's steps fell. Where none is moved, z itself is given back.
     """
     if friction.associated or not body.looks_for_all_velocities:
         return z
-    z, at = z.copy(), np.arange(z.shape[1])
-    for _ in range(2 * z.shape[1]):
-        found = body.solve(friction, angles[:, at], rates[:, at], delta, start=z[:, at - 1]).z
-        moved = np.abs(found - z[:, at]).max(axis=0) > _SAME * np.abs(z).max()
+    followed, at = z.copy(), np.arange(z.shape[1])
+    for count in range(2 * z.shape[1]):
+        found = body.solve(friction, angles[:, at], rates[:, at], delta, start=followed[:, at - 1]).z
+        moved = np.abs(found - followed[:, at]).max(axis=0) > _SAME * np.abs(z).max()
         if not moved.any():
-            break
-        z[:, at[moved]] = found[:, moved]
+            return followed if count else z
+        followed[:, at[moved]] = found[:, moved]
         # what comes after these began at another velocity
         at = (at[moved] + 1) % z.shape[1]
-    return z
+    return followed
 
 
 def _order(several: np.ndarray, sense: int) -> Iterator[tuple[int, int]]:

@@ -10,7 +10,7 @@ from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.motion.followed_motion import BACKWARDS, FORWARDS, followed_motion
+from colloc.motion.followed_motion import BACKWARDS, FORWARDS, followed_motion, on_one_branch
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import fine_motion
 from colloc.verification.replay import replay
@@ -67,6 +67,25 @@ def test_the_replay_follows_the_branch_in_time(sense):
     assert replay(BODY, friction, path, 1e-4, sense=sense, near=other).efficiency == pytest.approx(
         followed.efficiency, rel=1e-9
     )
+
+
+def test_velocities_solved_one_by_one_are_put_on_the_branch_that_steps_in_time_stay_on():
+    friction, (angles, rates) = Friction(100, 1, 1), random_path(3)(np.arange(1500) / 1500)
+    alone = solve_balance(BODY, friction, angles, rates, 1e-4).z
+    found, z = on_one_branch(BODY, friction, angles, rates, 1e-4, alone), alone[:, :1]
+    walked = np.empty_like(found)
+    for i in [*range(1500), *range(1500)]:  # once round, in case the first was on another branch
+        z = solve_balance(BODY, friction, angles[:, [i]], rates[:, [i]], 1e-4, start=z).z
+        walked[:, i] = z[:, 0]
+    assert np.abs(alone - walked).max() > 0.1
+    np.testing.assert_allclose(found, walked, atol=1e-4 * np.abs(walked).max())
+
+
+def test_where_one_motion_is_balanced_nothing_is_changed():
+    """To the last bit: the searches of all such problems go their way."""
+    angles, rates = random_path(1)(np.arange(300) / 300)
+    z = solve_balance(BODY, Friction(1.5, 1, 1.2), angles, rates, 1e-3).z
+    assert on_one_branch(BODY, Friction(1.5, 1, 1.2), angles, rates, 1e-3, z) is z
 
 
 @pytest.mark.parametrize("seed", [3, 5])
