@@ -22,7 +22,6 @@ def test_at_the_gait_s_own_pace_the_fastest_instant_decides_and_the_clock_is_eve
         assert (np.abs(steps).max(axis=1) <= most * (1 + 1e-6)).all()
 
 
-def test_the_speed_at_a_corner_of_the_clock_is_that_of_what_comes():
-    """At an even pace a sample falls on a vertex of the path as a polygon, where speeds are those of the gait at that phase."""
+def test_at_the_gait_s_own_pace_speeds_are_its_own():
     found = timed(GAIT, 400.0, limits=2.0, keep_pace=True)
     np.testing.assert_allclose(found.speeds, GAIT.rates(found.phase) / found.period, atol=1e-6)
