@@ -84,19 +84,30 @@ def on_one_branch(body: Body, friction: Law, angles: np.ndarray, rates: np.ndarr
     """The motion followed in time, ``(3, n_time)``, from balanced velocities z that were solved for one by one.
 
     Each is solved for again from the one before, round the period, until none changes: where several motions are balanced, some
-    lay on one branch and some on another, as a solver's steps fell. Where none is moved, z itself is given back.
+    lay on one branch and some on another, as a solver's steps fell. Of those that change all balanced velocities are found, and
+    the nearest that lasts is taken. Where none changes, z itself is given back.
     """
     if friction.associated or not body.looks_for_all_velocities:
         return z
-    followed, at = z.copy(), np.arange(z.shape[1])
-    for count in range(2 * z.shape[1]):
+    followed, at, moves = z.copy(), np.arange(z.shape[1]), np.zeros(z.shape[1], dtype=bool)
+    for _ in range(2 * z.shape[1]):
         found = body.solve(friction, angles[:, at], rates[:, at], delta, start=followed[:, at - 1]).z
         moved = np.abs(found - followed[:, at]).max(axis=0) > _SAME * np.abs(z).max()
         if not moved.any():
-            return followed if count else z
-        followed[:, at[moved]] = found[:, moved]
+            break
+        followed[:, at[moved]], moves[at[moved]] = found[:, moved], True
         # what comes after these began at another velocity
         at = (at[moved] + 1) % z.shape[1]
+    if not moves.any():
+        return z
+    # a step from a branch that ends may come to a motion that does not last
+    chosen = np.flatnonzero(moves)
+    chosen = np.roll(chosen, -int(np.searchsorted(chosen, np.argmin(moves))))
+    all_of = body.all_velocities(friction, angles[:, chosen], rates[:, chosen], delta)
+    assert all_of is not None
+    for k, now in enumerate(chosen):
+        if all_of.number[k]:
+            followed[:, now] = _nearest(all_of.z[:, :, k], all_of.sign[:, k], followed[:, now - 1])
     return followed
 
 

@@ -81,6 +81,21 @@ def test_velocities_solved_one_by_one_are_put_on_the_branch_that_steps_in_time_s
     np.testing.assert_allclose(found, walked, atol=1e-4 * np.abs(walked).max())
 
 
+@pytest.mark.parametrize(("law", "seed"), [((100, 1, 1), 3), ((1, 0.01, 100), 7)])
+def test_velocities_put_on_one_branch_are_of_motions_that_last(law, seed):
+    """A step from a branch that ends, or a solve from nothing, may come to one that does not."""
+    (angles, rates), at = random_path(seed)(np.arange(400) / 400), np.arange(400)
+    alone = solve_balance(BODY, Friction(*law), angles, rates, 1e-4).z
+    every = all_balanced_velocities(BODY, Friction(*law), angles, rates, 1e-4)
+
+    def lasting(z):
+        which = np.nan_to_num(np.abs(every.z - z).max(axis=1), nan=np.inf).argmin(axis=0)
+        return (every.sign[which, at] > 0) | (every.number == 1)
+
+    assert not lasting(alone).all()
+    assert lasting(on_one_branch(BODY, Friction(*law), angles, rates, 1e-4, alone)).all()
+
+
 def test_where_one_motion_is_balanced_nothing_is_changed():
     """To the last bit: the searches of all such problems go their way."""
     angles, rates = random_path(1)(np.arange(300) / 300)
