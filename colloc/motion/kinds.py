@@ -342,16 +342,8 @@ class WithInertia(_WithStates):
         near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
         tolerance: float = TOLERANCE,
     ) -> Along:
-        """Where Newton's method does not lead from the slow motion to the one with inertia, as on feet that hold, it is reached
-        through more viscous friction; not beside a motion that is known, where a search had better take a shorter step."""
-        held = False
-        if near[0] is not None:
-            states, out, held = self._closed(mesh, shapes, near[0], begin)
-        if not held:
-            states, out, held = self._closed(mesh, shapes, self._slow_states(mesh, shapes, begin), begin)
-        if not held and near[0] is None and shapes.delta * shapes.unit < _VISCOUS:
-            wetter = self.along(mesh, shapes._replace(delta=_WETTER * shapes.delta), begin)
-            states, out, held = self._closed(mesh, shapes, wetter.states, begin)
+        near_states = self._slow_states(mesh, shapes, begin) if near[0] is None else near[0]
+        states, out, held = self._closed(mesh, shapes, near_states, begin)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
@@ -365,10 +357,18 @@ class WithInertia(_WithStates):
         return np.concatenate([momenta(body, posture, body.velocity(posture, shapes.rates, slow.z)), slow.states])
 
     def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
-        """The states with momenta that repeat every period, by Newton's method from others ``(n_state, n_point)``; what the
-        body does with them (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any."""
-        out, first = near, np.append(near[: len(STATES), 0], begin[len(self._timed) :])
+        """The states with momenta that repeat every period, sought from others ``(n_state, n_point)``; what the body does with
+        them (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any. Where Newton's method does not lead to them, as
+        on feet that hold, they are reached through more viscous friction."""
+        found = self._newton(mesh, shapes, near, begin)
+        if found[-1] or shapes.delta * shapes.unit > _VISCOUS:
+            return found
+        wetter = self._closed(mesh, shapes._replace(delta=_WETTER * shapes.delta), near, begin)
+        return self._newton(mesh, shapes, wetter[0], begin) if wetter[-1] else wetter
 
+    def _newton(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """The same by Newton's method alone."""
+        out, first = near, np.append(near[: len(STATES), 0], begin[len(self._timed) :])
         froude = self._froude_at(shapes, begin)
 
         def rates(states: np.ndarray) -> Rates:

@@ -22,12 +22,12 @@ from colloc.numerics.mesh import Mesh
 _CLOSED, _STEPS = 1e-12, 200
 _ROUNDED = 1e-11
 """Newton's step that counts as none: where rates are steep, rounding leaves more of the equations than `_CLOSED`."""
-_ASTRAY = 5
-"""Steps in a row of which no part leads nearer, after which there is no motion near here."""
+_LEAST_SHARE = 1 / 16
+"""Of Newton's step; where less is asked for there is no motion near here, or a better way to it."""
+_FAR = np.errstate(over="ignore", invalid="ignore")
+"""Far from any motion, what grows from interval to interval has no number at the end."""
 _ALONE, _FOUND = 60, 1e-9
 """Steps by which the states of single intervals are found, and what their equations may be off by then."""
-_SHARES = 0.5 ** np.arange(7)
-"""Of Newton's step, tried until the equations are off by less."""
 
 
 class Rates(NamedTuple):
@@ -74,7 +74,9 @@ class CollocatedStates:
         start: np.ndarray,
         near: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """States at the points by Newton's method.
+        """States at the points by Newton's method, damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear Problems*,
+        section 3.3): a share of a step is taken if the next step, of the same derivatives, is a shorter one. With friction as
+        steep as 1/delta the equations may well be off by more on the way.
 
         Parameters
         ----------
@@ -95,28 +97,40 @@ class CollocatedStates:
         """
         start = np.array(start, dtype=float)
         states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
-        now, left_over, open_by, off = self._residual(rates, states, start)
-        astray = 0
+        x = np.column_stack([states, start])
+        now, residual, off = self._residual(rates, x)
+        next_step, trusted = np.zeros_like(x), np.inf
         for _ in range(_STEPS):
             if off < _CLOSED or not now.known:
                 break
-            with np.errstate(over="ignore", invalid="ignore"):  # far from any motion, what it grows to by the end has no number
-                step, step_start = self._newton(now.on_states, left_over, open_by)
-            if not np.isfinite(step).all():
+            newton = self._newton(now.on_states)
+            step = newton(residual)
+            size = float(np.linalg.norm(step))
+            if not np.isfinite(size):
                 break
             if np.abs(step).max() < _ROUNDED:
                 off = 0.0
                 break
-            for share in _SHARES:
-                after, begin = states - share * step, start - share * step_start
-                now, left_over, open_by, off_then = self._residual(rates, after, begin)
-                if off_then < off:
+            # derivatives are good for steps in proportion to how well they told this one
+            missed = float(np.linalg.norm(next_step - step)) * size
+            share = 1.0 if missed <= trusted else max(_LEAST_SHARE, trusted / missed)
+            while True:
+                trial = x - share * step
+                now, residual, off = self._residual(rates, trial)
+                if off < _CLOSED:
                     break
-            astray = 0 if off_then < off else astray + 1
-            if astray > _ASTRAY:
-                break
-            states, start, off = after, begin, off_then
-        return states, start, bool(now.known and off < _CLOSED)
+                closer = 0.25 * share
+                if now.known:
+                    next_step = newton(residual)
+                    trusted = share * size * float(np.linalg.norm(next_step))
+                    if np.linalg.norm(next_step) < size:
+                        break
+                    closer = 0.5 * share**2 * size / float(np.linalg.norm(next_step - (1.0 - share) * step))
+                if share <= _LEAST_SHARE:
+                    return trial[:, :-1], trial[:, -1], False
+                share = max(_LEAST_SHARE, min(closer, 0.5 * share))
+            x = trial
+        return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
 
     def alone(
         self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
@@ -150,28 +164,34 @@ class CollocatedStates:
         """What states gain from the begin of an interval to its stages, of rates ``(n_state, n, s)`` there."""
         return np.einsum("nij,anj->ani", self._a, stages)
 
-    def _residual(
-        self, rates: Callable[[np.ndarray], Rates], states: np.ndarray, start: np.ndarray
-    ) -> tuple[Rates, np.ndarray, np.ndarray, float]:
-        """Rates; what the equations are off by at the points and, of the free states, at the end; and the largest of these."""
+    def _residual(self, rates: Callable[[np.ndarray], Rates], x: np.ndarray) -> tuple[Rates, np.ndarray, float]:
+        """Rates at states and start, the last column of x; what the equations are off by at the points and, of the free
+        states, at the end; and the largest of these."""
+        states, start = x[:, :-1], x[:, -1]
         now = rates(states)
         gained, whole = self.integrals(now.value)
-        left_over, open_by = states - start[:, None] - gained, whole + self._moved(start)
-        off = max(np.abs(left_over).max(), np.abs(open_by[self._free]).max(initial=0.0))
-        return now, left_over, open_by, float(off) if now.known else np.inf
+        residual = np.column_stack([states - start[:, None] - gained, whole + self._moved(start)])
+        off = max(np.abs(residual[:, :-1]).max(), np.abs(residual[self._free, -1]).max(initial=0.0))
+        return now, residual, float(off) if now.known else np.inf
 
     def _moved(self, start: np.ndarray) -> np.ndarray:
         """``s_0 - M s_0``."""
         return start - (start if self._image is None else self._image @ start)
 
-    def _newton(self, on_states: np.ndarray, left_over: np.ndarray, open_by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of the states and of their start that the equations, to first order, differ by."""
-        within = _Linear(self._a, self._b, on_states)
-        own, through, gained = within.handed_on(left_over)
-        start, free = np.zeros_like(open_by), self._free
-        if free.size:
-            start[free] = np.linalg.solve(self._open(through[-1]), open_by[free] - gained[-1, free])
-        return within.at_points(own, through[:-1] @ start + gained[:-1]), start
+    @_FAR
+    def _newton(self, on_states: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """Of what the equations are off by, the change of the states and of their start that does it to first order."""
+        within, free = _Linear(self._a, self._b, on_states), self._free
+
+        @_FAR
+        def step(residual: np.ndarray) -> np.ndarray:
+            own, through, gained = within.handed_on(residual[:, :-1])
+            start = np.zeros(len(residual))
+            if free.size:
+                start[free] = np.linalg.solve(self._open(through[-1]), residual[free, -1] - gained[-1, free])
+            return np.column_stack([within.at_points(own, through[:-1] @ start + gained[:-1]), start])
+
+        return step
 
     def _open(self, through: np.ndarray) -> np.ndarray:
         """Of the free states ``d s_end / d s_0 - M``."""
