@@ -123,7 +123,7 @@ class GaitWithInertia:
         """`InertialMotion.states` through a period from a state ``(7,)``, or from momenta ``(3,)`` at the origin."""
 
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            _, _, omega, vx, vy, power, *rates = self._at(t, state)
+            _, _, omega, vx, vy, power, *rates = self._at(t, state[None])[0]
             moved = np.exp(1j * state[_THETA]) * complex(vx, vy)
             return np.array([*rates, omega - self.turn, moved.real, moved.imag, power]), None
 
@@ -136,7 +136,7 @@ class GaitWithInertia:
         rows = [-3, -2, -1, 2][: begin.shape[1]]
 
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            return np.concatenate([self._at(t, each)[rows] for each in state.reshape(begin.shape)]), None
+            return self._at(t, state.reshape(begin.shape))[:, rows].ravel(), None
 
         end = followed(slope, begin.ravel(), _ROUGH, self.breaks).states[:, -1].reshape(begin.shape)[:, :3].T
         return end[:, 0], (end[:, 1:] - end[:, :1]) / _APART
@@ -169,12 +169,13 @@ class GaitWithInertia:
             start = start + _newton_step(gap, slopes)
         raise NotConvergedError(f"at a Froude number of {self.froude:g} the periods do not become alike; try a smaller one.")
 
-    def _at(self, t: float, state: np.ndarray) -> np.ndarray:
-        """What `colloc.motion.compiled_momenta` says of a phase and momenta, with the weight's pull."""
+    def _at(self, t: float, states: np.ndarray) -> np.ndarray:
+        """What `colloc.motion.compiled_momenta` says of a phase and n momenta, with the weight's pull, ``(n, 9)``."""
         angles, rates = self.path(np.array([t]))
-        now = self._momenta(angles[:, 0], rates[:, 0], state[_MOMENTA])
+        now = np.stack([self._momenta(angles[:, 0], rates[:, 0], each) for each in states[:, _MOMENTA]])
         if self.regime.slides:
-            now[-3:-1] += self.regime.pull(state[None, _THETA, None])[:, 0] / self.froude  # type: ignore[index]
+            pull: Any = self.regime.pull(states[None, :, _THETA])
+            now[:, -3:-1] += pull.T / self.froude
         return now
 
     def passed(self, states: np.ndarray) -> dict[str, float]:
