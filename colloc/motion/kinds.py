@@ -358,8 +358,8 @@ class WithInertia(_WithStates):
 
     def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
         """The states with momenta that repeat every period, sought from others ``(n_state, n_point)``; what the body does with
-        them (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any. Where Newton's method does not lead to them, as
-        on feet that hold, they are reached through more viscous friction."""
+        them (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any. Where Newton's method does not lead to them,
+        as on feet that hold, they are reached through more viscous friction."""
         found = self._newton(mesh, shapes, near, begin)
         if found[-1] or shapes.delta * shapes.unit > _VISCOUS:
             return found

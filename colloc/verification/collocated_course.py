@@ -47,8 +47,12 @@ class CourseOfGait(NamedTuple):
     """Quantities that forces are needed for up to phases in order, ``(k, n)``; None if there are none."""
 
 
-def course(control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
-    """The motion of a gait without breaks, delta per period; with inertia it is sought near the one on a mesh."""
+def course(control: ControlProblem, gait: Any, delta: float, mesh: Mesh, tolerance: float) -> CourseOfGait:
+    """The motion of a gait without breaks, delta per period, to a relative error of the objective, from what the states count
+    in it on a mesh; with inertia it is sought near the motion there."""
+    period = _collocated(control, mesh, gait, delta).period
+    counts = sum(map(abs, control.aims.objective.shares(period).values()))
+    error = tolerance / counts if np.isfinite(counts) else tolerance
     return course_in(control.dynamics.regime, control, gait, delta, mesh, error)
 
 
@@ -72,42 +76,60 @@ def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: floa
     dynamics = control.dynamics
     at, regime = (dynamics.body, dynamics.law, gait, delta), regime.at(gait)
     played = gait_with_inertia(*at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime)
-    ran = played.settled(_along(kind_of_motion(dynamics), mesh, gait, delta).edges[:, 0], error)
+    kind = kind_of_motion(dynamics)
+    ran = played.settled(kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0], error)
     return CourseOfGait(ran.at, error)
 
 
-def _along(kind: Kind, mesh: Mesh, gait: Any, delta: float) -> Along:
+def _shapes(gait: Any, mesh: Mesh, delta: float) -> Shapes:
     angles, rates = gait(mesh.times)
-    return kind.along(mesh, Shapes(angles, rates, delta), begin_of(kind, gait))
+    return Shapes(angles, rates, delta)
+
+
+class _Collocated(NamedTuple):
+    """A gait on a mesh: its motion, and what its intervals and a period come to."""
+
+    along: Along
+    pose: CollocatedPose
+    work: np.ndarray
+    """Against friction, ``(n,)``."""
+    integrals: dict[str, np.ndarray]
+    period: dict[str, float]
+
+
+def _collocated(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> _Collocated:
+    kind = kind_of_motion(control.dynamics)
+    own, weights = kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)), stage_weights(mesh)
+    pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA] - kind.turn, own.now.centre, first_theta(kind, own.begin))
+    now = kind.instants(_shapes(gait, mesh, delta), pose.theta_on(mesh), own.z)
+    spent = (weights * own.now.power[mesh.points]).sum(axis=1)
+    summed = {each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1) for each in control.aims.integrals}
+    passed = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()), own.begin)
+    return _Collocated(own, pose, spent, summed, _period(kind, passed, summed))
+
+
+def _period(kind: Kind, passed: Passed, summed: dict[str, np.ndarray]) -> dict[str, float]:
+    return kind.counted(passed) | {name: kind.periods * float(part.sum()) for name, part in summed.items()}
 
 
 def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> dict[str, Any]:
     """Errors of collocating a gait whose motion has states, delta per period, by the names of
     `colloc.verification.mesh_error.MeshError`: of the work against friction, and none of velocities."""
     kind, objective = kind_of_motion(control.dynamics), control.aims.objective
-    own = _along(kind, mesh, gait, delta)
-    pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA] - kind.turn, own.now.centre, first_theta(kind, own.begin))
-    angles, rates = gait(mesh.times)
-    spent = (stage_weights(mesh) * own.now.power[mesh.points]).sum(axis=1)
+    own, pose, spent, summed, other = _collocated(control, mesh, gait, delta)
     at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
     true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()), own.begin)
-    found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()), own.begin)
-    known, summed, followed = {}, {}, iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
-    now = kind.instants(Shapes(angles, rates, delta), pose.theta_on(mesh), own.z)
+    known, followed = {}, iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
     for each in control.aims.integrals:
         known[each.name] = next(followed) if each.needs_forces else totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
-        summed[each.name] = (stage_weights(mesh) * each.at(now)[0, mesh.points]).sum(axis=1)
-    period, other = (
-        kind.counted(passed) | {name: kind.periods * float(part.sum()) for name, part in parts.items()}
-        for passed, parts in ((true, known), (found, summed))
-    )
+    period = _period(kind, true, known)
     aims, value = objective.shares(period), np.zeros(mesh.n)
     rotation, energy, displacement = pose.rotations - theta, spent - work, np.diff(pose.place) - (x + 1j * y)
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     if isinstance(kind, WithInertia):
-        shapes = Shapes(angles, rates, delta)
+        shapes = _shapes(gait, mesh, delta)
         known_states = np.arange(len(kind.states))  # momenta, and theta if it is one
         edge_states, at_points = at_edges[known_states], exact.at(mesh.times)[known_states]
         out, ends, alone = kind.alone(mesh, shapes, own, edge_states[:, :-1], at_points)

@@ -30,8 +30,6 @@ from colloc.verification.collocated_course import course, course_defects
 
 FINER = 0.05
 """The panels are refined until what they may still miss is this fraction of the error they measure or of the tolerance."""
-_OF_WAY = 0.1
-"""The way of a motion with states is usually no less: its error over a relative one."""
 _SAMPLES = 32
 
 
@@ -79,7 +77,7 @@ class Known(NamedTuple):
 def gait_motion(control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float) -> Any:
     """The gait's motion on adaptive panels, a `FineMotion`; where it has states, a `CourseOfGait`."""
     if kind_of_motion(control.dynamics).followed:
-        return course(control, gait, delta, mesh, _OF_WAY * tolerance)
+        return course(control, gait, delta, mesh, tolerance)
     shares, (body, friction, *_) = partial(_shares, control), control.dynamics
     asked: Any = {"quantities": control.aims.integrals, "turn": control.dynamics.turn}
     return fine_motion(body, friction, gait, delta, mesh.edges, tolerance, shares, **asked)

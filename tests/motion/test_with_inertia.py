@@ -11,8 +11,9 @@ from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import objective_from
 from colloc.mechanics.inertia import kinetic_energy, momentum_rates
 from colloc.mechanics.native_kernel import numpy_instead
-from colloc.motion.compiled_momenta import momenta_at
-from colloc.motion.kinds import WithInertia
+from colloc.motion import kinds
+from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
+from colloc.motion.kinds import Shapes, WithInertia, kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.pictures.animation import pictures
@@ -113,6 +114,21 @@ def test_gradients_are_those_of_differences(fields):
     sides = [(reduced.objective(v + step * unit), reduced.objective(v - step * unit)) for unit in np.eye(v.size)]
     differences = np.array([(high - low) / (2 * step) for high, low in sides])
     np.testing.assert_allclose(reduced.gradient(v), differences, atol=2e-6 * np.abs(differences).max())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypatch):
+    """Momenta as large as a body has that crosses its length in a period lead to those that the slow motion leads to."""
+    stated = problem(body=STANDING, delta=1e-4, froude=0.02, intervals=60)
+    space, _ = space_near(stated, LEANING)
+    angles, rates = LEANING(space.mesh.times)
+    kind, at = kind_of_motion(control_problem(stated).dynamics), (space.mesh, Shapes(angles, rates, 1e-4), np.empty(0))
+    expected, far, asked = kind.along(*at), np.random.default_rng(seed).normal(size=(3, space.mesh.n_point)), []
+    monkeypatch.setattr(kinds, "momenta_along_states", lambda *given: asked.append(1) or momenta_along_states(*given))
+    found = kind.along(*at, near=(far, None))
+    assert found.held.all()
+    np.testing.assert_allclose(found.states, expected.states, atol=1e-9)
+    assert len(asked) < 300
 
 
 def test_the_slow_motion_is_the_limit():
@@ -221,6 +237,15 @@ def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
     error = mesh_error(control_problem(stated), space.mesh, space.member(v), 0.1, 1e-7)
     assert error.value.sum() == pytest.approx(error.total, rel=0.05)
     assert np.abs(error.value).sum() > 10 * abs(error.total) > 1e-3, "of either sign"
+
+
+@pytest.mark.parametrize("size", [1.0, 0.15])
+def test_errors_are_told_apart_however_short_the_way(size):
+    """Two links go nowhere slowly, and not far fast: the differential equation is solved to a part of that."""
+    gait = colloc.Fourier(mean=[0.6], cos=[[size, 0.2 * size]], sin=[[0.0, 0.3 * size]])
+    stated = problem(body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2), guess=gait, froude=0.02)
+    error = mesh_error(control_problem(stated), control_problem(stated).mesh(), gait, 1e-2, 3e-5)
+    assert error.unresolved == pytest.approx(0.05 * 3e-5, rel=0.1)
 
 
 def test_a_mesh_is_fine_where_errors_are_made_not_where_they_are_felt():
