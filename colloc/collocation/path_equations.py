@@ -14,17 +14,13 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from colloc.collocation.point_equations import forward, with_forces
+from colloc.collocation.point_equations import N_RATE, forward, point_function
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits.control_problem import Dynamics
-from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import Instants, Quantity
+from colloc.gaits.regime import Regime
+from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.law import Law
 from colloc.numerics import arcs
 from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
-
-OMEGA, ADVANCE, POWER = range(3)
-"""Outputs of `path_point`, per unit of phase."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +81,16 @@ def path_point(body: Body, friction: Law, kind: Callable[[int], Piece]) -> Local
 
 
 @lru_cache(maxsize=32)
-def full_path_point(body: Body, friction: Law, kind: Callable[[int], Piece]) -> LocalFunction:
-    """The same with everything as a variable. Outputs: the place of the point and its direction, then those of
-    `colloc.mechanics.balance_results.Lifted`, which all vanish; then those of `path_point`. Locals: theta, angles, rates, z,
-    link forces, shape."""
-    piece, n_joint = kind(body.n_joint), body.n_joint
-    theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("z", 3)
-    angles, rates, forces = ca.SX.sym("q", n_joint), ca.SX.sym("r", n_joint), ca.SX.sym("forces", len(body.force_names))
-    lifted = body.with_forces(friction, angles, rates, z, forces, delta)
-    place = ca.vertcat(angles - piece.angles, rates - piece.direction)
-    gained = piece.speed * ca.vertcat(z[2], forward(theta, lifted.centre), lifted.power)
-    out = ca.vertcat(place, lifted.laws, lifted.balance, gained)
-    local = ca.vertcat(theta, angles, rates, z, forces, piece.shape)
-    return local_function("point", local, piece.given, delta, out)
+def full_path_point(body: Body, friction: Law, kind: Callable[[int], Piece], regime: Regime) -> LocalFunction:
+    """The same with everything as a variable: locals of `colloc.collocation.point_equations.point_function`, then the shape.
+    Outputs: the place of the point and its direction, and the equations of that function, which all vanish; then those of
+    `path_point`."""
+    piece, here, n = kind(body.n_joint), point_function(FULL, body, friction, regime), 2 * body.n_joint
+    local, delta = ca.SX.sym("local", here.n_local), ca.SX.sym("delta")
+    equations, gained = ca.vertsplit(here.value(local, ca.SX(0, 1), delta), [0, here.n_out - N_RATE, here.n_out])
+    place, omega = local[1 : 1 + n] - ca.vertcat(piece.angles, piece.direction), local[n + 3]
+    out = ca.vertcat(place, equations, piece.speed * ca.vertcat(omega, gained))
+    return local_function("point", ca.vertcat(local, piece.shape), piece.given, delta, out)
 
 
 @lru_cache(maxsize=256)
@@ -108,16 +101,12 @@ def chord(piece: Piece) -> LocalFunction:
     return local_function("chord", piece.shape, piece.given[1], ca.SX.sym("delta"), whole)
 
 
-def piece_density(quantity: Quantity, dynamics: Dynamics, piece: Piece) -> LocalFunction:
-    """Density of a quantity at a point of a piece, per unit of phase. Locals: those of `with_forces`, if it needs these; then
-    the shape."""
-    delta, body = ca.SX.sym("delta"), dynamics.body
-    local, now = ca.SX(0, 1), Instants(body, dynamics.law, piece.angles, piece.direction, delta)
-    if quantity.needs_forces:
-        theta, angles, rates = (ca.SX.sym(*each) for each in (("theta", 1), ("q", body.n_joint), ("r", body.n_joint)))
-        local, now = with_forces(dynamics, theta, angles, rates, delta, 1.0)
-    out = piece.speed * quantity.at(now)
-    return local_function(quantity.name, ca.vertcat(local, piece.shape), piece.given, delta, out)
+def per_phase(function: LocalFunction, piece: Piece, *, placed: bool = False) -> LocalFunction:
+    """A density at unit shape speed as one per unit of phase. Locals: its own, then the shape of the piece, by which angles and
+    rates are `placed` if it is a function of these alone."""
+    own, delta = ca.SX.sym("local", 0 if placed else function.n_local), ca.SX.sym("delta")
+    out = function.value(ca.vertcat(piece.angles, piece.direction) if placed else own, ca.SX(0, 1), delta)
+    return local_function(function.value.name(), ca.vertcat(own, piece.shape), piece.given, delta, piece.speed * out)
 
 
 @lru_cache(maxsize=256)

@@ -63,19 +63,16 @@ class PathGeometry:
         start, width, second = (np.repeat(a, repeat) for a in (self.start, self.width, self.second))
         return np.stack([start + width * tau, second])
 
-    def evenly(self, turn: float, rate: sparse.csr_matrix) -> tuple[dict[str, sparse.csr_matrix], np.ndarray]:
-        """What an even turn adds to the rows of a state, from the matrix that integrates its rate at the points: parts of
-        blocks, and what is given."""
-        given = -turn * np.asarray(rate.sum(axis=1)).ravel()
+    def evenly(self, turn: float, mesh: Mesh) -> sparse.csr_matrix | None:
+        """How fast axes turn at the points that turn evenly, from the block "shares", which is added; None if phases are those
+        of the mesh."""
         if self.shares is None or not turn:
-            return {}, given
+            return None
         function, gather = self.shares
         self.blocks["shares"] = function, gather, np.empty((0, 1))
-        n_point = rate.shape[1]
-        interval = np.repeat(np.arange(self.on.size), n_point // self.on.size)
-        place = np.arange(n_point), self.on[interval]
-        passed = sparse.csr_matrix((turn * self.second[interval], place), shape=(n_point, function.n_out))
-        return {"shares": (rate @ passed).tocsr()}, 0.0 * given
+        interval = np.repeat(np.arange(mesh.n), mesh.scheme.s)
+        place = np.arange(interval.size), self.on[interval]
+        return sparse.csr_matrix((turn * self.second[interval], place), shape=(interval.size, function.n_out))
 
 
 def _ends(name: str, conditions: tuple[np.ndarray, np.ndarray], columns: np.ndarray, n: int) -> Group:
@@ -190,9 +187,9 @@ def side_geometry(
         if half:
             row = across @ (selector(vertices[:, b], n) - selector(vertices[:, a], n))
             geometry.groups.append(equalities(f"side across the axis at {'start' if a == 0 else 'end'}", row))
-    n_piece = vertices.shape[1] - 1
-    geometry.shares = side_shares(n_joint, n_piece), parameters[:, None]
-    geometry.blocks["sides"] = (side_lengths(n_joint, n_piece), parameters[:, None], np.empty((0, 1)))
+    n_piece, chain = vertices.shape[1] - 1, vertices.ravel(order="F")[:, None]
+    geometry.shares = side_shares(n_joint, n_piece), chain
+    geometry.blocks["sides"] = (side_lengths(n_joint, n_piece), chain, np.empty((0, 1)))
     shortest = np.full(n_piece, gait.shortest_side)
     shortest[[0, -1]] *= np.where(gait.half_ends, 0.5, 1.0)
     least = np.append(shortest**2, 2 * np.pi * admissible.smallest_shape_speed * gait.fraction)

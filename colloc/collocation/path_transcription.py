@@ -8,6 +8,7 @@ the centre of mass along a fixed direction and the first orientation is free; th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -16,19 +17,17 @@ from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import Layout, layout_of
-from colloc.collocation.path_equations import (
-    ADVANCE,
-    OMEGA,
-    POWER,
-    arc,
-    full_path_point,
-    path_point,
-    piece_density,
-    side,
-    squared_distance,
+from colloc.collocation.motion_rows import (
+    SHAPE,
+    BlockParts,
+    asked_rows,
+    at_points,
+    bound_motion,
+    motion_groups,
+    objective_block,
 )
+from colloc.collocation.path_equations import arc, full_path_point, path_point, per_phase, side, squared_distance
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
-from colloc.collocation.point_equations import BlockParts, actuator_rows, objective_block, period_rows
 from colloc.collocation.program import GaitProgram, Implicit, assembled
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.control_problem import Admissible, ControlProblem
@@ -36,10 +35,8 @@ from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.gaits.polygon import Corners
 from colloc.mechanics.bodies import Body, Pairs
-from colloc.mechanics.densities import Quantity
-from colloc.motion.heading import closing_sign
-from colloc.numerics.blocks import Block
-from colloc.numerics.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector
+from colloc.numerics.blocks import Block, LocalFunction
+from colloc.numerics.constraint_rows import Group, output_group
 from colloc.numerics.mesh import Mesh
 
 _BESIDE = 1e-2
@@ -129,36 +126,21 @@ def transcribe_path(
     """
     near, mesh = path_through(control, gait, edges, scheme)
     layout = layout_of(control, mesh, near.knots)
-    body, law, turn = *control.dynamics[:2], control.dynamics.turn
+    body, law, regime, *_ = control.dynamics
     geometry = _geometry(control.admissible, mesh, layout.parameters[:, 0], layout.n, near, far)
     kind = arc if isinstance(near, ArcPath) else side
     full = layout.forces.size > 0
-    point = (full_path_point if full else path_point)(body, law, kind)
-    interval = np.repeat(np.arange(mesh.n), mesh.scheme.s)
-    tau = np.tile(mesh.scheme.c, mesh.n)
-    # a point that two intervals share would have two tangents at a corner: points of each interval are its own
-    theta = layout.theta[:, mesh.sites.ravel()]
-    given = geometry.given(tau)
-    own = np.concatenate([layout.angles, layout.rates, layout.z, layout.forces]) if full else np.empty((0, tau.size), dtype=int)
-    geometry.blocks["point"] = (point, np.concatenate([theta, own, geometry.shape[:, interval]]), given)
-    if full:
-        limit = body.largest_forces(law)
-        geometry.lower[layout.forces], geometry.upper[layout.forces] = -limit, limit
-
-    n_point, n_out = tau.size, point.n_out
-    omega, forward, power = (output - 3 + n_out for output in (OMEGA, ADVANCE, POWER))
-    state, rate = mesh.integration()
-    pick = selector(np.arange(n_point) * n_out + omega, n_out * n_point)
-    evenly, given_turn = geometry.evenly(turn, rate)
-    orientation = {"point": (-rate @ pick).tocsr()} | evenly
+    point = full_path_point(body, law, kind, regime) if full else path_point(body, law, kind)
+    n_point = mesh.n_point
+    here, given = np.repeat(geometry.shape, mesh.scheme.s, axis=1), geometry.given(np.tile(mesh.scheme.c, mesh.n))
+    own = at_points(layout, mesh, ("theta", "angles", "rates", "z", "forces") if full else ("theta",))
+    geometry.blocks["point"] = (point, np.concatenate([own, here]), given)
     groups = [
         *geometry.groups,
-        *(_full_groups(body, n_out, n_point, layout.n) if full else []),
-        equalities("orientation", state @ selector(layout.theta[0], layout.n), orientation, given_turn),
-        *rotation_groups(closing_sign(near.symmetry), layout.theta[0], layout.n, control.aims.rotation is not None),
-        quadrature_group("distance", layout.distance, forward, n_out, mesh, layout.n, 1.0),
-        quadrature_group("work", layout.work, power, n_out, mesh, layout.n, 1.0),
+        *(_full_groups(body, point.n_out, n_point, layout.n) if full else []),
+        *motion_groups(control, layout, mesh, point.n_out, 1.0, geometry.evenly(control.dynamics.turn, mesh)),
     ]
+    bound_motion(control, layout, geometry.lower, geometry.upper)
     velocity = ImplicitVelocity(body, law, n_point)
     piece = geometry.piece
     place = ca.Function("place", [piece.shape, piece.given], [piece.angles, piece.direction]).map(n_point)
@@ -168,18 +150,12 @@ def transcribe_path(
         angles, direction = place(local[1:, :], ca.DM(given))
         return velocity(angles, direction, unknown, delta)
 
-    for state_index in (layout.distance[0, 0], layout.work[0, 0]):
-        geometry.lower[state_index] = geometry.upper[state_index] = 0.0
-    here = geometry.shape[:, interval]
-    with_forces = np.concatenate([theta, layout.angles, layout.rates, layout.forces]) if full else here
+    def block(function: LocalFunction, names: Sequence[str]) -> BlockParts:
+        placed = names == SHAPE
+        own = [] if placed else [at_points(layout, mesh, names)]
+        return per_phase(function, piece, placed=placed), np.concatenate([*own, here]), given
 
-    def density(quantity: Quantity) -> BlockParts:
-        own = [*([with_forces] if quantity.needs_forces else []), here]
-        return piece_density(quantity, control.dynamics, piece), np.concatenate(own), given
-
-    besides = period_rows(control, layout, mesh, density, 1.0)
-    besides |= actuator_rows(control.actuators, control.dynamics, with_forces, layout.n, 1.0)
-    for name, (parts, group) in besides.items():
+    for name, (parts, group) in asked_rows(control, layout, mesh, block, 1.0).items():
         geometry.blocks[name] = parts
         groups.append(group)
     implicit: Implicit = {} if full else {"point": balanced}

@@ -14,19 +14,14 @@ itself is a step function of the tail velocity as delta goes to 0 and does not c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
-from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits.control_problem import ControlProblem, Dynamics
+from colloc.gaits.control_problem import Dynamics
 from colloc.gaits.gait_fields import AnyClass
-from colloc.gaits.objective import Objective
-from colloc.gaits.period import chord_per_way
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import FULL, Body
@@ -34,20 +29,16 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants, PathLimits, Quantity
 from colloc.mechanics.inertia import STATES, about_centre, checked_mass, momenta, turning
 from colloc.mechanics.law import Law
-from colloc.numerics.blocks import Block, LocalFunction, implicit_function, local_function
-from colloc.numerics.constraint_rows import Group, block_group, total_group
-from colloc.numerics.mesh import Mesh
+from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
 
-ACTUATORS = "actuators"
-"""The rows of the limits on torques and powers, point by point."""
-N_RATE = 2
-"""The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
+N_RATE = 3
+"""The last outputs of a point: rotation rate, velocity of the centre of mass along the lab's x, and power."""
 
 
 @lru_cache(maxsize=32)
 def point_function(formulation: str, body: Body, friction: Law, regime: Regime = LEVEL, unit: float = 1.0) -> LocalFunction:
-    """Outputs at a mesh point: equations that must vanish, then rate of distance and power of the joints, all per period
-    divided by `unit`, as the law of friction takes rates.
+    """Outputs at a mesh point: equations that must vanish, then rates of rotation and distance and power of the joints, all per
+    period divided by `unit`, as the law of friction takes rates.
 
     Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links. With
     inertia the momenta, too: they, not the balance, have to be those that the body has, and before the last outputs are their
@@ -79,7 +70,7 @@ def _full_point(body: Body, friction: Law, regime: Regime) -> LocalFunction:
     if load is not None:
         balance += load_wrench(body, body.posture(angles), load)  # type: ignore[attr-defined, arg-type]
         power -= ca.sum1(load * centre)
-    out = ca.vertcat(laws, balance, forward(theta - regime.ahead, centre), power)
+    out = ca.vertcat(laws, balance, z[2], forward(theta - regime.ahead, centre), power)
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
 
 
@@ -98,7 +89,7 @@ def _point_with_inertia(body: Chain, friction: Law, regime: Regime, froude: floa
         pushed += ca.vertcat(pull, 0)
         power -= ca.sum1(pull * centre)
     changes = pushed / froude + turning(z, states)
-    out = ca.vertcat(laws, own - states, changes, forward(theta - regime.ahead, centre), power)
+    out = ca.vertcat(laws, own - states, changes, z[2], forward(theta - regime.ahead, centre), power)
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces, states, log_period), ca.SX(0, 1), delta, out)
 
 
@@ -111,12 +102,12 @@ def across_point(dynamics: Dynamics) -> LocalFunction:
 
 
 def _map_point(body: Body, friction: Law) -> LocalFunction:
-    """Outputs z - Z, rate of distance at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter)."""
+    """Outputs z - Z, rates at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter)."""
     theta, angles, rates, z, delta = _symbols(body)
     solved, local = ca.SX.sym("Z", 3), ca.vertcat(theta, angles, rates, z)
     balanced = body.sliding(friction, angles, rates, solved, delta)
     ahead = forward(theta, body.sliding(friction, angles, rates, z, delta).centre)
-    out = ca.vertcat(z - solved, ahead, balanced.power)
+    out = ca.vertcat(z - solved, z[2], ahead, balanced.power)
     return implicit_function("point", local, ca.SX(0, 1), solved, delta, balanced.force, out)
 
 
@@ -142,7 +133,7 @@ def member_equations(gait: AnyClass, n_joint: int) -> LocalFunction:
 
 
 def density_point(quantity: Quantity, dynamics: Dynamics, unit: float) -> LocalFunction:
-    """Density of a quantity at a point, from joint angles and rates or, if it needs forces, from what `actuator_rows` gathers,
+    """Density of a quantity at a point, from joint angles and rates or, if it needs forces, from the locals of `with_forces`,
     per period divided by `unit`."""
     theta, angles, rates, _, delta = _symbols(dynamics.body)
     if not quantity.needs_forces:
@@ -162,59 +153,8 @@ def with_forces(
     return ca.vertcat(theta, angles, rates, forces), now
 
 
-def actuator_rows(
-    limits: PathLimits, dynamics: Dynamics, gather: np.ndarray, n: int, unit: float
-) -> dict[str, tuple[BlockParts, Group]]:
-    """Block and rows, by name, that keep the actuators within their limits at the points of a full program of n variables, if
-    there are any.
-
-    `gather`: orientation, joint angles, rates and forces of the points. Rates of the variables are those per period divided by
-    `unit`; the law of friction takes them.
-    """
-    if not limits.names:
-        return {}
+def actuator_point(limits: PathLimits, dynamics: Dynamics, unit: float) -> LocalFunction:
+    """What limited actuators do at a point, as parts of what they can; locals and unit as of `with_forces`."""
     theta, angles, rates, _, delta = _symbols(dynamics.body)
     local, now = with_forces(dynamics, theta, angles, rates, delta, unit)
-    function, n_point = local_function(ACTUATORS, local, ca.SX(0, 1), delta, limits.at(now)), gather.shape[1]
-    group = block_group(ACTUATORS, np.tile(limits.least, n_point), 1.0, n_point * len(limits.names), n)
-    return {ACTUATORS: ((function, gather, np.empty((0, n_point))), group)}
-
-
-BlockParts = tuple[LocalFunction, np.ndarray, np.ndarray]
-"""What a `colloc.numerics.blocks.Block` is made of: function, gather, instance parameters."""
-
-
-def period_block(control: ControlProblem, aims: Sequence[Objective], sign: float, layout: Layout) -> BlockParts:
-    """`sign` times the values of objectives for a whole period, of which a part is solved."""
-    names = tuple(dict.fromkeys(name for aim in aims for name in aim.uses))
-    parts = {name: ca.SX.sym(name, 2 if name == "rotation" else 1) for name in names}
-    turn, fraction = control.dynamics.turn, control.admissible.gait.fraction
-    whole = dict.fromkeys(names, 1 / fraction) | {"distance": chord_per_way(turn) / fraction}
-    period = {name: part[0] - part[1] + turn if name == "rotation" else whole[name] * part for name, part in parts.items()}
-    period |= {name: ca.exp(parts[name]) for name in names if name == "period"}
-    out = ca.vertcat(*(sign * aim(period) for aim in aims))
-    function = local_function("period", ca.vertcat(*parts.values()), ca.SX(0, 1), ca.SX.sym("delta"), out)
-    return function, layout.of_period(names), np.empty((0, 1))
-
-
-def objective_block(control: ControlProblem, layout: Layout) -> Block:
-    """Minus the objective for a whole period, of which a part is solved."""
-    function, gather, given = period_block(control, [control.aims.objective], -1.0, layout)
-    return Block(function, gather, sparse.eye(1, format="csr"), given)
-
-
-def period_rows(
-    control: ControlProblem, layout: Layout, mesh: Mesh, density: Callable[[Quantity], BlockParts], unit: float
-) -> dict[str, tuple[BlockParts, Group]]:
-    """Blocks and rows, by name, of what is asked of a whole period besides the objective.
-
-    `density`: the block of a quantity that is an integral, per `unit` of time at the points.
-    """
-    found, aims = {}, control.aims
-    for quantity, total in zip(aims.integrals, layout.totals, strict=True):
-        found[quantity.name] = density(quantity), total_group(quantity.name, total[:, None], mesh, layout.n, unit)
-    if aims.at_least:
-        reached, least = zip(*aims.at_least, strict=True)
-        parts = period_block(control, reached, 1.0, layout)
-        found["at least"] = parts, block_group("at least", np.array(least), np.inf, len(least), layout.n)
-    return found
+    return local_function("actuators", local, ca.SX(0, 1), delta, limits.at(now))

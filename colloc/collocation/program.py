@@ -11,7 +11,7 @@ from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import Layout
-from colloc.collocation.point_equations import BlockParts
+from colloc.collocation.motion_rows import BlockParts
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.collocation.worst_instants import held_shares, worst_instants
 from colloc.gaits.control_problem import ControlProblem

@@ -12,45 +12,25 @@ pull, which depends on theta, the first theta is the last parameter of the gait,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, layout_of
-from colloc.collocation.point_equations import (
-    N_RATE,
-    BlockParts,
-    across_point,
-    actuator_rows,
-    density_point,
-    gait_check,
-    mean_square,
-    member_equations,
-    objective_block,
-    period_rows,
-    point_function,
-)
+from colloc.collocation.motion_rows import BlockParts, asked_rows, at_points, bound_motion, motion_groups, objective_block
+from colloc.collocation.point_equations import N_RATE, gait_check, mean_square, member_equations, point_function
 from colloc.collocation.program import GaitProgram, Implicit, assembled
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.gaits.control_problem import Admissible, ControlProblem
 from colloc.gaits.limits import widest
 from colloc.mechanics.bodies import FULL, Pairs
-from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
-from colloc.motion.heading import closing_sign, momenta_image
-from colloc.motion.kinds import kind_of_motion
-from colloc.numerics.constraint_rows import (
-    Group,
-    block_group,
-    equalities,
-    gait_group,
-    output_group,
-    quadrature_group,
-    rotation_groups,
-    selector,
-    zero_total_group,
-)
+from colloc.motion.heading import momenta_image
+from colloc.numerics.blocks import LocalFunction
+from colloc.numerics.constraint_rows import Group, block_group, equalities, gait_group, output_group, selector
 from colloc.numerics.mesh import Mesh
 
 
@@ -73,7 +53,7 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
     Self-contact is constrained between links two apart, and between the pairs `far` of links farther apart: see
     `colloc.search.converge.crossing_pairs`.
     """
-    mesh, dynamics, admissible, aims = control.mesh(edges, scheme), control.dynamics, control.admissible, control.aims
+    mesh, dynamics, admissible = control.mesh(edges, scheme), control.dynamics, control.admissible
     layout = layout_of(control, mesh)
     moved = dynamics.in_speeds_of(RADIANS)
     body, friction = moved.body, moved.law
@@ -82,13 +62,9 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
     point = point_function(control.formulation, body, friction, dynamics.regime, RADIANS)
     n_parameter = layout.parameters.shape[0]
 
-    sites = np.empty(mesh.n_point, dtype=int)
-    sites[mesh.points] = mesh.sites
     paces = np.repeat(layout.parameters[[layout.pace]], mesh.n_point, axis=1)[: dynamics.regime.free_pace]
-    point_gather = np.concatenate(
-        [layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces, layout.momenta[:, sites], paces]
-    )
-    blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
+    own, none = at_points(layout, mesh, ("theta", "angles", "rates", "z", "forces", "momenta")), np.empty((0, mesh.n_point))
+    blocks = {"point": (point, np.concatenate([own, paces]), none)}
     for check in checks:
         function = gait_check(check, n_joint, n_parameter)
         middles = np.vstack([_columns(check, admissible, 0.5 * (mesh.edges[1:] + mesh.edges[:-1])), np.full(mesh.n, -1.0)])
@@ -99,19 +75,10 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
         np.empty((0, 1)),
     )
 
-    none = np.empty((0, mesh.n_point))
-    with_forces = np.concatenate([layout.theta[:, sites], layout.angles, layout.rates, layout.forces])
+    def block(function: LocalFunction, names: Sequence[str]) -> BlockParts:
+        return function, at_points(layout, mesh, names), none
 
-    def density(quantity: Quantity) -> BlockParts:
-        own = with_forces if quantity.needs_forces else np.concatenate([layout.angles, layout.rates])
-        return density_point(quantity, moved, RADIANS), own, none
-
-    besides = period_rows(control, layout, mesh, density, RADIANS)
-    besides |= actuator_rows(control.actuators, moved, with_forces, layout.n, RADIANS)
-    if aims.no_way_across:
-        across = across_point(moved)
-        parts = across, point_gather[: across.n_local], none
-        besides["across"] = parts, zero_total_group("across", mesh, layout.n)
+    besides = asked_rows(control, layout, mesh, block, RADIANS)
     if not gait.linear:
         members = member_equations(gait, n_joint)
         besides["members"] = (
@@ -125,9 +92,7 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
         gait_group("angles", layout.angles, layout.parameters, gait.angle_matrix(mesh.times, n_joint), layout.n),
         gait_group("rates", layout.rates, layout.parameters, rates, layout.n),
         *_point_groups(control, point.n_out, mesh, layout),
-        *_orientation_groups(control, mesh, layout),
-        quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
-        quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
+        *motion_groups(control, layout, mesh, point.n_out, RADIANS),
         *(check.group(admissible.joint_limit, mesh.n, layout.n) for check in checks),
         block_group("shape speed", admissible.smallest_shape_speed**2, np.inf, 1, layout.n),
         *(group for _, group in besides.values()),
@@ -141,23 +106,12 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
     implicit: Implicit = {} if control.formulation == FULL else {"point": velocity_map}
     objective = objective_block(control, layout)
     assembly, names, row_lower, row_upper, rows = assembled(layout, objective, blocks, groups, implicit)
-    lower, upper = _variable_bounds(control, layout)
+    lower, upper, parameters = np.full(layout.n, -np.inf), np.full(layout.n, np.inf), layout.parameters[:, 0]
+    lower[parameters], upper[parameters] = gait.bounds(body, widest(admissible.joint_limit))
+    bound_motion(control, layout, lower, upper)
     return SeriesProgram(
         control, mesh, None, layout, assembly, names, lower, upper, row_lower, row_upper, rows, checks, RADIANS, velocity
     )
-
-
-def _variable_bounds(control: ControlProblem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
-    gait, body, limit, *_ = control.admissible
-    own = layout.parameters[:, 0]
-    lower[own], upper[own] = gait.bounds(body, widest(limit))
-    if layout.forces.size:
-        most = body.largest_forces(control.dynamics.law)
-        lower[layout.forces], upper[layout.forces] = -most, most
-    for state in (layout.distance, layout.work):
-        lower[state[0, 0]] = upper[state[0, 0]] = 0.0
-    return lower, upper
 
 
 def _point_groups(control: ControlProblem, n_out: int, mesh: Mesh, layout: Layout) -> list[Group]:
@@ -178,17 +132,3 @@ def _point_groups(control: ControlProblem, n_out: int, mesh: Mesh, layout: Layou
         begin, end = selector(momenta[:, 0], n), selector(momenta[:, -1], n)
         groups.append(equalities("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin)))
     return groups
-
-
-def _orientation_groups(control: ControlProblem, mesh: Mesh, layout: Layout) -> list[Group]:
-    """theta' = omega - turn, how theta closes where no symmetry does it, and where it begins if the gait says so."""
-    state, rate = mesh.integration()
-    linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
-    turn = control.dynamics.turn
-    sign = closing_sign(control.admissible.gait.closing_symmetry)
-    begin = selector(layout.theta[0, :1], layout.n) - selector(layout.parameters[-1], layout.n)
-    return [
-        equalities("orientation", linear, given=-turn * np.asarray(rate.sum(axis=1)).ravel()),
-        *rotation_groups(sign, layout.theta[0], layout.n, control.aims.rotation is not None),
-        *([equalities("heading", begin)] if "theta" in kind_of_motion(control.dynamics).told else []),
-    ]

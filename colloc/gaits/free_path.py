@@ -8,7 +8,7 @@ tangents at all edges, then the joint angles there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction
 from colloc.numerics.arcs import advance, direction
-from colloc.system.arguments import check_positive, is_whole, named_arguments
+from colloc.system.arguments import STATED_IF_SET, check_positive, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _BESIDE = 1e-10
@@ -43,6 +43,8 @@ class ArcPath(UnitSpeedGait):
     length : float
         Of the whole closed path [rad].
     symmetry : {"none", "bilateral", "antipodal"}
+    theta : float, optional
+        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
 
     Examples
     --------
@@ -63,6 +65,7 @@ class ArcPath(UnitSpeedGait):
     tangents: np.ndarray
     length: float
     symmetry: str = "none"
+    theta: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
 
     def __post_init__(self) -> None:
         self._check_symmetry()
@@ -132,7 +135,7 @@ class ArcPath(UnitSpeedGait):
         """Length, winding and sharpest bend."""
         turned = "" if self.winding is None else f", winding {self.winding}"
         sharpest = np.abs(self.curvatures()).max()
-        return [f"path of length {self.length:.4f} rad{turned}, largest curvature {sharpest:.3f} per rad"]
+        return [f"path of length {self.length:.4f} rad{turned}, largest curvature {sharpest:.3f} per rad", *self.pointing]
 
     def mapped(self, matrix: np.ndarray) -> Corners:
         """A polygon of many corners along the path whose shapes are these, multiplied by a matrix ``(m, n_joint)``."""
@@ -144,7 +147,7 @@ class ArcPath(UnitSpeedGait):
         t0, t1 = self.tangents[:, k], self.tangents[:, k + 1]
         shapes = self.shapes[:, k] + self.length * h * advance(t0, t1, tau)
         tangents = t0 + tau * (t1 - t0) if self.n_joint == 2 else direction(t0, t1, tau)
-        return ArcPath(edges, shapes, tangents, self.length, self.symmetry)
+        return replace(self, edges=edges, shapes=shapes, tangents=tangents)
 
 
 @named_arguments
@@ -174,7 +177,7 @@ class FreePath(ClassOfGaits):
 
     unit_speed = True
     delta_start = DELTA_START
-    of_arcs = without_cusps = True
+    of_arcs = without_cusps = may_tell = True
 
     def __post_init__(self) -> None:
         check_positive(self, "curvature", of="gait.")
@@ -224,7 +227,6 @@ class FreePath(ClassOfGaits):
         ]
 
     def size(self, n_joint: int, n_interval: int) -> int:
-        """Number of parameters."""
         return 1 + (n_interval + 1) * (n_joint + (1 if n_joint == 2 else n_joint))
 
     def split(self, parameters: np.ndarray, n_joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -238,12 +240,10 @@ class FreePath(ClassOfGaits):
         return parameters[:1].reshape(1, 1), tangents, parameters[1 + rows * n_edge :].reshape(n_edge, n_joint).T
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> ArcPath:
-        """The gait of a parameter vector on the mesh `edges` (phases)."""
         speed, tangents, shapes = self.split(parameters, n_joint)
         return ArcPath(edges, shapes, tangents, 2 * np.pi * speed[0, 0], self.symmetry)
 
     def parameters(self, path: ArcPath) -> np.ndarray:
-        """The parameter vector of a member."""
         return np.concatenate([[path.length / (2 * np.pi)], path.tangents.ravel(order="F"), path.shapes.ravel(order="F")])
 
 

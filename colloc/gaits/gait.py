@@ -191,6 +191,8 @@ class ClassOfGaits:
     """Whether angles of a class of series are linear in the parameters by which its members are searched."""
     of_arcs = False
     """Whether it has curvature, and arcs that meet."""
+    may_tell = False
+    """Whether members can say where they point (`colloc.gaits.told`)."""
 
     def _check_symmetry(self) -> None:
         if self.symmetry not in self.symmetries:
@@ -274,6 +276,18 @@ class ClassOfGaits:
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> Any:
         """The gait of a parameter vector, on a mesh where that matters."""
         raise NotImplementedError
+
+    def parameters(self, gait: Any) -> np.ndarray:
+        """The parameter vector of a member."""
+        raise NotImplementedError
+
+    def nearest(self, gait: Any) -> np.ndarray:
+        """That of the member nearest to a gait, in its phase."""
+        return self.parameters(gait)
+
+    def in_phase(self, gait: Any) -> bool:
+        """Whether a gait starts where members do."""
+        return True
 
     def own_checks(self, gait: Any) -> list[tuple[str, float, float, str]]:
         """What a certificate checks of a member beyond what all gaits have to keep: name, value, allowed, meaning."""

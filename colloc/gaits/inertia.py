@@ -7,12 +7,11 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from colloc.gaits.linear import LinearClass
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.gaits.sloped import OnSlope, Slope
 from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.gaits.told import Telling, telling
-from colloc.mechanics.bodies import FULL, Body
+from colloc.mechanics.bodies import FULL
 from colloc.mechanics.inertia import GRAVITY, checked_mass
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import is_number
@@ -40,24 +39,19 @@ symmetry none, delta 1e-04>
 
 
 class AtFreePace(Telling):
-    """What a free pace changes in a class that is linear in its parameters: members say how long a period takes."""
+    """What a free pace changes in a class of gaits: members say how long a period takes, at first the middle of the range."""
 
     tells = "log_period"
     pace: Free
 
-    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
-        return self._bounds(body, limit, *(-0.5 * np.log(self.pace[::-1])))
+    @property
+    def least_and_most(self) -> tuple[float, float]:
+        longest, shortest = -0.5 * np.log(self.pace)
+        return shortest, longest
 
-    def parameters(self, gait: Any) -> np.ndarray:
-        """The parameter vector of the member nearest to a gait; at the middle of the range if that does not say its pace."""
-        return np.append(self.without.parameters(gait), self._said(gait))
-
-    def nearest(self, gait: Any) -> np.ndarray:
-        return np.append(self.without.nearest(gait), self._said(gait))
-
-    def _said(self, gait: Any) -> float:
-        periods = -0.5 * np.log(self.pace)
-        return float(periods.mean() if gait.log_period is None else np.clip(gait.log_period, periods[1], periods[0]))
+    def said(self, gait: Any) -> float:
+        ends = self.least_and_most
+        return float(np.mean(ends) if gait.log_period is None else np.clip(gait.log_period, *ends))
 
 
 @dataclass(frozen=True)
@@ -96,7 +90,7 @@ class Paced(Regime):
         level = super().class_of(gait_class)
         if self.free is None:
             return level
-        if not (isinstance(level, LinearClass) and level.linear):
+        if not level.may_tell or level.unit_speed or not level.linear:
             raise ProblemError(f"a free pace is sought with a gait of a class Harmonic, not {type(level).__name__}.")
         return telling(AtFreePace, level, pace=self.free)
 

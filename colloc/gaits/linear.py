@@ -118,8 +118,7 @@ class LinearClass(ClassOfGaits):
     symmetry: str
     harmonics: int
     """As many as the functions need to be resolved."""
-    linear = True
-    moves_knots = True
+    linear = moves_knots = may_tell = True
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """``(n_function, n_time)``: the functions of the phase at phases t, or their derivatives per period."""
@@ -174,10 +173,6 @@ class LinearClass(ClassOfGaits):
     def parameters(self, gait: Any) -> np.ndarray:
         """The parameter vector of the class member nearest to a gait."""
         return self.nearest(gait)
-
-    def in_phase(self, gait: Any) -> bool:
-        """Whether a gait starts where members do."""
-        return True
 
     def nearest(self, gait: Any) -> np.ndarray:
         """The parameter vector of the class member nearest to a gait, in its phase (least squares over the period)."""

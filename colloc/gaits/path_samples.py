@@ -6,6 +6,7 @@ period that is solved, and arcs or straight pieces are laid through the samples.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -22,6 +23,10 @@ _POLYGON_POINTS = 241
 
 class Gait(Protocol):
     """Joint angles and rates of a closed path as functions of the phase."""
+
+    @property
+    def theta(self) -> float | None:
+        """Where the tail link points at phase 0, if that matters."""
 
     @property
     def n_joint(self) -> int: ...
@@ -81,7 +86,7 @@ def arcs_through(gait: Gait, target: FreePath, edges: np.ndarray) -> ArcPath:
     if gait.n_joint == 2:
         tangents = np.unwrap(np.arctan2(tangents[1], tangents[0]))[None]
         tangents = tangents + _end_correction(tangents, target, at)
-    return ArcPath(edges, shapes, tangents, length / fraction(target.symmetry), target.symmetry)
+    return ArcPath(edges, shapes, tangents, length / fraction(target.symmetry), target.symmetry, theta=gait.theta)
 
 
 def _extended(points: np.ndarray, symmetry: str) -> np.ndarray:
@@ -117,7 +122,7 @@ def corners_through(gait: Gait, target: Polygon) -> Corners:
         if half:
             # the middle of a side between the last corner and its image
             vertices[:, end] = 0.5 * (vertices[:, inner] - vertices[::-1, inner])
-    return Corners.through(vertices, target.symmetry)
+    return replace(Corners.through(vertices, target.symmetry), theta=gait.theta)
 
 
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:

@@ -5,14 +5,14 @@ The parameters of a member are the joint angles at the ends of all straight piec
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
 from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, both_halves, fraction
-from colloc.system.arguments import is_number, is_whole, named_arguments
+from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _EVENLY = np.linspace(0.0, 1.0, 1001)[:-1]
@@ -30,6 +30,8 @@ class Corners(UnitSpeedGait):
         Joint angles [rad] at the corners, in order. Without a symmetry the last is joined to the first. With one these are
         the vertices of half the path, ends included; an end that lies within an edge is no corner of the polygon.
     symmetry : {"none", "bilateral", "antipodal"}
+    theta : float, optional
+        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
 
     Examples
     --------
@@ -41,6 +43,7 @@ class Corners(UnitSpeedGait):
 
     corners: np.ndarray
     symmetry: str = "none"
+    theta: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
 
     @classmethod
     def through(cls, vertices: np.ndarray, symmetry: str) -> Corners:
@@ -116,9 +119,9 @@ class Corners(UnitSpeedGait):
         """Length and, if they are few, corners."""
         n = self.corners.shape[1]
         if n > _MOST_TOLD:
-            return [f"path of length {self.length:.4f} rad, {n} vertices"]
+            return [f"path of length {self.length:.4f} rad, {n} vertices", *self.pointing]
         corners = [f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in self.corners.T]
-        return [f"path of length {self.length:.4f} rad", *corners]
+        return [f"path of length {self.length:.4f} rad", *corners, *self.pointing]
 
 
 @named_arguments
@@ -149,7 +152,7 @@ class Polygon(ClassOfGaits):
     axis: str = "corner"
     shortest_side: float = 0.02
 
-    unit_speed = True
+    unit_speed = may_tell = True
     delta_start = DELTA_START
 
     def __post_init__(self) -> None:
@@ -197,7 +200,6 @@ class Polygon(ClassOfGaits):
         return harmonics_within(harmonics, self.symmetry)
 
     def size(self, n_joint: int, n_interval: int | None = None) -> int:
-        """Number of parameters."""
         return n_joint * (self.pieces + 1)
 
     def split(self, parameters: np.ndarray, n_joint: int) -> np.ndarray:
@@ -205,9 +207,7 @@ class Polygon(ClassOfGaits):
         return parameters.reshape(-1, n_joint).T
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Corners:
-        """The gait of a parameter vector; the mesh does not matter."""
         return Corners.through(self.split(parameters, n_joint), self.symmetry)
 
     def parameters(self, gait: Corners) -> np.ndarray:
-        """The parameter vector of a member."""
         return gait.vertices.ravel(order="F")

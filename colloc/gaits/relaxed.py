@@ -63,6 +63,8 @@ class Mixture:
         if self.symmetry not in (*SYMMETRIES, BOTH):
             raise ProblemError(f"mixture.symmetry must be one of {', '.join((*SYMMETRIES, BOTH))}, not {self.symmetry!r}.")
 
+    theta = None
+
     @property
     def n_joint(self) -> int:
         return self.start.size

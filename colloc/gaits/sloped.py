@@ -14,7 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from colloc.gaits.linear import LinearClass
+from colloc.gaits.gait import DELTA_START
 from colloc.gaits.regime import Regime
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.gaits.told import Telling, telling
@@ -58,12 +58,18 @@ class Slope(Regime):
         return replace(super().in_units_of(unit), grade=self.grade / unit)  # the weight's pull is a force, too
 
     def class_of(self, gait_class: Any) -> Any:
-        """Any class that derives from `LinearClass`, one's own too, can be here. `ProblemError` for others."""
+        """Any class that derives from `LinearClass`, one's own too, can be here, and paths. `ProblemError` for others."""
         level = super().class_of(gait_class)
-        if not isinstance(level, LinearClass):
+        name = type(level).__name__
+        if not level.may_tell:
             raise ProblemError(
-                f"on a slope gaits are sought in classes paced by time, not {type(level).__name__}: take Harmonic, BSpline or "
-                "Basis."
+                f"on a slope gaits say where the body points, which those of the class {name} cannot: take Harmonic, BSpline, "
+                "Basis, FreePath or Polygon."
+            )
+        if level.unit_speed and level.symmetry != NONE:
+            raise ProblemError(
+                f"on a slope no part of a period follows from another: take {name}(..., symmetry='none'), which has gaits of "
+                f"symmetry {level.symmetry}, too."
             )
         return telling(OnSlope, level)
 
@@ -93,11 +99,15 @@ class Slope(Regime):
 
 
 class OnSlope(Telling):
-    """What a slope changes in a class that is linear in its parameters: members say where the tail link points at phase 0."""
+    """What a slope changes in a class of gaits: members say where the tail link points at phase 0."""
 
     tells = "theta"
-    delta_start = 0.02
-    """At more the body creeps down faster than it crawls up."""
+    least_and_most = -_ANY_ANGLE, _ANY_ANGLE
+
+    @property
+    def delta_start(self) -> float:  # type: ignore[override]
+        """At more the body creeps down faster than it crawls up."""
+        return 0.2 * DELTA_START if self.unit_speed else 0.02
 
     @property
     def fraction(self) -> float:
@@ -112,15 +122,12 @@ class OnSlope(Telling):
         """Bilateral gaits keep every heading (docs/howto/slopes.md), others have to be told to."""
         return BILATERAL if self.symmetry == BILATERAL else NONE
 
-    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
-        return self._bounds(body, limit, -_ANY_ANGLE, _ANY_ANGLE)
+    def said(self, gait: Any) -> float:
+        """NaN also if the member nearest to the gait starts in another phase."""
+        return gait.theta if gait.theta is not None and self.in_phase(gait) else np.nan
 
     def parameters(self, gait: Any) -> np.ndarray:
-        """The parameter vector of the member nearest to a gait; its last one is NaN if that does not say where it points, or
-        would, started in another phase."""
-        if gait.theta is None or not self.in_phase(gait):
-            return np.append(self.without.parameters(gait), np.nan)
-        return np.append(self.without.nearest(gait), gait.theta)
+        return super().parameters(gait) if np.isnan(self.said(gait)) else self.nearest(gait)
 
 
 def _checked_grade(grade: object) -> float:

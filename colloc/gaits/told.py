@@ -11,17 +11,26 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from colloc.gaits.linear import LinearClass
+from colloc.gaits.gait import ClassOfGaits
 from colloc.mechanics.bodies import Body
 
 
-class Telling(LinearClass):
-    """What saying a number changes in a class that is linear in its parameters; members whose last parameter is NaN do not say
-    it yet. Such classes derive from a child of this one first and then from the class that they are without (`telling`)."""
+class Telling(ClassOfGaits):
+    """What saying a number changes in a class, of series or of paths; members whose last parameter is NaN do not say it yet.
+    Such classes derive from a child of this one first and then from the class that they are without (`telling`)."""
 
     tells: ClassVar[str]
     """What members call the number."""
     _own: ClassVar[tuple[tuple[str, Any], ...]]
+
+    @property
+    def least_and_most(self) -> tuple[float, float]:
+        """What the number may be."""
+        raise NotImplementedError
+
+    def said(self, gait: Any) -> float:
+        """The number of any gait; NaN if it is not known."""
+        raise NotImplementedError
 
     @property
     def without(self) -> Any:
@@ -38,17 +47,31 @@ class Telling(LinearClass):
     def series(self, harmonics: int) -> Any:
         return self.without.series(harmonics)
 
+    def size(self, n_joint: int, n_interval: int | None = None) -> int:
+        return self.without.size(n_joint, n_interval) + 1
+
     def _basis(self, n_joint: int) -> np.ndarray:
-        """No angle depends on the number."""
+        """Of a class that is linear in its parameters."""
         basis = self.without._basis(n_joint)
         return np.column_stack([basis, np.zeros(len(basis))])
 
-    def _bounds(self, body: Body, limit: float, least: float, most: float) -> tuple[np.ndarray, np.ndarray]:
-        lower, upper = self.without.bounds(body, limit)
-        return np.append(lower, least), np.append(upper, most)
+    def split(self, parameters: np.ndarray, n_joint: int) -> Any:
+        """Of a class of paths: what they are made of."""
+        return self.without.split(parameters[:-1], n_joint)
+
+    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        own = self.without.bounds(body, limit)
+        lower, upper = (np.append(each, end) for each, end in zip(own, self.least_and_most, strict=True))
+        return lower, upper
+
+    def parameters(self, gait: Any) -> np.ndarray:
+        return np.append(self.without.parameters(gait), self.said(gait))
+
+    def nearest(self, gait: Any) -> np.ndarray:
+        return np.append(self.without.nearest(gait), self.said(gait))
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
-        gait = self.without.member(parameters[:-1], n_joint)
+        gait = self.without.member(parameters[:-1], n_joint, edges)
         return gait if np.isnan(parameters[-1]) else replace(gait, **{self.tells: float(parameters[-1])})
 
     def through(self, gait: Any) -> Any:

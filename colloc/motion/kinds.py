@@ -57,6 +57,8 @@ class Shapes(NamedTuple):
     rates: np.ndarray
     delta: float
     unit: float = 1.0
+    pace: np.ndarray | float = 1.0
+    """By which velocities at the points are multiplied, ``(n_point,)``, of gaits along paths."""
 
 
 class Along(NamedTuple):
@@ -277,7 +279,7 @@ class SlowOnSlope(_WithStates):
             now = balance_on_slope(self._chain, self.friction, self._slope, at, states[0], start=z, tolerance=tolerance)
             z = now.solved.z
             balanced = bool((now.solved.residual < _ACCEPTED * tolerance).all())
-            return Rates(z[None, OMEGA], now.on_theta[None, None, OMEGA], balanced)
+            return Rates(shapes.pace * z[None, OMEGA], shapes.pace * now.on_theta[None, None, OMEGA], balanced)
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, begin, states)
         slopes = now.on_shape, now.on_theta[:, None]

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from colloc.collocation.point_equations import ACTUATORS
+from colloc.collocation.motion_rows import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.densities import PathLimits

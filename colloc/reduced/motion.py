@@ -72,7 +72,7 @@ class ReducedMotion:
             return last
         angles, rates, pace = self.shapes.at(v)
         begin = v[v.size - len(self.kind.told) :]
-        along = self.kind.along(self.mesh, Moving(angles, rates, delta), begin, self._start(angles, rates, begin))
+        along = self.kind.along(self.mesh, Moving(angles, rates, delta, pace=pace), begin, self._start(angles, rates, begin))
         self.solves += 1
         now, mesh = along.now, self.mesh
         out = np.vstack([now.z[OMEGA] - self._even(pace), now.centre, now.power])
@@ -169,7 +169,7 @@ class ReducedMotion:
         mesh, kind, blocks = self.mesh, self.kind, s.pace.size // self.mesh.n_point
         slopes, on_states = self._slopes(s)
         by_theta = on_points[:, -1].reshape(len(on_points), blocks, -1).sum(axis=1)
-        rows, on_begin, _ = through_motion(kind, mesh, s.pose, shares, on_states, by_theta[:, mesh.points])
+        rows, on_begin, _ = through_motion(kind, mesh, s.pose, shares, on_states * s.pace, by_theta[:, mesh.points])
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]

@@ -26,6 +26,7 @@ from colloc.numerics.sqp import minimised, remembered
 from colloc.reduced.constraints import Constraints
 from colloc.reduced.given import Given
 from colloc.reduced.place_slopes import along_arcs, along_shape
+from colloc.reduced.pointed import pointed
 from colloc.system.errors import NotConvergedError
 
 _FOLLOWS = ("path", "unit tangent", "smooth closure")
@@ -53,15 +54,15 @@ class PathSpace:
         free = fit.lower < fit.upper
         self._fixed = np.where(free, 0.0, fit.lower)
         gait, n_joint = control.admissible.gait, control.admissible.n_joint
-        self.shapes, self._arcs = np.arange(fit.lower.size), gait.of_arcs
+        self._arcs, parts = gait.of_arcs, gait.split(np.arange(fit.lower.size), n_joint)
         self._closed = self._arcs and n_joint > 2 and gait.symmetry != BILATERAL
         self._side = 1.0 if gait.symmetry == NONE else -1.0
         self.own = np.arange(fit.lower.size)
+        self.shapes = parts[-1] if self._arcs else parts
         if self._arcs:
-            speed, tangents, shapes = gait.split(self.own, n_joint)
-            self._speed, self._tangents, self.shapes = speed[0, 0], tangents, shapes
-            last = tangents[:, : -1 if self._closed else None]
-            self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0]])
+            speed, self._tangents, shapes = parts
+            self._speed, last = speed[0, 0], self._tangents[:, : -1 if self._closed else None]
+            self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0], self.own[shapes[-1, -1] + 1 :]])
             self.own = self.own[free[self.own]]
             chord, self._on_arcs, arc_h = self._geometry.blocks["chord"]
             self._chord, self._chord_slope = ColumnFunction(chord.value), ColumnFunction(chord.jacobian)
@@ -148,7 +149,7 @@ class PathSpace:
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters ``(n,)`` of the member nearest to a gait, in the sum of squared distances where arcs or sides meet.
         `NotConvergedError` if no path of the class is found near the gait."""
-        laid = self._through(gait)
+        laid = self._pointed(gait)
         v, target, accuracy = laid[self.own], laid, _NEAR
         for _ in range(_ROUNDS):
             asked = self.constraints(v)
@@ -168,10 +169,16 @@ class PathSpace:
 
     def laid(self, gait: AnyGait) -> np.ndarray:
         """Parameters of a path through a gait, which need not be a member: it may bend more than it should."""
-        return self._through(gait)[self.own]
+        return self._pointed(gait)[self.own]
+
+    def _pointed(self, gait: AnyGait) -> np.ndarray:
+        """Full parameters of a path through a gait, which need not keep every constraint, and where it points."""
+        laid = self._through(gait)
+        if np.isnan(laid[-1]):
+            laid[-1] = pointed(self.control, self.mesh, self, laid[self.own])[-1]
+        return laid
 
     def _through(self, gait: AnyGait) -> np.ndarray:
-        """Full parameters of a path through a gait; it need not keep every constraint."""
         kind = self.control.admissible.gait
         if self._fit.knots is not None:
             return kind.parameters(arcs_through(gait, kind, self._fit.knots))

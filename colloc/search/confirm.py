@@ -17,7 +17,7 @@ from enum import Enum
 import numpy as np
 
 from colloc.collocation.layout import distance_and_work, layout_of
-from colloc.collocation.point_equations import ACTUATORS
+from colloc.collocation.motion_rows import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
 from colloc.numerics.sqp import Stationarity, stationarity

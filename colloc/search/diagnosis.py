@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from colloc.collocation.point_equations import ACTUATORS
+from colloc.collocation.motion_rows import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.numerics.multiplier_estimate import quasi_definite_factors
 from colloc.search.certify import VIOLATION

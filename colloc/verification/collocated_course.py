@@ -16,7 +16,7 @@ import numpy as np
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.inertia import Paced
 from colloc.gaits.regime import Regime
-from colloc.gaits.sloped import Slope, checked_chain
+from colloc.gaits.sloped import Slope
 from colloc.gaits.symmetry import NONE
 from colloc.motion.collocated import CollocatedPose, stage_weights
 from colloc.motion.kinds import (
@@ -25,7 +25,6 @@ from colloc.motion.kinds import (
     Kind,
     Passed,
     Shapes,
-    WithInertia,
     begin_of,
     first_theta,
     kind_of_motion,
@@ -34,7 +33,7 @@ from colloc.motion.kinds import (
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import totals_along
 from colloc.verification.inertial_motion import gait_with_inertia
-from colloc.verification.slope import GaitOnSlope
+from colloc.verification.slope import gait_on_slope
 
 
 class CourseOfGait(NamedTuple):
@@ -45,10 +44,12 @@ class CourseOfGait(NamedTuple):
     error: float
     sums: Callable[[np.ndarray], np.ndarray] | None = None
     """Quantities that forces are needed for up to phases in order, ``(k, n)``; None if there are none."""
+    alone: Callable[..., Any] | None = None
+    """Intervals by themselves (`colloc.motion.kinds.WithInertia.alone`); None: their errors are seen in the whole motion."""
 
 
 def course(control: ControlProblem, gait: Any, delta: float, mesh: Mesh, tolerance: float) -> CourseOfGait:
-    """The motion of a gait without breaks, delta per period, to a relative error of the objective, from what the states count
+    """The motion of a gait, delta per period, to a relative error of the objective, from what the states count
     in it on a mesh; with inertia it is sought near the motion there."""
     period = _collocated(control, mesh, gait, delta).period
     counts = sum(map(abs, control.aims.objective.shares(period).values()))
@@ -64,9 +65,8 @@ def course_in(regime: Regime, control: ControlProblem, gait: Any, delta: float, 
 
 @course_in.register
 def _on_slope(regime: Slope, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
-    body, friction, *_ = control.dynamics
     asked = [each for each in control.aims.integrals if each.needs_forces]
-    on = GaitOnSlope(checked_chain(body, friction, regime.grade), friction, gait, delta, (), regime.grade)
+    on = gait_on_slope(control.dynamics.body, control.dynamics.law, gait, delta, regime.grade, gait.corner_phases)
     ran = on.followed(np.array([gait.theta]), error)
     return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
 
@@ -76,9 +76,9 @@ def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: floa
     dynamics = control.dynamics
     at, regime = (dynamics.body, dynamics.law, gait, delta), regime.at(gait)
     played = gait_with_inertia(*at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime)
-    kind = kind_of_motion(dynamics)
+    kind: Any = kind_of_motion(dynamics)
     ran = played.settled(kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0], error)
-    return CourseOfGait(ran.at, error)
+    return CourseOfGait(ran.at, error, alone=kind.alone)
 
 
 def _shapes(gait: Any, mesh: Mesh, delta: float) -> Shapes:
@@ -128,11 +128,10 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     aims, value = objective.shares(period), np.zeros(mesh.n)
     rotation, energy, displacement = pose.rotations - theta, spent - work, np.diff(pose.place) - (x + 1j * y)
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
-    if isinstance(kind, WithInertia):
+    if exact.alone is not None:
         shapes = _shapes(gait, mesh, delta)
-        known_states = np.arange(len(kind.states))  # momenta, and theta if it is one
-        edge_states, at_points = at_edges[known_states], exact.at(mesh.times)[known_states]
-        out, ends, alone = kind.alone(mesh, shapes, own, edge_states[:, :-1], at_points)
+        edge_states, near = (at[: len(kind.states)] for at in (at_edges, exact.at(mesh.times)))  # momenta, perhaps theta
+        out, ends, alone = exact.alone(mesh, shapes, own, edge_states[:, :-1], near)
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
         here, spent_alone = np.exp(1j * angle[:-1]), (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
         # an error of rotation turns everything after it, and by half of it the direction that counts

@@ -5,7 +5,7 @@ import pytest
 from shared.instants import random_instants
 
 from colloc import Chain, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscous, replay
-from colloc.collocation.point_equations import ACTUATORS
+from colloc.collocation.motion_rows import ACTUATORS
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.control_problem import control_problem
 from colloc.mechanics.actuators import joint_moments

@@ -1,9 +1,11 @@
 """The collocated motion on a slope: against the differential equation, differences, and the full program."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from colloc import Basis, BSpline, Chain, Foot, Friction, Harmonic, Pad, Problem, Serpenoid, Wheel, ellipse
+from colloc import Basis, BSpline, Chain, Foot, FreePath, Friction, Harmonic, Pad, Polygon, Problem, Serpenoid, Wheel, ellipse
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.gait_fields import fields, gait_from
 from colloc.reduced.program import ReducedProgram
@@ -29,35 +31,44 @@ FEET = SKEW.with_(
 
 SNAKE = SKEW.with_(name="snake", gait=Serpenoid(2), guess=None)
 SPLINE = SKEW.with_(name="spline", gait=BSpline(7, degree=3), guess=None)
+ARCS = Problem("arcs", friction=Friction(1.7, 1, 1.3), gait=FreePath(5.0), grade=0.4, intervals=12)
+ARCS_OF_THREE = ARCS.with_(name="arcs-3", body=Chain((0.25,) * 4), guess=None, grade=0.2)
+SIDES = SKEW.with_(name="sides", gait=Polygon(5), guess=None)
+NOTHING_MORE = (None, "driven efficiency", {"torque_limit": 0.06})
+ACROSS = (2.0, "driven efficiency", {"torque_limit": 0.06})
+PACED = (2.0, "distance / (work + 0.01 * length)", {"power_limit": 0.3, "torque_limit": 0.06})
 
 
 def program_at(problem, delta):
-    """A program, and a point of it with nothing special."""
-    space, v = space_near(problem, ellipse(0, 2.6, 1.3))
-    v = np.append(v[:-1] + 0.1 * np.random.default_rng(0).normal(size=v.size - 1), 0.7)
+    """A program, and a point of it with nothing special; of paths one that is closed."""
+    space, v = space_near(problem, ellipse(0, 2.6, 1.3) if problem.body.n_joint == 2 else problem.guess)
+    size = 0.0 if problem.gait.unit_speed else 0.1
+    v = np.append(v[:-1] + size * np.random.default_rng(0).normal(size=v.size - 1), 0.7)
     program = ReducedProgram(space, delta)
     program.place_rows(v)
     return program, v
 
 
-@pytest.mark.parametrize("problem", [LEVEL, SKEW, FEET, SPLINE], ids=lambda p: p.name)
+@pytest.mark.parametrize("problem", [LEVEL, SKEW, FEET, SPLINE, ARCS, ARCS_OF_THREE, SIDES], ids=lambda p: p.name)
 def test_the_mesh_has_the_motion_of_the_differential_equation(problem):
     program, v = program_at(problem.with_(intervals=120), 0.1)
-    ran = slope_motion(problem.body, problem.friction, program.space.member(v), 0.1, problem.grade)
+    gait = program.space.member(v)
+    at = problem.body, problem.friction, gait, 0.1 * gait.delta_unit, problem.grade
+    ran = slope_motion(*at, breaks=gait.corner_phases)
     found = program.motion.values(v, 0.1)
     for name, exact in (("distance", ran.climb), ("work", ran.joint_work), ("rotation", ran.turn), ("across", ran.aside)):
         assert found[name] == pytest.approx(float(np.squeeze(exact)), abs=1e-5), name
 
 
-@pytest.mark.parametrize("problem", [LEVEL, FEET, SPLINE, SNAKE], ids=lambda p: p.name)
 @pytest.mark.parametrize(
-    ("towards", "objective", "limits"),
+    ("problem", "asked"),
     [
-        (None, "driven efficiency", {"torque_limit": 0.06}),
-        (2.0, "distance / (work + 0.01 * length)", {"power_limit": 0.3, "torque_limit": 0.06}),
+        *((problem, asked) for problem in (LEVEL, FEET, SPLINE, SNAKE) for asked in (NOTHING_MORE, PACED)),
+        *((problem, asked) for problem in (ARCS, ARCS_OF_THREE, SIDES) for asked in (NOTHING_MORE, ACROSS)),
     ],
 )
-def test_gradients_are_the_limit_of_differences(problem, towards, objective, limits):
+def test_gradients_are_the_limit_of_differences(problem, asked):
+    towards, objective, limits = asked
     program, v = program_at(problem.with_(towards=towards, objective=objective, **limits), 0.05)
     assert program.actuators.placed.shape[1] > 10
     slopes, gradient, rows = program.motion.gradients(v, 0.05), program.gradient(v), program.row_slopes(v)
@@ -71,17 +82,46 @@ def test_gradients_are_the_limit_of_differences(problem, towards, objective, lim
         np.testing.assert_allclose(rows[:, k], (program.rows(v + step) - program.rows(v - step)) / 2e-5, atol=3e-5)
 
 
-@pytest.mark.parametrize(("problem", "towards"), [(SKEW, None), (SNAKE, None), (FEET.with_(torque_limit=5.0), 2.0)])
+@pytest.mark.parametrize(
+    ("problem", "towards"),
+    [
+        (SKEW, None),
+        (SNAKE, None),
+        (FEET.with_(torque_limit=5.0), 2.0),
+        (ARCS.with_(torque_limit=5.0), 2.0),
+        (SIDES, 2.0),
+        (ARCS_OF_THREE, None),
+    ],
+)
 def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towards):
     """Every equation but those that the gait has still to be found for: no turn, no way across."""
     program, v = program_at(problem.with_(towards=towards, objective="driven efficiency"), 0.05)
-    full = transcribed(program.space.control.problem, program.space.member(v))
+    gait = program.space.member(v)
+    full = transcribed(program.space.control.problem, gait, program.space.phase_mesh(gait).edges)
     x = feasible_point(full, program.space.full_parameters(v), 0.05)
     found = Solver(full).measured(x, 0.05, np.zeros_like(x), np.zeros(full.constraint_lower.size))
-    off = {name for name, rows in full.groups.items() if found.excess[rows].max(initial=0.0) > 1e-9}
+    off = {name for name, rows in full.groups.items() if found.excess[rows].max(initial=0.0) > 1e-7}
     assert off == ({"rotation"} if towards is None else {"rotation", "across"})
     assert found.objective == pytest.approx(program.objective(v), abs=1e-12)
     assert found.excess[full.groups["rotation"]][0] == pytest.approx(abs(program.motion.values(v, 0.05)["rotation"]), abs=1e-9)
+
+
+@pytest.mark.parametrize("problem", [SKEW, SPLINE, ARCS, SIDES], ids=lambda p: p.name)
+def test_where_the_ground_is_nearly_level_a_gait_goes_up_as_far_as_on_the_level(problem):
+    (up, v), (level, w) = (space_near(problem.with_(grade=grade), problem.guess) for grade in (1e-9, 0.0))
+    found, known = (ReducedProgram(space, 0.01).motion.values(at, 0.01) for space, at in ((up, v), (level, w)))
+    turned = up.member(np.append(v[:-1], v[-1] + 0.3))
+    assert up.parameters(turned)[-1] == pytest.approx(v[-1] + 0.3)
+    assert found["work"] == pytest.approx(known["work"], abs=1e-7)
+    assert np.hypot(found["distance"], found["across"]) == pytest.approx(known["distance"], abs=1e-7)
+    assert found["distance"] > 0.98 * known["distance"]  # where it points is found at a larger delta
+
+
+@pytest.mark.parametrize("problem", [ARCS, SIDES], ids=lambda p: p.name)
+def test_a_path_laid_through_a_gait_points_where_that_does(problem):
+    space, _ = space_near(problem, problem.guess)
+    for gait in (ellipse(0, 2.4, 1.2), space.member(space.laid(problem.guess))):
+        assert space.parameters(replace(gait, theta=0.3))[-1] == pytest.approx(0.3, abs=1e-6)
 
 
 def test_a_serpenoid_gait_on_a_slope_is_known_by_its_few_parameters():

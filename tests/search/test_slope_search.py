@@ -12,8 +12,10 @@ from colloc import (
     FreePath,
     Friction,
     Harmonic,
+    Polygon,
     Problem,
     ProblemError,
+    Relaxed,
     Viscous,
     Wheel,
     ellipse,
@@ -23,6 +25,7 @@ from colloc import (
 from colloc.commands import report, verify
 from colloc.commands import solve as solve_command
 from colloc.gaits.control_problem import control_problem
+from colloc.gaits.path_samples import path_length
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram
 from colloc.search.certify import _one_motion, gait_certificate
@@ -32,6 +35,8 @@ from colloc.verification.mesh_error import mesh_error
 from colloc.verification.slope import slope_motion
 
 PROBLEM = Problem("climber", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, grade=0.1)
+SIDES = PROBLEM.with_(name="sides", gait=Polygon(4), delta=6e-4, delta_start=None, intervals=None)
+"""About as dry: the path is 17 rad long."""
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +58,31 @@ def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
     assert uphill.certificate.distance == pytest.approx(ran.climb[0], abs=1e-5)
     assert uphill.certificate.work == pytest.approx(ran.joint_work[0], abs=1e-5)
     assert uphill.certificate.work == pytest.approx(ran.friction_work[0] + 0.1 * ran.climb[0], abs=1e-5)
+
+
+def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, capsys):
+    found = solve(SIDES, 1)
+    assert (found.status, found.answer.program) == ("solved", FULL), found.message
+    gait, delta = found.gait, found.answer.delta * found.gait.delta_unit
+    ran = slope_motion(Chain(), Friction(), gait, delta, 0.1, theta=gait.theta, breaks=gait.corner_phases)
+    assert found.certificate.value == pytest.approx(ran.climb[0] / ran.joint_work[0], rel=1e-5)
+    assert abs(ran.turn) < 1e-5
+    assert found.certificate.value > 1.4 * uphill.certificate.value
+    path = save(found, tmp_path / "sides.h5")
+    assert load(path).gait.theta == gait.theta
+    assert verify.main([str(path)]) == 0
+    assert "certified" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_free_path_climbs_better_than_a_harmonic_gait_that_it_contains():
+    harmonic = solve(PROBLEM.with_(delta=2e-3), 1)
+    delta = 2e-3 / path_length(harmonic.gait)
+    free = SIDES.with_(name="free", gait=FreePath(6), guess=harmonic.gait, delta=delta, intervals=30)
+    found = solve(free, 1)
+    assert found.status == "solved", found.message
+    ran = slope_motion(Chain(), Friction(), found.gait, found.answer.delta * found.gait.delta_unit, 0.1)
+    assert ran.climb[0] / ran.joint_work[0] > 2 * harmonic.certificate.value
 
 
 @pytest.mark.slow
@@ -212,7 +242,8 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"gait": FreePath()}, "classes paced by time, not FreePath"),
+        ({"gait": Relaxed()}, "gaits say where the body points, which those of the class Relaxed cannot"),
+        ({"gait": FreePath(symmetry="bilateral")}, "no part of a period follows from another: take FreePath"),
         ({"body": CrawlerBody(), "gait": None, "guess": None}, "only a Chain"),
         ({"objective": "turning"}, "the objective speaks of the rotation"),
         ({"gait": Harmonic(1), "rotation": 0.1}, "a body that a period turns has no gait that repeats"),
