@@ -304,8 +304,8 @@ def _follow(problem: Problem, gait: AnyGait, deltas: list[float], known: list[li
         if is_viscous(found):
             continue  # as far as this delta goes, the start is as it was
         space, v = found.space, found.v
-        if found.violation > SKETCH.kkt_error:
-            continue  # no member of the class yet, whatever its value
+        if not _is_member(found):
+            continue
         at = next((c for c in here if same_gait(problem, c.optimum, found)), None)
         new = at is None
         if at is None:
@@ -317,6 +317,11 @@ def _follow(problem: Problem, gait: AnyGait, deltas: list[float], known: list[li
         if not new:
             return
         before = at
+
+
+def _is_member(found: Optimum) -> bool:
+    """Whether a gait is one of its class, about; else its value means nothing."""
+    return found.violation <= SKETCH.kkt_error
 
 
 def is_finite(optimum: Optimum) -> bool:
@@ -344,7 +349,9 @@ def _followed_to_the_end(
             break
         helpers.await_for(_followed, problem, candidate.optimum)
         with suppress(CollocError):
-            ends.append((_followed(problem, candidate.optimum), candidate))
+            end = _followed(problem, candidate.optimum)
+            if _is_member(end):
+                ends.append((end, candidate))
         run.told("explore", number, len(queue) + len(spare), _best([optimum for optimum, _ in ends]))
     if not ends:
         raise NotConvergedError("no gait could be followed to the final delta; start at a larger delta or give another guess.")

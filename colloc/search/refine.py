@@ -86,7 +86,10 @@ def refine(optimum: Optimum) -> Optimum:
 
 
 def _finer(optimum: Optimum, meshes: _Meshes) -> Optimum | None:
-    """The gait optimised on the next mesh, or on more panels; after the last with what it lacks. None if its own will do."""
+    """The gait optimised on the next mesh, or on more panels; after the last with what it lacks. None if its own will do, or
+    no other would."""
+    if meshes.count and optimum.violation > ROUGH.kkt_error:
+        return None  # its rows contradict each other, which no mesh mends
     refines = optimum.problem.mesh_tolerance > 0
     finer = on_more_panels(optimum) if refines else None
     plan = meshes.plan(optimum) if refines and finer is None else None
