@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
@@ -24,14 +25,33 @@ Implicit = dict[str, Callable[[ca.MX, ca.MX], ca.MX]]
 """By name of a block, the velocities that are tied to those of the balance solver, from its locals and delta."""
 
 
+class CollocatedClass(Protocol):
+    """A class of gaits on a mesh."""
+
+    @property
+    def mesh(self) -> Mesh: ...
+
+    @property
+    def knots(self) -> np.ndarray | None:
+        """``(n,)`` or None: phases where the arcs of a free path meet; None for other gaits."""
+
+    @property
+    def checks(self) -> list[ShapeCheck]:
+        """Shape functions whose largest value in each mesh cell is constrained."""
+
+    def phase_mesh(self, gait: AnyGait) -> Mesh:
+        """The mesh in phases of a member."""
+
+    def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """What a check's block is given at an instant of every cell of a mesh in phases, ``(n_given, n_cell)``."""
+
+
 @dataclass(frozen=True, eq=False)
 class GaitProgram:
     """An optimal control problem on a mesh, ready for a solver of nonlinear programs."""
 
     control: ControlProblem
-    mesh: Mesh
-    knots: np.ndarray | None
-    """``(n,)`` or None: phases where the arcs of a free path meet; None for other gaits."""
+    gaits: CollocatedClass
     layout: Layout
     assembly: Assembly
     names: tuple[str, ...]
@@ -43,12 +63,22 @@ class GaitProgram:
     constraint_upper: np.ndarray  # (m,)
     groups: dict[str, slice]
     """Names of the constraint rows, in order."""
-    checks: list[ShapeCheck]
-    """Shape functions whose largest value in each mesh cell is constrained."""
     speed_unit: float
     """The program's unit of speed: delta is divided by it before the blocks see it."""
     velocity: ImplicitVelocity | None
     """Kept alive here for the functions that call it."""
+
+    @property
+    def mesh(self) -> Mesh:
+        return self.gaits.mesh
+
+    @property
+    def knots(self) -> np.ndarray | None:
+        return self.gaits.knots
+
+    @property
+    def checks(self) -> list[ShapeCheck]:
+        return self.gaits.checks
 
     def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> GaitProgram:
         """The program with other bounds of its rows."""
@@ -65,11 +95,7 @@ class GaitProgram:
 
     def phase_mesh(self, gait: AnyGait) -> Mesh:
         """The mesh in phases of a member."""
-        return self.mesh
-
-    def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
-        """What a check's block is given at an instant of every cell of a mesh in phases, ``(n_given, n_cell)``."""
-        raise NotImplementedError
+        return self.gaits.phase_mesh(gait)
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.
@@ -81,23 +107,32 @@ class GaitProgram:
         mesh, given = self.phase_mesh(gait), {}
         limit = self.control.admissible.joint_limit
         for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks, limit), strict=True):
-            given[check.name] = np.vstack([self.placed(check, times, mesh), held_shares(check, gait, times)])
+            given[check.name] = np.vstack([self.gaits.placed(check, times, mesh), held_shares(check, gait, times)])
         blocks = zip(self.names, self.assembly.blocks, strict=True)
         return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]
 
 
-def assembled(
-    layout: Layout, objective: Block, blocks: dict[str, BlockParts], groups: list[Group], implicit: Implicit
-) -> tuple[Assembly, tuple[str, ...], np.ndarray, np.ndarray, dict[str, slice]]:
-    """The assembly of blocks and rows, the blocks' names, the bounds of the rows, and where each group's rows are."""
+class ProgramRows(NamedTuple):
+    """Constraint rows as a solver sees them."""
+
+    linear: sparse.csr_matrix
+    blocks: tuple[Block, ...]
+    lower: np.ndarray
+    upper: np.ndarray
+    groups: dict[str, slice]
+
+
+def stacked_rows(n: int, blocks: dict[str, BlockParts], groups: list[Group], implicit: Implicit | None = None) -> ProgramRows:
+    """Groups of rows over the first of n variables, or all, one below the other."""
     ends = np.cumsum([0] + [g.m for g in groups])
     scattered = tuple(
-        Block(function, gather, stacked(groups, name, function.n_out * gather.shape[1]), given, implicit.get(name))
+        Block(function, gather, stacked(groups, name, function.n_out * gather.shape[1]), given, (implicit or {}).get(name))
         for name, (function, gather, given) in blocks.items()
     )
-    return (
-        Assembly(layout.n, objective, scattered, sparse.vstack([g.linear for g in groups]).tocsr()),
-        tuple(blocks),
+    linear = [sparse.csr_matrix((g.linear.data, g.linear.indices, g.linear.indptr), shape=(g.m, n)) for g in groups]
+    return ProgramRows(
+        sparse.vstack(linear).tocsr(),
+        scattered,
         np.concatenate([g.lower for g in groups]),
         np.concatenate([g.upper for g in groups]),
         {g.name: slice(int(a), int(b)) for g, a, b in zip(groups, ends, ends[1:], strict=False)},

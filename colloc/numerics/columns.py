@@ -6,10 +6,13 @@ takes longer than the functions themselves.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 import numpy as np
+from scipy import sparse
 
-from colloc.numerics.blocks import Assembly, Block, jacobian_terms, summed
+from colloc.numerics.blocks import Block, jacobian_terms, summed
 
 
 class ColumnFunction:
@@ -47,19 +50,21 @@ class ColumnFunction:
 
 
 class ChosenRows:
-    """The rows `kept` of an assembly without implicit blocks, with the instance parameters ``(n_given, n_instance)`` of every
-    block as they are now."""
+    """The rows `kept` of a linear part and of blocks, none implicit, with the instance parameters ``(n_given, n_instance)`` of
+    every block as they are now."""
 
-    def __init__(self, assembly: Assembly, kept: np.ndarray, parameters: list[np.ndarray]) -> None:
-        self._linear, blocks = assembly.linear[kept], []
-        for block, given in zip(assembly.blocks, parameters, strict=True):
+    def __init__(
+        self, linear: sparse.csr_matrix, of_blocks: Sequence[Block], kept: np.ndarray, parameters: Sequence[np.ndarray]
+    ) -> None:
+        self._linear, blocks = linear[kept], []
+        for block, given in zip(of_blocks, parameters, strict=True):
             scatter, n_out = block.scatter[kept], block.function.n_out
             used = np.unique(scatter.indices // n_out)
             if used.size:
                 columns = (used[:, None] * n_out + np.arange(n_out)).ravel()
                 blocks.append(Block(block.function, block.gather[:, used], scatter[:, columns], given[:, used]))
         terms = jacobian_terms(self._linear, blocks)
-        key = terms.row.astype(int) * assembly.n + terms.column
+        key = terms.row.astype(int) * linear.shape[1] + terms.column
         self._places, self._weights = summed(key, terms.source, terms.weight, terms.n_source)
         self._parts = [_Part(block) for block in blocks]
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from colloc.collocation.path_transcription import path_through, transcribe_fit
+from colloc.collocation.path_equations import along_arcs, along_shape
+from colloc.collocation.path_geometry import path_geometry, path_through
 from colloc.collocation.worst_instants import check_values, held_shares, near_peaks
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.free_path import ArcPath
@@ -21,11 +22,9 @@ from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.columns import ChosenRows, ColumnFunction
 from colloc.numerics.constraint_rows import selector
-from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import minimised, remembered
 from colloc.reduced.constraints import Constraints
 from colloc.reduced.given import Given
-from colloc.reduced.place_slopes import along_arcs, along_shape
 from colloc.reduced.pointed import pointed
 from colloc.system.errors import NotConvergedError
 
@@ -49,42 +48,42 @@ class PathSpace:
         self, control: ControlProblem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
     ) -> None:
         self.control, self.given = control, Given(near, edges, scheme, far)
-        self._fit = fit = transcribe_fit(control, near, edges, scheme, far)
-        self.mesh, self._geometry = fit.mesh, fit.geometry
-        free = fit.lower < fit.upper
-        self._fixed = np.where(free, 0.0, fit.lower)
+        self._paths = paths = path_geometry(control, near, edges, scheme, far)
+        self.mesh, self._rows, self.phase_mesh = paths.mesh, paths.rows, paths.phase_mesh
+        free = paths.lower < paths.upper
+        self._fixed = np.where(free, 0.0, paths.lower)
+        self.own = np.arange(free.size)
         gait, n_joint = control.admissible.gait, control.admissible.n_joint
-        self._arcs, parts = gait.of_arcs, gait.split(np.arange(fit.lower.size), n_joint)
+        self._arcs, parts = gait.of_arcs, gait.split(self.own, n_joint)
         self._closed = self._arcs and n_joint > 2 and gait.symmetry != BILATERAL
         self._side = 1.0 if gait.symmetry == NONE else -1.0
-        self.own = np.arange(fit.lower.size)
         self.shapes = parts[-1] if self._arcs else parts
         if self._arcs:
             speed, self._tangents, shapes = parts
             self._speed, last = speed[0, 0], self._tangents[:, : -1 if self._closed else None]
             self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0], self.own[shapes[-1, -1] + 1 :]])
             self.own = self.own[free[self.own]]
-            chord, self._on_arcs, arc_h = self._geometry.blocks["chord"]
+            chord, self._on_arcs, arc_h = paths.blocks["chord"]
             self._chord, self._chord_slope = ColumnFunction(chord.value), ColumnFunction(chord.jacobian)
             self._chord_entries, self._along = (chord.jac_row, chord.jac_col), (arc_h, np.zeros_like(arc_h))
         self.n = self.own.size
-        self.lower, self.upper = fit.lower[self.own], fit.upper[self.own]
+        self.lower, self.upper = paths.lower[self.own], paths.upper[self.own]
         dropped = _FOLLOWS[: 2 if gait.symmetry == BILATERAL else 3] if self._arcs else ()
-        checked = [check.name for check in fit.checks]
-        self._fixed_rows = {n: np.arange(r.stop - r.start) for n, r in fit.groups.items() if n not in (*dropped, *checked)}
+        moving = [*dropped, *(check.name for check in paths.checks)]
+        self._fixed_rows = {n: np.arange(r.stop - r.start) for n, r in self._rows.groups.items() if n not in moving}
         self._place()
         self._followed, self._steep = remembered(self._follow), remembered(self._chord_jacobian)
 
     def _place(self) -> None:
         """Where the collocation points lie, as functions of the parameters."""
-        mesh, piece = self.mesh, self._geometry.piece
+        mesh, piece = self.mesh, self._paths.piece
         out = ca.vertcat(piece.angles, piece.direction, piece.speed)
         arguments = [piece.shape, piece.given]
         self._value = ColumnFunction(ca.Function("place", arguments, [out]))
         n_joint = self.control.admissible.n_joint
         self._pulled = along_arcs(n_joint) if self._arcs and n_joint > 2 else along_shape(piece)
-        self._given = self._geometry.given(np.tile(mesh.scheme.c, mesh.n))
-        self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
+        self._given = self._paths.given(np.tile(mesh.scheme.c, mesh.n))
+        self._gather = np.repeat(self._paths.shape, mesh.scheme.s, axis=1)
         self._scatter = selector(self._gather.ravel(), self._fixed.size)
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
@@ -144,7 +143,10 @@ class PathSpace:
         return self.from_full(v, np.eye(self._fixed.size)[self.shapes.ravel(order="F")])
 
     def member(self, v: np.ndarray) -> ArcPath | Corners:
-        return self._fit.member(self.full_parameters(v))
+        return self._member(self.full_parameters(v))
+
+    def _member(self, full: np.ndarray) -> ArcPath | Corners:
+        return self.control.admissible.member(full, self._paths.knots)
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters ``(n,)`` of the member nearest to a gait, in the sum of squared distances where arcs or sides meet.
@@ -180,12 +182,9 @@ class PathSpace:
 
     def _through(self, gait: AnyGait) -> np.ndarray:
         kind = self.control.admissible.gait
-        if self._fit.knots is not None:
-            return kind.parameters(arcs_through(gait, kind, self._fit.knots))
+        if self._arcs:
+            return kind.parameters(arcs_through(gait, kind, self._paths.near.edges))
         return kind.parameters(path_through(self.control, gait, self.mesh.edges)[0])
-
-    def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
-        return self._fit.phase_mesh(gait)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
@@ -200,29 +199,27 @@ class PathSpace:
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """The rows of the class, and checks where they might bind. They stay where they are placed: no path was seen to swing,
         and rows that follow cost as much as all else."""
-        p, fit = self.full_parameters(v), self._fit
-        gait, limit = fit.member(p), self.control.admissible.joint_limit
-        mesh, excess, kinds = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
-        given = {name: block.parameters.copy() for name, block in zip(self._geometry.blocks, fit.assembly.blocks, strict=True)}
-        for check, (cells, times) in zip(fit.checks, near_peaks(gait, mesh, fit.checks, limit), strict=True):
+        paths, rows, limit = self._paths, self._rows, self.control.admissible.joint_limit
+        gait, excess, kinds = self._member(self.full_parameters(v)), -np.inf, dict(self._fixed_rows)
+        mesh, given = paths.phase_mesh(gait), {name: parameters.copy() for name, (*_, parameters) in paths.blocks.items()}
+        for check, (cells, times) in zip(paths.checks, near_peaks(gait, mesh, paths.checks, limit), strict=True):
             kinds[check.name] = cells
             if not cells.size:
                 continue
-            times = times + later * mesh.h[cells]
-            tau, values = np.full(mesh.n, 0.5), check_values(check, gait, times)
-            tau[cells] = np.clip((times - mesh.edges[cells]) / mesh.h[cells], 0.0, 1.0)
-            given[check.name][:-1] = self._geometry.given(tau)
+            times, instants = times + later * mesh.h[cells], 0.5 * (mesh.edges[1:] + mesh.edges[:-1])
+            instants[cells], values = times, check_values(check, gait, times)
+            given[check.name][:-1] = paths.placed(check, instants, mesh)
             given[check.name][-1, cells] = held_shares(check, gait, times)
             excess = max(excess, float(check.excess(values, limit).max()))
-        kept = np.concatenate([fit.groups[name].start + rows for name, rows in kinds.items()])
-        rows = ChosenRows(fit.assembly, kept, list(given.values()))
+        kept = np.concatenate([rows.groups[name].start + own for name, own in kinds.items()])
+        chosen = ChosenRows(rows.linear, rows.blocks, kept, list(given.values()))
         return Constraints(
             kinds,
-            fit.constraint_lower[kept],
-            fit.constraint_upper[kept],
+            rows.lower[kept],
+            rows.upper[kept],
             excess,
-            lambda v: rows.values(self.full_parameters(v)),
-            lambda v: self.from_full(v, rows.slopes(self.full_parameters(v))),
+            lambda v: chosen.values(self.full_parameters(v)),
+            lambda v: self.from_full(v, chosen.slopes(self.full_parameters(v))),
         )
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.collocation.path_transcription import transcribe_path
 from colloc.collocation.program import GaitProgram
-from colloc.collocation.transcription import transcribe
+from colloc.collocation.transcription import transcribe, transcribe_path
 from colloc.gaits.control_problem import ControlProblem, control_problem
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyGait

@@ -3,11 +3,12 @@
 import casadi as ca
 import numpy as np
 import pytest
+from scipy import sparse
 
 from colloc import Chain, FreePath, Friction, Polygon, Problem
-from colloc.collocation.path_transcription import transcribe_fit
+from colloc.collocation.path_geometry import path_geometry
 from colloc.gaits.control_problem import control_problem
-from colloc.numerics.blocks import oracles
+from colloc.numerics.blocks import Assembly, Block, local_function, oracles
 from colloc.numerics.columns import ChosenRows, ColumnFunction
 
 
@@ -28,12 +29,15 @@ def test_a_function_of_columns_takes_any_number_of_them():
 def test_chosen_rows_are_those_of_the_program(body, gait, seed):
     """Every other row, at a point that keeps none of them."""
     problem, rng = Problem("rows", body=body, friction=Friction(2, 1, 1), gait=gait), np.random.default_rng(seed)
-    fit = transcribe_fit(control_problem(problem), problem.guess)
-    x = rng.uniform(0.5, 1.5, fit.assembly.n)
-    given = [block.parameters for block in fit.assembly.blocks]
-    program = oracles(fit.assembly)
-    values, jacobian = program.options["jac_g"](x, program.parameter_vector(0.0, [fit.assembly.objective.parameters, *given]))
-    kept = np.arange(seed % 2, fit.constraint_lower.size, 2)
-    chosen = ChosenRows(fit.assembly, kept, given)
+    rows = path_geometry(control_problem(problem), problem.guess).rows
+    x = rng.uniform(0.5, 1.5, rows.linear.shape[1])
+    given = [block.parameters for block in rows.blocks]
+    local = ca.SX.sym("x")
+    square = local_function("square", local, ca.SX(0, 1), ca.SX.sym("delta"), local**2)
+    objective = Block(square, np.zeros((1, 1), dtype=int), sparse.eye(1, format="csr"), np.empty((0, 1)))
+    program = oracles(Assembly(x.size, objective, rows.blocks, rows.linear))
+    values, jacobian = program.options["jac_g"](x, program.parameter_vector(0.0, [objective.parameters, *given]))
+    kept = np.arange(seed % 2, rows.lower.size, 2)
+    chosen = ChosenRows(rows.linear, rows.blocks, kept, given)
     np.testing.assert_allclose(chosen.values(x), values.full().ravel()[kept], atol=1e-13)
     np.testing.assert_allclose(chosen.slopes(x), jacobian.full()[kept], atol=1e-12)

@@ -81,9 +81,9 @@ def test_a_redundant_rotation_constraint_is_detected():
     t = transcribe(control_problem(problem))
     rows = t.groups["rotation"]
     linear = t.assembly.linear.tolil()
-    linear[t.groups["orientation"].start] = linear[rows.start]
+    linear[t.groups["angles"].start] = linear[rows.start]
     doubled = Solver(_with_linear(t, linear.tocsr()))
-    assert redundant_equations(doubled, x, 0.1) == ["orientation", "rotation"]
+    assert redundant_equations(doubled, x, 0.1) == ["angles", "rotation"]
 
 
 def test_the_search_for_redundant_equations_takes_time_in_proportion_to_the_mesh():

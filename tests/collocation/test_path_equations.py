@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.collocation.path_equations import arc
-from colloc.reduced.place_slopes import along_arcs, along_shape
+from colloc.collocation.path_equations import along_arcs, along_shape, arc
 
 
 @pytest.mark.parametrize("n_joint", [3, 5])
