@@ -73,9 +73,9 @@ class PathGeometry:
     def rows(self) -> ProgramRows:
         return stacked_rows(self.lower.size, self.blocks, self.groups)
 
-    def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
+    def phase_mesh(self, gait: Any) -> Mesh:
         """The mesh in phases of a member: sides that grew take more of the period than the mesh gives them."""
-        if isinstance(gait, ArcPath):
+        if self.shares is None:
             return self.mesh
         edges = np.append(gait.phases[self.on] + self.start * np.diff(gait.phases)[self.on], gait.phases[-1])
         return Mesh(self.mesh.scheme, edges)
@@ -144,7 +144,7 @@ def path_through(control: ControlProblem, gait: Gait, edges: np.ndarray | None, 
     arc, if those are not too many.
     """
     kind = control.admissible.gait
-    if isinstance(kind, FreePath):
+    if kind.of_arcs:
         knots = _arc_knots(control, gait, edges)
         return arcs_through(gait, kind, knots), control.mesh(knots if edges is None else with_knots(edges, knots), scheme)
     mesh, corners = control.mesh(edges, scheme), corners_through(gait, kind)

@@ -86,11 +86,8 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
         function = gait_check(check, n_joint, n_parameter)
         middles = np.vstack([series.placed(check, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]), mesh), np.full(mesh.n, -1.0)])
         blocks[check.name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
-    blocks["shape speed"] = (
-        mean_square(ca.DM(gait.mean_square_rate(n_joint) / RADIANS**2)),
-        layout.parameters,
-        np.empty((0, 1)),
-    )
+    square = mean_square(ca.DM(gait.mean_square_rate(n_joint) / RADIANS**2))
+    blocks["shape speed"] = square, layout.parameters, np.empty((0, 1))
 
     def block(function: LocalFunction, names: Sequence[str]) -> BlockParts:
         return function, at_points(layout, mesh, names), none
@@ -114,10 +111,9 @@ def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme:
         _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])
         return velocity(angles, rates, z, delta)
 
-    implicit: Implicit = {} if control.formulation == FULL else {"point": velocity_map}
-    bounds = gait.bounds(body, widest(admissible.joint_limit))
     asked = asked_rows(control, layout, mesh, block, RADIANS)
-    rows = _Rows(blocks, groups, asked, implicit)
+    rows = _Rows(blocks, groups, asked, {} if control.formulation == FULL else {"point": velocity_map})
+    bounds = gait.bounds(body, widest(admissible.joint_limit))
     return _program(control, series, layout, rows, bounds=bounds, unit=RADIANS, velocity=velocity)
 
 
@@ -185,23 +181,14 @@ def _program(
     linear, scattered, row_lower, row_upper, places = stacked_rows(
         layout.n, blocks, [*rows.groups, *(group for _, group in rows.asked.values())], rows.implicit
     )
-    lower, upper, own = np.full(layout.n, -np.inf), np.full(layout.n, np.inf), layout.parameters[:, 0]
-    lower[own], upper[own] = bounds
+    lower, upper, parameters = np.full(layout.n, -np.inf), np.full(layout.n, np.inf), layout.parameters[:, 0]
+    lower[parameters], upper[parameters] = bounds
     bound_motion(control, layout, lower, upper)
+    assembly = Assembly(layout.n, objective_block(control, layout), scattered, linear)
     return GaitProgram(
-        control,
-        gaits,
-        layout,
-        Assembly(layout.n, objective_block(control, layout), scattered, linear),
-        tuple(blocks),
-        lower=lower,
-        upper=upper,
-        constraint_lower=row_lower,
-        constraint_upper=row_upper,
-        groups=places,
-        speed_unit=unit,
-        velocity=velocity,
-    )
+        control, gaits, layout, assembly, tuple(blocks), lower=lower, upper=upper,
+        constraint_lower=row_lower, constraint_upper=row_upper, groups=places, speed_unit=unit, velocity=velocity,
+    )  # fmt: skip
 
 
 def _point_groups(control: ControlProblem, n_out: int, mesh: Mesh, layout: Layout, *, placed: bool = False) -> list[Group]:

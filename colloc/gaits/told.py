@@ -78,18 +78,9 @@ class Telling(ClassOfGaits):
         near = self.without.through(gait)
         return replace(near, **{self.tells: getattr(gait, self.tells)}) if gait.is_series else near
 
-    # where searches begin: the number is not drawn
     def first_guess(self, gait: Any) -> Any:
+        """Where searches begin the number is not drawn."""
         return self.without.first_guess(gait)
-
-    def dimension(self, n_joint: int) -> int:
-        return self.without.dimension(n_joint)
-
-    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
-        return self.without.drawn(unit, n_joint)
-
-    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
-        return self.without.moved(gait, step, fall, rng)
 
 
 def telling(kind: type[Telling], gait_class: Any, **own: Any) -> Any:
