@@ -4,6 +4,9 @@ Everything that a bound on efficiency needs to know of friction is here: for a s
 *middle* of the body and the power. That is the midpoint of the middle link, in its own axes; for an even number of links it
 is the middle joint, in axes along the mean heading of the two links that meet there. The middle is used, not the tail,
 because the symmetries of the body are then plain: turning the body end for end negates that velocity.
+
+On feet it is the centre of pressure, in those axes. Its speed times min(mu) is at most the power, while near shapes where all
+feet may hold and joints turn that vanishes, and no spline follows such a point closely enough.
 """
 
 from __future__ import annotations
@@ -41,7 +44,7 @@ class CoulombMotion:
     angles, rates : (n_joint, n)
         Shapes and unit directions of joint rates.
     velocity : (2, n)
-        Velocity of the middle, in its own axes.
+        Velocity of the middle, or on feet of the centre of pressure, in the axes of the middle.
     spin : (n,)
         Its rotation rate.
     power : (n,)
@@ -112,12 +115,16 @@ def _motion(
 
 def _of_the_middle(body: Chain, angles: np.ndarray, rates: np.ndarray, link: LinkVelocity) -> tuple[np.ndarray, np.ndarray]:
     """Velocity ``(2, n)`` and rotation rate ``(n,)`` of the middle (see above)."""
-    k = body.n_link // 2
-    if body.n_link % 2:
-        return np.stack([link.vs[k], link.vn[k]]), link.w[k]
-    # link k begins at the joint, and is half of its angle ahead of the mean heading
-    velocity = (link.vs[k] + 1j * (link.vn[k] - 0.5 * body.lengths[k] * link.w[k])) * np.exp(0.5j * angles[k - 1])
-    return np.stack([velocity.real, velocity.imag]), link.w[k] - 0.5 * rates[k - 1]
+    k, even = body.n_link // 2, 1 - body.n_link % 2
+    # link k begins at the joint of an even number, and is half of its angle ahead of the mean heading
+    ahead, spin = 0.5 * even * angles[k - even], link.w[k] - 0.5 * even * rates[k - even]
+    velocity = link.vs[k] + 1j * (link.vn[k] - 0.5 * even * body.lengths[k] * link.w[k])
+    if body.feet:
+        contact, foot, heading = body.contact, body.contact.velocities(link), np.exp(1j * body.tangent_angles(angles))
+        direction = (contact.cos + 1j * contact.sin) * heading[contact.links] / heading[k]
+        velocity = (contact.weight * (foot.vs + 1j * foot.vn) * direction).sum(axis=0)
+    velocity = velocity * np.exp(1j * ahead)
+    return np.stack([velocity.real, velocity.imag]), spin
 
 
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:

@@ -24,13 +24,13 @@ CACHE = "bounds.sqlite"
 
 def refusal(problem: Problem) -> str:
     """Why no upper bound can be computed for the gaits of a problem, in a sentence; "" if one can."""
-    if isinstance(problem.body, Chain) and problem.body.feet:
-        return "upper bounds are computed for links that lie on the floor, not for feet; for these there is 1/min(mu)."
     if not isinstance(problem.body, Chain) or not isinstance(problem.friction, Friction):
         return (
             "upper bounds are computed for chains of links under Coulomb friction, or the elliptic law, only; for this one "
             "there is 1/min(mu)."
         )
+    if problem.body.feet and not problem.law.associated:
+        return f"on feet no upper bound is computed for {problem.law.label}: its motions are not unique; there is 1/min(mu)."
     if not _bounded(problem):
         return "upper bounds are of the efficiency, on the level, of gaits that do not turn."
     if problem.body.n_link > MOST_LINKS:

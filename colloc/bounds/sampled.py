@@ -23,6 +23,7 @@ from colloc.bounds.sampling import Domain
 from colloc.gaits.gait_fields import fields
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
@@ -81,7 +82,7 @@ def usual_budget(body: Chain) -> Budget:
     return {3: FOUR_LINKS, 4: FIVE_LINKS}.get(body.n_joint, QUICK)
 
 
-def usual_harmonics(body: Chain, friction: Friction) -> tuple[int, ...]:
+def usual_harmonics(body: Chain, friction: Law) -> tuple[int, ...]:
     """Those in the heading that are worth what they cost."""
     if not friction.reversible:
         return 0, 1
@@ -163,7 +164,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     """The sampled bound, computed anew (see `efficiency_bound`)."""
     begin = time.process_time()
     body = domain.body
-    harmonics = budget.harmonics or usual_harmonics(body, domain.friction)
+    harmonics = budget.harmonics or usual_harmonics(body, domain.law)
     spline = TensorSpline(body.n_joint, domain.joint_limit, min(budget.first, budget.intervals))
     space = PotentialSpace(spline, harmonics, swaps_ends(body), budget.together)
     found = exchanged_optimum(
@@ -177,7 +178,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         tolerance=budget.tolerance,
         smoothing=budget.smoothing,
     )
-    missing = MISSING_MARGIN if domain.friction.associated else MISSING_LAW
+    missing = MISSING_MARGIN if domain.law.associated else MISSING_LAW
     return Bound(
         sampled=found.top,
         floor=found.floor,
@@ -249,7 +250,8 @@ def efficiency_bound(
     Raises
     ------
     ProblemError
-        For a joint limit outside (0, pi], more than five links, or even harmonics with mu_b = mu_f.
+        For a joint limit outside (0, pi], more than five links, even harmonics with mu_b = mu_f, or feet under a law that is
+        not associated.
     StoreError
         If the cache cannot be read. One that cannot be written costs a `ChangedFileWarning`.
     """
@@ -263,9 +265,9 @@ def efficiency_bound(
     known = known_bound(body, friction, joint_limit, budget=budget, cache=cache) if cache is not None else None
     if known is not None:
         return known
-    if friction.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
-        raise ProblemError("even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only.")
     domain = Domain(body, friction, float(joint_limit))
+    if domain.law.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
+        raise ProblemError("even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only.")
     bound = compute_bound(domain, budget)
     if cache is not None:
         try:

@@ -20,6 +20,7 @@ from colloc.bounds.coulomb_motion import (
 )
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 
 _DELTA = 1e-6
@@ -52,8 +53,13 @@ class Domain:
     joint_limit: float
 
     def __post_init__(self) -> None:
-        if self.body.feet:
-            raise ProblemError("upper bounds are computed for links that lie on the floor, not for feet; there is 1/min(mu).")
+        if self.body.feet and not self.law.associated:
+            raise ProblemError(f"on feet no upper bound is computed for {self.law.label}: its motions are not unique.")
+
+    @property
+    def law(self) -> Law:
+        """That of all that touches the floor."""
+        return self.body.law(self.friction)
 
     def holds(self, angles: np.ndarray) -> np.ndarray:
         """Mask of shapes within the limits whose links do not cross."""
@@ -72,7 +78,7 @@ class Domain:
         are sampled. `shift` in [0, 1) moves the lattice by that part of its spacing (then without its last value). More than
         two joints have directions at random, others at every shape; another shift draws others.
         """
-        n_joint, half = self.body.n_joint, self.friction.reversible
+        n_joint, half = self.body.n_joint, self.law.reversible
         angles = self._representatives(shapes, shift)
         rng = np.random.default_rng(round(1e9 * shift))
         if n_joint > 2:

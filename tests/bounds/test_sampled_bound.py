@@ -22,6 +22,7 @@ from colloc.gaits.problem import Problem
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.feet import Foot
 from colloc.mechanics.friction import Friction
 from colloc.numerics.minimax_program import smallest_maximum
 from colloc.numerics.spline import TensorSpline
@@ -347,6 +348,33 @@ def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
     velocity = (after - before) / (2 * h) * np.exp(-1j * heading)
     np.testing.assert_allclose(motion.velocity[0] + 1j * motion.velocity[1], velocity, atol=1e-6)
     np.testing.assert_allclose(motion.spin, (turned - turned_before) / (2 * h), atol=1e-6)
+
+
+@pytest.mark.parametrize("lengths", [(0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
+def test_on_feet_the_centre_of_pressure_is_followed_and_no_faster_than_friction_pays_for(lengths):
+    """Its velocity in the axes of the middle, from places of the feet a moment later; with it no potential is needed for 1/mu."""
+    n, rng, h = len(lengths), np.random.default_rng(43), 1e-6
+    body = Chain(lengths, feet=(Foot(0, 0.2, weight=0.4), Foot(n - 1, 0.9, weight=0.3), Foot(n - 1, 0.1, weight=0.3)))
+    law = Friction(0.5, 0.5, 0.5)
+    angles, rates = rng.uniform(-1, 1, (n - 1, 20)), rng.normal(size=(n - 1, 20))
+    z = solve_balance(body, law, angles, rates, 1e-9).require().z
+    motion = balanced_motion(body, law, angles, rates)
+
+    def pressed(t):
+        heading = z[2] * t + np.concatenate([[np.zeros(20)], np.cumsum(angles + rates * t, axis=0)])
+        along = np.array(lengths)[:, None] * np.exp(1j * heading)
+        place = [along[: foot.link].sum(axis=0) + foot.place * along[foot.link] for foot in body.feet]
+        middle = (heading[n // 2] + heading[(n - 1) // 2]) / 2
+        return (z[0] + 1j * z[1]) * t + np.array([0.4, 0.3, 0.3]) @ place, middle
+
+    velocity = (pressed(h)[0] - pressed(-h)[0]) / (2 * h) * np.exp(-1j * pressed(0.0)[1])
+    np.testing.assert_allclose(motion.velocity[0] + 1j * motion.velocity[1], velocity, atol=1e-6)
+    assert (0.5 * np.hypot(*motion.velocity) <= motion.power + 1e-8).all()
+
+
+def test_on_two_feet_a_link_the_bound_lies_between_the_best_small_gait_and_friction_alone():
+    bound = efficiency_bound(Chain(feet=2), Friction(), 1.0, budget=Budget(4, (1,), 8, 16, 4, starts=60, tolerance=0.01))
+    assert small_gait(Chain(feet=2), Friction(), np.zeros(2)).efficiency < bound.sampled < 0.75
 
 
 def test_lattices_of_four_links_have_other_directions_everywhere_and_creases_where_joints_rest():

@@ -153,9 +153,10 @@ def test_a_gait_of_no_size_pays_no_more_than_the_least_friction_on_one_foot_a_li
 
 
 def test_what_feet_cannot_do_yet_is_refused():
-    with pytest.raises(ProblemError, match="not for feet"):
-        Domain(Chain(feet=1), Friction(), 2.0)
-    assert "not for feet" in refusal(Problem("bound", body=Chain(feet=1)))
+    with pytest.raises(ProblemError, match="on feet no upper bound"):
+        Domain(Chain(feet=1), Friction(2, 1, 1), 2.0)
+    assert "on feet no upper bound" in refusal(Problem("bound", body=Chain(feet=1), friction=Friction(2, 1, 1)))
+    assert refusal(Problem("bound", body=Chain(feet=1))) == ""
     with pytest.raises(ProblemError, match="read the same from both ends"):
         Problem("half", body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=Harmonic(1, "bilateral"))
 
