@@ -1,7 +1,7 @@
 """How efficiently chains crawl on feet and wheels: python -m scripts.feet [--starts 16] [--output results]
 
 The best gait found by the usual search, of chains of equal links that lie on the floor, stand on one to three feet a link, or
-on a wheel each that rolls at a fiftieth of its friction sideways. A table, feet.md.
+on a wheel each that rolls at a fiftieth of its friction sideways; and what bounds all gaits of three links. A table, feet.md.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import argparse
 import warnings
 from pathlib import Path
 
+from colloc.bounds.infinitesimal import best_small_gait
+from colloc.bounds.sampled import efficiency_bound
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
@@ -57,6 +59,14 @@ def main() -> None:
     for links in (3, 4, 5):
         wheels = tuple(Wheel(link) for link in range(links))
         lines.append(f"| {links} | {best(Chain((1 / links,) * links, feet=wheels), Friction(), 1, options.starts)} |")
+        print(lines[-1], flush=True)
+    lines += ["", "| links, (1, 1, 1) | feet a link | best small gait | every gait (samples) |", "|---|---|---|---|"]
+    for feet in (2, 3):
+        body = Chain(feet=feet)
+        small, bound = best_small_gait(body, Friction())[0].efficiency, efficiency_bound(body, Friction())
+        lines.append(
+            f"| {body.n_link} | {feet} | {small:.4f} | {bound.sampled:.4f}{'' if bound.converged else ' (not converged)'} |"
+        )
         print(lines[-1], flush=True)
     options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "feet.md").write_text("\n".join(lines) + "\n", encoding="utf-8")

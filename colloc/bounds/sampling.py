@@ -67,8 +67,11 @@ class Domain:
         return inside & admissible(self.body, angles, _EDGE)
 
     def solved(self, angles: np.ndarray, rates: np.ndarray) -> tuple[CoulombMotion, np.ndarray]:
-        """All balanced motions, and the column of shapes and rates that each is of."""
-        return all_motions(self.body, self.friction, angles, rates, _DELTA)
+        """All balanced motions, and the column of shapes and rates that each is of; but those in which all feet hold: they pay
+        nothing, and those beside them say what a potential may gain there."""
+        motion, source = all_motions(self.body, self.friction, angles, rates, _DELTA)
+        slides = np.flatnonzero(motion.power > self.law.smallest * _DELTA)
+        return motion.take(slides), source[slides]
 
     def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> CoulombMotion:
         """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions` rate directions; and of each

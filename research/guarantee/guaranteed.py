@@ -194,8 +194,9 @@ def certify(
     odd = not friction.reversible or all(k % 2 for k in space.harmonics)
     if not friction.associated or body.n_link != 3 or body.weights or body.feet or not (odd and 1 in space.harmonics):
         raise ProblemError(
-            "a bound is guaranteed only for three links without feet or weights of their own, associated friction (equal coefficients, "
-            "or the elliptic law), and harmonics from 1 on, odd ones where mu_b = mu_f; otherwise the sampled value stands."
+            "a bound is guaranteed only for three links without feet or weights of their own, associated friction (equal "
+            "coefficients, or the elliptic law), and harmonics from 1 on, odd ones where mu_b = mu_f; otherwise the sampled "
+            "value stands."
         )
     begin, unit = time.process_time(), friction.in_units_of(friction.mu_t)
     views = [(body, free)]

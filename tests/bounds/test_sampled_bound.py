@@ -352,7 +352,7 @@ def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
 def test_on_feet_the_centre_of_pressure_is_followed_and_no_faster_than_friction_pays_for(lengths):
-    """Its velocity in the axes of the middle, from places of the feet a moment later; with it no potential is needed for 1/mu."""
+    """Its velocity in the axes of the middle, from places of the feet a moment later; so no potential at all says 1/mu."""
     n, rng, h = len(lengths), np.random.default_rng(43), 1e-6
     body = Chain(lengths, feet=(Foot(0, 0.2, weight=0.4), Foot(n - 1, 0.9, weight=0.3), Foot(n - 1, 0.1, weight=0.3)))
     law = Friction(0.5, 0.5, 0.5)

@@ -17,6 +17,7 @@ from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.motion_frames import frames
 from colloc.search.solve import solve
+from colloc.verification.dry_balance import dry_balance
 from colloc.verification.replay import replay
 
 KNOWN = Fourier([-1.287, 1.287], [[0.687], [-0.687]], [[1.206], [1.206]])
@@ -150,6 +151,19 @@ def test_a_gait_of_no_size_pays_no_more_than_the_least_friction_on_one_foot_a_li
     assert 1 - 1e-3 < small_gait(Chain(feet=1), Friction(), straight).efficiency <= 1
     more = [small_gait(Chain(feet=n), Friction(), straight).efficiency for n in (2, 3)]
     np.testing.assert_allclose(more, [0.6585, 0.5], atol=2e-4)
+
+
+def test_at_a_zigzag_every_foot_steps_the_same_way_while_two_hold_with_no_smoothing():
+    """Three steps bring the joints back, nothing turns, and all that is paid for travels: no potential has a bound below
+    1/min(mu)."""
+    body, rates = Chain(feet=1), np.array([[-1.0, 1, 0], [0, 1, -1]])
+    angles = np.array([[2.2] * 3, [-2.2] * 3])
+    found, posture = dry_balance(body, Friction(), angles, rates), body.posture(angles)
+    foot = body.velocity(posture, rates, found.z)
+    steps = (foot.vs + 1j * foot.vn) * (posture.cos + 1j * posture.sin)
+    np.testing.assert_allclose(steps, steps[0, 0] * np.eye(3), atol=1e-7)
+    np.testing.assert_allclose(foot.w[1], 0, atol=1e-7)
+    np.testing.assert_allclose([found.least, found.most], abs(steps[0, 0]) / 3, rtol=1e-7)
 
 
 def test_what_feet_cannot_do_yet_is_refused():
