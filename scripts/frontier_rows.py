@@ -88,10 +88,10 @@ def smallest_bound(row: Row, known: dict) -> float:
 
 def guaranteed_bound(row: Row) -> float:
     """Of the bounds that are proved for its law and body, and its limit or a larger one, the smallest; inf if there is none."""
-    parts: dict[tuple[float, int], list[float]] = {}
+    parts: dict[tuple[float, float, int], list[float]] = {}
     for proof in json.loads(PROVED.read_text()):
         of_body = len(proof["lengths"]) == row.links and np.allclose(proof["lengths"], 1 / row.links)
         of_law = proof["law"] == "Friction" and tuple(proof["mu"]) == row.mu
         if of_body and of_law and round(proof["joint_limit"], 4) >= round(row.limit, 4) and not proof["open_cells"]:
-            parts.setdefault((proof["joint_limit"], proof["part"][1]), []).append(proof["guaranteed"])
-    return min((max(found) for (_, count), found in parts.items() if len(found) == count), default=np.inf)
+            parts.setdefault((proof["joint_limit"], proof["target"], proof["part"][1]), []).append(proof["guaranteed"])
+    return min((max(found) for (*_, count), found in parts.items() if len(found) == count), default=np.inf)

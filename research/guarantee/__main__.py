@@ -46,6 +46,7 @@ def main() -> None:
     print(certificate, f"wall time {time.perf_counter() - begin:.0f} s")
     arguments.out.mkdir(parents=True, exist_ok=True)
     stated = {"lengths": arguments.lengths, "law": arguments.law, "mu": arguments.friction, "joint_limit": arguments.limit}
+    stated["arithmetic"] = "intervals"
     numbers = "-".join(f"{x:g}" for x in (*arguments.lengths, *arguments.friction, round(arguments.limit, 4), arguments.target))
     name = f"guaranteed-{arguments.law}-{numbers}-{part[0]}-of-{part[1]}.json"
     (arguments.out / name).write_text(json.dumps(stated | {"part": part} | asdict(certificate), indent=1) + "\n")

@@ -24,7 +24,7 @@ from colloc.mechanics.contact import crossing_sums
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.system.processors import available_threads
-from research.guarantee.enclosure import CORNERS, DELTA, Allowance, Cells, by_convexity, by_loads, corner_motions
+from research.guarantee.enclosure import CORNERS, WIDER, Allowance, Cells, by_convexity, by_loads, corner_motions, least_power
 from research.guarantee.potential_range import PotentialRange
 
 _CHUNK = 8000
@@ -35,6 +35,8 @@ _LAYERS = (1e-9, 1e-6, 1e-4, 1e-3, 4e-3, 8.75e-3, 0.0175, 0.035)
 joint however slowly it turns. The motion there is homogeneous: what a cell may not know of it is in proportion to its speed."""
 _THIN = 0.5
 """Size in s over that in the angles below which s is not halved: so slow a joint moves all in proportion."""
+_LEAST = 1e-6
+"""Share of the power at a corner that has to be left for it to be known to 1e-9 with rounding."""
 _LOAD = 4.0
 """Times the root of the cell's size: 1/multiplier of the loads. It balances what they move with what interpolation loses."""
 
@@ -46,7 +48,7 @@ class Guarantee:
     Attributes
     ----------
     guaranteed : float
-        No balanced motion exceeds this ratio, up to floating-point rounding (1e-9 is allowed for in every cell).
+        No balanced motion exceeds this ratio: proved, with rounding.
     target : float
         The value that was aimed at; ``guaranteed == target`` if all cells were closed.
     open_cells, cells : int
@@ -74,8 +76,9 @@ class _Lattice:
 
     def coordinate(self, axis: int, index: np.ndarray) -> np.ndarray:
         edges, parts = self.edges[axis], 1 << self.levels[axis]
-        interval = np.minimum(index // parts, edges.size - 2)
-        return edges[interval] + (edges[interval + 1] - edges[interval]) * ((index - interval * parts) / parts)
+        first = index // parts
+        begin, end = edges[first], edges[np.minimum(first + 1, edges.size - 1)]
+        return begin + (end - begin) * ((index - first * parts) / parts)
 
     def box(self, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Low corners and sizes of cells, ``(3, n)`` each."""
@@ -110,14 +113,15 @@ def cell_bounds(body: Chain, friction: Friction, potential: PotentialRange, cell
     Loads are tried where convexity alone does not bring the bound below `goal`.
     """
     motions = corner_motions(body, friction, cells)
-    gain, power = potential.corner_gain(cells, motions)[cells.at], (motions.potential - DELTA)[cells.at]
+    gain, power = potential.corner_gain(cells, motions)[cells.at], least_power(body, friction, cells, motions)[cells.at]
     beyond, reference = potential.trial_error(cells, motions), potential.reference(cells)
 
     def largest(chosen: np.ndarray, allowed: Allowance) -> np.ndarray:
         below = power[chosen] - allowed.power[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
-            value = ((gain[chosen] + (beyond[chosen] + allowed.gain)[:, None]) / below).max(axis=1)
-        return np.where((below.min(axis=1) > 0) & (value >= 0), value, np.inf)
+            value = WIDER * ((gain[chosen] + (beyond[chosen] + allowed.gain)[:, None]) / below).max(axis=1)
+        # the rounding of what is left is as small as that of a sum only if much is left
+        return np.where((below > _LEAST * power[chosen]).all(axis=1) & (value >= 0), value, np.inf)
 
     everything = np.arange(cells.low.shape[1])
     value = largest(everything, by_convexity(body, friction, cells, motions, reference))

@@ -1,4 +1,7 @@
-"""The guarantee's own C (folder `native`), compiled for the process with the library's headers, and its calls."""
+"""The guarantee's own C and C++ (folder `native`), compiled for the process, and calls.
+
+The C finds motions, in floating point, with the library's headers. The C++ says what they prove, in interval arithmetic.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,16 @@ from colloc.mechanics.links import Links
 from colloc.mechanics.native_kernel import BODY, address, call_for_all
 from colloc.numerics.c_compiler import c_compiler, compiled_library
 
-_SOURCES = Path(__file__).with_name("native")
+SOURCES = Path(__file__).with_name("native")
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
 _SIGNATURES = {
     "colloc_loaded": (*BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
-    "colloc_enclosure": (_ARRAY, _ARRAY, _COUNT, _COUNT, *[_ARRAY] * 6, _REAL, _ARRAY),
+}
+_PROOFS = {
+    "colloc_states": (_COUNT, *[_ARRAY] * 5, _REAL, _ARRAY),
+    "colloc_by_convexity": (_COUNT, *[_ARRAY] * 7, _REAL, _ARRAY),
+    "colloc_by_loads": (_COUNT, _COUNT, *[_ARRAY] * 10, _REAL, _REAL, _ARRAY),
+    "colloc_harmonic": (_COUNT, ctypes.c_int, _ARRAY, _ARRAY, ctypes.c_int, *[_ARRAY] * 5),
 }
 
 
@@ -28,12 +36,32 @@ def guarantee_kernel(body: Links) -> ctypes.CDLL | None:
 
 
 @cache
+def proofs() -> ctypes.CDLL:
+    """What is proved in interval arithmetic. `StoreError` without a C++ compiler."""
+    return _with_signatures(compiled_library(SOURCES / "proofs.cpp", proof_flags(), {}), _PROOFS)
+
+
+def proof_flags() -> list[str]:
+    """Those of the library's C, for C++: nothing that reorders arithmetic."""
+    return ["-std=c++17", "-fno-exceptions", "-fno-rtti", *(flag for flag in native_kernel.FLAGS if "-std" not in flag)]
+
+
+def call(name: str, *arguments: np.ndarray | float) -> None:
+    """A function of `proofs`; arrays by their addresses, copied if they are not contiguous."""
+    given = [np.ascontiguousarray(each) if isinstance(each, np.ndarray) else each for each in arguments]
+    getattr(proofs(), name)(*(address(each) if isinstance(each, np.ndarray) else each for each in given))
+
+
+def _with_signatures(library: ctypes.CDLL, signatures: dict) -> ctypes.CDLL:
+    for name, arguments in signatures.items():
+        getattr(library, name).argtypes = arguments
+    return library
+
+
+@cache
 def _library() -> ctypes.CDLL:
     headers = {each.name: each.read_text("ascii") for each in native_kernel.SOURCES.iterdir() if each.name.endswith(".h")}
-    found = compiled_library(_SOURCES / "guarantee.c", native_kernel.FLAGS, headers)
-    for name, arguments in _SIGNATURES.items():
-        getattr(found, name).argtypes = arguments
-    return found
+    return _with_signatures(compiled_library(SOURCES / "guarantee.c", native_kernel.FLAGS, headers), _SIGNATURES)
 
 
 def compiled_loaded(

@@ -21,7 +21,8 @@ def test_a_bound_holds_for_smaller_limits_and_larger_widths_and_friction_alone_g
 
 @pytest.mark.parametrize(("left", "bound"), [(0, 0.47), (3, np.inf)])
 def test_what_is_proved_in_parts_holds_once_every_part_has_closed_all_cells(tmp_path, monkeypatch, left, bound):
-    proof = {"lengths": [1 / 3] * 3, "law": "Friction", "mu": [1.0, 1.0, 1.0], "joint_limit": float(np.pi), "guaranteed": 0.47}
+    proof = {"lengths": [1 / 3] * 3, "law": "Friction", "mu": [1.0, 1.0, 1.0], "joint_limit": float(np.pi)}
+    proof |= {"target": 0.47, "guaranteed": 0.47}
     parts = [proof | {"part": [k, 2], "open_cells": left * (k - 1)} for k in (1, 2)]
     file = tmp_path / "guaranteed.json"
     file.write_text(json.dumps(parts))

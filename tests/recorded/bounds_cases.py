@@ -118,7 +118,7 @@ def allowances_of_cells():
     thin = (ODD, 0.002, True), (Chain((0.1, 0.3, 0.6)), 0.0003, True), (ODD, 0.02, True)
     for body, size, rests in ((ODD, 0.02, False), (THREE, 0.006, False), *thin):
         cells, corners, reference = random_cells(body, ISOTROPIC, size, 26, rests, 60)
-        early = corners._replace(residual=np.random.default_rng(29).uniform(1e-7, 3e-4, corners.residual.shape))
+        early = corners._replace(velocity=corners.velocity * (1.0 + 1e-5 * np.random.default_rng(29).normal(size=3)[:, None]))
         known = [by_loads(body, ISOTROPIC, cells, given, reference, 4 / np.sqrt(size)) for given in (corners, early)]
         known += [by_convexity(body, ISOTROPIC, cells, given, reference) for given in (corners, early)]
         found.append([np.log(part) for each in known for part in each])

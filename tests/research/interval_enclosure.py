@@ -338,13 +338,13 @@ def allowance(lengths, sigma, low, size, motions, forces, left, point, delta):
         pull = iv.sqrt(total * fourth_power_norm(forward, G)) + torque * turn
         pull += force * reach_of(forward, [[one, none, none], [none, one, none]])
         pull += sum(e * reach_of(forward, k.plain) for e, k in zip(turning, links, strict=True))
-        radius = iv.mpf(1.000001) * (pull + iv.sqrt(pull**2 + 4 * gap)) / 2
+        radius = (pull + iv.sqrt(pull**2 + 4 * gap)) / 2
         moved = []
         for k in links:
             # a turn by h/2 changes a velocity by at most that share of it, before it is stretched
             plain = k.norm * reach_of(forward, k.plain)
             hinge, tip = (reach_of(forward, k.rows(s)) + k.h / 2 * plain for s in (none, k.l))
-            moved.append(iv.mpf(1.000001) * radius * top([least([plain, hinge]), tip]))
+            moved.append(radius * top([least([plain, hinge]), tip]))
         fit = [mid(m) < mid(A) for m, A in zip(moved, allowed, strict=True)]
         if all(fit):
             at_point = reach_of(forward, [[one, none, -py], [none, one, px]])

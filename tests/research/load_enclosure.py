@@ -5,7 +5,7 @@ import numpy as np
 from research.guarantee.enclosure import DELTA
 from research.guarantee.loaded_balance import loaded_balance
 
-KAPPA, TORQUE, ROUNDING = np.sqrt(2) - 1, 0.15, 1e-9
+KAPPA, TORQUE, ROUNDING = np.sqrt(2) - 1, 0.15, 0.0
 
 
 def difference(values, axis):

@@ -1,9 +1,13 @@
-/* What the guarantee needs compiled: allowances of cells (enclosure.h), and chains in balance under loads, instant by instant.
+/* Chains in balance under loads, instant by instant: choices, of which proofs.cpp says what they prove.
    Made with the headers of colloc/mechanics/native. Arrays and `first`, `last` are as in kernel.c there. */
 
 #include <stdlib.h>
 
-#include "enclosure.h"
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "chain.h"
 #include "loaded.h"
 
 /* Chains under unit friction and loads (3, n_time) on the middle link, whose velocity is given to start from and found;
