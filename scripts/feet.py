@@ -25,9 +25,15 @@ SCENES = (
     (2, Friction(1, 1, 3), 1),
     (3, Friction(), 1),
     (3, Friction(), 2),
+    (3, Friction(), 3),
     (3, Friction(2, 1, 1), 1),
+    (3, Friction(2, 1, 1), 2),
     (4, Friction(), 1),
+    (4, Friction(), 2),
+    (4, Friction(2, 1, 1), 1),
     (5, Friction(), 1),
+    (5, Friction(), 2),
+    (5, Friction(2, 1, 1), 1),
 )
 HEAD = ("links", "friction", "harmonics", "line", "1 foot a link", "2 feet", "3 feet")
 

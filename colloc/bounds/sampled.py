@@ -96,7 +96,7 @@ class Bound:
     Attributes
     ----------
     sampled : float
-        Largest ratio met on any sample; what lies between samples may exceed it.
+        Largest ratio met on any sample; what lies between samples may exceed it. Or 1/min(mu), if that is less.
     floor : float
         Value of the last program: no potential of this space does better on the samples held, up to the smoothing (1e-5).
     converged : bool
@@ -180,7 +180,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     )
     missing = MISSING_MARGIN if domain.law.associated else MISSING_LAW
     return Bound(
-        sampled=found.top,
+        sampled=min(found.top, 1.0 / domain.law.smallest),
         floor=found.floor,
         converged=found.converged,
         guaranteed=None,

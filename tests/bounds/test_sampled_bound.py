@@ -377,6 +377,12 @@ def test_on_two_feet_a_link_the_bound_lies_between_the_best_small_gait_and_frict
     assert small_gait(Chain(feet=2), Friction(), np.zeros(2)).efficiency < bound.sampled < 0.75
 
 
+def test_no_bound_says_less_than_friction_alone():
+    coarse = Budget(2, (1,), 6, 8, 1, starts=10)
+    bound = efficiency_bound(Chain(feet=1), Friction(0.5, 0.5, 0.5), budget=coarse)
+    assert bound.sampled == 2.0
+
+
 def test_lattices_of_four_links_have_other_directions_everywhere_and_creases_where_joints_rest():
     domain = Domain(Chain((0.25,) * 4), Friction(), 2.5)
     one, other = domain.lattice(4, 10, 0.2), domain.lattice(4, 10, 0.4)
