@@ -69,10 +69,9 @@ class Work:
     tried: frozenset[str]
     """Keys of starts solved before."""
     warm_starts: int
-    warm_delta_start: float
     time_limit: float
     seed: int
-    """These four: see `colloc.studies.study.Study`."""
+    """These three: see `colloc.studies.study.Study`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,14 +167,14 @@ def visit(work: Work, found: dict[Index, AnyGait]) -> Visit:
 
     warm = _distinct_untried(work, members, scores)
     for key in warm[: work.warm_starts if work.first else 0]:
-        solve(WARM, members[key], min(work.warm_delta_start, problem.delta_start))
+        solve(WARM, members[key], problem.delta)
     if work.first:
         solve(GUESS, problem.guess, problem.delta_start)
         for number in work.cold if problem.gait.free else ():
             solve(COLD, start_gait(problem, LATIN_HYPERCUBE, work.seed, number), problem.delta_start)
     for key in warm:
         if promising(key):
-            solve(WARM, members[key], min(work.warm_delta_start, problem.delta_start))
+            solve(WARM, members[key], problem.delta)
     if warm and (promising(warm[0]) or not (work.incumbent or best_attempt(attempts))):
         solve(RESCUE, members[warm[0]], problem.delta_start)
     for key, near in members.items():

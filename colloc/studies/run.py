@@ -209,7 +209,6 @@ class StudyRun:
             0.0 if own is None else own.outcome.value,
             state.tried,
             study.warm_starts,
-            study.warm_delta_start,
             study.time_limit,
             study.seed,
         )

@@ -87,8 +87,6 @@ class Study:
         is solved only if its gait, as it is, does better than all that was found.
     chunk : int
         Cells along the last axis that make one task, with warm starts travelling inside. More cells cost less scheduling.
-    warm_delta_start : float
-        Where the continuation in delta begins from a warm start.
     time_limit : float
         Seconds for one start.
     seed : int
@@ -109,7 +107,6 @@ class Study:
     cold_starts: int = 4
     warm_starts: int = 2
     chunk: int = 1
-    warm_delta_start: float = 1e-3
     time_limit: float = 120.0
     seed: int = 0
 
@@ -126,8 +123,8 @@ class Study:
             value = getattr(self, field)
             if not is_whole(value, least):
                 raise ProblemError(f"{field} must be a whole number, at least {least}, not {value!r}.")
-        if not (self.time_limit > 0 and self.warm_delta_start > 0):
-            raise ProblemError("time_limit and warm_delta_start must be positive.")
+        if not self.time_limit > 0:
+            raise ProblemError("time_limit must be positive.")
         if math.prod(self.shape) > MOST_CELLS:
             raise ProblemError(f"a study may have {MOST_CELLS} cells, not {math.prod(self.shape)}; split it.")
 

@@ -292,7 +292,7 @@ def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path
     assert len(solved) == len(set(solved)) == sum(len(state.attempts) for state in run.cells.values())
     # a visit that is told what was tried solves what is left, be it the guess, a start of its own or a gait from elsewhere
     stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
-    work = Work((0,), stated, True, (), (elsewhere,), (0,), 0.0, frozenset(), 1, 1e-2, 300.0, 1)
+    work = Work((0,), stated, True, (), (elsewhere,), (0,), 0.0, frozenset(), 1, 300.0, 1)
     first = study_cell.visit(work, {})
     assert {a.origin for a in first.attempts} == {GUESS, "cold", WARM}
     for attempt in first.attempts:
@@ -304,7 +304,7 @@ def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path
 def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_gait_of_all_its_starts():
     stated = Problem("two", ellipse(0.0, 2.0, 1.0), gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12)
     elsewhere = ellipse(0.0, 2.85, 1.3)
-    work = Work((0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 1e-2, 300.0, 1)
+    work = Work((0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 300.0, 1)
     done = study_cell.visit(work, {})
     assert [a.outcome.status for a in done.attempts if a.origin == WARM] == [SOLVED]
     passed = [a for a in done.attempts if a.outcome.status == PASSED_OVER]
@@ -326,7 +326,7 @@ def test_a_gait_that_promises_more_than_was_found_is_measured_as_finely_as_a_cer
     stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
     monkeypatch.setattr(study_cell, "run_guess", lambda s, start, number, limit, **_: outcome(number, start(), start(), 0.01))
     monkeypatch.setattr(study_cell, "value_as_it_is", lambda p, g, *grid: 0.2 if grid else 0.21)
-    work = Work((0,), stated, True, (), (elsewhere,), (), 0.0, frozenset(), 1, 1e-2, 300.0, 1)
+    work = Work((0,), stated, True, (), (elsewhere,), (), 0.0, frozenset(), 1, 300.0, 1)
     assert list(study_cell.visit(work, {}).scores.values()) == [0.2]
 
 
