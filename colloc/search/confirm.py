@@ -107,7 +107,7 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, _OPTIONS)
     before = solver.measured(x, delta, *_multipliers(reduced, conditions, program))
-    if before.optimal:
+    if before.optimal or optimum.optimal:
         solver.expect_little()
     here = replace(before, status=STATIONARY, kkt_error=optimum.kkt_error, complementarity=optimum.complementarity)
     failed = replace(before, status=NOT_STATIONARY, iterations=optimum.iterations)

@@ -36,7 +36,8 @@ LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
 negative curvature would otherwise carry them away for good. The price is up to 120 short steps a level. The velocity map
 needs no such leash and is slowed by it."""
 _CONFIRMING = 30
-"""Steps at a point where the conditions hold: one to four confirm it, and more than these lead away."""
+"""Steps at a point where the conditions hold, in the reduced space at least: one to four confirm it, and more than these lead
+away."""
 
 
 @dataclass(frozen=True, eq=False)
