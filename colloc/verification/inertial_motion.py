@@ -38,7 +38,7 @@ _ROUGH = 1e-4
 _APART = 1e-3
 """How far the runs of that start from each other."""
 _CLOSED = 10.0
-"""Gap between the momenta at start and end that is left open, over the error of a run."""
+"""Gap between the momenta at start and end that is left open at most, over the error of a run: where steps close it no more."""
 _MOST_PERIODS = 30
 _ONE_SIDED = 1e-12
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
@@ -158,15 +158,16 @@ class GaitWithInertia:
     def settled(self, near: np.ndarray, aim: float, slopes: np.ndarray | None = None) -> Course:
         """`InertialMotion.states` through a period that leaves the momenta as they are, to an error, sought near some momenta;
         with the derivatives of `closed`, if they are known."""
-        start = near
+        start, before = near, np.inf
         if slopes is None:
             start, slopes = self.closed(near)
         for _ in range(_MOST_PERIODS):
             ran = self.run(start, aim)
             gap = ran.states[_MOMENTA, -1] - start
-            if np.abs(gap).max() < _CLOSED * aim:
+            size = np.abs(gap).max()
+            if size < aim or before <= size < _CLOSED * aim:
                 return ran
-            start = start + _newton_step(gap, slopes)
+            start, before = start + _newton_step(gap, slopes), size
         raise NotConvergedError(f"at a Froude number of {self.froude:g} the periods do not become alike; try a smaller one.")
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
