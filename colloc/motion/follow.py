@@ -5,6 +5,7 @@ It knows nothing of meshes and of collocation. Rates may jump at given phases, a
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 STEP = 1 / 100
 """Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and then skip one unnoticed
 (Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams' takes short ones, and errs by 8 to 40 times a step."""
+_METHODS = "LSODA", "Radau"
+"""Adams' and Gear's; and where these give up, as where friction is stiff beside little inertia, one that costs more."""
 _ONE_SIDED = 1e-12
 
 
@@ -86,8 +89,12 @@ def followed(
     phases, states, between, state = [], [], [], begin
     for first, last in pairwise([0.0, *breaks, 1.0]):
         accuracy = {"rtol": 1e-13, "atol": STEP * tolerance, "max_step": longest}
-        run = solve_ivp(slope, (first, last), state, method="LSODA", dense_output=True, **accuracy)
-        if not run.success:
+        for method in _METHODS:
+            with warnings.catch_warnings(action="ignore", category=UserWarning):  # that it gives up
+                run = solve_ivp(slope, (first, last), state, method=method, dense_output=True, **accuracy)
+            if run.success:
+                break
+        else:
             raise NotConvergedError(f"the motion could not be followed beyond phase {run.t[-1]:.4f}.")
         state = run.y[:, -1]
         phases.append(run.t)

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import scipy.integrate
 
 from colloc.motion.follow import followed
+from colloc.system.errors import NotConvergedError
 
 TURN = np.array([[0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 BEGIN = np.array([1.0, 0.0, 2.0])
@@ -41,3 +43,22 @@ def test_a_jump_of_the_rates_is_met_from_both_sides():
 
 def test_steps_are_no_longer_than_asked():
     assert np.diff(followed(turning, BEGIN, 1e-3, longest=0.01).phases).max() <= 0.01 + 1e-15
+
+
+@pytest.mark.parametrize("others", [True, False])
+def test_where_one_method_gives_up_another_goes_on(monkeypatch, others):
+    """As where friction is far stiffer than the body is slow to move; where none goes on, a sentence says how far."""
+
+    def gives_up(*given, method, **how):
+        ran = solve_ivp(*given, method=method, **how)
+        ran.success = others and method != "LSODA"
+        return ran
+
+    solve_ivp = scipy.integrate.solve_ivp
+    monkeypatch.setattr(scipy.integrate, "solve_ivp", gives_up)
+    if others:
+        ran = followed(turning, BEGIN, 1e-7)
+        assert np.abs(ran.states - exact(ran.phases)).max() < 1e-7
+    else:
+        with pytest.raises(NotConvergedError, match="could not be followed beyond phase 1"):
+            followed(turning, BEGIN, 1e-7)
