@@ -378,7 +378,7 @@ class WithInertia(_WithStates):
             out, found = self._rates(shapes, states, froude)
             return found
 
-        states, _, held = self._equations(mesh, shapes.unit).solved(rates, first, near)
+        states, _, held = self._equations(mesh, shapes.unit).settled(rates, first, near)
         return states, out, held
 
     def alone(

@@ -22,8 +22,11 @@ from colloc.numerics.mesh import Mesh
 _CLOSED, _STEPS = 1e-12, 200
 _ROUNDED = 1e-11
 """Newton's step that counts as none: where rates are steep, rounding leaves more of the equations than `_CLOSED`."""
+_SHARES, _ASTRAY = 0.5 ** np.arange(7), 5
+"""Of Newton's step, tried until the equations are off by less; steps in a row of which none does, after which there is no
+motion near here."""
 _LEAST_SHARE = 1 / 16
-"""Of Newton's step; where less is asked for there is no motion near here, or a better way to it."""
+"""Of a step that is to make the next one shorter; where less is asked for the search had better come another way."""
 _FAR = np.errstate(over="ignore", invalid="ignore")
 """Far from any motion, what grows from interval to interval has no number at the end."""
 _ALONE, _FOUND = 60, 1e-9
@@ -74,9 +77,7 @@ class CollocatedStates:
         start: np.ndarray,
         near: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """States at the points by Newton's method, damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear Problems*,
-        section 3.3): a share of a step is taken if the next step, of the same derivatives, is a shorter one. With friction as
-        steep as 1/delta the equations may well be off by more on the way.
+        """States at the points by Newton's method: as much of a step is taken as makes the equations be off by less.
 
         Parameters
         ----------
@@ -95,9 +96,39 @@ class CollocatedStates:
         held : bool
             Whether there is such a motion: it was found, and all rates are known.
         """
-        start = np.array(start, dtype=float)
-        states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
-        x = np.column_stack([states, start])
+        x = self._begun(start, near)
+        now, residual, off = self._residual(rates, x)
+        astray = 0
+        for _ in range(_STEPS):
+            if off < _CLOSED or not now.known:
+                break
+            step = self._newton(now.on_states)(residual)
+            if not np.isfinite(step).all():
+                break
+            if np.abs(step).max() < _ROUNDED:
+                off = 0.0
+                break
+            for share in _SHARES:
+                trial = x - share * step
+                now, residual, off_then = self._residual(rates, trial)
+                if off_then < off:
+                    break
+            astray = 0 if off_then < off else astray + 1
+            if astray > _ASTRAY:
+                break
+            x, off = trial, off_then
+        return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
+
+    def settled(
+        self, rates: Callable[[np.ndarray], Rates], start: np.ndarray, near: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
+        """The same, damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3): a share of a step
+        is taken if the next step, of the same derivatives, is a shorter one.
+
+        For momenta, which friction as steep as 1/delta pulls to and fro: their equations may well be off by more on the way. On
+        a slow slope rates are not known everywhere, and it does worse.
+        """
+        x = self._begun(start, near)
         now, residual, off = self._residual(rates, x)
         next_step, trusted = np.zeros_like(x), np.inf
         for _ in range(_STEPS):
@@ -131,6 +162,12 @@ class CollocatedStates:
                 share = max(_LEAST_SHARE, min(closer, 0.5 * share))
             x = trial
         return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
+
+    def _begun(self, start: np.ndarray, near: np.ndarray | None) -> np.ndarray:
+        """States and, in the last column, their start."""
+        start = np.array(start, dtype=float)
+        states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
+        return np.column_stack([states, start])
 
     def alone(
         self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray

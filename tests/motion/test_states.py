@@ -132,9 +132,10 @@ def test_a_good_start_is_found_at_once_and_no_motion_is_said_to_be_none():
     assert not equations.solved(lambda s: at(s)._replace(known=False), np.zeros(3))[2]
 
 
+@pytest.mark.parametrize("method", ["solved", "settled"])
 @pytest.mark.parametrize("k", SIZES)
 @pytest.mark.parametrize("free", [False, True])
-def test_newtons_method_solves_linear_equations_in_one_step(k, free):
+def test_newtons_method_solves_linear_equations_in_one_step(k, free, method):
     mesh, matrix = Mesh(scheme("gauss-3"), EDGES), 2.0 * np.eye(k) + 0.3
     force, asked = np.sin(2 * np.pi * mesh.times + np.arange(k)[:, None]), []
 
@@ -142,7 +143,8 @@ def test_newtons_method_solves_linear_equations_in_one_step(k, free):
         asked.append(s)
         return Rates(force - matrix @ s, np.repeat(-matrix[:, :, None], mesh.n_point, axis=2))
 
-    assert CollocatedStates(mesh, np.full(k, free)).solved(rates, np.full(k, 0.7))[2]
+    solve = getattr(CollocatedStates(mesh, np.full(k, free)), method)
+    assert solve(rates, np.full(k, 0.7), np.full((k, mesh.n_point), 0.7))[2]
     assert len(asked) == 2
 
 
