@@ -3,8 +3,10 @@
     python -m benchmarks.mutants --number 40 --seed 1
 
 A place is a comparison, an operation, a sign, an `and`, a `not`, a `min` or an index off by one, drawn evenly from all of
-`colloc/`. First the tests of its package are run, then all of them. What is done is kept in results/mutants-SEED.jsonl: an
-interrupted run goes on where it stopped. A mutant that no test sees is one that changes nothing, or a test that lacks.
+`colloc/`. All tests are run once on the whole library, in which every place drawn notes the file of tests that comes by; a
+mutant is then tried with these files, the quickest first: the others cannot see it. A file that fails on the whole library
+sees nothing. What is done is kept in results/mutants-SEED.jsonl: an interrupted run goes on where it stopped. A mutant
+that no test sees is one that changes nothing, or a test that lacks.
 """
 
 from __future__ import annotations
@@ -17,9 +19,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -29,31 +33,44 @@ OTHERS: dict[type, str] = {
     ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*",
 }  # fmt: skip
 EXTREMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "argmin": "argmax", "argmax": "argmin"}
-LONGEST = 1500
-"""Seconds after which tests that go round in circles have seen a mutant."""
+SLOWEST = 10
+"""Tests that take so many times as long as on the whole library, and a minute, go round in circles: they have seen a mutant."""
+PASSING = """import os
+def by(place, seen=set()):
+    now = place, os.environ.get("PYTEST_CURRENT_TEST", "*").split("::")[0]
+    if now not in seen:
+        seen.add(now)
+        with open({kept!r}, "a") as file:
+            print(*now, file=file)
+"""
+"""A module of the tree in which all places drawn note who passes."""
 
 
 class Mutant(NamedTuple):
-    """A module with one place exchanged."""
+    """A module with one place exchanged, which is these bytes of it."""
 
     module: str
     line: int
     before: str
     after: str
-    source: str
+    begin: int
+    end: int
+
+    def within(self, tree: Path) -> bytes:
+        """Its module of a tree with the place exchanged."""
+        whole = (tree / self.module).read_bytes()
+        return whole[: self.begin] + self.after.encode() + whole[self.end :]
 
 
 def mutants(path: Path) -> Iterator[Mutant]:
     """All of a module."""
     source = path.read_text()
+    lines = source.encode().splitlines(keepends=True)
     for node in _nodes(ast.parse(source)):
         for at, text in _exchanges(node):
             part = ast.get_source_segment(source, at) or ""
-            lines = source.splitlines(keepends=True)
-            begin = len("".join(lines[: at.lineno - 1]).encode()) + at.col_offset
-            raw = source.encode()
-            changed = raw[:begin] + text.encode() + raw[begin + len(part.encode()) :]
-            yield Mutant(str(path.relative_to(ROOT)), at.lineno, part, text, changed.decode())
+            begin = len(b"".join(lines[: at.lineno - 1])) + at.col_offset
+            yield Mutant(str(path.relative_to(ROOT)), at.lineno, part, text, begin, begin + len(part.encode()))
 
 
 def _nodes(node: ast.AST) -> Iterator[ast.AST]:
@@ -89,21 +106,55 @@ def drawn(number: int, seed: int) -> list[Mutant]:
     return [everything[k] for k in np.random.default_rng(seed).permutation(len(everything))[:number]]
 
 
-def seen_by(tree: Path, mutant: Mutant, workers: int) -> str:
-    """The first test that fails on it; "" if none does."""
-    package = Path(mutant.module).parts[1]
-    near = [f"tests/{package}"] if (tree / "tests" / package).is_dir() else []
+def passing(tree: Path, places: list[Mutant], workers: int) -> tuple[dict[str, float], list[set[str]]]:
+    """The seconds that each file of tests takes, and for each place those that come by; files that fail are left out."""
+    added = defaultdict(list)
+    for k, place in enumerate(places):
+        added[place.module] += [
+            (place.begin, f"(__import__('colloc.passing').passing.by({k}) or (".encode()),
+            (place.end, b"))"),
+        ]
+    whole = {module: (tree / module).read_bytes() for module in added}
+    for module, parts in added.items():
+        text = whole[module]
+        for at, part in sorted(parts, key=lambda one: one[0], reverse=True):
+            text = text[:at] + part + text[at:]
+        (tree / module).write_bytes(text)
+    kept, times = tree.parent / "passed", tree.parent / "times.xml"
+    (tree / "colloc" / "passing.py").write_text(PASSING.format(kept=str(kept)))
+    tested(tree, workers, None, "-o", "junit_family=xunit1", f"--junitxml={times}")
+    for module, before in whole.items():
+        (tree / module).write_bytes(before)
+    (tree / "colloc" / "passing.py").unlink()
+    seconds, failed = defaultdict(float), set()
+    for case in ElementTree.parse(times).iter("testcase"):
+        seconds[case.attrib["file"]] += float(case.attrib["time"])
+        if case.find("failure") is not None or case.find("error") is not None:
+            failed.add(case.attrib["file"])
+    print(f"Left out, since they fail on the whole library: {', '.join(sorted(failed)) or 'none'}.", flush=True)
+    good = {file: seconds[file] for file in sorted(seconds, key=seconds.__getitem__) if file not in failed}
+    passed = [line.split() for line in kept.read_text().splitlines()]
+    files = [{file for at, file in passed if int(at) == k} for k in range(len(places))]
+    return good, [set(good) if "*" in those else those & set(good) for those in files]
+
+
+def tested(tree: Path, workers: int, seconds: float | None, *options: str) -> subprocess.CompletedProcess[str]:
+    """What pytest says of a tree."""
     environment = os.environ | {"PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
-    for tests in (near, ["tests"]):
-        command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-n", str(workers), *tests]
-        try:
-            done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=LONGEST)
-        except subprocess.TimeoutExpired:
-            return "time"
-        if tests and done.returncode:
-            failed = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-            return failed[0] if failed else "collection"
-    return ""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", str(workers), *options]
+    return subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=seconds)
+
+
+def seen_by(tree: Path, workers: int, files: dict[str, float]) -> str:
+    """The first test of these files that fails on a tree; "" if none does."""
+    if not files:
+        return ""
+    try:
+        done = tested(tree, workers, 60 + SLOWEST * sum(files.values()), "-x", *files)
+    except subprocess.TimeoutExpired:
+        return "time"
+    failed = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return failed[0] if failed else "collection" if done.returncode else ""
 
 
 def _unneeded(folder: str, names: list[str]) -> list[str]:
@@ -116,20 +167,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--number", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--workers", type=int, default=0)
     options = parser.parse_args()
     kept = ROOT / "results" / f"mutants-{options.seed}.jsonl"
     done = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder, "colloc")
         shutil.copytree(ROOT, tree, ignore=_unneeded)
-        for mutant in drawn(options.number, options.seed)[len(done) :]:
-            whole = (tree / mutant.module).read_text()
-            (tree / mutant.module).write_text(mutant.source)
-            test = seen_by(tree, mutant, options.workers)
-            (tree / mutant.module).write_text(whole)
-            done.append({**mutant._asdict(), "seen by": test})
-            del done[-1]["source"]
+        places = drawn(options.number, options.seed)[len(done) :]
+        seconds, passed = passing(tree, places, options.workers)
+        for mutant, near in zip(places, passed, strict=True):
+            whole = (tree / mutant.module).read_bytes()
+            (tree / mutant.module).write_bytes(mutant.within(tree))
+            test = seen_by(tree, options.workers, {file: took for file, took in seconds.items() if file in near})
+            (tree / mutant.module).write_bytes(whole)
+            done.append({**mutant._asdict(), "files": len(near), "seen by": test})
             with kept.open("a") as file:
                 file.write(json.dumps(done[-1]) + "\n")
     print("| place | before | after | seen by |\n|---|---|---|---|")
