@@ -108,7 +108,7 @@ def drawn(number: int, seed: int) -> list[Mutant]:
 
 def passing(tree: Path, places: list[Mutant], workers: int) -> tuple[dict[str, float], list[set[str]]]:
     """The seconds that each file of tests takes, and for each place those that come by; files that fail are left out."""
-    added = defaultdict(list)
+    added: defaultdict[str, list[tuple[int, bytes]]] = defaultdict(list)
     for k, place in enumerate(places):
         added[place.module] += [
             (place.begin, f"(__import__('colloc.passing').passing.by({k}) or (".encode()),
@@ -126,7 +126,8 @@ def passing(tree: Path, places: list[Mutant], workers: int) -> tuple[dict[str, f
     for module, before in whole.items():
         (tree / module).write_bytes(before)
     (tree / "colloc" / "passing.py").unlink()
-    seconds, failed = defaultdict(float), set()
+    seconds: defaultdict[str, float] = defaultdict(float)
+    failed = set()
     for case in ElementTree.parse(times).iter("testcase"):
         seconds[case.attrib["file"]] += float(case.attrib["time"])
         if case.find("failure") is not None or case.find("error") is not None:

@@ -101,6 +101,7 @@ class Run:
         self._known: dict[str, Any] = {}
         self._pending: dict[str, Any] = {}
         self._problems: dict[str, Problem] = {}
+        self._refused = False  # by the disk; tried again at the end, since another try may have to wait
         if self.problem is None:
             return
         self._stated = self.problem.to_dict()
@@ -163,12 +164,13 @@ class Run:
         if not keeps:
             return value
         self._known[key] = self._pending[key] = self.written(value)
-        if time.monotonic() - self._last > EVERY:
+        if not self._refused and time.monotonic() - self._last > EVERY:
             self.write()
         return value
 
     def write(self) -> None:
-        """Put what was found since the last time into the file; a warning, once, where that is not possible."""
+        """Put what was found since the last time into the file; a warning, once, where that is not possible. The file then
+        holds what it held; an empty one goes."""
         self._last = time.monotonic()
         if self.path is None or not self._pending:
             return
@@ -177,8 +179,13 @@ class Run:
             put_rows(self.path, ROWS, {_PROBLEM: self.problem.hash, **self._pending})
             self._pending = {}
         except StoreError as error:
-            warnings.warn(f"{error} The solve goes on; an interrupt would lose it.", ReadOnlyRunWarning, stacklevel=2)
-            self.path = None
+            if not self._refused:
+                said = f"{error} The solve goes on, and tries again at its end."
+                warnings.warn(said, ReadOnlyRunWarning, stacklevel=2)
+            self._refused = True
+            with suppress(OSError):
+                if self.path.stat().st_size == 0:
+                    self.path.unlink()
 
     def told(self, stage: str, done: int, count: int, best: Optimum | None = None) -> None:
         """Say how far a stage has come, and which gait is the best so far."""

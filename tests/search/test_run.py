@@ -246,15 +246,48 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     assert not run.exists()
 
 
-def test_a_run_that_cannot_be_written_is_told_once_and_the_solve_goes_on(tmp_path, monkeypatch, at_once):
-    def full(*_):
-        raise StoreError("cannot write: no space left on device.")
+def test_a_run_that_cannot_be_written_is_told_once_and_is_written_at_the_end_if_there_is_room(tmp_path, monkeypatch, at_once):
+    path, tries = tmp_path / "x.run.sqlite", []
+
+    def full(*given):
+        tries.append(given)
+        if len(tries) == 1:
+            raise StoreError("cannot write: no space left on device.")
+        put_rows(*given)
 
     monkeypatch.setattr("colloc.search.run.put_rows", full)
     with pytest.warns(ReadOnlyRunWarning, match="no space left") as told:
-        solution = solve(QUICK, 2, keep=tmp_path / "x.run.sqlite")
+        solution = solve(QUICK, 2, keep=path)
     assert solution.certificate.replayed
-    assert len(told) == 1
+    assert (len(told), len(tries)) == (1, 2)
+    assert len(read_rows(path, ROWS).values) > 5
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits")
+@pytest.mark.parametrize("held", [0, 3])
+def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_there(undisturbed, tmp_path, held):
+    """No file may grow, which a write meets as it meets a full disk."""
+    import resource
+
+    file, wanted = undisturbed
+    run, rows = run_file(tmp_path / "quick.h5"), {f"stage {k}": [k] for k in range(held)}
+    if held:
+        put_rows(run, ROWS, {"problem": read_problem_file(file).problem.hash, **rows})
+    before = run.read_bytes() if held else b""
+    command = [sys.executable, "-m", "colloc", "solve", file, "--starts", "4", "--output", f"{tmp_path}/", "--no-figure"]
+
+    def full():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (len(before),) * 2)
+
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=full)
+    assert done.returncode == 2
+    assert done.stdout.startswith("quick: solved in ")
+    for said in (f"cannot write {run}: ", "The solve goes on", "the result is not saved: cannot write "):
+        assert done.stderr.count(said) == 1
+    assert "Traceback" not in done.stderr
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == ({run.name: before} if held else {})
+    subprocess.run(command, capture_output=True, check=True)  # with room
+    assert contents(tmp_path / "quick.h5") == wanted
 
 
 @pytest.mark.parametrize("thread", ["main", "worker"])
