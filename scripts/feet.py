@@ -1,17 +1,20 @@
 """How efficiently chains crawl on feet and wheels: python -m scripts.feet [--starts 16] [--output results]
 
 The best gait found by the usual search, of chains of equal links that lie on the floor, stand on one to three feet a link, or
-on a wheel each that rolls at a fiftieth of its friction sideways; and what bounds all gaits of three links. A table, feet.md.
+on a wheel each that rolls at a fiftieth of its friction sideways; and what bounds all gaits of three links. Each class begins
+with the best gait of the class before it. A table, feet.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 from colloc.bounds.infinitesimal import best_small_gait
 from colloc.bounds.sampled import efficiency_bound
+from colloc.gaits.free_path import FreePath
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
@@ -20,34 +23,28 @@ from colloc.mechanics.friction import Friction
 from colloc.search.solve import solve
 from colloc.system.errors import CollocError
 
-STANDS = (0, 1, 2, 3)
-SCENES = (
-    (2, Friction(1, 1, 3), 1),
-    (3, Friction(), 1),
-    (3, Friction(), 2),
-    (3, Friction(), 3),
-    (3, Friction(2, 1, 1), 1),
-    (3, Friction(2, 1, 1), 2),
-    (4, Friction(), 1),
-    (4, Friction(), 2),
-    (4, Friction(2, 1, 1), 1),
-    (5, Friction(), 1),
-    (5, Friction(), 2),
-    (5, Friction(2, 1, 1), 1),
-)
-HEAD = ("links", "friction", "harmonics", "line", "1 foot a link", "2 feet", "3 feet")
+STANDS = {"line": 0, "1 foot a link": 1, "2 feet": 2, "3 feet": 3}
+CLASSES: tuple[Harmonic | FreePath, ...] = (Harmonic(1), Harmonic(2), Harmonic(3), FreePath())
+LEVEL = Friction(), Friction(2, 1, 1)
 
 
-def best(body: Chain, friction: Friction, harmonics: int, starts: int) -> str:
-    """Efficiency of the best gait found, and the distance of a period; in brackets if the certificate fails."""
-    problem = Problem("feet", body=body, friction=friction, gait=Harmonic(harmonics))
-    try:
-        with warnings.catch_warnings(action="ignore"):
-            found = solve(problem, starts)
-    except CollocError:
-        return "none"
-    text = f"{found.certificate.efficiency:.4f} ({found.certificate.distance:.3f})"
-    return text if found.certificate.passed else f"[{text}]"
+def column(body: Chain, friction: Friction, starts: int) -> list[str]:
+    """Efficiency and distance of the best gait found of each class, in brackets if its certificate fails."""
+    cells, problem = [], Problem("feet", body=body, friction=friction)
+    for kind in CLASSES if body.n_joint > 1 else CLASSES[:1]:
+        cells.append("none")
+        with warnings.catch_warnings(action="ignore"), suppress(CollocError):
+            found = solve(problem.with_(gait=kind), starts)
+            text = f"{found.certificate.efficiency:.4f} ({found.certificate.distance:.3f})"
+            cells[-1] = text if found.certificate.passed else f"[{text}]"
+            problem = problem.with_(gait=kind, guess=found.gait)
+    return cells
+
+
+def table(columns: dict[str, list[str]], links: int, friction: str) -> list[str]:
+    """The rows of one body and friction, a class each."""
+    names = ("1 harmonic", "2 harmonics", "3 harmonics", "free path")
+    return [f"| {links} | {friction} | {' | '.join(row)} |" for row in zip(names, *columns.values(), strict=False)]
 
 
 def main() -> None:
@@ -56,16 +53,19 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("results"), metavar="FOLDER")
     options = parser.parse_args()
     lines = [f"d/W at delta 1e-4 (distance of a period), by `python -m scripts.feet --starts {options.starts}`.", ""]
-    lines += [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"]
-    for links, friction, harmonics in SCENES:
-        cells = [best(Chain((1 / links,) * links, feet=feet), friction, harmonics, options.starts) for feet in STANDS]
-        lines.append(f"| {links} | {friction.label} | {harmonics} | {' | '.join(cells)} |")
-        print(lines[-1], flush=True)
-    lines += ["", "| links on a wheel each, (1, 0.02, 0.02) | one harmonic |", "|---|---|"]
+    head = ("links", "friction", "class", *STANDS)
+    lines += [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for links in (2, 3, 4, 5):
+        for friction in LEVEL if links > 2 else (Friction(1, 1, 3),):
+            chains = {stand: Chain((1 / links,) * links, feet=feet) for stand, feet in STANDS.items()}
+            columns = {stand: column(chain, friction, options.starts) for stand, chain in chains.items()}
+            lines += table(columns, links, friction.label)
+            print(*lines[-4:], sep="\n", flush=True)
+    lines += ["", "| links | on | class | a wheel a link, (1, 0.02, 0.02) |", "|---|---|---|---|"]
     for links in (3, 4, 5):
-        wheels = tuple(Wheel(link) for link in range(links))
-        lines.append(f"| {links} | {best(Chain((1 / links,) * links, feet=wheels), Friction(), 1, options.starts)} |")
-        print(lines[-1], flush=True)
+        chain = Chain((1 / links,) * links, feet=tuple(Wheel(link) for link in range(links)))
+        lines += table({"wheels": column(chain, Friction(), options.starts)}, links, "wheels")
+        print(*lines[-4:], sep="\n", flush=True)
     lines += ["", "| links, (1, 1, 1) | feet a link | best small gait | every gait (samples) |", "|---|---|---|---|"]
     for feet in (2, 3):
         body = Chain(feet=feet)
