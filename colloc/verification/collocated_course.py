@@ -77,7 +77,7 @@ def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: floa
     at, regime = (dynamics.body, dynamics.law, gait, delta), regime.at(gait)
     played = gait_with_inertia(*at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime)
     kind: Any = kind_of_motion(dynamics)
-    ran = played.settled(kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0], error)
+    ran, _ = played.periodic_run(kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0], error)
     return CourseOfGait(ran.at, error, alone=kind.alone)
 
 

@@ -155,19 +155,21 @@ class GaitWithInertia:
             f"at a Froude number of {self.froude:g} no motion was found in which all periods are alike; try a smaller one."
         )
 
-    def settled(self, near: np.ndarray, aim: float, slopes: np.ndarray | None = None) -> Course:
+    def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray | None = None) -> tuple[Course, np.ndarray]:
         """`InertialMotion.states` through a period that leaves the momenta as they are, to an error, sought near some momenta;
-        with the derivatives of `closed`, if they are known."""
+        with the derivatives of `closed`, if they are known. And momenta that close the gap it leaves, ``(3,)``: where a body
+        glides far they are much further away than the gap is wide."""
         start, before = near, np.inf
         if slopes is None:
             start, slopes = self.closed(near)
         for _ in range(_MOST_PERIODS):
             ran = self.run(start, aim)
             gap = ran.states[_MOMENTA, -1] - start
-            size = np.abs(gap).max()
-            if size < aim or before <= size < _CLOSED * aim:
-                return ran
-            start, before = start + _newton_step(gap, slopes), size
+            step = _newton_step(gap, slopes)
+            start, size = start + step, np.abs(step).max()
+            if size < aim or (before <= size and np.abs(gap).max() < _CLOSED * aim):
+                return ran, start
+            before = size
         raise NotConvergedError(f"at a Froude number of {self.froude:g} the periods do not become alike; try a smaller one.")
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
@@ -268,13 +270,15 @@ def inertial_motion(
     """
     check_finite(positive=True, froude=froude, delta=delta)
     played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime)
-    start, slopes = played.closed(played.slow_momenta())
+    try:
+        start, slopes = played.closed(played.slow_momenta())
+    except NotConvergedError:
+        start, slopes = played.closed(np.zeros(3))  # a body that friction hardly brakes keeps what it begins with at rest
     totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
 
     def run(aim: float) -> tuple[Course, dict[str, float]]:
         nonlocal start
-        ran = played.settled(start, aim, slopes)
-        start = ran.states[_MOMENTA, 0]
+        ran, start = played.periodic_run(start, aim, slopes)  # begun elsewhere the next run tells what the gap left open means
         return ran, played.passed(ran.states) | {"period": float(froude) ** -0.5}
 
     ran, values, errors = to_tolerance(run, tolerance, objective, tolerance, totals)

@@ -119,6 +119,15 @@ def test_without_friction_momentum_is_conserved():
     np.testing.assert_allclose(now.rates[:, 0], [omega * states[1, 0], -omega * states[0, 0], 0.0], atol=1e-11)
 
 
+@pytest.mark.parametrize("mu", [0.02, 0.01])
+def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
+    """A period leaves nearly all of a change of the momenta, so a small gap at its end is a motion far off."""
+    at = CHAIN, colloc.Friction(mu, mu, mu), LEANING, 1e-3, 1.0
+    rough, fine = (colloc.inertial_motion(*at, tolerance=tolerance) for tolerance in (1e-4, 1e-6))
+    assert np.abs(rough.multipliers).max() > 0.96
+    assert abs(rough.distance - fine.distance) < rough.errors["distance"] < 1e-4 * rough.distance
+
+
 def test_slow_motion_is_the_limit():
     """The difference falls at least like the Froude number."""
     slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2, tolerance=1e-7).efficiency
