@@ -276,12 +276,17 @@ def inertial_motion(
         start, slopes = played.closed(np.zeros(3))  # a body that friction hardly brakes keeps what it begins with at rest
     totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
 
-    def run(aim: float) -> tuple[Course, dict[str, float]]:
+    def run(aim: float) -> tuple[tuple[Course, np.ndarray], dict[str, float]]:
         nonlocal start
-        ran, start = played.periodic_run(start, aim, slopes)  # begun elsewhere the next run tells what the gap left open means
-        return ran, played.passed(ran.states) | {"period": float(froude) ** -0.5}
+        ran, start = played.periodic_run(start, aim, slopes)
+        return (ran, start), played.passed(ran.states) | {"period": float(froude) ** -0.5}
 
-    ran, values, errors = to_tolerance(run, tolerance, objective, tolerance, totals)
+    def left_open(of: tuple[Course, np.ndarray]) -> dict[str, float]:
+        """As far as the velocity that is missing to a closed period carries the body in one."""
+        ran, closed = of
+        return {"distance": float(np.linalg.norm(closed[:2] - ran.states[:2, 0]))}
+
+    (ran, _), values, errors = to_tolerance(run, tolerance, objective, tolerance, totals, left_open)
     multipliers = np.linalg.eigvals(slopes)
     return InertialMotion(values, errors, {}, froude, multipliers, phases=ran.phases, states=ran.states)
 

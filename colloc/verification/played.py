@@ -99,18 +99,20 @@ def to_tolerance(
     objective: Objective,
     tolerance: float,
     known: tuple[Numbers, Numbers],
+    left_open: Callable[[Ran], Numbers] = lambda ran: {},
 ) -> tuple[Ran, Numbers, Numbers]:
     """A differential equation solved with ever smaller errors a step, until the last tenth of them changes an objective by less
     than a relative error: what ran last, the numbers of its period, and their errors.
 
     `run` takes an error, `first` to begin with, and gives what ran and its numbers; `known` are other numbers, and their
-    errors. `NotConvergedError` if rounding hides the accuracy that is asked for.
+    errors; `left_open` says what else may be wrong with numbers of what ran. `NotConvergedError` if rounding hides the accuracy that is asked for.
     """
     aim, before = first, None
     while aim >= _LEAST:
         ran, now = run(aim)
         if before is not None:
-            errors = {name: abs(value - before[name]) for name, value in now.items()} | known[1]
+            more = left_open(ran)
+            errors = {name: abs(value - before[name]) + more.get(name, 0.0) for name, value in now.items()} | known[1]
             if not objective.relative_error(now | known[0], errors) > tolerance:
                 return ran, now | known[0], errors
         aim, before = _TENTH * aim, now
