@@ -105,7 +105,8 @@ def to_tolerance(
     than a relative error: what ran last, the numbers of its period, and their errors.
 
     `run` takes an error, `first` to begin with, and gives what ran and its numbers; `known` are other numbers, and their
-    errors; `left_open` says what else may be wrong with numbers of what ran. `NotConvergedError` if rounding hides the accuracy that is asked for.
+    errors; `left_open` says what else may be wrong with numbers of what ran. `NotConvergedError` if rounding hides the
+    accuracy that is asked for.
     """
     aim, before = first, None
     while aim >= _LEAST:
