@@ -5,8 +5,8 @@
 Bytes are changed, cut, left out and put in; files with a seal or checksums are also forged: fields and numbers are exchanged,
 and the checksums made right. In texts (tables, problem files) lines, numbers and words are exchanged. A file is read in a
 process with 3 GB of memory and 20 s for each. A finding is an error that is not one of colloc's, a warning of NumPy's, a crash,
-a file that takes longer, or one whose checksums do not fit and that is believed. (Rows of a run, which are
-for the same solve alone, are believed if their sums fit.)
+a file that takes longer, or one whose checksums do not fit and that is believed. (Rows of a run, which are for the same solve
+alone, are believed if their sums fit.)
 """
 
 from __future__ import annotations

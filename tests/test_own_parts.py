@@ -64,6 +64,8 @@ def test_a_body_that_says_its_outline_alone_looks_like_one_that_says_everything(
     x, y = body.outline(angles)
     np.testing.assert_allclose(places, np.stack([0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])]), atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(force, axis=0), 1.0, atol=1e-12)  # dry, and alike in all directions
+    one, _ = Body.rubbing(body, Friction(), angles[:, :1], rates[:, :1], 1e-9, z[:, :1], 1)
+    np.testing.assert_array_equal(one, places[:, :1, :1])
 
 
 @pytest.mark.slow

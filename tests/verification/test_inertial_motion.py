@@ -165,6 +165,14 @@ def test_slow_enough_is_where_the_part_is_lost(friction):
     assert abs(1 - played.efficiency / slow) == pytest.approx(0.01, rel=0.06)
 
 
+def test_a_gait_whose_efficiency_no_pace_changes_much_is_slow_enough_at_none():
+    gait = colloc.ellipse(A0=0.3, A1=0.6, B1=0.5)
+    with pytest.raises(colloc.NotConvergedError, match=r"by less than 0.3 up to a Froude number of 10\."):
+        colloc.slow_enough(CHAIN, ISOTROPIC, gait, 1e-2, 0.3)
+    slow = colloc.replay(CHAIN, ISOTROPIC, gait, 1e-2).efficiency
+    assert abs(1 - colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 10.0).efficiency / slow) < 0.3
+
+
 def test_what_has_no_inertia_is_refused_in_words():
     with pytest.raises(colloc.ProblemError, match="froude must be"):
         colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.0)
