@@ -160,7 +160,8 @@ def control_problem(problem: Problem) -> ControlProblem:
         Aims(
             problem.objective,
             tuple((aim, value / _size(aim, unit)) for aim, value in problem.at_least),
-            problem.rotation,
+            # a row that holds whatever the gait would have no slope but what the mesh errs by
+            None if problem.keeps_heading else problem.rotation,
             regime.keeps_ahead,
         ),
         limits.in_units_of(unit),

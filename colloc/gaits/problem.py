@@ -348,13 +348,19 @@ class Problem:
                 "reverse the motion (the scallop theorem). Give the body three links, mu_b different from mu_f, or the problem "
                 "a froude."
             )
-        alike = self.body.n_joint == 1 and self.law.reversible and self.body.symmetric
-        if alike and self.gait.symmetry == ANTIPODAL and not self.grade:
+        if self.keeps_heading and self.rotation:
+            raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")
+        if self.keeps_heading and self.gait.symmetry == ANTIPODAL:
             raise ProblemError(
                 "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: the body moves along its own axis of "
                 "symmetry, and as far back while it is bent to the other side. Take the class without symmetry, links that "
                 "differ, or mu_b different from mu_f."
             )
+
+    @property
+    def keeps_heading(self) -> bool:
+        """Whether the body is its own mirror image in every shape: then it moves along its own axis and never turns."""
+        return self.body.n_joint == 1 and self.law.reversible and self.body.symmetric and not self.grade
 
     @property
     def asked(self) -> str:

@@ -300,6 +300,23 @@ def test_two_equal_links_go_nowhere_by_an_antipodal_gait_and_such_a_problem_is_r
     assert problem(body=colloc.Chain((0.4, 0.6)), **stated).froude == 0.1
 
 
+def test_two_equal_links_never_turn_so_that_nothing_has_to_keep_them_from_it():
+    """In every shape they are their own mirror image; that a mesh errs is no reason to look for gaits that make up for it."""
+    gait, friction = colloc.Fourier(mean=[0.7], cos=[[0.4, 0.5]], sin=[[0.9, -0.2]]), colloc.Friction(0.4)
+    turned = [
+        colloc.replay(colloc.Chain(lengths), friction, gait, 1e-2, froude=0.05, tolerance=1e-5).rotation
+        for lengths in ((0.5, 0.5), (0.4, 0.6))
+    ]
+    assert abs(turned[0]) < 1e-6 < 1e-3 < abs(turned[1])
+    stated = {"friction": friction, "gait": colloc.Harmonic(2), "guess": gait, "rotation": 0.0}
+    rows = [program(problem(body=colloc.Chain(lengths), **stated)) for lengths in ((0.5, 0.5), (0.4, 0.6))]
+    for reduced, v in rows:
+        reduced.place_rows(v)
+    assert [reduced.rows(v).size - reduced.constraints.values(v).size for reduced, v in rows] == [0, 1]
+    with pytest.raises(colloc.ProblemError, match="never turn"):
+        problem(body=colloc.Chain((0.5, 0.5)), **stated | {"rotation": 1.0})
+
+
 def test_where_no_motion_is_found_the_search_says_so(monkeypatch):
     closed = WithInertia._closed
     monkeypatch.setattr(WithInertia, "_closed", lambda *arguments: (*closed(*arguments)[:2], False))
