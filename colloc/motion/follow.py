@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,9 +21,14 @@ if TYPE_CHECKING:
 STEP = 1 / 100
 """Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and then skip one unnoticed
 (Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams' takes short ones, and errs by 8 to 40 times a step."""
-_METHODS = "LSODA", "Radau"
-"""Adams' and Gear's; and where these give up, as where friction is stiff beside little inertia, one that costs more."""
+_METHODS = ("LSODA", 50_000), ("Radau", np.inf)
+"""Adams' and Gear's, and how often they may ask for rates; and where these give up, as where friction is stiff beside little
+inertia, one that costs more. Adams' may not see that his steps are as short as stability, not accuracy, wants them: 1e-8."""
 _ONE_SIDED = 1e-12
+
+
+class _TooOften(Exception):
+    """Rates were asked for more often than a method may."""
 
 
 class Course(NamedTuple):
@@ -78,10 +84,13 @@ def followed(
     from scipy.integrate import solve_ivp
 
     near: Any = None
-    first = last = 0.0
+    first = last = left = 0.0
 
     def slope(t: float, state: np.ndarray) -> np.ndarray:
-        nonlocal near
+        nonlocal near, left
+        left -= 1
+        if left < 0:
+            raise _TooOften
         one_sided = min(max(t, first + _ONE_SIDED), last - _ONE_SIDED)  # rates may jump at the ends
         found, near = rates(one_sided, state, near)
         return found
@@ -89,11 +98,12 @@ def followed(
     phases, states, between, state = [], [], [], begin
     for first, last in pairwise([0.0, *breaks, 1.0]):
         accuracy = {"rtol": 1e-13, "atol": STEP * tolerance, "max_step": longest}
-        for method in _METHODS:
-            with warnings.catch_warnings(action="ignore", category=UserWarning):  # that it gives up
+        for method, most in _METHODS:
+            left = most
+            with suppress(_TooOften), warnings.catch_warnings(action="ignore", category=UserWarning):  # that it gives up
                 run = solve_ivp(slope, (first, last), state, method=method, dense_output=True, **accuracy)
-            if run.success:
-                break
+                if run.success:
+                    break
         else:
             raise NotConvergedError(f"the motion could not be followed beyond phase {run.t[-1]:.4f}.")
         state = run.y[:, -1]

@@ -45,11 +45,13 @@ def test_steps_are_no_longer_than_asked():
     assert np.diff(followed(turning, BEGIN, 1e-3, longest=0.01).phases).max() <= 0.01 + 1e-15
 
 
-@pytest.mark.parametrize("others", [True, False])
-def test_where_one_method_gives_up_another_goes_on(monkeypatch, others):
+@pytest.mark.parametrize(("others", "asks"), [(True, False), (True, True), (False, False)])
+def test_where_one_method_gives_up_or_asks_without_end_another_goes_on(monkeypatch, others, asks):
     """As where friction is far stiffer than the body is slow to move; where none goes on, a sentence says how far."""
 
     def gives_up(*given, method, **how):
+        while asks and method == "LSODA":
+            given[0](0.1, given[2])
         ran = solve_ivp(*given, method=method, **how)
         ran.success = others and method != "LSODA"
         return ran
