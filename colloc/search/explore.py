@@ -86,11 +86,14 @@ class Exploration:
         Tried in all.
     others : tuple of Alternative
         All distinct gaits met, the best first.
+    left : tuple of Optimum
+        Gaits at a larger delta that nobody followed further, the most promising first (see `followed_further`).
     """
 
     optima: tuple[Optimum, ...]
     starts: int
     others: tuple[Alternative, ...] = ()
+    left: tuple[Optimum, ...] = ()
 
 
 def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
@@ -166,8 +169,20 @@ def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], b
         else:
             twin.starts += candidate.starts
     followed = [_alternative(problem, optimum, led.starts) for optimum, led in distinct]
-    dropped = [_alternative(problem, c.optimum, c.starts) for c in known if not any(c is done for _, done in ends)]
-    return Exploration(tuple(optimum for optimum, _ in distinct), tried, (*followed, *dropped))
+    left = [c for c in known if not any(c is done for _, done in ends)]
+    others = *followed, *(_alternative(problem, c.optimum, c.starts) for c in left)
+    return Exploration(tuple(optimum for optimum, _ in distinct), tried, others, tuple(c.optimum for c in left))
+
+
+def followed_further(problem: Problem, explored: Exploration, goes_on: Callable[[], bool]) -> tuple[Optimum, ...]:
+    """What the first of the gaits left over lead to at the final delta, best first, where none of those followed will do."""
+    ends: list[Optimum] = []
+    for optimum in itertools.takewhile(lambda _: goes_on(), explored.left[:ENOUGH]):
+        with suppress(CollocError):
+            end = _followed(problem, optimum)
+            if _is_member(end) and not any(same_gait(problem, end, other) for other in (*explored.optima, *ends)):
+                ends.append(end)
+    return tuple(sorted(ends, key=lambda end: end.objective))
 
 
 def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:

@@ -25,7 +25,7 @@ from colloc.search.choose import choose, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is
 from colloc.search.descend import FACTOR, below_saddle, descend
-from colloc.search.explore import CLOSE, ENOUGH, Exploration, begin_at, explore, is_finite
+from colloc.search.explore import CLOSE, ENOUGH, Exploration, begin_at, explore, followed_further, is_finite
 from colloc.search.literal import literal_answer
 from colloc.search.optimum import Optimum
 from colloc.search.prescribed import prescribed_answer
@@ -121,7 +121,10 @@ def _solved(problem: Problem, starts: int | None, search: str, until: float, wor
         if not worth(first):
             return Solution(problem, unconfirmed(first))
         explored = replace(explored, optima=(first, *explored.optima[1:]))
-        solution = choose(problem, _certified_best(problem, explored))
+        found = _certified_best(problem, explored.optima)
+        if not any(each.holds for each in found) and explored.left:
+            found += _certified_best(problem, followed_further(problem, explored, goes_on))
+        solution = choose(problem, found)
     solution.starts, solution.others = explored.starts, explored.others
     return solution
 
@@ -135,12 +138,12 @@ def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool])
     return Exploration((begin_at(problem, problem.guess),), 1)
 
 
-def _certified_best(problem: Problem, explored: Exploration) -> list[Certified]:
+def _certified_best(problem: Problem, optima: Sequence[Optimum]) -> list[Certified]:
     """The best gaits, certified: of finite size first, then what shrank and is better; in one row where either will do."""
-    if problem.shrinking or explored.starts == 1:
-        return _tried(explored.optima, lambda found: found.holds)
-    finite = [optimum for optimum in explored.optima if is_finite(optimum)]
-    shrunk = [optimum for optimum in explored.optima if not is_finite(optimum)]
+    if problem.shrinking:
+        return _tried(optima, lambda found: found.holds)
+    finite = [optimum for optimum in optima if is_finite(optimum)]
+    shrunk = [optimum for optimum in optima if not is_finite(optimum)]
     found = _tried(finite, lambda found: found.holds and found.is_finite)
     best = max(map(promised, found), default=-np.inf)
     return [*found, *_tried([optimum for optimum in shrunk if optimum.value > best], lambda found: found.holds)]
