@@ -35,8 +35,9 @@ def column(body: Chain, friction: Friction, starts: int) -> list[str]:
         cells.append("none")
         with warnings.catch_warnings(action="ignore"), suppress(CollocError):
             found = solve(problem.with_(gait=kind), starts)
-            text = f"{found.certificate.efficiency:.4f} ({found.certificate.distance:.3f})"
-            cells[-1] = text if found.certificate.passed else f"[{text}]"
+            best = found.shrunk or found  # whatever its size
+            text = f"{best.certificate.efficiency:.4f} ({best.certificate.distance:.3f})"
+            cells[-1] = text if best.certificate.passed else f"[{text}]"
             problem = problem.with_(gait=kind, guess=found.gait)
     return cells
 
