@@ -351,23 +351,33 @@ def _followed_to_the_end(
 
     Gaits of finite size may shrink on the way, so they are followed until one has not.
     """
-    run, ends = this_run(), list[tuple[Optimum, Candidate]]()
-    least = -known[0].dry - (1 - PROMISING) * abs(known[0].dry)
-    promising = [c for c in known if -c.dry >= least]
-    queue = [c for c in promising if not c.is_loop][:FOLLOWED] + [c for c in promising if c.is_loop][:FOLLOWED]
-    spare = [c for c in known if is_finite(c.optimum) and c not in queue][:ENOUGH]
-    for number, candidate in enumerate(queue):
-        if helpers.has(number):
-            helpers.ask(_followed, problem, candidate.optimum)
-    for number, candidate in enumerate((*queue, *spare), 1):
-        if (ends and not goes_on()) or (candidate in spare and any(is_finite(optimum) for optimum, _ in ends)):
-            break
+    run, ends, left = this_run(), list[tuple[Optimum, Candidate]](), list(known)
+
+    def promising(candidate: Candidate) -> bool:
+        """By what the best one promises; or has come to, where it promised too much."""
+        best = max(known[0].dry, min((optimum.objective for optimum, _ in ends), default=-np.inf))
+        return candidate.dry <= best + (1 - PROMISING) * abs(best)
+
+    def follow(candidate: Candidate) -> None:
+        left.remove(candidate)
         helpers.await_for(_followed, problem, candidate.optimum)
         with suppress(CollocError):
             end = _followed(problem, candidate.optimum)
             if _is_member(end):
                 ends.append((end, candidate))
-        run.told("explore", number, len(queue) + len(spare), _best([optimum for optimum, _ in ends]))
+        run.told("explore", len(known) - len(left), len(known), _best([optimum for optimum, _ in ends]))
+
+    queue = [c for c in known if not c.is_loop][:FOLLOWED] + [c for c in known if c.is_loop][:FOLLOWED]
+    for number, candidate in enumerate(filter(promising, queue)):
+        if helpers.has(number):
+            helpers.ask(_followed, problem, candidate.optimum)
+    for candidate in queue:
+        if promising(candidate) and (goes_on() or not ends):
+            follow(candidate)
+    for candidate in [c for c in left if is_finite(c.optimum)][:ENOUGH]:
+        if any(is_finite(optimum) for optimum, _ in ends) or (ends and not goes_on()):
+            break
+        follow(candidate)
     if not ends:
         raise NotConvergedError("no gait could be followed to the final delta; start at a larger delta or give another guess.")
     best = min(optimum.objective for optimum, _ in ends)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -168,11 +169,13 @@ def finished(optimum: Optimum) -> Certified:
     Where it turns out to be a saddle, the search goes on below it; where friction is viscous at its speeds, at a smaller
     delta: what is slow enough for a large gait is not for a small one, or where feet hold.
     """
-    for _ in range(_TRIES):
-        found = certified(confirmed(optimum))
+    found = certified(confirmed(optimum))
+    for _ in range(_TRIES - 1):
         if not _is_viscous(found):
             break
         optimum = _at_smaller_delta(optimum)
+        with suppress(NotConvergedError):  # there the body may have no such motion
+            found = certified(confirmed(optimum))
     return found
 
 

@@ -150,6 +150,32 @@ def test_the_search_ends_once_eight_starts_have_met_the_best_gait_unless_more_ar
     assert candidates(Problem("same", gait=Harmonic(1, "bilateral")), asked, lambda: True, ALONE)[1] == tried
 
 
+@pytest.mark.parametrize(
+    ("promised_and_kept", "followed"),
+    [
+        ([(1.0, 1.0), (0.9, 0.9), (0.5, 0.5)], [1.0, 0.9]),
+        ([(1.0, 0.3), (0.5, 0.4), (0.35, 0.35), (0.1, 0.1)], [1.0, 0.5, 0.35]),
+        ([(1.0, 0.6), (0.4, 0.4)], [1.0]),
+    ],
+    ids=["promises are kept", "the best one promised too much", "and less than the others do"],
+)
+def test_who_promised_too_much_does_not_keep_others_from_being_followed(monkeypatch, promised_and_kept, followed):
+    ends, tried = dict(promised_and_kept), []
+
+    def end(problem, optimum):
+        tried.append(optimum.value)
+        return SimpleNamespace(objective=-ends[optimum.value], violation=0.0, gait=None, delta=1e-4, history=())
+
+    monkeypatch.setattr(explore, "_followed", end)
+    monkeypatch.setattr(explore, "is_finite", lambda optimum: True)
+    monkeypatch.setattr(explore, "space_near", lambda problem, gait: (None, None))
+    monkeypatch.setattr(explore, "converged", lambda *at: SimpleNamespace(after=lambda *of: SimpleNamespace(objective=0.0)))
+    monkeypatch.setattr(explore, "_best", lambda optima: None)
+    known = [explore.Candidate(SimpleNamespace(value=value, history=()), dry=-value) for value in ends]
+    explore._followed_to_the_end(UNEQUAL, known, lambda: True, ALONE)
+    assert tried == followed
+
+
 def certified(value, holds=True, finite=True):
     """An answer with its certificate, as the choice among them sees it."""
     gait = ellipse(0.0, 2.0, 1.0) if finite else ellipse(0.0, 0.1, 0.1)
