@@ -185,7 +185,7 @@ def test_bad_files_are_refused_in_a_sentence(text, tmp_path):
         (np.zeros((3, 20)), {}, "angles of 3 joints, and the body has 2"),
         (np.full((2, 20), np.nan), {}, "no finite angle of joint 1 at sample 1"),
         (GAIT.angles(T[:20]), {}, "does not close"),
-        (GAIT.angles(T), {"period": -1}, "period must be positive"),
+        (GAIT.angles(T), {"period": 0}, "period must be positive"),
         (GAIT.angles(T), {"period": 0.06}, "in the file's unit of time"),
         (GAIT.angles(T), {"harmonics": 40}, "60 samples determine 1 to 28 harmonics"),
         (0.01 * GAIT.angles(T), {}, "hardly moves"),
