@@ -311,8 +311,11 @@ def test_time_that_is_over_gives_the_best_gait_so_far(thread):
 
 
 def test_progress_is_told_from_the_first_moment_and_says_how_long():
-    seen = []
+    begin, seen = time.monotonic(), []
     solution = solve(QUICK, 4, progress=seen.append)
+    told = [news.seconds for news in seen]
+    assert told == sorted(told)
+    assert 0 <= told[0] < told[-1] < time.monotonic() - begin
     assert (seen[0].stage, seen[0].done, seen[0].count) == ("explore", 0, 4)
     assert seen[0].best.value > 0
     tried = [news for news in seen if news.stage == "explore" and news.count == 4]
