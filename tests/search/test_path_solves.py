@@ -136,6 +136,16 @@ def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
     assert {check.name for check in certificate.failures} <= {"replay gap", "delta influence"}
 
 
+def test_ipopt_alone_refines_the_mesh_of_a_path_just_until_the_replay_is_as_near_as_asked():
+    """Speeds of a path are lengths of it per period, and so is its delta: with another one a mesh that will do is refined."""
+    stated = Problem("path", ellipse(1.0, 0.7, 1.1), gait=FreePath(2.0, "bilateral"), delta=0.1, delta_start=None, intervals=12)
+    for tolerance, meshes in ((1e-4, 1), (1e-5, 2)):
+        found = solve(stated.with_(mesh_tolerance=tolerance), search="full")
+        (error,) = [check for check in found.certificate.checks if check.name == "mesh error"]
+        assert error.passed
+        assert len(found.history) == meshes
+
+
 @pytest.mark.slow
 def test_triangles_at_the_fold_approach_the_best_infinitesimal_gait_in_proportion_to_their_length():
     limit = small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
