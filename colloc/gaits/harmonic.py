@@ -11,7 +11,7 @@ from colloc.gaits.gait import GaitFunction, finite_array
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, symmetric_samples
 from colloc.mechanics.bodies import Body
-from colloc.system.arguments import STATED_IF_SET, is_whole, named_arguments
+from colloc.system.arguments import STATED_IF_SET, check_finite, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _SAME_START = 1e-9
@@ -135,6 +135,7 @@ def ellipse(A0: float, A1: float, B1: float) -> Fourier:
     array([[ 1.3],
            [-1.3]])
     """
+    check_finite(A0=A0, A1=A1, B1=B1)
     return Fourier(np.array([A0, -A0]), np.array([[A1], [-A1]]), np.array([[B1], [B1]]))
 
 

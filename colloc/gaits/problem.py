@@ -391,7 +391,9 @@ class Problem:
         """
         try:
             return cls(**gait_fields.problem_arguments(stated))
-        except (KeyError, TypeError) as error:
+        except ProblemError:
+            raise
+        except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
 
     @property

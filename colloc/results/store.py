@@ -263,10 +263,11 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
     besides = {*NUMBERS, _DRY, *(f"{name}_error" for name in ("distance", "work"))}
     integrals = [name for name in group.attrs if name not in besides]  # those that were asked for
-    values = {name: attribute(group, name) for name in ("distance", "work", "rotation", *integrals)}
-    errors = {name: attribute(group, f"{name}_error") for name in ("distance", "work")}
+    values = {name: float(attribute(group, name)) for name in ("distance", "work", "rotation", *integrals)}
+    errors = {name: float(attribute(group, f"{name}_error")) for name in ("distance", "work")}
     dry = tuple(attribute(group, _DRY)) if _DRY in group.attrs else None
-    return Certificate(values, errors, {}, checks, **{name: attribute(group, name) for name in NUMBERS}, dry=dry)
+    others = {name: type(getattr(UNCERTIFIED, name))(attribute(group, name)) for name in NUMBERS}  # numbers, not arrays of them
+    return Certificate(values, errors, {}, checks, **others, dry=dry)
 
 
 def _read(file: h5py.File) -> Solution:

@@ -22,6 +22,7 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.concertina import ODD_SCALE
 from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
+from colloc.system.arguments import is_number, is_whole
 from colloc.system.errors import ProblemError
 
 LAP = 1.3
@@ -65,9 +66,9 @@ class CrawlerBody(PanelBody):
 
     def __post_init__(self) -> None:
         for name, low, high in (("epsilon", 0, 0.5), ("share", 0, 1)):
-            if not low < getattr(self, name) < high:
+            if not is_number(getattr(self, name)) or not low < getattr(self, name) < high:
                 raise ProblemError(f"{name} must lie between {low} and {high}, not {getattr(self, name)!r}.")
-        if not 2 <= self.modes <= 12:
+        if not is_whole(self.modes, 2, 12):
             raise ProblemError(f"modes must lie between 2 and 12, not {self.modes!r}.")
 
     @property

@@ -111,7 +111,7 @@ class Study:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axes", tuple(self.axes))
+        object.__setattr__(self, "axes", tuple(self.axes) if isinstance(self.axes, Iterable) else (self.axes,))
         if not self.axes or not all(isinstance(axis, Axis) for axis in self.axes):
             raise ProblemError("a study needs at least one Axis.")
         if len({axis.name for axis in self.axes}) != len(self.axes):

@@ -139,7 +139,7 @@ def left_over(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarra
     The rest of a geometric series, which falls no faster than at a kink that lies anywhere; but no less than smooth motion
     would leave of the change before, with a margin.
     """
-    falloff = np.minimum(2 * far / np.maximum(wider, 1e-300), _KINK)
+    falloff = np.minimum(2 * far / np.maximum(np.maximum(wider, far), 1e-300), _KINK)
     return np.maximum(near * falloff / (1 - falloff), _MARGIN * _SMOOTH * wider)
 
 

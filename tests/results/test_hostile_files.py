@@ -17,10 +17,15 @@ from shared.store_forgery import SUPERBLOCK, checksum_at, lookup3
 from shared.store_samples import KINDS, Samples, archive
 
 from benchmarks.fuzz import never, outcomes, readers
+from colloc.gaits.harmonic import ellipse
+from colloc.gaits.problem import Problem
 from colloc.results.archive import save_archive
 from colloc.results.store import load, save
+from colloc.smooth.crawler_body import CrawlerBody
+from colloc.studies.study import Axis, Study
 from colloc.system import store_file
-from colloc.system.errors import StoreError
+from colloc.system.csv_table import csv_table
+from colloc.system.errors import ProblemError, StoreError
 from colloc.system.sealed_file import MAGIC, check_seal, write_sealed
 from colloc.system.store_file import LARGEST_FILE, array, attribute, mark, new_file, sealed_file
 
@@ -66,6 +71,43 @@ def test_so_they_do_a_thousand_times(all_readers):
         crashes = [why for why in findings if why.startswith("signal")]
         assert len(crashes) <= ("forged" in reader.name) * SLOW // 100, reader.name
         assert len(findings) == len(crashes), findings
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        (lambda: ellipse({}, 1, 1), "A0 must be a finite number"),
+        (lambda: CrawlerBody(epsilon="0.1"), "epsilon must lie between 0 and 0.5"),
+        (lambda: CrawlerBody(modes=[]), "modes must lie between 2 and 12"),
+        (
+            lambda: Problem.from_dict({**Problem("x").to_dict(), "guess": {"kind": "Phases", "schedule": ["?"]}}),
+            "not the descr",
+        ),
+    ],
+)
+def test_what_is_no_number_where_one_belongs_is_refused_in_a_sentence(state, said):
+    with pytest.raises(ProblemError, match=said):
+        state()
+
+
+def test_numbers_whose_squares_are_too_large_are_none_of_a_table(tmp_path):
+    (tmp_path / "x.csv").write_text("0,1,2\n1,1e200,2\n")
+    with pytest.raises(ProblemError, match="sample 2: '1,1e200,2' is not 3 finite numbers below 1e150"):
+        csv_table(tmp_path / "x.csv", 2)
+
+
+def test_a_certificate_of_arrays_is_none(samples, tmp_path):
+    path = save(samples.solution, tmp_path / "x.h5")
+    with h5py.File(path, "a") as file:
+        file["certificate"].attrs["value"] = [0.26, 0.27]
+    write_sealed(path, path.read_bytes())
+    with pytest.raises(StoreError, match="not a readable colloc solution"):
+        load(path)
+
+
+def test_an_axis_of_a_study_needs_no_tuple():
+    axis = Axis("x", (1.0, 2.0))
+    assert Study("x", axis, lambda x: Problem("x")).axes == (axis,)
 
 
 def test_what_is_believed_though_it_was_changed_is_found_out(all_readers):

@@ -88,12 +88,12 @@ class Samples:
             found = open_archive(problem(), path.with_suffix(".h5"))
             return {name: o.efficiency for name, o in found.outcomes.items()}, len(found.damaged)
         if kind == "arrays":
-            return {k: v.tolist() for k, v in read_arrays(path).items()}
+            return {k: np.asarray(v).tolist() for k, v in read_arrays(path).items()}
         if kind == "study":
             found = load_study(path)
-            return found.attributes["source"], found.variables["efficiency"].tolist()
+            return found.attributes.get("source"), found.variables["efficiency"].tolist()
         if kind == "journal":
             text = read_journal(path.parent)
-            return sorted(r.attempts[0].key for r in text.records), text.damaged
+            return sorted(a.key for r in text.records for a in r.attempts), text.damaged
         found = read_rows(path, CACHE)
         return found.values, len(found.damaged)
