@@ -21,7 +21,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.feet import Wheel
 from colloc.mechanics.friction import Friction
 from colloc.search.solve import solve
-from colloc.system.errors import CollocError
+from colloc.system.errors import CollocError, ProblemError
 
 STANDS = {"line": 0, "1 foot a link": 1, "2 feet": 2, "3 feet": 3}
 CLASSES: tuple[Harmonic | FreePath, ...] = (Harmonic(1), Harmonic(2), Harmonic(3), FreePath())
@@ -30,15 +30,18 @@ LEVEL = Friction(), Friction(2, 1, 1)
 
 def column(body: Chain, friction: Friction, starts: int) -> list[str]:
     """Efficiency and distance of the best gait found of each class, in brackets if its certificate fails."""
-    cells, problem = [], Problem("feet", body=body, friction=friction)
+    cells, known, plain = [], None, Problem("feet", body=body, friction=friction)
     for kind in CLASSES if body.n_joint > 1 else CLASSES[:1]:
         cells.append("none")
         with warnings.catch_warnings(action="ignore"), suppress(CollocError):
-            found = solve(problem.with_(gait=kind), starts)
+            problem = plain.with_(gait=kind)
+            with suppress(ProblemError):  # where it is too small for the class
+                problem = problem if known is None else problem.with_(guess=known)
+            found = solve(problem, starts)
             best = found.shrunk or found  # whatever its size
             text = f"{best.certificate.efficiency:.4f} ({best.certificate.distance:.3f})"
             cells[-1] = text if best.certificate.passed else f"[{text}]"
-            problem = problem.with_(gait=kind, guess=found.gait)
+            known = found.gait
     return cells
 
 
