@@ -4,9 +4,9 @@
 
 Bytes are changed, cut, left out and put in; files with a seal or checksums are also forged: fields and numbers are exchanged,
 and the checksums made right. In texts (tables, problem files) lines, numbers and words are exchanged. A file is read in a
-process with 3 GB of memory and 20 s for each. A finding is an error that is not one of colloc's, a warning of NumPy's, a crash,
-a file that takes longer, or one whose checksums do not fit and that is believed. (Rows of a run, which are for the same solve
-alone, are believed if their sums fit.)
+process with 3 GB of memory and 20 s of processor time for each. A finding is an error that is not one of colloc's, a warning
+of NumPy's, a crash, a file that takes longer, or one whose checksums do not fit and that is believed. (Rows of a run, which
+are for the same solve alone, are believed if their sums fit.)
 """
 
 from __future__ import annotations
@@ -278,7 +278,7 @@ def outcomes(reader: Reader, seed: int) -> Iterator[tuple[str, str]]:
             done = [json.loads(line) for line in answers]
         ended = os.WTERMSIG(os.waitpid(process, 0)[1])  # 0 for a process that came to its end
         if ended:
-            done.append(["finding", f"over {LONGEST} s" if ended == signal.SIGALRM else f"signal {ended}"])
+            done.append(["finding", f"over {LONGEST} s" if ended == signal.SIGPROF else f"signal {ended}"])
         yield from done
         number += len(done)
 
@@ -301,7 +301,7 @@ def _batch(reader: Reader, seed: int, first: int, before: list[Any], write: int)
     for number in range(first, first + BATCH):
         rng = np.random.default_rng([seed, *reader.name.encode(), number])
         k = int(rng.integers(len(reader.contents)))
-        signal.alarm(LONGEST)
+        signal.setitimer(signal.ITIMER_PROF, LONGEST)
         try:
             data = reader.damage(rng, reader.contents[k])
             same = data == reader.contents[k]
@@ -315,7 +315,7 @@ def _batch(reader: Reader, seed: int, first: int, before: list[Any], write: int)
             last = [frame for frame in traceback.extract_tb(error.__traceback__) if "/colloc/" in frame.filename][-1:]
             where = "".join(f" ({Path(frame.filename).name}:{frame.lineno})" for frame in last)
             end = "finding", f"{type(error).__name__}: {str(error)[:100]}{where}"
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         os.write(write, (json.dumps(end) + "\n").encode())
     os._exit(0)
 

@@ -102,7 +102,7 @@ def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], tu
         try:
             (sampler, seed, number), entry = value
             outcomes[StartName(str(sampler), int(seed), int(number))] = outcome_from(entry)
-        except (KeyError, TypeError, ValueError, CollocError):
+        except (KeyError, TypeError, ValueError, OverflowError, CollocError):
             damaged.append(key)
     return outcomes, tuple(damaged)
 

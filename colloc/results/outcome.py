@@ -96,7 +96,8 @@ def outcome_fields(outcome: Outcome) -> dict[str, Any]:
 
 
 def outcome_from(entry: dict[str, Any]) -> Outcome:
-    """The outcome that `outcome_fields` described. KeyError, TypeError, ValueError or ProblemError if it did not."""
+    """The outcome that `outcome_fields` described. KeyError, TypeError, ValueError, OverflowError or ProblemError if it did
+    not."""
     if entry["status"] not in STATUSES:
         raise ValueError(f"no status: {entry['status']}")
     kinds: list[tuple[Callable, tuple[str, ...]]] = [(int, _COUNTS), (str, _TEXTS), (float, _NUMBERS), (gait_from, _GAITS)]

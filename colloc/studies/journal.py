@@ -57,7 +57,7 @@ def read_journal(folder: Path) -> Journal:
     for entry in rows.values.values():
         try:
             found.records.append(_record_from(entry))
-        except (KeyError, TypeError, ValueError, AttributeError, CollocError):
+        except (KeyError, TypeError, ValueError, OverflowError, AttributeError, CollocError):
             found.damaged += 1
     return found
 
