@@ -295,11 +295,11 @@ class ClassOfGaits:
 
 
 def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
-    """Numbers of a gait as an array of so many dimensions. `ProblemError` if they are none, or not finite."""
+    """Numbers of a gait as an array of so many dimensions. `ProblemError` if they, or their squares, are none or not finite."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ProblemError(f"{name} must be numbers, not {value!r}.") from None
-    if array.ndim != ndim or not np.isfinite(array).all():
+    if array.ndim != ndim or not (np.abs(array) < np.sqrt(np.finfo(float).max) / (array.size + 1)).all():
         raise ProblemError(f"{name} must be a finite {ndim}-D array.")
     return array
