@@ -13,7 +13,7 @@ from colloc.mechanics.inertia import kinetic_energy, momentum_rates
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.motion import kinds
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
-from colloc.motion.kinds import Shapes, WithInertia, kind_of_motion
+from colloc.motion.kinds import Shapes, WithInertia, begin_of, kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.pictures.animation import pictures
@@ -87,6 +87,11 @@ def test_shooting_and_collocation_find_the_same_motion(froude):
     assert found["distance"] == pytest.approx(shot.distance, rel=2e-4)
     assert found["work"] == pytest.approx(shot.work, rel=2e-4)
     assert found["rotation"] == pytest.approx(shot.rotation, abs=2e-4)
+    kind, mesh, gait = reduced.motion.kind, reduced.space.mesh, reduced.space.member(v)
+    along = kind.along(mesh, Shapes(*gait(mesh.times), 1e-2), begin_of(kind, gait))
+    largest = np.abs(shot.states[:3]).max()
+    for momentum, edges in zip(shot.states[:3], along.edges, strict=True):
+        np.testing.assert_allclose(edges, np.interp(mesh.edges, shot.phases, momentum), atol=1e-3 * largest)
 
 
 def test_half_of_an_antipodal_gait_says_what_all_of_it_does():
