@@ -124,8 +124,8 @@ def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path
     assert len(stops) > 3
     np.testing.assert_array_equal(found.answer.x, wanted.answer.x)
     rows = [key.split(" ")[0] for key in read_rows(path, ROWS).values]
-    assert sum(stage == "converged" for stage in computed) == rows.count("converged")
-    assert computed.count("confirm") == computed.count("certify") == 1
+    for stage in ("converged", "confirm", "certify"):
+        assert computed.count(stage) == rows.count(stage) > 0
 
 
 def test_ctrl_c_in_python_gives_a_solution_and_is_over_then():
