@@ -74,6 +74,7 @@ def test_the_module_behind_python_m_is_also_the_function():
     ("made", "said"),
     [
         (lambda: colloc.Problem("x", frction=1), "did you mean friction"),
+        (lambda: colloc.Problem(), "Problem needs name"),
         (lambda: colloc.Friction(mu=1), "did you mean mu_t, mu_f or mu_b"),
         (lambda: colloc.Harmonic(harmonic=2), "did you mean harmonics"),
         (lambda: colloc.Problem("x").with_(intervalls=3), "did you mean intervals"),

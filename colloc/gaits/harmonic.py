@@ -233,7 +233,8 @@ class Harmonic(LinearClass):
 
     def fourier(self, parameters: np.ndarray, n_joint: int) -> Fourier:
         """The gait of a parameter vector."""
-        table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
+        with np.errstate(over="ignore", invalid="ignore"):  # a series refuses what is not finite
+            table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
         return Fourier(table[:, 0], table[:, 1::2], table[:, 2::2])
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Fourier:

@@ -17,7 +17,7 @@ STATED_IF_SET = {"stated if set": True}
 
 
 def named_arguments(cls: type[T]) -> type[T]:
-    """Make a dataclass refuse arguments it does not have by a `ProblemError` that says which one is meant.
+    """Make a dataclass refuse arguments it does not have, or lacks, by a `ProblemError` that says which one is meant.
 
     Examples
     --------
@@ -27,7 +27,9 @@ def named_arguments(cls: type[T]) -> type[T]:
     colloc.system.errors.ProblemError: Friction has no argument 'mu_x'; did you mean mu_t, mu_f or mu_b?
     """
     made = cls.__init__
-    known = [f.name for f in dataclasses.fields(cls) if f.init]  # type: ignore[arg-type]
+    fields = [f for f in dataclasses.fields(cls) if f.init]  # type: ignore[arg-type]
+    known = [f.name for f in fields]
+    needed = [f.name for f in fields if f.default is dataclasses.MISSING is f.default_factory]
 
     @functools.wraps(made)
     def checked(self: T, *given: Any, **named: Any) -> None:
@@ -38,6 +40,8 @@ def named_arguments(cls: type[T]) -> type[T]:
                 near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
                 hint = f"did you mean {_either(near)}?" if near else f"it takes {', '.join(known)}."
                 raise ProblemError(f"{cls.__name__} has no argument {name!r}; {hint}")
+        if missing := [name for name in needed if name in known[len(given) :] and name not in named]:
+            raise ProblemError(f"{cls.__name__} needs {' and '.join(missing)}.")
         made(self, *given, **named)
 
     cls.__init__ = checked  # type: ignore[assignment]

@@ -87,3 +87,8 @@ def test_unknown_classes_are_refused(bad):
 def test_coefficients_of_different_shape_are_refused():
     with pytest.raises(ProblemError, match="shape"):
         Fourier([0.0], [[1.0]], [[1.0, 2.0]])
+
+
+def test_numbers_too_large_to_add_are_refused_in_words():
+    with pytest.raises(ProblemError, match="must be a finite"):
+        Harmonic(2).member(np.full(9, 1e308), 2)
