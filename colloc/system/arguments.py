@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
+import inspect
 import math
 from typing import Any, TypeGuard, TypeVar
 
@@ -27,9 +27,8 @@ def named_arguments(cls: type[T]) -> type[T]:
     colloc.system.errors.ProblemError: Friction has no argument 'mu_x'; did you mean mu_t, mu_f or mu_b?
     """
     made = cls.__init__
-    fields = [f for f in dataclasses.fields(cls) if f.init]  # type: ignore[arg-type]
-    known = [f.name for f in fields]
-    needed = [f.name for f in fields if f.default is dataclasses.MISSING is f.default_factory]
+    _, *taken = inspect.signature(made).parameters.values()  # without self
+    known, needed = [each.name for each in taken], [each.name for each in taken if each.default is each.empty]
 
     @functools.wraps(made)
     def checked(self: T, *given: Any, **named: Any) -> None:
