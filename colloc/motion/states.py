@@ -298,14 +298,11 @@ class _Linear:
     def handed_on(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """``(I - H R) x = begin + right``: `own` of the right side ``(k, n_point)``, and the states at the edges as
         ``through @ begin + gained``, ``(n + 1, k, k)`` and ``(n + 1, k)``."""
-        n, _, k = self._shape
-        own = self.own(right)
-        more, edges = self._gain @ own[:, :, None], np.empty((n + 1, k, k + 1))
-        edges[0] = now = np.eye(k, k + 1)
-        for interval, through in enumerate(self._through):
-            now = through @ now
-            now[:, -1:] += more[interval]
-            edges[interval + 1] = now
+        own, k = self.own(right), len(right)
+        more = self._gain @ own[:, :, None]
+        through, gained = _one_after_another(self._through.transpose(0, 2, 1), more.transpose(0, 2, 1))
+        begin = np.eye(k, k + 1)[None]
+        edges = np.concatenate([begin, np.concatenate([through, gained], axis=1).transpose(0, 2, 1)])
         return own, edges[:, :, :-1], edges[:, :, -1]
 
     def at_points(self, own: np.ndarray, begins: np.ndarray) -> np.ndarray:
@@ -318,12 +315,21 @@ class _Linear:
         the intervals, ``(m, k, n)``."""
         (n, s, k), given = self._shape, self._by_interval(of_states)
         through = np.einsum("mni,nia->mna", given, self._response)
-        later = np.empty_like(through)
-        now = np.zeros((len(given), k)) if of_end is None else of_end
-        for interval in range(n - 1, -1, -1):
-            later[:, interval] = now
-            now = now @ self._through[interval] + through[:, interval]
+        end = np.zeros((len(given), k)) if of_end is None else of_end
+        back, gained = _one_after_another(self._through[::-1], through.transpose(1, 0, 2)[::-1])
+        before = end @ back + gained
+        later = np.concatenate([end[None], before[:-1]])[::-1].transpose(1, 0, 2)
         mu = np.einsum("mni,nij->mnj", given + np.einsum("mna,nai->mni", later, self._gain), self._inverse)
         stages = mu.reshape(-1, n, s, k)
         on_rates = np.einsum("mnia,nij->mnja", stages, self._a) + self._b[:, :, None] * later[:, :, None]
-        return now, self._by_point(on_rates.reshape(-1, n, s * k)), later.transpose(0, 2, 1)
+        return before[-1], self._by_point(on_rates.reshape(-1, n, s * k)), later.transpose(0, 2, 1)
+
+
+def _one_after_another(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of maps ``x -> x t + c``, ``(n, k, k)`` and ``(n, m, k)``, what all up to each do, in log2 n steps for all of them."""
+    t, c, reach = t.copy(), c.copy(), 1
+    while reach < len(t):
+        c[reach:] += c[:-reach] @ t[reach:]
+        t[reach:] = t[:-reach] @ t[reach:]
+        reach *= 2
+    return t, c
