@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -70,19 +71,25 @@ class Fourier(GaitFunction):
     def n_harmonic(self) -> int:
         return self.cos.shape[1]
 
-    def _waves(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        k = 2 * np.pi * np.arange(1, self.n_harmonic + 1)[:, None]
-        return k, np.cos(k * t), np.sin(k * t)
+    @cached_property
+    def _terms(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies ``(K, 1)``, and what angles and rates ``(2 n_joint, 2 K)`` have of their cosines and then sines."""
+        k = 2 * np.pi * np.arange(1, self.n_harmonic + 1)
+        return k[:, None], np.block([[self.cos, self.sin], [k * self.sin, -k * self.cos]])
+
+    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        k, terms = self._terms
+        now = k * np.asarray(t, dtype=float)
+        both = terms @ np.concatenate([np.cos(now), np.sin(now)])
+        return self.mean[:, None] + both[: self.n_joint], both[self.n_joint :]
 
     def angles(self, t: np.ndarray) -> np.ndarray:
         """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
-        _, cos, sin = self._waves(np.asarray(t, dtype=float))
-        return self.mean[:, None] + self.cos @ cos + self.sin @ sin
+        return self(t)[0]
 
     def rates(self, t: np.ndarray) -> np.ndarray:
         """Joint rates ``(n_joint, n_time)`` per period at phases t."""
-        k, cos, sin = self._waves(np.asarray(t, dtype=float))
-        return -self.cos @ (k * sin) + self.sin @ (k * cos)
+        return self(t)[1]
 
     def lines(self) -> list[str]:
         """The formula, joint by joint, or mode by mode."""

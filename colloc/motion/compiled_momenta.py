@@ -71,24 +71,20 @@ def _momenta(
 
 
 class MomentaAt:
-    """The outputs at one instant after another, ``(9,)``, a few microseconds each."""
+    """The outputs at one instant after another, of n momenta each, ``(n, 9)``: a few microseconds."""
 
-    def __init__(self, body: Chain, friction: Law, delta: float, froude: float) -> None:
-        self._given = (
-            np.zeros(body.n_joint),
-            np.zeros(body.n_joint),
-            np.zeros(len(STATES)),
-            np.array([delta]),
-            np.array([froude]),
-        )
-        self._out, self._function = np.zeros(N_OUT), _function(body, friction, differentiated=False)
+    def __init__(self, body: Chain, friction: Law, delta: float, froude: float, n: int = 1) -> None:
+        shapes, momenta, numbers = np.zeros((2, body.n_joint)), np.zeros((n, len(STATES))), np.array([[delta], [froude]])
+        self._given, self._out = (*shapes, momenta, *numbers), np.zeros((n, N_OUT))
+        one = _function(body, friction, differentiated=False)
+        self._function = one.map("momenta", "serial", n, [0, 1, 3, 4], list[int]())
         self._buffer, self._evaluate = self._function.buffer()
         for k, given in enumerate(self._given):
-            self._buffer.set_arg(k, memoryview(given.data))
-        self._buffer.set_res(0, memoryview(self._out.data))
+            self._buffer.set_arg(k, memoryview(given.reshape(-1).data))
+        self._buffer.set_res(0, memoryview(self._out.reshape(-1).data))
 
     def __call__(self, angles: np.ndarray, rates: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Of angles and rates ``(n_joint,)`` and momenta ``(3,)``."""
+        """Of angles and rates ``(n_joint,)`` and momenta ``(n, 3)``."""
         self._given[0][:], self._given[1][:], self._given[2][:] = angles, rates, states
         self._evaluate()
         return self._out.copy()

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -110,7 +111,7 @@ class GaitWithInertia:
     ) -> None:
         self.body, self.friction, self.path, self.delta = body, friction, path, delta
         self.froude, self.breaks, self.turn, self.regime, self.theta = froude, breaks, turn, regime, theta
-        self._momenta = MomentaAt(body, friction, delta, froude)
+        self._momenta_of = lru_cache(partial(MomentaAt, body, friction, delta, froude))
 
     def slow_momenta(self) -> np.ndarray:
         """Those at the start of the period if the gait is played slowly on the level, ``(3,)``: where to begin."""
@@ -175,7 +176,7 @@ class GaitWithInertia:
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
         """What `colloc.motion.compiled_momenta` says of a phase and n momenta, with the weight's pull, ``(n, 9)``."""
         angles, rates = self.path(np.array([t]))
-        now = np.stack([self._momenta(angles[:, 0], rates[:, 0], each) for each in states[:, _MOMENTA]])
+        now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
         if self.regime.slides:
             pull: Any = self.regime.pull(states[None, :, _THETA])
             now[:, -3:-1] += pull.T / self.froude
