@@ -43,6 +43,11 @@ BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
     "colloc_balance": (*BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
     "colloc_motion": (*BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
+    "colloc_repeating": (
+        *BODY,
+        *(_ARRAY, _ARRAY, _REAL, _ARRAY, _REAL),
+        *(_COUNT, ctypes.c_int, *[_ARRAY] * 6, ctypes.POINTER(ctypes.c_int)),
+    ),
     "colloc_momenta": (*BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, _ARRAY, ctypes.c_int, _ARRAY, _ARRAY),
 }
 
@@ -107,19 +112,21 @@ def address(array: np.ndarray | None) -> int | None:
     return None if array is None else array.ctypes.data
 
 
-def call_for_all(function: Callable[..., int], body: Links, friction: Law, n_time: int, *arguments: object) -> None:
+def call_for_all(
+    function: Callable[..., int], body: Links, friction: Law, n_time: int, *arguments: object, piece: int = _PIECE
+) -> None:
     """Call a function of the kernel for all instants: with the chain, the law and the instants of a piece, then arguments."""
     law = np.array(body.contact.kernel_law(friction).numbers, dtype=float)
     numbers = np.array(body.lengths), body.pressure_column().ravel(), body.mass_column().ravel(), law
     chain = (body.n_link, *map(address, numbers), n_time)
-    _each_piece(n_time, lambda first, last: function(*chain, first, last, *arguments))
+    _each_piece(n_time, piece, lambda first, last: function(*chain, first, last, *arguments))
 
 
-def _each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
+def _each_piece(n_time: int, piece: int, treat: Callable[[int, int], int]) -> None:
     """Call ``treat(first, last)`` for all of a batch, in pieces, on several threads if it is large. `MemoryError` if a call
     returns anything but 0."""
-    starts = range(0, n_time, _PIECE)
-    ends = [min(first + _PIECE, n_time) for first in starts]
+    starts = range(0, n_time, piece)
+    ends = [min(first + piece, n_time) for first in starts]
     workers = min(available_threads(), len(ends)) if len(ends) > 1 else 1
     if workers > 1:
         with ThreadPoolExecutor(workers) as pool:
@@ -175,3 +182,20 @@ def kernel_momenta(
     how = address(spin), froude, address(states), columns, address(values), address(slopes)
     call_for_all(library.colloc_momenta, body, friction, n_time, address(angles), address(rates), delta, *how)
     return values, slopes
+
+
+def kernel_repeating(
+    library: ctypes.CDLL, moving: Moving, near: np.ndarray, froude: float, scheme: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Momenta ``(3, n_time)`` at the points of a collocation `scheme` (`colloc.motion.states.CollocatedStates.scheme`) that
+    repeat every period, sought near others, of which the last column is the start; their outputs ``(9, n_time)``; and whether
+    there are any."""
+    body, friction, angles, rates, delta, _ = moving
+    n_time, (a, b, image) = angles.shape[1], (np.ascontiguousarray(each, dtype=float) for each in scheme)
+    angles, rates = np.ascontiguousarray(angles, dtype=float), np.ascontiguousarray(rates, dtype=float)
+    states, start, spin = near[:, :-1].copy(), near[:, -1].copy(), body.inertia_column().ravel()
+    values, held = np.empty((9, n_time)), ctypes.c_int()
+    how = address(spin), froude, *b.shape, *map(address, (a, b, image, states, start, values)), ctypes.byref(held)
+    shapes = address(angles), address(rates), delta
+    call_for_all(library.colloc_repeating, body, friction, n_time, *shapes, *how, piece=n_time)
+    return states, values, bool(held.value)

@@ -26,12 +26,14 @@ from colloc.gaits.period import chord_per_way
 from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import fraction
+from colloc.mechanics.balance import Moving
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
 from colloc.mechanics.law import Law
+from colloc.mechanics.native_kernel import kernel_repeating, native_kernel
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
 from colloc.motion.followed_motion import on_one_branch
@@ -371,14 +373,18 @@ class WithInertia(_WithStates):
     def _newton(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
         """The same by Newton's method alone."""
         out, first = near, np.append(near[: len(STATES), 0], begin[len(self._timed) :])
-        froude = self._froude_at(shapes, begin)
+        froude, equations = self._froude_at(shapes, begin), self._equations(mesh, shapes.unit)
+        library = None if self._slow.states else native_kernel(self._chain, self.friction)
+        if library is not None:
+            moving, begun = Moving(self._chain, self.friction, *shapes[:3], None), np.column_stack([near, first])
+            return kernel_repeating(library, moving, begun, froude, equations.scheme)
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal out
             out, found = self._rates(shapes, states, froude)
             return found
 
-        states, _, held = self._equations(mesh, shapes.unit).settled(rates, first, near)
+        states, _, held = equations.settled(rates, first, near)
         return states, out, held
 
     def alone(

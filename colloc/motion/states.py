@@ -64,6 +64,11 @@ class CollocatedStates:
         self._free = np.flatnonzero(np.zeros(0, dtype=bool) if free is None else free)
         self._image = image
 
+    @property
+    def scheme(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A ``(n, s, s)`` and b ``(n, s)`` times the lengths of the intervals, and the image of the start."""
+        return self._a, self._b, np.eye(len(self._free)) if self._image is None else self._image
+
     def integrals(self, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``, of rates ``(n_state, n_point)``."""
         stages = rates.reshape(len(rates), *self._shape)

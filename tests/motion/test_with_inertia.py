@@ -123,17 +123,44 @@ def test_gradients_are_those_of_differences(fields):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypatch):
-    """Momenta as large as a body has that crosses its length in a period lead to those that the slow motion leads to."""
+    """Momenta as large as a body has that crosses its length in a period lead to those that the slow motion leads to. The
+    kernel goes NumPy's way."""
     stated = problem(body=STANDING, delta=1e-4, froude=0.02, intervals=60)
     space, _ = space_near(stated, LEANING)
     angles, rates = LEANING(space.mesh.times)
     kind, at = kind_of_motion(control_problem(stated).dynamics), (space.mesh, Shapes(angles, rates, 1e-4), np.empty(0))
     expected, far, asked = kind.along(*at), np.random.default_rng(seed).normal(size=(3, space.mesh.n_point)), []
     monkeypatch.setattr(kinds, "momenta_along_states", lambda *given: asked.append(1) or momenta_along_states(*given))
-    found = kind.along(*at, near=(far, None))
-    assert found.held.all()
+    compiled = kind.along(*at, near=(far, None))
+    with numpy_instead():
+        found = kind.along(*at, near=(far, None))
+    assert found.held.all() and compiled.held.all()
+    np.testing.assert_allclose(compiled.states, found.states, atol=1e-11)
     np.testing.assert_allclose(found.states, expected.states, atol=1e-9)
     assert len(asked) < 300
+
+
+@pytest.mark.parametrize(
+    "fields", [{}, {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "rotation": 0.0}], ids=["whole", "half"]
+)
+@pytest.mark.parametrize("size", [0.1, 30.0])
+def test_the_kernel_and_numpy_come_to_the_same_momenta_or_to_none(fields, size):
+    """Also where a whole step would lead astray, and where the search is given up."""
+    stated, held = problem(intervals=12, delta=1e-5, **fields), []
+    space, _ = space_near(stated, stated.guess)
+    kind, mesh = kind_of_motion(control_problem(stated).dynamics), space.mesh
+    shapes = Shapes(*stated.guess(mesh.times), 1e-5)
+    for seed in range(6):
+        near = size * np.random.default_rng(seed).normal(size=(3, mesh.n_point))
+        states, out, found = kind._newton(mesh, shapes, near, np.empty(0))
+        with numpy_instead():
+            expected = kind._newton(mesh, shapes, near, np.empty(0))
+        held.append(found)
+        assert found == expected[2]
+        if found:
+            np.testing.assert_allclose(states, expected[0], atol=1e-10)
+            np.testing.assert_allclose(out, expected[1], rtol=1e-6, atol=1e-8)
+    assert set(held) == {size < 1.0}
 
 
 def test_the_slow_motion_is_the_limit():

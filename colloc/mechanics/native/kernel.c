@@ -6,7 +6,7 @@
 
 #include <stdlib.h>
 
-#include "momenta.h"
+#include "repeating.h"
 
 #ifdef COLLOC_SOURCES
 #define TEXT_OF(name) #name
@@ -155,36 +155,30 @@ int colloc_momenta(
     ptrdiff_t first, ptrdiff_t last, const double *angles, const double *rates, double delta, const double *spin, double froude,
     const double *states, int columns, double *values, double *slopes)
 {
-    const Law law = law_of(law_numbers);
-    const int n_joint = n - 1, n_shape = columns - 3;
-    const double own_delta = scaled_delta_of(delta, 1.0);
-    Link *link = malloc((size_t)n * sizeof *link);
-    Sliding *k = new_slidings(n, 1, &law);
-    Matrix3 *K = malloc((size_t)n * sizeof *K);
-    Change *d = malloc((size_t)n * sizeof *d);
-    for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {
-        const Vector3 p = {states[t], states[n_time + t], states[2 * n_time + t]};
-        double value[MOMENTA_ROWS], change[MOMENTA_ROWS];
-        find_directions(n, link, length, pressure, mass, angles + t, rates + t, 1.0, n_time);
-        find_midpoints(n, link, 0);
-        const Centre centre = find_centre(n, link, spin);
-        const Total total = find_momentum_rates(n, link, k, &centre, spin, p, &law, own_delta, froude, value);
-        for (int row = 0; row < MOMENTA_ROWS; ++row)
-            values[row * n_time + t] = value[row];
-        for (int i = 0; i < n; ++i)
-            find_slopes(&k[i], &law, &link[i], own_delta, K[i]);
-        for (int column = 0; column < columns; ++column) {
-            Vector3 dp = {0.0, 0.0, 0.0};
-            if (column < n_shape)
-                find_changes(n, link, k, 0, column % n_joint, column >= n_joint, d);
-            else {
-                memset(d, 0, (size_t)n * sizeof *d);
-                dp[column - n_shape] = 1.0;
-            }
-            momentum_rate_changes(n, link, k, K, &centre, spin, p, total.force, froude, d, dp, change);
-            for (int row = 0; row < MOMENTA_ROWS; ++row)
-                slopes[(row * columns + column) * n_time + t] = change[row];
-        }
-    }
-    return freed(link, k, K, d);
+    Played played = {n, length, pressure, mass, spin, law_of(law_numbers), n_time, angles, rates, delta, froude};
+    const bool ready = new_room(&played);
+    if (ready)
+        momenta_instants(&played, first, last, states, columns, values, slopes);
+    free_room(&played);
+    return ready ? 0 : 1;
+}
+
+/* Momenta that repeat (repeating.h), on `intervals` of s stages each, in order of the stages: from `states` (3, n_time) and
+   their start (3), which become those that are found, with their rows (MOMENTA_ROWS, n_time). `held` says whether there are
+   any. */
+int colloc_repeating(
+    int n, const double *length, const double *pressure, const double *mass, const double *law_numbers, ptrdiff_t n_time,
+    ptrdiff_t first, ptrdiff_t last, const double *angles, const double *rates, double delta, const double *spin, double froude,
+    ptrdiff_t intervals, int s, const double *A, const double *b, const double *image, double *states, double *start,
+    double *values, int *held)
+{
+    Played played = {n, length, pressure, mass, spin, law_of(law_numbers), n_time, angles, rates, delta, froude};
+    Periods q = {.played = &played, .intervals = intervals, .s = s, .A = A, .b = b, .image = image};
+    const bool ready = new_room(&played) && new_periods(&q);
+    (void)first, (void)last;
+    if (ready)
+        *held = find_repeating(&q, states, start, values);
+    free_periods(&q);
+    free_room(&played);
+    return ready ? 0 : 1;
 }
