@@ -41,7 +41,7 @@ def column(body: Chain, friction: Friction, starts: int) -> list[str]:
             best = found.shrunk or found  # whatever its size
             text = f"{best.certificate.efficiency:.4f} ({best.certificate.distance:.3f})"
             cells[-1] = text if best.certificate.passed else f"[{text}]"
-            known = found.gait
+            known = best.gait
     return cells
 
 

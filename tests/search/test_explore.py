@@ -99,7 +99,7 @@ def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkey
 def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, count, better, tried):
     numbers = itertools.count()
 
-    def follow(problem, gait, deltas, known):
+    def follow(problem, gait, deltas, known, *, hop=False):
         number = next(numbers)
         if number in better:
             found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0)
@@ -117,7 +117,7 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
     """New starts and hops take turns, and what a hop begins from depends on what came before alone."""
     begun = {}
 
-    def follow(problem, gait, deltas, known):
+    def follow(problem, gait, deltas, known, *, hop=False):
         number = len(begun)
         begun[number] = (gait, len(deltas))
         found = SimpleNamespace(objective=-1.0 if number == 0 else -2.0, gait=ellipse(0, 1.0, 0.1 * number), delta=1.0)
@@ -137,17 +137,32 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
         np.testing.assert_array_equal(gait.cos, begun[number][0].cos)
 
 
-@pytest.mark.parametrize(("asked", "tried"), [(None, 8), (32, 32)], ids=["by default", "as many as were asked for"])
-def test_the_search_ends_once_eight_starts_have_met_the_best_gait_unless_more_are_asked_for(monkeypatch, asked, tried):
-    def follow(problem, gait, deltas, known):
+@pytest.mark.parametrize(
+    ("asked", "meeting", "froude", "tried"),
+    [
+        (None, range(4), 0.0, 8),
+        (None, [0, 4, 8, 12], 0.0, 13),
+        (None, [0, 1, 2], 0.0, 32),
+        (None, [0, *range(16, 32)], 0.0, 32),
+        (None, [0, 1, 2], 0.1, 96),
+        (32, range(32), 0.0, 32),
+    ],
+    ids=["soon", "later", "too few", "hops do not count", "with inertia there are more gaits", "as many as were asked for"],
+)
+def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(monkeypatch, asked, meeting, froude, tried):
+    numbers = itertools.count()
+
+    def follow(problem, gait, deltas, known, *, hop=False):
         if not known[-1]:
             known[-1].append(explore.Candidate(SimpleNamespace(objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0)))
-        known[-1][0].joined()
+        if next(numbers) in meeting:
+            known[-1][0].joined(hop=hop)
 
     monkeypatch.setattr(explore, "_follow", follow)
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
-    assert candidates(Problem("same", gait=Harmonic(1, "bilateral")), asked, lambda: True, ALONE)[1] == tried
+    problem = Problem("same", gait=Harmonic(1, "antipodal"), froude=froude)
+    assert candidates(problem, asked, lambda: True, ALONE)[1] == tried
 
 
 @pytest.mark.parametrize(
@@ -254,3 +269,11 @@ def test_delta_is_lowered_where_nothing_else_fails(failed, lowered):
     checks = [SimpleNamespace(name=name) for name in failed]
     found = SimpleNamespace(certificate=SimpleNamespace(failures=checks))
     assert stages._is_viscous(found) == lowered
+
+
+def test_a_guess_as_small_as_may_be_is_not_lost_where_friction_is_viscous(monkeypatch):
+    """At the deltas of large gaits it is nothing."""
+    small = solve(Problem("small", gait=Harmonic(2)), 2).shrunk
+    monkeypatch.setattr(explore, "small_loops", lambda problem: [])
+    again = solve(small.problem.with_(gait=Harmonic(3), guess=small.gait), 2)
+    assert again.shrunk.value > small.value > 1.1 * again.value
