@@ -29,19 +29,22 @@ LEVEL = Friction(), Friction(2, 1, 1)
 
 
 def column(body: Chain, friction: Friction, starts: int) -> list[str]:
-    """Efficiency and distance of the best gait found of each class, in brackets if its certificate fails."""
-    cells, known, plain = [], None, Problem("feet", body=body, friction=friction)
+    """Efficiency and distance of the best gait found of each class, in brackets if its certificate fails. More harmonics can do
+    what fewer do."""
+    cells, known, plain, most = [], None, Problem("feet", body=body, friction=friction), 0.0
     for kind in CLASSES if body.n_joint > 1 else CLASSES[:1]:
-        cells.append("none")
+        cells.append(cells[-1] if cells and kind.seeds is kind else "none")
         with warnings.catch_warnings(action="ignore"), suppress(CollocError):
             problem = plain.with_(gait=kind)
             with suppress(ProblemError):  # where it is too small for the class
                 problem = problem if known is None else problem.with_(guess=known)
             found = solve(problem, starts)
-            best = found.shrunk or found  # whatever its size
-            text = f"{best.certificate.efficiency:.4f} ({best.certificate.distance:.3f})"
-            cells[-1] = text if best.certificate.passed else f"[{text}]"
-            known = best.gait
+            best, known = found.shrunk or found, found.gait  # whatever its size
+            text, passed = f"{best.certificate.efficiency:.4f} ({best.certificate.distance:.3f})", best.certificate.passed
+            if passed and (best.value > most or kind.unit_speed):
+                cells[-1], most = text, best.value
+            elif cells[-1] == "none":
+                cells[-1] = f"[{text}]"
     return cells
 
 

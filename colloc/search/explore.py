@@ -224,8 +224,7 @@ def candidates(
         run.told("explore", 0, count, as_it_is(*space_about(coarse, problem.guess), deltas[0]))
     known: list[list[Candidate]] = [[] for _ in deltas]
     loops: list[Candidate] = []
-    small = [problem.guess] if on_speed_floor(problem, problem.guess) else []
-    for loop in (*small, *run.kept("small loops", (problem,), lambda: small_loops(problem))):
+    for loop in run.kept("small loops", (problem,), lambda: small_loops(problem)):
         with suppress(CollocError):
             _follow(coarse, _closed(coarse, loop, dry), [dry], [loops])
     starts, drawn = starting_gaits(problem), list[AnyGait | None]()

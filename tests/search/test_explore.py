@@ -269,11 +269,3 @@ def test_delta_is_lowered_where_nothing_else_fails(failed, lowered):
     checks = [SimpleNamespace(name=name) for name in failed]
     found = SimpleNamespace(certificate=SimpleNamespace(failures=checks))
     assert stages._is_viscous(found) == lowered
-
-
-def test_a_guess_as_small_as_may_be_is_not_lost_where_friction_is_viscous(monkeypatch):
-    """At the deltas of large gaits it is nothing."""
-    small = solve(Problem("small", gait=Harmonic(2)), 2).shrunk
-    monkeypatch.setattr(explore, "small_loops", lambda problem: [])
-    again = solve(small.problem.with_(gait=Harmonic(3), guess=small.gait), 2)
-    assert again.shrunk.value > small.value > 1.1 * again.value
