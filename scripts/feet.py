@@ -33,7 +33,7 @@ def column(body: Chain, friction: Friction, starts: int) -> list[str]:
     what fewer do."""
     cells, known, plain, most = [], None, Problem("feet", body=body, friction=friction), 0.0
     for kind in CLASSES if body.n_joint > 1 else CLASSES[:1]:
-        cells.append(cells[-1] if cells and kind.seeds is kind else "none")
+        cells.append("none" if kind.unit_speed or not cells else cells[-1])
         with warnings.catch_warnings(action="ignore"), suppress(CollocError):
             problem = plain.with_(gait=kind)
             with suppress(ProblemError):  # where it is too small for the class
