@@ -31,7 +31,7 @@ LEVEL = Friction(), Friction(2, 1, 1)
 def column(body: Chain, friction: Friction, starts: int) -> list[str]:
     """Efficiency and distance of the best gait found of each class, in brackets if its certificate fails. More harmonics can do
     what fewer do."""
-    cells, known, plain, most = [], None, Problem("feet", body=body, friction=friction), 0.0
+    cells, known, most, plain = list[str](), None, 0.0, Problem("feet", body=body, friction=friction)
     for kind in CLASSES if body.n_joint > 1 else CLASSES[:1]:
         cells.append("none" if kind.unit_speed or not cells else cells[-1])
         with warnings.catch_warnings(action="ignore"), suppress(CollocError):
