@@ -134,7 +134,8 @@ def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypa
     compiled = kind.along(*at, near=(far, None))
     with numpy_instead():
         found = kind.along(*at, near=(far, None))
-    assert found.held.all() and compiled.held.all()
+    assert found.held.all()
+    assert compiled.held.all()
     np.testing.assert_allclose(compiled.states, found.states, atol=1e-11)
     np.testing.assert_allclose(found.states, expected.states, atol=1e-9)
     assert len(asked) < 300
