@@ -100,7 +100,8 @@ def followed(
         accuracy = {"rtol": 1e-13, "atol": STEP * tolerance, "max_step": longest}
         for method, most in _METHODS:
             left = most
-            with suppress(_TooOften), warnings.catch_warnings(action="ignore", category=UserWarning):  # that it gives up
+            giving_up = warnings.catch_warnings(action="ignore", category=UserWarning)
+            with suppress(_TooOften), giving_up, np.errstate(over="ignore"):  # of the steps of Radau's differences
                 run = solve_ivp(slope, (first, last), state, method=method, dense_output=True, **accuracy)
                 if run.success:
                     break

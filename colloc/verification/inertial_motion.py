@@ -116,7 +116,11 @@ class GaitWithInertia:
     def slow_momenta(self) -> np.ndarray:
         """Those at the start of the period if the gait is played slowly on the level, ``(3,)``: where to begin."""
         angles, rates = self.path(np.full(1, _ONE_SIDED))
-        z = solve_balance(self.body, self.friction, angles, rates, self.delta).require().z
+        return self.momenta(solve_balance(self.body, self.friction, angles, rates, self.delta).require().z)
+
+    def momenta(self, z: np.ndarray) -> np.ndarray:
+        """Those at the start of the period, ``(3,)``, where the tail link has a velocity ``(3, 1)``."""
+        angles, rates = self.path(np.full(1, _ONE_SIDED))
         posture = self.body.posture(angles)
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
@@ -226,6 +230,7 @@ def inertial_motion(
     turn: float = 0.0,
     quantities: Iterable[Quantity | str] = (),
     regime: Regime = LEVEL,
+    near: np.ndarray | None = None,
 ) -> InertialMotion:
     """Play a gait with inertia, once the body has settled to a motion in which all periods are alike.
 
@@ -253,6 +258,9 @@ def inertial_motion(
     regime : Regime
         On a slope `problem.regime`, or `colloc.gaits.sloped.Slope`: the gait says where it points, distance and work are as
         of `colloc.slope_motion`.
+    near : (3,), optional
+        Momenta at phase 0 to begin with, as those of another delta; by default as if the gait were played slowly, or else at
+        rest.
 
     Raises
     ------
@@ -272,7 +280,7 @@ def inertial_motion(
     check_finite(positive=True, froude=froude, delta=delta)
     played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime)
     try:
-        start, slopes = played.closed(played.slow_momenta())
+        start, slopes = played.closed(played.slow_momenta() if near is None else near)
     except NotConvergedError:
         start, slopes = played.closed(np.zeros(3))  # a body that friction hardly brakes keeps what it begins with at rest
     totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)

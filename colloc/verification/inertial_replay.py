@@ -37,24 +37,26 @@ def inertial_replay(
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
     quantities: Iterable[Quantity | str] = (),
+    near: Replay | None = None,
     **_: object,
 ) -> Replay:
     """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`; the
-    regime says its pace.
+    regime says its pace. Of a gait replayed `near` another, as at another delta, one motion is looked for where that had one.
 
     Of the result the residual is the change of the momenta in a period; the work of the joints is that against friction and
     what the body gains in kinetic energy.
     """
     settings: Any = {"breaks": breaks, "turn": turn, "regime": regime}
-    ran = inertial_motion(
-        body, friction, gait, delta, regime.froude, tolerance=tolerance, objective=objective, quantities=quantities, **settings
-    )
-    phases = ran.phases % 1.0
     played = gait_with_inertia(body, friction, gait, delta, froude=regime.froude, **settings)
+    settings |= {"tolerance": tolerance, "objective": objective, "quantities": quantities}
+    begin = None if near is None else played.momenta(near.tail_velocity(np.zeros(1)))
+    ran = inertial_motion(body, friction, gait, delta, regime.froude, **settings, near=begin)
+    phases = ran.phases % 1.0
     chain, (angles, rates) = played.body, played.path(phases)
     from_rest = ran.states[:3, 0]
-    with suppress(NotConvergedError):  # Newton's method need not lead to any from there
-        from_rest = played.closed(np.zeros(3))[0]
+    if near is None or near.several:
+        with suppress(NotConvergedError):  # Newton's method need not lead to any from there
+            from_rest = played.closed(np.zeros(3))[0]
     several = float(np.abs(from_rest - ran.states[:3, 0]).max() > _APART)
     other: Any = played.run(from_rest, tolerance) if several else ran
     z = tail_velocity(chain, angles, rates, ran.states[:3])
