@@ -28,14 +28,15 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_inertia, momenta
 from colloc.mechanics.law import Law
 from colloc.motion.compiled_momenta import MomentaAt
-from colloc.motion.follow import Course, followed
+from colloc.motion.follow import STEP, Course, followed
 from colloc.system.arguments import check_finite, is_whole
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.played import Path, to_tolerance
 
 _ROUGH = 1e-4
-"""Error of the runs that say how the momenta at the end depend on those at the start, over the size of the momenta."""
+"""Error of the runs that say how the momenta at the end depend on those at the start, over the size of the momenta; less where
+friction is so dry that a step would err by more than a tenth of delta: then bodies that should rest are shaken to and fro."""
 _APART = 1e-3
 """How far the runs of that start from each other."""
 _CLOSED = 10.0
@@ -111,6 +112,7 @@ class GaitWithInertia:
     ) -> None:
         self.body, self.friction, self.path, self.delta = body, friction, path, delta
         self.froude, self.breaks, self.turn, self.regime, self.theta = froude, breaks, turn, regime, theta
+        self._rough = min(_ROUGH, 0.1 * delta / STEP)
         self._momenta_of = lru_cache(partial(MomentaAt, body, friction, delta, froude))
 
     def slow_momenta(self) -> np.ndarray:
@@ -143,7 +145,7 @@ class GaitWithInertia:
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
             return self._at(t, state.reshape(begin.shape))[:, rows].ravel(), None
 
-        end = followed(slope, begin.ravel(), _ROUGH, self.breaks).states[:, -1].reshape(begin.shape)[:, :3].T
+        end = followed(slope, begin.ravel(), self._rough, self.breaks).states[:, -1].reshape(begin.shape)[:, :3].T
         return end[:, 0], (end[:, 1:] - end[:, :1]) / _APART
 
     def closed(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -154,7 +156,7 @@ class GaitWithInertia:
             end, slopes = self.mapped(start)
             step = _newton_step(end - start, slopes)
             start = start + step
-            if np.abs(step).max() < _CLOSED * _ROUGH:
+            if np.abs(step).max() < _CLOSED * self._rough:
                 return start, slopes
         raise NotConvergedError(
             f"at a Froude number of {self.froude:g} no motion was found in which all periods are alike; try a smaller one."

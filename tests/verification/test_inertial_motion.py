@@ -8,6 +8,7 @@ from colloc.mechanics.inertia import moment_of_inertia, momenta, momentum_rates,
 from colloc.motion.slow_enough import SCHEME, GaitOnMesh
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.verification.inertial_motion import GaitWithInertia
 
 GAIT = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
@@ -237,3 +238,13 @@ def test_on_the_level_it_does_not_matter_where_a_body_points_at_first():
     np.testing.assert_allclose(turned.periods, ran.periods, atol=1e-4)
     (x, y), (u, v) = ran.states[4:6, -1], turned.states[4:6, -1]
     assert u + 1j * v == pytest.approx((x + 1j * y) * np.exp(1j), abs=1e-4)
+
+
+def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_friction_is(monkeypatch):
+    """Steps that err by more than delta shake a body that should rest, and there is no end to them."""
+    standing, asked, at = colloc.Chain((0.3, 0.45, 0.25), feet=1), [], GaitWithInertia._at
+    played = GaitWithInertia(standing, standing.law(colloc.Friction(1.7, 1.0, 1.3)), LEANING, 1e-7, froude=0.02)
+    monkeypatch.setattr(GaitWithInertia, "_at", lambda *given: asked.append(1) or at(*given))
+    _, slopes = played.mapped(played.slow_momenta())
+    assert np.abs(slopes).max() < 1e-6, "friction leaves nothing of the momenta of the period before"
+    assert len(asked) < 30_000
