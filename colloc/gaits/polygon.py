@@ -108,7 +108,8 @@ class Corners(UnitSpeedGait):
         """Where the side that each phase lies on begins, the rates on it, and how long ago it began."""
         phases, vertices = self.phases, self.vertices
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
-        return vertices[:, k], (np.diff(vertices) / np.diff(phases))[:, k], phase - phases[k]
+        # a side of no length is never chosen
+        return vertices[:, k], (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k]), phase - phases[k]
 
     def grown(self, factor: float) -> Corners:
         """The polygon with shapes multiplied by a factor about their mean over the path."""

@@ -22,7 +22,7 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.concertina import ODD_SCALE
 from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
-from colloc.system.arguments import is_number, is_whole
+from colloc.system.arguments import check_finite, is_number, is_whole
 from colloc.system.errors import ProblemError
 
 LAP = 1.3
@@ -198,6 +198,9 @@ class CrawlerBody(PanelBody):
         way : (float, float)
             Where the bump grows and where it is flattened: its place p there.
         """
+        check_finite(amplitude=amplitude)
+        if not is_whole(sides, 4) or np.shape(way) != (2,) or not all(map(is_number, way)):
+            raise ProblemError(f"sides must be at least 4 and way two places, not {sides!r} and {way!r}.")
         corners = np.zeros((self.n_joint, 5))
         corners[0], corners[2] = (way[0], way[0], way[1], way[1], -way[0]), (0.0, amplitude, amplitude, 0.0, 0.0)
         parts = np.ones(4)

@@ -54,7 +54,10 @@ class Axis:
     travels: bool = True
 
     def __post_init__(self) -> None:
-        values = tuple(v if isinstance(v, str) else float(v) for v in self.values)
+        try:
+            values = tuple(v if isinstance(v, str) else float(v) for v in self.values)
+        except (TypeError, ValueError):
+            raise ProblemError(f"values of an axis must be numbers or names, not {self.values!r}.") from None
         object.__setattr__(self, "values", values)
         if not self.name.isidentifier():
             raise ProblemError(f"the name of an axis must be a Python name, not {self.name!r}.")
@@ -123,8 +126,8 @@ class Study:
             value = getattr(self, field)
             if not is_whole(value, least):
                 raise ProblemError(f"{field} must be a whole number, at least {least}, not {value!r}.")
-        if not self.time_limit > 0:
-            raise ProblemError("time_limit must be positive.")
+        if not isinstance(self.time_limit, (int, float)) or not self.time_limit > 0:
+            raise ProblemError(f"time_limit must be positive, not {self.time_limit!r}.")
         if math.prod(self.shape) > MOST_CELLS:
             raise ProblemError(f"a study may have {MOST_CELLS} cells, not {math.prod(self.shape)}; split it.")
 

@@ -146,3 +146,9 @@ def test_a_bump_lies_at_the_ends_of_its_region_where_it_grows_and_is_flattened_a
     np.testing.assert_allclose(ends[-1, 2], 0.6, atol=1e-15)
     np.testing.assert_allclose(ends[-1] - ends[0], body.width, atol=1e-15)
     assert 0.4 < ends[0, 3] < ends[-1, 3] < 0.6
+
+
+@pytest.mark.parametrize("asked", [{"way": (0.9,)}, {"way": (0.9, "text")}, {"way": 0.9}, {"sides": 3}, {"amplitude": "wide"}])
+def test_what_is_no_concertina_is_refused_in_one_sentence(asked):
+    with pytest.raises(ProblemError, match="must be"):
+        BODY.concertina(**{"amplitude": 1.3} | asked)

@@ -99,6 +99,7 @@ def test_starts_travel_from_the_value_before_and_between_all_texts():
         ({"name": "a b"}, "name must be"),
         ({"chunk": 0}, "chunk must be"),
         ({"time_limit": 0}, "must be positive"),
+        ({"time_limit": "long"}, "must be positive"),
         ({"problem": 3}, "must be a function"),
         ({"axes": (Axis("x", range(1001)), Axis("y", range(1001)))}, "1000000 cells"),
     ],
@@ -106,6 +107,12 @@ def test_starts_travel_from_the_value_before_and_between_all_texts():
 def test_bad_studies_are_refused_in_one_sentence(changes, text):
     with pytest.raises(ProblemError, match=text):
         grid(**changes)
+
+
+@pytest.mark.parametrize("values", [3.0, (1.0, None), ([1.0, 2.0],)])
+def test_what_is_no_value_of_an_axis_is_refused_in_one_sentence(values):
+    with pytest.raises(ProblemError, match="values of an axis must be numbers"):
+        Axis("x", values)
 
 
 @pytest.mark.parametrize("values", [(), (1.0, 1.0), (1.0, "a"), (float("nan"),)])
