@@ -1,8 +1,8 @@
-"""What kept potentials say: python -m scripts.check_potential [FILE] [--seed 0] [--shapes 60] [--directions 120]
+"""What kept potentials say: python -m scripts.check_potential [FILE] [--seed 0] [--shapes 60] [--directions 120] [--random N]
 
 A sampled bound is a potential over shape and heading; `results/curated/potentials.json` keeps the best that are known, for
 three links. The largest ratio of gain to power is looked for on lattices and by climbs that know nothing of how it
-was found.
+was found, or at random motions: no ratio may exceed what is guaranteed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.bounds.coulomb_motion import swaps_ends
-from colloc.bounds.potential import PotentialSpace
+from colloc.bounds.potential import PotentialSpace, largest_ratios
 from colloc.bounds.recheck import largest_ratio
 from colloc.bounds.sampling import Domain
 from colloc.laws.elliptic import Elliptic
@@ -25,6 +25,7 @@ from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 
 KEPT = Path("results/curated/potentials.json")
+_AT_ONCE = 200_000
 LAWS: dict[str, type[Friction]] = {law.__name__: law for law in (Friction, Elliptic)}
 
 
@@ -77,21 +78,38 @@ def domain_of(options: argparse.Namespace) -> Domain:
     return Domain(Chain(tuple(options.lengths)), LAWS[options.law](*options.friction), options.limit)
 
 
+def largest_random_ratio(kept: Kept, count: int, seed: int) -> float:
+    """Largest ratio of so many random motions, of all shapes without crossing links and all directions alike."""
+    rng, top, left = np.random.default_rng(seed), 0.0, count
+    while left > 0:
+        angles = rng.uniform(-kept.domain.joint_limit, kept.domain.joint_limit, (2, _AT_ONCE))
+        angles = angles[:, kept.domain.holds(angles)][:, :left]
+        way = rng.uniform(0.0, 2.0 * np.pi, angles[0].shape)
+        motion, _ = kept.domain.solved(angles, np.stack([np.cos(way), np.sin(way)]))
+        top, left = max(top, largest_ratios(kept.space, kept.free, motion).max()), left - angles.shape[1]
+    return float(top)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", nargs="?", type=Path, default=KEPT)
     for name, usual in (("seed", 0), ("shapes", 60), ("directions", 120), ("starts", 1000)):
         parser.add_argument(f"--{name}", type=int, default=usual)
+    parser.add_argument("--random", type=int, metavar="N", help="so many random motions instead")
     options = parser.parse_args()
     settings = {name: getattr(options, name) for name in ("seed", "shapes", "directions", "starts")}
-    for domain, space, free, program in potentials(options.file):
-        begin, mu = time.process_time(), domain.friction
+    for kept in potentials(options.file):
+        domain, begin = kept.domain, time.process_time()
         lengths = ", ".join(f"{length:.4g}" for length in domain.body.lengths)
-        top, at = largest_ratio(domain, space, free, **settings)
+        if options.random:
+            found = f"{largest_random_ratio(kept, options.random, options.seed):.5f} of {options.random} random motions"
+        else:
+            top, at = largest_ratio(domain, kept.space, kept.free, **settings)
+            found = f"{top:.5f} at angles {at.angles[:, 0].round(4)}, rates {at.rates[:, 0].round(4)}"
         print(
-            f"links {lengths}, {mu.label}, limit {domain.joint_limit:.4f}, {space.size} unknowns, program "
-            f"{program:.5f}: largest ratio {top:.5f} at angles {at.angles[:, 0].round(4)}, rates {at.rates[:, 0].round(4)}; "
-            f"{time.process_time() - begin:.0f} s of processor time"
+            f"links {lengths}, {domain.friction.label}, limit {domain.joint_limit:.4f}, {kept.space.size} unknowns, program "
+            f"{kept.program:.5f}: largest ratio {found}; {time.process_time() - begin:.0f} s of processor time",
+            flush=True,
         )
 
 
