@@ -39,13 +39,13 @@ from colloc.search.spaces import space_about, space_near
 from colloc.system.errors import CollocError, NotConvergedError
 
 STARTS, ENOUGH, _MOST = 32, 8, 3
-"""Starts where no number is asked for, or fewer once half as many as are enough, hops not counted, have met the best gait. The
-search goes on until enough in a row have led nowhere better, and ends at so many times the starts. With inertia, which makes
-many more gaits, as many times are asked for: of 14 problems of `python -m benchmarks.zoo --paced` 32 starts come within 1 % of
-128 in 11, and 96 in all."""
+"""Starts where no number is asked for, or fewer once enough of them, hops not counted, have met the best gait. The search goes
+on until as many in a row have led nowhere better, and ends at so many times the starts. With inertia, which makes many more
+gaits, as many times are asked for: of 14 problems of `python -m benchmarks.zoo --paced` 32 starts come within 1 % of 128 in 11,
+and 96 in all."""
 FOLLOWED, PROMISING, CLOSE = 3, 0.8, 0.01
-"""How many gaits are followed to the final delta, and of small loops; the share of the best value that they need at the coarse
-one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
+"""How many different gaits those that are followed to the final delta may come to, and small loops; the share of the best value
+that they need at the coarse one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
 _HOP = 0.4
 """How far hops from the best gait known go [rad], in turn half as far, as far and twice as far; half as many as usual starts
 take turns with as many hops. At 0.2 a hop mostly falls back, at 0.8 it lands where any start would; which of them leads on
@@ -230,7 +230,7 @@ def candidates(
     used, tried, better, best, begin = 0, 0, -ENOUGH, 0.0, time.monotonic()
 
     def knows() -> bool:
-        enough = tried >= (count if asked or 2 * _met_best(known[-1]) < ENOUGH else ENOUGH)
+        enough = tried >= count or (asked is None and _met_best(known[-1]) >= ENOUGH)
         return enough and tried > better + ENOUGH
 
     def begun(start: int, number: int) -> tuple[AnyGait | None, bool]:
@@ -355,7 +355,7 @@ def _followed_to_the_end(
 
     Gaits of finite size may shrink on the way, so they are followed until one has not.
     """
-    run, ends, left = this_run(), list[tuple[Optimum, Candidate]](), list(known)
+    run, ends, left, new = this_run(), list[tuple[Optimum, Candidate]](), list(known), list[bool]()
 
     def promising(candidate: Candidate) -> bool:
         """By what the best one promises; or has come to, where it promised too much."""
@@ -368,16 +368,19 @@ def _followed_to_the_end(
         with suppress(CollocError):
             end = _followed(problem, candidate.optimum)
             if _is_member(end):
+                new.append(not any(same_gait(problem, end, other) for other, _ in ends))
                 ends.append((end, candidate))
         run.told("explore", len(known) - len(left), len(known), _best([optimum for optimum, _ in ends]))
 
-    queue = [c for c in known if not c.is_loop][:FOLLOWED] + [c for c in known if c.is_loop][:FOLLOWED]
-    for number, candidate in enumerate(filter(promising, queue)):
+    queues = [c for c in known if not c.is_loop], [c for c in known if c.is_loop]
+    for number, candidate in enumerate(filter(promising, itertools.chain(*(queue[:FOLLOWED] for queue in queues)))):
         if helpers.has(number):
             helpers.ask(_followed, problem, candidate.optimum)
-    for candidate in queue:
-        if promising(candidate) and (goes_on() or not ends):
-            follow(candidate)
+    for queue in queues:
+        new = list[bool]()  # sketches may be told apart that come to one gait
+        for candidate in queue[:ENOUGH]:
+            if sum(new) < FOLLOWED and promising(candidate) and (goes_on() or not ends):
+                follow(candidate)
     for candidate in [c for c in left if is_finite(c.optimum)][:ENOUGH]:
         if any(is_finite(optimum) for optimum, _ in ends) or (ends and not goes_on()):
             break

@@ -140,11 +140,11 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
 @pytest.mark.parametrize(
     ("asked", "meeting", "froude", "tried"),
     [
-        (None, range(4), 0.0, 8),
-        (None, [0, 4, 8, 12], 0.0, 13),
-        (None, [0, 1, 2], 0.0, 32),
+        (None, range(8), 0.0, 8),
+        (None, range(0, 16, 2), 0.0, 15),
+        (None, range(7), 0.0, 32),
         (None, [0, *range(16, 32)], 0.0, 32),
-        (None, [0, 1, 2], 0.1, 96),
+        (None, range(7), 0.1, 96),
         (32, range(32), 0.0, 32),
     ],
     ids=["soon", "later", "too few", "hops do not count", "with inertia there are more gaits", "as many as were asked for"],
@@ -171,10 +171,14 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(monkeypatc
         ([(1.0, 1.0), (0.9, 0.9), (0.5, 0.5)], [1.0, 0.9]),
         ([(1.0, 0.3), (0.5, 0.4), (0.35, 0.35), (0.1, 0.1)], [1.0, 0.5, 0.35]),
         ([(1.0, 0.6), (0.4, 0.4)], [1.0]),
+        ([(1.0, 0.9), (0.99, 0.8), (0.98, 0.7), (0.97, 1.0)], [1.0, 0.99, 0.98]),
+        ([(1.0, 0.9), (0.99, 0.9), (0.98, 0.8), (0.97, 1.0)], [1.0, 0.99, 0.98, 0.97]),
     ],
-    ids=["promises are kept", "the best one promised too much", "and less than the others do"],
+    ids=["promises are kept", "the best one promised too much", "and less than the others do", "three", "two are one"],
 )
-def test_who_promised_too_much_does_not_keep_others_from_being_followed(monkeypatch, promised_and_kept, followed):
+def test_gaits_are_followed_while_they_promise_enough_until_three_have_come_to_different_ones(
+    monkeypatch, promised_and_kept, followed
+):
     ends, tried = dict(promised_and_kept), []
 
     def end(problem, optimum):
@@ -183,6 +187,7 @@ def test_who_promised_too_much_does_not_keep_others_from_being_followed(monkeypa
 
     monkeypatch.setattr(explore, "_followed", end)
     monkeypatch.setattr(explore, "is_finite", lambda optimum: True)
+    monkeypatch.setattr(explore, "same_gait", lambda problem, one, other: one.objective == other.objective)
     monkeypatch.setattr(explore, "space_near", lambda problem, gait: (None, None))
     monkeypatch.setattr(explore, "converged", lambda *at: SimpleNamespace(after=lambda *of: SimpleNamespace(objective=0.0)))
     monkeypatch.setattr(explore, "_best", lambda optima: None)
