@@ -176,9 +176,7 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(monkeypatc
     ],
     ids=["promises are kept", "the best one promised too much", "and less than the others do", "three", "two are one"],
 )
-def test_gaits_are_followed_while_they_promise_enough_until_three_have_come_to_different_ones(
-    monkeypatch, promised_and_kept, followed
-):
+def test_gaits_are_followed_until_three_have_come_to_different_ones(monkeypatch, promised_and_kept, followed):
     ends, tried = dict(promised_and_kept), []
 
     def end(problem, optimum):
