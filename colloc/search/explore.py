@@ -39,8 +39,8 @@ from colloc.search.spaces import space_about, space_near
 from colloc.system.errors import CollocError, NotConvergedError
 
 STARTS, ENOUGH, _MOST = 32, 8, 3
-"""Starts where no number is asked for, or fewer once enough of them, hops not counted, have met the best gait. The search goes
-on until as many in a row have led nowhere better, and ends at so many times the starts. With inertia, which makes many more
+"""Starts where no number is asked for, or fewer once half as many as are enough, no hops, have met the best gait. The search
+goes on until enough in a row have led nowhere better, and ends at so many times the starts. With inertia, which makes many more
 gaits, as many times are asked for: of 14 problems of `python -m benchmarks.zoo --paced` 32 starts come within 1 % of 128 in 11,
 and 96 in all."""
 FOLLOWED, PROMISING, CLOSE = 3, 0.8, 0.01
@@ -230,7 +230,7 @@ def candidates(
     used, tried, better, best, begin = 0, 0, -ENOUGH, 0.0, time.monotonic()
 
     def knows() -> bool:
-        enough = tried >= count or (asked is None and _met_best(known[-1]) >= ENOUGH)
+        enough = tried >= (count if asked or 2 * _met_best(known[-1]) < ENOUGH else ENOUGH)
         return enough and tried > better + ENOUGH
 
     def begun(start: int, number: int) -> tuple[AnyGait | None, bool]:

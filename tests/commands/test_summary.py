@@ -21,7 +21,7 @@ def test_a_result_is_told_in_three_lines_and_its_checks_in_one(three_link):
     lines = summary_lines(three_link, None)
     assert len(lines) == 4
     assert lines[0].startswith("three_link: solved in ")
-    assert "best of 19 starts" in lines[0]
+    assert "best of 8 starts" in lines[0]
     checks = three_link.certificate.checks
     nearest = max(checks, key=lambda check: abs(check.value) / check.threshold)
     how_near = f"{nearest.name}, {abs(nearest.value):.1e} where {nearest.threshold:.0e} is allowed"

@@ -49,7 +49,7 @@ def test_a_better_answer_to_the_same_question_is_kept_and_a_worse_or_equal_one_r
         assert saved.former == (former and tmp_path / "x.former-1.h5")
         assert load(path).certificate.value == value
     assert values(tmp_path) == {"x.h5": 0.1, "x.former-1.h5": 0.3}
-    assert "which is better (0.3, best of 19 starts)" in saved.why
+    assert "which is better (0.3, best of 8 starts)" in saved.why
 
 
 def test_two_problems_in_turns_fill_no_folder(three_link, tmp_path):
