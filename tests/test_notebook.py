@@ -20,7 +20,8 @@ def said(cell):
 
 
 def numbers(text):
-    return [float(value) for value in re.findall(r"(?<![\w.])[-+]?\d+\.\d+(?!e)(?:\b)", text)]
+    """Without signs: a gait and its mirror image are worth the same, and the last bit of a sine says which is found."""
+    return [float(value) for value in re.findall(r"(?<![\w.])\d+\.\d+(?!e)(?:\b)", text.replace("-", " "))]
 
 
 def test_it_was_run_once_from_top_to_bottom_without_an_error():
