@@ -11,6 +11,7 @@ method on the map from one to the other, whose derivatives also say whether the 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
@@ -162,6 +163,15 @@ class GaitWithInertia:
             f"at a Froude number of {self.froude:g} no motion was found in which all periods are alike; try a smaller one."
         )
 
+    def closed_from(self, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """`closed` near some momenta; where they are not given or lead nowhere, near the slow ones, or near none: a body that
+        friction hardly brakes keeps what it begins with at rest."""
+        for begin in (lambda: near, self.slow_momenta):
+            with suppress(NotConvergedError):
+                if (momenta := begin()) is not None:
+                    return self.closed(momenta)
+        return self.closed(np.zeros(3))
+
     def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray | None = None) -> tuple[Course, np.ndarray]:
         """`InertialMotion.states` through a period that leaves the momenta as they are, to an error, sought near some momenta;
         with the derivatives of `closed`, if they are known. And momenta that close the gap it leaves, ``(3,)``: where a body
@@ -261,8 +271,7 @@ def inertial_motion(
         On a slope `problem.regime`, or `colloc.gaits.sloped.Slope`: the gait says where it points, distance and work are as
         of `colloc.slope_motion`.
     near : (3,), optional
-        Momenta at phase 0 to begin with, as those of another delta; by default as if the gait were played slowly, or else at
-        rest.
+        Momenta at phase 0 to begin with, as those of another delta; then as if the gait were played slowly, or else at rest.
 
     Raises
     ------
@@ -281,10 +290,7 @@ def inertial_motion(
     """
     check_finite(positive=True, froude=froude, delta=delta)
     played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime)
-    try:
-        start, slopes = played.closed(played.slow_momenta() if near is None else near)
-    except NotConvergedError:
-        start, slopes = played.closed(np.zeros(3))  # a body that friction hardly brakes keeps what it begins with at rest
+    start, slopes = played.closed_from(near)
     totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
 
     def run(aim: float) -> tuple[tuple[Course, np.ndarray], dict[str, float]]:
