@@ -63,7 +63,7 @@ def solve(
     problem : Problem
     starts : int, optional
         The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops: at least so many. With 1 the guess
-        alone. By default 32, with inertia 96, or fewer once four new ones, and one in eight, met the best gait; of relaxed gaits 8.
+        alone. By default 32, with inertia 96; fewer once four new ones, and one in eight, met the best. Of relaxed gaits 8.
     seconds : float
         Wall time allowed. Then the best gait so far is returned, with status "interrupted" unless its certificate holds.
     search : {"reduced", "full"}
