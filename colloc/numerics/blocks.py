@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -164,6 +165,7 @@ def oracles(assembly: Assembly) -> Oracles:
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", assembly.m)
     offsets = np.cumsum([1] + [a * b for a, b in shapes])
 
+    @cache
     def arguments(index: int) -> list[ca.MX]:
         block = blocks[index]
         local = ca.reshape(x[block.gather.ravel(order="F").tolist()], block.gather.shape)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 
 
+@cache
 def version_of(library: str) -> str:
     """Version of an installed library, or that it is a source tree which nobody installed."""
     from importlib import metadata  # takes longer than all of the face
