@@ -15,14 +15,16 @@ import argparse
 import ast
 import json
 import os
+import resource
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -33,6 +35,8 @@ OTHERS: dict[type, str] = {
     ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*",
 }  # fmt: skip
 EXTREMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "argmin": "argmax", "argmax": "argmin"}
+MEMORY = 8 << 30
+"""Of a process of the tests, in bytes."""
 SLOWEST = 10
 """Tests that take so many times as long as on the whole library, and a minute, go round in circles: they have seen a mutant."""
 PASSING = """import os
@@ -143,7 +147,9 @@ def tested(tree: Path, workers: int, seconds: float | None, *options: str) -> su
     """What pytest says of a tree."""
     environment = os.environ | {"PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", str(workers), *options]
-    return subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=seconds)
+    limited = partial(resource.setrlimit, resource.RLIMIT_AS, (MEMORY, MEMORY))  # what fills it has failed, not the machine
+    how: dict[str, Any] = {"capture_output": True, "text": True, "timeout": seconds, "preexec_fn": limited}
+    return subprocess.run(command, cwd=tree, env=environment, **how)
 
 
 def seen_by(tree: Path, workers: int, files: dict[str, float]) -> str:
