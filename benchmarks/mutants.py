@@ -157,7 +157,7 @@ def seen_by(tree: Path, workers: int, files: dict[str, float]) -> str:
     if not files:
         return ""
     try:
-        done = tested(tree, workers, 60 + SLOWEST * sum(files.values()), "-x", *files)
+        done = tested(tree, workers, 60 + SLOWEST * sum(files.values()), "-x", "--tb=no", *files)
     except subprocess.TimeoutExpired:
         return "time"
     failed = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
