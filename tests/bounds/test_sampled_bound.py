@@ -226,15 +226,16 @@ def test_minimax_program_agrees_with_a_simplex_solver():
     assert best.weights @ constants == pytest.approx(best.value, abs=1e-6)
 
 
-def test_roughness_is_the_integral_of_squared_second_derivatives():
-    """f = x^2 y on [-a, a]^2, interpolated exactly by cubic splines: |D^2 f|^2 = 4 y^2 + 8 x^2 integrates to 16 a^4."""
+@pytest.mark.parametrize("n_joint", [2, 3])
+def test_roughness_is_the_integral_of_squared_second_derivatives(n_joint):
+    """f = x^2 y on [-a, a]^n, interpolated exactly by cubic splines: |D^2 f|^2 = 4 y^2 + 8 x^2 integrates to 16 a^4 (2 a)^(n-2)."""
     a = 1.3
-    spline = TensorSpline(2, a, 4)
-    q = np.random.default_rng(16).uniform(-a, a, (2, 400))
+    spline = TensorSpline(n_joint, a, 4)
+    q = np.random.default_rng(16).uniform(-a, a, (n_joint, 800))
     c = np.linalg.lstsq(spline.matrix(q).toarray(), q[0] ** 2 * q[1], rcond=None)[0]
     np.testing.assert_allclose(spline.matrix(q) @ c, q[0] ** 2 * q[1], atol=1e-10)
     # the midpoint rule with 8 points an axis misses 1/64 of the mean square
-    assert c @ spline.roughness @ c == pytest.approx(16 * a**4 * (1 - 1 / 64), rel=1e-9)
+    assert c @ spline.roughness @ c == pytest.approx(16 * a**4 * (2 * a) ** (n_joint - 2) * (1 - 1 / 64), rel=1e-9)
 
 
 def test_climbs_find_the_summit_of_a_crease():

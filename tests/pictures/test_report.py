@@ -21,7 +21,7 @@ from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames, lab_outline
-from colloc.pictures.report_page import PLAIN, environment, report_page
+from colloc.pictures.report_page import PLAIN, environment, motion_data, report_page
 from colloc.pictures.style import INK
 from colloc.results.checks import Check
 from colloc.results.solution import Solution
@@ -231,6 +231,16 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     # points only, between them z is interpolated: hence the loose bound on a mesh of eight intervals
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
+
+
+def test_what_the_page_draws_is_what_the_frames_hold(unsolved):
+    problem = crawler(3)
+    shown = frames(unsolved(problem), count=7, arrows=12)
+    data = motion_data(shown, problem.body)
+    for names, rows in ((("x", "y"), shown.ends), (("arrowX", "arrowY"), shown.arrow_base), (("forceX", "forceY"), shown.arrow)):
+        np.testing.assert_allclose([data[name] for name in names], rows, atol=1e-3)
+    (left, low), (right, high) = shown.window
+    np.testing.assert_allclose(data["window"], [left, right, low, high], atol=1e-4)
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,20 @@ PROBLEM = Problem("wide", gait=Harmonic(1, "bilateral"), friction=Friction(10, 1
 
 
 @pytest.fixture(scope="module")
-def front():
-    return pareto_front(PROBLEM, points=4, starts=1)
+def told():
+    """What is told of every point, in turn."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def front(told):
+    return pareto_front(PROBLEM, points=4, starts=1, progress=lambda k, solution: told.append((k, solution.measured.value)))
+
+
+def test_a_point_is_replaced_only_by_a_better_one(front, told):
+    for k in range(4):
+        values = [value for point, value in told if point == k]
+        assert values == sorted(set(values))
 
 
 def test_the_front_is_monotone_and_every_point_is_certified(front):
