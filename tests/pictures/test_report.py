@@ -237,7 +237,8 @@ def test_what_the_page_draws_is_what_the_frames_hold(unsolved):
     problem = crawler(3)
     shown = frames(unsolved(problem), count=7, arrows=12)
     data = motion_data(shown, problem.body)
-    for names, rows in ((("x", "y"), shown.ends), (("arrowX", "arrowY"), shown.arrow_base), (("forceX", "forceY"), shown.arrow)):
+    drawn = {("x", "y"): shown.ends, ("arrowX", "arrowY"): shown.arrow_base, ("forceX", "forceY"): shown.arrow}
+    for names, rows in drawn.items():
         np.testing.assert_allclose([data[name] for name in names], rows, atol=1e-3)
     (left, low), (right, high) = shown.window
     np.testing.assert_allclose(data["window"], [left, right, low, high], atol=1e-4)
