@@ -15,8 +15,8 @@ from colloc.mechanics.bodies import Body
 from colloc.system.arguments import STATED_IF_SET, check_finite, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
-_SAME_START = 1e-9
-"""Sine of the first joint's first harmonic up to which a gait starts where those of its class do."""
+SAME_START = 1e-9
+"""Sine of the first joint's first harmonic, or of the wave, up to which a gait starts where those of its class do."""
 
 
 @named_arguments
@@ -291,7 +291,7 @@ class Harmonic(LinearClass):
         return self.nearest(gait)
 
     def in_phase(self, gait: Fourier) -> bool:
-        return self.symmetry == BILATERAL or bool(abs(gait.sin[0, 0]) < _SAME_START)
+        return self.symmetry == BILATERAL or bool(abs(gait.sin[0, 0]) < SAME_START)
 
     def nearest(self, gait: Fourier) -> np.ndarray:
         """The parameter vector of the class member nearest to `gait`, in its phase."""

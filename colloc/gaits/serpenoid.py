@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.harmonic import Fourier, Harmonic, shifted
+from colloc.gaits.harmonic import SAME_START, Fourier, Harmonic, shifted
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.mechanics.bodies import Body
 from colloc.numerics.arrays import Array, namespace
@@ -22,8 +22,6 @@ from colloc.system.errors import ProblemError
 
 _LAGS = np.linspace(-np.pi, np.pi, 361)
 """Where the lag of the wave nearest to a gait is looked for first; equal lags a whole turn apart are the same wave."""
-_SAME_START = 1e-9
-"""How far from sin 0 a wave may begin and have the start phase of its class [rad]."""
 
 
 @named_arguments
@@ -151,7 +149,7 @@ class Serpenoid(Harmonic):
         """The own parameters of the wave nearest to a gait, after shifting its start phase if that is free."""
         lag, start = self._begun(gait)
         gait = gait.resized(self.harmonics)
-        wave = _at_the_middle(gait if abs(start) <= _SAME_START else shifted(gait, -start / (2 * np.pi)), lag)
+        wave = _at_the_middle(gait if abs(start) <= SAME_START else shifted(gait, -start / (2 * np.pi)), lag)
         offset = [gait.mean.mean()] if self.symmetry == NONE else []
         return np.array([lag, *offset, *(-wave[k - 1].imag if sine else wave[k - 1].real for k, sine in self._waves)])
 
@@ -164,7 +162,7 @@ class Serpenoid(Harmonic):
         return lag, 0.0 if self.symmetry == BILATERAL or wave[0] == 0 else float(np.angle(1j * wave[0]))
 
     def in_phase(self, gait: Fourier) -> bool:
-        return abs(self._begun(gait)[1]) <= _SAME_START
+        return abs(self._begun(gait)[1]) <= SAME_START
 
     def _nearest_lag(self, gait: Fourier) -> float:
         """The lag at which the joints agree best on what wave they are part of."""

@@ -24,7 +24,8 @@ STEP = 1 / 100
 _METHODS = ("LSODA", 50_000), ("Radau", np.inf)
 """Adams' and Gear's, and how often they may ask for rates; and where these give up, as where friction is stiff beside little
 inertia, one that costs more. Adams' may not see that his steps are as short as stability, not accuracy, wants them: 1e-8."""
-_ONE_SIDED = 1e-12
+ONE_SIDED = 1e-12
+"""How far beside a jump of the rates they are asked for on its side, in phase."""
 
 
 class _TooOften(Exception):
@@ -91,7 +92,7 @@ def followed(
         left -= 1
         if left < 0:
             raise _TooOften
-        one_sided = min(max(t, first + _ONE_SIDED), last - _ONE_SIDED)  # rates may jump at the ends
+        one_sided = min(max(t, first + ONE_SIDED), last - ONE_SIDED)  # rates may jump at the ends
         found, near = rates(one_sided, state, near)
         return found
 

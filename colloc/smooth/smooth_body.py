@@ -10,8 +10,8 @@ from colloc.mechanics.law import Law
 from colloc.smooth.balance import SmoothSolution, solve_smooth
 from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity
 from colloc.smooth.motion import Motion
+from colloc.smooth.panel_balance import TAIL
 
-TAIL = 0
 _OUTLINE, _NODES = 96, 3
 _SHOWN = 5
 """Places along the body whose speeds are drawn."""

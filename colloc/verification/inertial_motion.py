@@ -29,7 +29,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_inertia, momenta
 from colloc.mechanics.law import Law
 from colloc.motion.compiled_momenta import MomentaAt
-from colloc.motion.follow import STEP, Course, followed
+from colloc.motion.follow import ONE_SIDED, STEP, Course, followed
 from colloc.system.arguments import check_finite, is_whole
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.adaptive_motion import whole_totals
@@ -43,7 +43,6 @@ _APART = 1e-3
 _CLOSED = 10.0
 """Gap between the momenta at start and end that is left open at most, over the error of a run: where steps close it no more."""
 _MOST_PERIODS = 30
-_ONE_SIDED = 1e-12
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
 
@@ -118,12 +117,12 @@ class GaitWithInertia:
 
     def slow_momenta(self) -> np.ndarray:
         """Those at the start of the period if the gait is played slowly on the level, ``(3,)``: where to begin."""
-        angles, rates = self.path(np.full(1, _ONE_SIDED))
+        angles, rates = self.path(np.full(1, ONE_SIDED))
         return self.momenta(solve_balance(self.body, self.friction, angles, rates, self.delta).require().z)
 
     def momenta(self, z: np.ndarray) -> np.ndarray:
         """Those at the start of the period, ``(3,)``, where the tail link has a velocity ``(3, 1)``."""
-        angles, rates = self.path(np.full(1, _ONE_SIDED))
+        angles, rates = self.path(np.full(1, ONE_SIDED))
         posture = self.body.posture(angles)
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 

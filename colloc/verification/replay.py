@@ -25,12 +25,12 @@ from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import LENGTH, Instants, PathLimit, PathLimits, Quantity, limits_of, quantities_of
 from colloc.mechanics.law import Law
+from colloc.motion.follow import ONE_SIDED
 from colloc.motion.followed_motion import FORWARDS, followed_motion
 from colloc.system.errors import ProblemError
 from colloc.verification.panels import WHOLE, Panels, begun, changes, halves, increments, left_over, travelled
 from colloc.verification.played import MixedPath, Path, Replay, lever
 
-_ONE_SIDED = 1e-12
 _NARROWEST = 1e-10
 
 
@@ -167,8 +167,8 @@ def replay(
     left, width = edges[:-1], np.diff(edges)
     t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
     # one-sided limits at jumps
-    t[np.isin(left, ends[1:-1]), 0] += _ONE_SIDED
-    t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
+    t[np.isin(left, ends[1:-1]), 0] += ONE_SIDED
+    t[np.isin(edges[1:], ends[1:-1]), 4] -= ONE_SIDED
     start = None if near is None else near.tail_velocity(t.ravel())
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     names = "rotation", "distance", "work", *(each.name for each in asked)
