@@ -147,7 +147,7 @@ def tested(tree: Path, workers: int, seconds: float | None, *options: str) -> su
     """What pytest says of a tree."""
     environment = os.environ | {"PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", str(workers), *options]
-    limited = partial(resource.setrlimit, resource.RLIMIT_AS, (MEMORY, MEMORY))  # what fills it has failed, not the machine
+    limited = partial(resource.setrlimit, resource.RLIMIT_DATA, (MEMORY, MEMORY))  # what fills it has failed, not the machine
     how: dict[str, Any] = {"capture_output": True, "text": True, "timeout": seconds, "preexec_fn": limited}
     return subprocess.run(command, cwd=tree, env=environment, **how)
 

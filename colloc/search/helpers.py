@@ -49,9 +49,9 @@ class Helpers:
         self._next: SimpleQueue[str] = SimpleQueue()
 
     def begin(self, seconds: float) -> None:
-        """Begin, where there is so much left to do."""
+        """Begin, where there is so much left to do and a run that keeps what they find."""
         count = available_threads() - 1
-        if self._processes or count == 0 or seconds < _WORTH:
+        if self._processes or count == 0 or seconds < _WORTH or self._run.problem is None:
             return
         try:
             given = pickle.dumps((sys.path, self._problem))

@@ -145,9 +145,20 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
         (None, range(3), 0.0, 32),
         (None, [0, *range(16, 32)], 0.0, 32),
         (None, range(3), 0.1, 96),
+        (None, range(4), 0.1, 24),
+        (None, [0, 1, 2, 70], 0.1, 96),
         (32, range(32), 0.0, 32),
     ],
-    ids=["soon", "later", "too few", "hops do not count", "with inertia there are more gaits", "as many as were asked for"],
+    ids=[
+        "soon",
+        "later",
+        "too few",
+        "hops do not count",
+        "with inertia there are more gaits",
+        "a quarter at least",
+        "not an eighth",
+        "as many as were asked for",
+    ],
 )
 def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(monkeypatch, asked, meeting, froude, tried):
     numbers = itertools.count()

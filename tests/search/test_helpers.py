@@ -9,7 +9,7 @@ import colloc
 from benchmarks.kills import contents
 from colloc import Harmonic, Problem
 from colloc.search import helpers
-from colloc.search.explore import sketched
+from colloc.search.explore import explore, sketched
 from colloc.search.run import Run
 
 PROBLEM = Problem("quick", gait=Harmonic(1, "none"), delta=1e-2, delta_start=0.1, intervals=12, mesh_tolerance=1e-3)
@@ -64,15 +64,21 @@ def test_so_it_is_if_they_die(alone, learnt, tmp_path, monkeypatch, command):
 
 
 def test_none_is_begun_for_what_this_process_alone_knows_nor_for_little(learnt, monkeypatch):
-    with helpers.helping(SimpleNamespace(law=lambda: 0)) as some:
+    run = Run(problem=PROBLEM)
+    with run.under_way(60.0), helpers.helping(SimpleNamespace(law=lambda: 0)) as some:
         some.begin(1e3)
         assert some.count == 0
     monkeypatch.setattr(helpers, "_WORTH", 2.0)
-    with helpers.helping(PROBLEM) as some:
+    with run.under_way(60.0), helpers.helping(PROBLEM) as some:
         some.begin(1.9)
         assert some.count == 0
         some.begin(2.1)
         assert some.count == 2
+
+
+def test_none_is_begun_where_a_stage_is_called_by_itself(learnt):
+    assert explore(PROBLEM, starts=4).starts >= 4
+    assert not learnt
 
 
 def test_what_is_asked_for_twice_is_waited_for_once(learnt):

@@ -248,3 +248,21 @@ def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_frictio
     _, slopes = played.mapped(played.slow_momenta())
     assert np.abs(slopes).max() < 1e-6, "friction leaves nothing of the momenta of the period before"
     assert len(asked) < 30_000
+
+
+def test_momenta_that_lead_nowhere_give_way_to_slow_ones_and_these_to_rest(monkeypatch):
+    at, begun, closed = (CHAIN, ISOTROPIC, GAIT, 1e-2, 0.1), [], GaitWithInertia.closed
+    usual = colloc.inertial_motion(*at, tolerance=1e-3)
+
+    def mostly_lost(self, near):
+        begun.append(near)
+        if len(begun) < 3:
+            raise colloc.NotConvergedError("nowhere")
+        return closed(self, near)
+
+    monkeypatch.setattr(GaitWithInertia, "closed", mostly_lost)
+    asked = np.array([0.1, 0.2, 0.3])
+    found = colloc.inertial_motion(*at, tolerance=1e-3, near=asked)
+    assert [near.any() for near in begun] == [True, True, False]
+    np.testing.assert_array_equal(begun[0], asked)
+    assert found.efficiency == pytest.approx(usual.efficiency, rel=1e-3)
