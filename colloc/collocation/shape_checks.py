@@ -12,7 +12,8 @@ import numpy as np
 
 from colloc.gaits.limits import Limit, range_of
 from colloc.mechanics.bodies import Body, Pairs, Stretch
-from colloc.mechanics.contact import Contact, tangent_of_minimum
+from colloc.mechanics.contact import Contact, smooth_minimum, tangent_of_minimum
+from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.constraint_rows import Group, block_group
 from colloc.numerics.peaks import vertex
 
@@ -25,17 +26,17 @@ class ShapeCheck:
     """A scalar function of the shape that admissibility bounds from above (angles also from below), or of the shape's rates.
 
     along: its values ``(n_time,)`` at shapes ``(n_joint, n_time)``. share: there, the weight of the first of two functions of
-    which this is the minimum, or -1; of the largest angle on a stretch of a smooth body, where on the body it is. cut: of the
-    shape and a share, the tangent plane of that weight, the function itself where it is negative, or the angle at that place.
-    slope: its derivative with respect to the shape. row: it per shape coordinate, if it is linear. place: which of the body's
-    angles it is, -1 if it is none. fixed: its bounds, if these are not the limits of such an angle. derivative: 1 if "shapes"
-    are their rates per period.
+    which this is the minimum, or -1; of the largest angle on a stretch of a smooth body, where on the body it is. cut: of
+    shapes and shares ``(n_time,)``, or CasADi's for one, the tangent planes of these weights, the function itself where they
+    are negative, or the angles at these places, ``(1, n_time)``. slope: its derivative with respect to the shape. row: it per
+    shape coordinate, if it is linear. place: which of the body's angles it is, -1 if it is none. fixed: its bounds, if these
+    are not the limits of such an angle. derivative: 1 if "shapes" are their rates per period.
     """
 
     name: str
     along: Callable[[np.ndarray], np.ndarray]
     share: Callable[[np.ndarray], np.ndarray]
-    cut: ca.Function
+    cut: Callable[[Array, Array], Array]
     slope: ca.Function
     row: np.ndarray | None = None
     place: int = -1
@@ -103,19 +104,30 @@ def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) ->
         checks = [_stretch_check(name, angles, stretch, k) for (k, name), stretch in zip(names, stretches, strict=True)]
     else:
         checks = [_angle_check(name, angles, row, k) for (k, name), row in zip(names, body.limited, strict=True)]
-    checks += [_minimum_check(contact, angles) for contact in body.contacts(far)]
+    known = _contact_checks(body)
+    checks += [known.get(each.name) or known.setdefault(each.name, _minimum_check(each, angles)) for each in body.contacts(far)]
     unit = np.eye(body.n_joint)
     named = [(f"speed of {body.coordinate} {j + 1}", most) for j, most in enumerate(speeds)]
     return checks + [_speed_check(name, angles, unit[j] / most) for j, (name, most) in enumerate(named)]
 
 
+@lru_cache(maxsize=64)
+def _contact_checks(body: Body) -> dict[str, ShapeCheck]:
+    """Those of a body's contacts that were made, by their names: most are in the checks of many sets of pairs."""
+    return {}
+
+
 def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> ShapeCheck:
-    share, value = ca.SX.sym("share"), ca.mtimes(ca.DM(row[None]), angles)
+
+    def cut(shapes: Array, shares: Array) -> Array:
+        return namespace(shapes).matmul(row[None], shapes)
+
     return ShapeCheck(
         name,
         lambda shapes: row @ shapes,
         lambda shapes: np.full(shapes.shape[1], -1.0),
-        *_cut(angles, share, value),
+        cut,
+        _slope(cut, angles),
         row,
         place,
     )
@@ -128,7 +140,6 @@ def _speed_check(name: str, rates: ca.SX, row: np.ndarray) -> ShapeCheck:
 
 def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> ShapeCheck:
     """The largest angle on a stretch of a smooth body."""
-    share = ca.SX.sym("share")
     fine = np.linspace(stretch.first, stretch.last, _PLACES)
     rows = stretch.angles_at(fine)
 
@@ -141,24 +152,30 @@ def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> Sh
         return fine[inner] + np.clip(offset, -1, 1) * (fine[1] - fine[0])
 
     def along(shapes: np.ndarray) -> np.ndarray:
-        return np.asarray((stretch.angles_at(largest(shapes)).T * shapes).sum(axis=0))
+        return cut(shapes, largest(shapes))[0]
 
-    return ShapeCheck(name, along, largest, *_cut(angles, share, ca.mtimes(stretch.angles_at(share), angles)), place=place)
+    def cut(shapes: Array, places: Array) -> Array:
+        return namespace(shapes).sum_rows(stretch.angles_at(places).T * shapes)
+
+    return ShapeCheck(name, along, largest, cut, _slope(cut, angles), place=place)
 
 
-def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Function]:
-    slope = ca.densify(ca.gradient(cut, angles))
-    return ca.Function("cut", [angles, share], [cut]), ca.Function("slope", [angles, share], [slope])
+def _slope(cut: Callable[[Array, Array], Array], angles: ca.SX) -> ca.Function:
+    share = ca.SX.sym("share")
+    return ca.Function("slope", [angles, share], [ca.densify(ca.gradient(cut(angles, share), angles))])
 
 
 def _minimum_check(contact: Contact, angles: ca.SX) -> ShapeCheck:
-    (first, second), share = contact.pair(angles), ca.SX.sym("share")
-    tangent = tangent_of_minimum(first, second, ca.fmax(share, 0), contact.width)
-    cut = ca.if_else(share < 0, contact.excess(angles), tangent)
+    def cut(shapes: Array, shares: Array) -> Array:
+        xp, (first, second) = namespace(shapes), contact.pair(shapes)
+        tangent = tangent_of_minimum(first, second, 0.5 * (shares + xp.abs(shares)), contact.width)
+        return xp.where(shares < 0, smooth_minimum(first, second, contact.width), tangent)
+
     return ShapeCheck(
         contact.name,
         lambda shapes: contact.excess(shapes)[0],
         lambda shapes: contact.share(shapes)[0],
-        *_cut(angles, share, cut),
+        cut,
+        _slope(cut, angles),
         fixed=(-np.inf, 0.0),
     )

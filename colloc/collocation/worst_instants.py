@@ -75,16 +75,18 @@ def followed(
     By Newton's method on the check along the gait. `cells`: where they begin and how wide they are, ``(n,)`` each.
     """
     left, h = cells
-    step, held = _STEP * h, np.tile(shares, 3)[None]
+    step, held = _STEP * h, np.tile(shares, 3)
 
     def heights(t: np.ndarray) -> np.ndarray:
-        return check.cut(check.of(gait, np.concatenate([t - step, t, t + step])), held).full().reshape(3, -1)
+        return check.cut(check.of(gait, np.concatenate([t - step, t, t + step])), held).reshape(3, -1)
 
     sign = np.sign(heights(times)[1] - check.middle(limit)) if check.both_ways else 1.0
     for _ in range(_STEPS):
         before, here, after = sign * heights(times)
         move = vertex(before, here, after) * step
-        times = np.clip(times + np.clip(move, -_LARGEST * h, _LARGEST * h), left + step, left + h - step)
+        last, times = times, np.clip(times + np.clip(move, -_LARGEST * h, _LARGEST * h), left + step, left + h - step)
+        if np.abs(times - last).max() < _STEP * step.min():
+            break
     return times
 
 

@@ -200,9 +200,13 @@ class Shaped(Protocol):
         """How far parts penetrate each other, ``(n_time,)``; of all pairs, or of given ones."""
         return np.zeros(angles.shape[1])
 
-    def passing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
+    def passing_depth(self, angles: np.ndarray) -> float:
         """How far parts pass through each other from instant to instant of a path."""
         return 0.0
+
+    def crossing_pairs(self, angles: np.ndarray, least: float) -> Pairs:
+        """The `far_pairs` that penetrate or pass through each other by more than `least` on a path."""
+        return ()
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         """A travelling wave of bending: the factors ``(n_joint,)`` of the cosine and the sine of the phase."""

@@ -15,6 +15,7 @@ from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     SMOOTHING,
     Contact,
+    crossing_pairs,
     crossing_sums,
     ends_and_links,
     excess,
@@ -162,8 +163,11 @@ class Chain(Links, Body):
     def crossing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
         return overlap(self, angles, pairs)
 
-    def passing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
-        return passing_depth(self, angles, pairs)
+    def passing_depth(self, angles: np.ndarray) -> float:
+        return passing_depth(self, angles)
+
+    def crossing_pairs(self, angles: np.ndarray, least: float) -> Pairs:
+        return crossing_pairs(self, angles, least)
 
     def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.joints(angles)

@@ -162,7 +162,7 @@ def separate_pairs(body: Links) -> list[tuple[int, int]]:
     return [(i, j) for i in range(body.n_link) for j in range(i + 2, body.n_link)]
 
 
-def crossing_depth(body: Links, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
+def crossing_depth(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None) -> np.ndarray:
     """How far links penetrate each other, ``(n_time,)``; 0 where no two of them cross.
 
     Plain segment intersection of the given pairs, by default of all that are not neighbours, independent of
@@ -170,16 +170,10 @@ def crossing_depth(body: Links, angles: np.ndarray, pairs: Sequence[tuple[int, i
     other segment.
     """
     ends = np.stack(body.joints(angles))
-    depth = np.zeros(angles.shape[1])
-    for i, j in separate_pairs(body) if pairs is None else pairs:
-        (d1, d2), (d3, d4), _ = _end_distances(ends, i, j)
-        crossing = (d1 * d2 < 0) & (d3 * d4 < 0)
-        distance = np.min(np.abs([d1, d2, d3, d4]), axis=0)
-        depth = np.maximum(depth, np.where(crossing, distance, 0.0))
-    return depth
+    return _crossing(ends, _within_reach(body, ends, separate_pairs(body) if pairs is None else pairs))
 
 
-def passing_depth(body: Links, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
+def passing_depth(body: Links, angles: np.ndarray) -> float:
     """How far links pass through each other between successive instants of a path [body lengths]; 0 if none does.
 
     A link cannot cross another without an end of one passing through the other. That shows even where no sample holds a
@@ -187,8 +181,42 @@ def passing_depth(body: Links, angles: np.ndarray, pairs: Sequence[tuple[int, in
     value is the smaller of the end's distances before and after.
     """
     ends = np.stack(body.joints(angles))
+    return _passing(ends, _within_reach(body, ends, separate_pairs(body)))
+
+
+def crossing_pairs(body: Links, angles: np.ndarray, least: float) -> tuple[Pair, ...]:
+    """The `far_pairs` that overlap, or pass through each other between successive instants of a path, by more than `least`
+    [body lengths]."""
+    ends = np.stack(body.joints(angles))
+    near = ([pair] for pair in _within_reach(body, ends, far_pairs(body)))
+    return tuple(one for (one,) in near if max(_overlap(body, ends, [one]).max(), _passing(ends, [one])) > least)
+
+
+def _within_reach(body: Links, ends: np.ndarray, pairs: Sequence[Pair]) -> list[Pair]:
+    """Those of pairs whose links can come nearer than their width, at an instant or on the straight way to the next: most of
+    a long body never do, and their middles say so."""
+    middles, near = 0.5 * (ends[:, 1:] + ends[:, :-1]), []
+    for i, j in pairs:
+        apart = middles[:, j] - middles[:, i]
+        reach = 0.5 * (body.lengths[i] + body.lengths[j] + np.hypot(*np.diff(apart)).max(initial=0.0)) + body.width
+        if np.hypot(*apart).min(initial=np.inf) <= reach:
+            near.append((i, j))
+    return near
+
+
+def _crossing(ends: np.ndarray, pairs: Sequence[Pair]) -> np.ndarray:
+    depth = np.zeros(ends.shape[2])
+    for i, j in pairs:
+        (d1, d2), (d3, d4), _ = _end_distances(ends, i, j)
+        crossing = (d1 * d2 < 0) & (d3 * d4 < 0)
+        distance = np.min(np.abs([d1, d2, d3, d4]), axis=0)
+        depth = np.maximum(depth, np.where(crossing, distance, 0.0))
+    return depth
+
+
+def _passing(ends: np.ndarray, pairs: Sequence[Pair]) -> float:
     deepest = 0.0
-    for i, j in separate_pairs(body) if pairs is None else pairs:
+    for i, j in pairs:
         first, second, beside = _end_distances(ends, i, j)
         for distance, along in zip((*first, *second), beside, strict=True):
             through = (distance[1:] * distance[:-1] < 0) & along[1:] & along[:-1]
@@ -244,19 +272,34 @@ def excess(body: Links, angles: Array, end: int, link: int) -> Array:
     return (w * w - square_distance(body, angles, end, link)) / (2 * w)
 
 
-def gap(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None) -> np.ndarray:
+def gap(body: Links, angles: np.ndarray) -> np.ndarray:
     """The smallest distance of an end from a link that it is not an end of [body lengths], ``(n_time,)``; 0 where links cross.
 
-    Of all, or of pairs of links. Neighbours of equal lengths l folded by an angle beyond pi/2 have the gap l sin(pi - |angle|).
+    Neighbours of equal lengths l folded by an angle beyond pi/2 have the gap l sin(pi - |angle|).
     """
-    found = [_from_segment(np.stack(body.joints(angles)), end, link) for end, link in ends_and_links(body, pairs)]
-    return np.where(crossing_depth(body, angles, pairs) > 0, 0.0, np.min(found, axis=0, initial=np.inf))
+    ends = np.stack(body.joints(angles))
+    return np.where(_crossing(ends, separate_pairs(body)) > 0, 0.0, _gap(ends, ends_and_links(body)))
 
 
 def overlap(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None) -> np.ndarray:
-    """What links lack of their width, and how far they cross besides [body lengths], ``(n_time,)``; 0 where they keep it."""
-    depth = crossing_depth(body, angles, pairs)
-    return depth if body.width == 0 else depth + np.maximum(body.width - gap(body, angles, pairs), 0.0)
+    """What links lack of their width, and how far they cross besides [body lengths], ``(n_time,)``; 0 where they keep it.
+
+    Of all, or of pairs of links.
+    """
+    return _overlap(body, np.stack(body.joints(angles)), pairs)
+
+
+def _overlap(body: Links, ends: np.ndarray, pairs: Sequence[Pair] | None) -> np.ndarray:
+    near = _within_reach(body, ends, separate_pairs(body) if pairs is None else pairs)
+    depth = _crossing(ends, near)
+    if body.width == 0:
+        return depth
+    apart = np.where(depth > 0, 0.0, _gap(ends, ends_and_links(body, None if pairs is None else near)))
+    return depth + np.maximum(body.width - apart, 0.0)
+
+
+def _gap(ends: np.ndarray, apart: Sequence[Pair]) -> np.ndarray:
+    return np.min([_from_segment(ends, end, link) for end, link in apart], axis=0, initial=np.inf)
 
 
 def _from_segment(ends: np.ndarray, end: int, link: int) -> np.ndarray:

@@ -165,9 +165,7 @@ class _Placed(NamedTuple):
     moving: np.ndarray
 
     def value(self, v: np.ndarray) -> np.ndarray:
-        if self.check.row is not None:
-            return (self.check.row @ self.matrix) @ v
-        return self.check.cut((self.matrix @ v).T, self.shares[None]).full().ravel()
+        return self.check.cut((self.matrix @ v).T, self.shares)[0]
 
     def slope(self, v: np.ndarray) -> np.ndarray:
         if self.check.row is not None:

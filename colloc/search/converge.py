@@ -42,7 +42,7 @@ _WIDEST = 1e-5
 objective is missed by less than an equation may be violated. It is as exact as a gait has to be elsewhere."""
 PHASES = 1000
 """Phases of the solved part of the period at which all pairs of links are checked; the certificate checks 20000 a period."""
-_FRACTIONS = np.linspace(1.0, 0.0, 21)
+_FRACTIONS = np.linspace(0.05, 0.95, 19)
 
 
 class Placed(NonlinearProgram, Protocol):
@@ -254,19 +254,15 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     only touch makes problems harder for nothing (a folded chain of equal links has such contacts).
     """
     admissible = space.control.admissible
-    body, t = admissible.body, np.linspace(0.0, admissible.gait.fraction, PHASES)
-    angles = space.member(v).angles(t)
-    return tuple(
-        pair
-        for pair in body.far_pairs
-        if max(body.crossing_depth(angles, [pair]).max(), body.passing_depth(angles, [pair])) > VIOLATION
-    )
+    return admissible.body.crossing_pairs(space.member(v).angles(np.linspace(0.0, admissible.gait.fraction, PHASES)), VIOLATION)
 
 
 def last_free(space: Members, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:
     """Gait parameters on the way from those of a free gait to those of one with crossing links, as far as links stay apart."""
+    last = free
     for fraction in _FRACTIONS:
         between = free + fraction * (crossing - free)
-        if not crossing_pairs(space, between):
-            return between
-    return free
+        if crossing_pairs(space, between):
+            break
+        last = between
+    return last

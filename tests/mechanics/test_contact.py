@@ -13,7 +13,9 @@ from colloc.mechanics.contact import (
     SMOOTHING,
     crossing_bounds,
     crossing_depth,
+    far_pairs,
     gap,
+    overlap,
     passing_depth,
     share_of_first,
     smooth_minimum,
@@ -142,6 +144,28 @@ def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_an
     height = np.abs(np.sin(2.0) + np.sin(angles.sum(axis=0))) / 3
     assert passing_depth(Chain(), angles) == pytest.approx(height[np.abs(steps) == 0.02].item(), rel=1e-12)
     assert passing_depth(Chain(), angles[:, :3]) == 0.0
+
+
+@pytest.mark.parametrize("width", [0.0, 0.02])
+def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
+    """By signs of areas, for one shape at a time, and all pairs that are three links apart at least."""
+    body, rng, found = Chain((0.05, 0.2, 0.1, 0.15, 0.2, 0.1, 0.2), width=width), np.random.default_rng(5), 0
+    for angles in rng.uniform(-2.8, 2.8, (300, 6, 1)):
+        at = (np.array([1, 1j]) @ np.stack(body.joints(angles))[..., 0]).ravel()
+
+        def side(a, b, p, at=at):
+            return np.sign(((at[b] - at[a]).conjugate() * (at[p] - at[a])).imag)
+
+        crossed = {
+            (i, j)
+            for i, j in far_pairs(body)
+            if side(i, i + 1, j) != side(i, i + 1, j + 1) and side(j, j + 1, i) != side(j, j + 1, i + 1)
+        }
+        pairs = body.crossing_pairs(angles, 0.0)
+        assert crossed <= set(pairs) if width else crossed == set(pairs)
+        assert all(crossing_depth(body, angles, [pair])[0] > 0 or overlap(body, angles, [pair])[0] < width for pair in pairs)
+        found += len(crossed)
+    assert found > 50
 
 
 @pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)

@@ -63,7 +63,9 @@ def test_parallel_links_that_slip_through_each_other_are_caught():
     np.testing.assert_allclose(height[3], height[4], atol=1e-12)
     assert height[3, 1] < 0 < height[3, 2]
     assert crossing_depth(body, angles, [(0, 3)]).max() < 1e-9
-    assert passing_depth(body, angles, [(0, 3)]) > 1e-3
+    assert passing_depth(body, angles) > 1e-3
+    assert body.crossing_pairs(angles, 1e-3) == ((0, 3),)
+    assert not body.crossing_pairs(angles[:, :2], 0.0)
     assert clearance(body, angles[:, 1:3].mean(axis=1, keepdims=True), 0, 3)[0, 0] < 0
 
 
