@@ -204,10 +204,6 @@ class Shaped(Protocol):
         """How far parts pass through each other from instant to instant of a path."""
         return 0.0
 
-    def crossing_pairs(self, angles: np.ndarray, least: float) -> Pairs:
-        """The `far_pairs` that penetrate or pass through each other by more than `least` on a path."""
-        return ()
-
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         """A travelling wave of bending: the factors ``(n_joint,)`` of the cosine and the sine of the phase."""
         phase = 2 * np.pi * waves * (np.arange(1, self.n_joint + 1) / (self.n_joint + 1) - 0.5)

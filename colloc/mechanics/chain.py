@@ -15,7 +15,6 @@ from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     SMOOTHING,
     Contact,
-    crossing_pairs,
     crossing_sums,
     ends_and_links,
     excess,
@@ -165,9 +164,6 @@ class Chain(Links, Body):
 
     def passing_depth(self, angles: np.ndarray) -> float:
         return passing_depth(self, angles)
-
-    def crossing_pairs(self, angles: np.ndarray, least: float) -> Pairs:
-        return crossing_pairs(self, angles, least)
 
     def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.joints(angles)

@@ -170,7 +170,7 @@ def crossing_depth(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None
     other segment.
     """
     ends = np.stack(body.joints(angles))
-    return _crossing(ends, _within_reach(body, ends, separate_pairs(body) if pairs is None else pairs))
+    return _crossing(ends, _within_reach(ends, separate_pairs(body) if pairs is None else pairs))
 
 
 def passing_depth(body: Links, angles: np.ndarray) -> float:
@@ -181,24 +181,26 @@ def passing_depth(body: Links, angles: np.ndarray) -> float:
     value is the smaller of the end's distances before and after.
     """
     ends = np.stack(body.joints(angles))
-    return _passing(ends, _within_reach(body, ends, separate_pairs(body)))
+    return _passing(ends, _within_reach(ends, separate_pairs(body)))
 
 
-def crossing_pairs(body: Links, angles: np.ndarray, least: float) -> tuple[Pair, ...]:
-    """The `far_pairs` that overlap, or pass through each other between successive instants of a path, by more than `least`
-    [body lengths]."""
-    ends = np.stack(body.joints(angles))
-    near = ([pair] for pair in _within_reach(body, ends, far_pairs(body)))
-    return tuple(one for (one,) in near if max(_overlap(body, ends, [one]).max(), _passing(ends, [one])) > least)
+def crossing_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float) -> tuple[Pair, ...]:
+    """Those of pairs of links that overlap, or pass through each other between successive instants of a path, by more than
+    `least` [body lengths]; from the coordinates ``(2, n_link + 1, n_time)`` of joints and tips."""
+    near = ([pair] for pair in _within_reach(ends, pairs, width))
+    return tuple(
+        one for (one,) in near if max(_overlap(ends, [one], width, _their_ends([one])).max(), _passing(ends, [one])) > least
+    )
 
 
-def _within_reach(body: Links, ends: np.ndarray, pairs: Sequence[Pair]) -> list[Pair]:
+def _within_reach(ends: np.ndarray, pairs: Sequence[Pair], width: float = 0.0) -> list[Pair]:
     """Those of pairs whose links can come nearer than their width, at an instant or on the straight way to the next: most of
     a long body never do, and their middles say so."""
     middles, near = 0.5 * (ends[:, 1:] + ends[:, :-1]), []
+    lengths = np.hypot(*(ends[:, 1:] - ends[:, :-1])).max(axis=1, initial=0.0)
     for i, j in pairs:
         apart = middles[:, j] - middles[:, i]
-        reach = 0.5 * (body.lengths[i] + body.lengths[j] + np.hypot(*np.diff(apart)).max(initial=0.0)) + body.width
+        reach = 0.5 * (lengths[i] + lengths[j] + np.hypot(*np.diff(apart)).max(initial=0.0)) + width
         if np.hypot(*apart).min(initial=np.inf) <= reach:
             near.append((i, j))
     return near
@@ -242,10 +244,13 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[1] - a[1] * b[0]
 
 
-def ends_and_links(body: Links, pairs: Sequence[Pair] | None = None) -> list[Pair]:
-    """All (end, link) where the joint or tip number `end`, from 0 at the tail, is no end of the link; or of pairs of links."""
-    if pairs is None:
-        return [(end, link) for link in range(body.n_link) for end in range(body.n_link + 1) if end not in (link, link + 1)]
+def ends_and_links(body: Links) -> list[Pair]:
+    """All (end, link) where the joint or tip number `end`, from 0 at the tail, is no end of the link."""
+    return [(end, link) for link in range(body.n_link) for end in range(body.n_link + 1) if end not in (link, link + 1)]
+
+
+def _their_ends(pairs: Sequence[Pair]) -> list[Pair]:
+    """The same of pairs of links."""
     return [(end, link) for i, j in pairs for link, ends in ((i, (j, j + 1)), (j, (i, i + 1))) for end in ends]
 
 
@@ -286,16 +291,15 @@ def overlap(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None
 
     Of all, or of pairs of links.
     """
-    return _overlap(body, np.stack(body.joints(angles)), pairs)
+    ends = np.stack(body.joints(angles))
+    if pairs is None:
+        return _overlap(ends, separate_pairs(body), body.width, ends_and_links(body))
+    return _overlap(ends, pairs, body.width, _their_ends(pairs))
 
 
-def _overlap(body: Links, ends: np.ndarray, pairs: Sequence[Pair] | None) -> np.ndarray:
-    near = _within_reach(body, ends, separate_pairs(body) if pairs is None else pairs)
-    depth = _crossing(ends, near)
-    if body.width == 0:
-        return depth
-    apart = np.where(depth > 0, 0.0, _gap(ends, ends_and_links(body, None if pairs is None else near)))
-    return depth + np.maximum(body.width - apart, 0.0)
+def _overlap(ends: np.ndarray, pairs: Sequence[Pair], width: float, apart: Sequence[Pair]) -> np.ndarray:
+    depth = _crossing(ends, _within_reach(ends, pairs))
+    return depth if width == 0 else depth + np.maximum(width - np.where(depth > 0, 0.0, _gap(ends, apart)), 0.0)
 
 
 def _gap(ends: np.ndarray, apart: Sequence[Pair]) -> np.ndarray:

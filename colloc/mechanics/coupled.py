@@ -110,7 +110,7 @@ class Coupled(Body):
     motion, replayed, all_velocities = map(_under_friction, ("motion", "replayed", "all_velocities"))
     slowness, rubbing = map(_under_friction, ("slowness", "rubbing"))
     speeds, seen_from_head = map(_in_motion, ("speeds", "seen_from_head"))
-    crossing_depth, passing_depth, crossing_pairs = map(_at_shapes, ("crossing_depth", "passing_depth", "crossing_pairs"))
+    crossing_depth, passing_depth = map(_at_shapes, ("crossing_depth", "passing_depth"))
     outline, centre, footprints, imbalance = map(_at_shapes, ("outline", "centre", "footprints", "imbalance"))
 
     @property

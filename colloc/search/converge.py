@@ -18,6 +18,7 @@ import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
+from colloc.mechanics import contact
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
@@ -254,7 +255,10 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     only touch makes problems harder for nothing (a folded chain of equal links has such contacts).
     """
     admissible = space.control.admissible
-    return admissible.body.crossing_pairs(space.member(v).angles(np.linspace(0.0, admissible.gait.fraction, PHASES)), VIOLATION)
+    body, t = admissible.body, np.linspace(0.0, admissible.gait.fraction, PHASES)
+    return contact.crossing_pairs(
+        np.stack(body.outline(space.member(v).angles(t))), body.far_pairs, body.drawn_width, VIOLATION
+    )
 
 
 def last_free(space: Members, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:
