@@ -184,13 +184,14 @@ def passing_depth(body: Links, angles: np.ndarray) -> float:
     return _passing(ends, _within_reach(ends, separate_pairs(body)))
 
 
-def crossing_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float) -> tuple[Pair, ...]:
+def overlapping_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float) -> tuple[Pair, ...]:
     """Those of pairs of links that overlap, or pass through each other between successive instants of a path, by more than
     `least` [body lengths]; from the coordinates ``(2, n_link + 1, n_time)`` of joints and tips."""
-    near = ([pair] for pair in _within_reach(ends, pairs, width))
-    return tuple(
-        one for (one,) in near if max(_overlap(ends, [one], width, _their_ends([one])).max(), _passing(ends, [one])) > least
-    )
+
+    def depth(one: list[Pair]) -> float:
+        return max(float(_overlap(ends, one, width, _their_ends(one)).max()), _passing(ends, one))
+
+    return tuple(pair for pair in _within_reach(ends, pairs, width) if depth([pair]) > least)
 
 
 def _within_reach(ends: np.ndarray, pairs: Sequence[Pair], width: float = 0.0) -> list[Pair]:

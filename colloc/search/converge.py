@@ -18,8 +18,8 @@ import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics import contact
 from colloc.mechanics.bodies import Pairs
+from colloc.mechanics.contact import overlapping_pairs
 from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
@@ -256,9 +256,8 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     """
     admissible = space.control.admissible
     body, t = admissible.body, np.linspace(0.0, admissible.gait.fraction, PHASES)
-    return contact.crossing_pairs(
-        np.stack(body.outline(space.member(v).angles(t))), body.far_pairs, body.drawn_width, VIOLATION
-    )
+    ends = np.stack(body.outline(space.member(v).angles(t)))
+    return overlapping_pairs(ends, body.far_pairs, body.drawn_width, VIOLATION)
 
 
 def last_free(space: Members, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:

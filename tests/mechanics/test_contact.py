@@ -13,10 +13,10 @@ from colloc.mechanics.contact import (
     SMOOTHING,
     crossing_bounds,
     crossing_depth,
-    crossing_pairs,
     far_pairs,
     gap,
     overlap,
+    overlapping_pairs,
     passing_depth,
     share_of_first,
     smooth_minimum,
@@ -162,7 +162,7 @@ def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
             for i, j in far_pairs(body)
             if side(i, i + 1, j) != side(i, i + 1, j + 1) and side(j, j + 1, i) != side(j, j + 1, i + 1)
         }
-        pairs = crossing_pairs(np.stack(body.joints(angles)), far_pairs(body), width, 0.0)
+        pairs = overlapping_pairs(np.stack(body.joints(angles)), far_pairs(body), width, 0.0)
         assert crossed <= set(pairs) if width else crossed == set(pairs)
         assert all(crossing_depth(body, angles, [pair])[0] > 0 or overlap(body, angles, [pair])[0] < width for pair in pairs)
         found += len(crossed)

@@ -10,7 +10,7 @@ from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, crossing_pairs, far_pairs, passing_depth
+from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, overlapping_pairs, passing_depth
 from colloc.mechanics.friction import Friction
 from colloc.search.converge import crossing_pairs, last_free
 from colloc.search.ipopt import Solver
@@ -65,8 +65,8 @@ def test_parallel_links_that_slip_through_each_other_are_caught():
     assert crossing_depth(body, angles, [(0, 3)]).max() < 1e-9
     assert passing_depth(body, angles) > 1e-3
     ends = np.stack(body.joints(angles))
-    assert crossing_pairs(ends, [(0, 3)], 0.0, 1e-3) == ((0, 3),)
-    assert not crossing_pairs(ends[..., :2], [(0, 3)], 0.0, 0.0)
+    assert overlapping_pairs(ends, [(0, 3)], 0.0, 1e-3) == ((0, 3),)
+    assert not overlapping_pairs(ends[..., :2], [(0, 3)], 0.0, 0.0)
     assert clearance(body, angles[:, 1:3].mean(axis=1, keepdims=True), 0, 3)[0, 0] < 0
 
 
