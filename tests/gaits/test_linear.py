@@ -76,6 +76,15 @@ def test_a_symmetry_halves_the_parameters():
     assert [Basis(FOUR, symmetry=s).size(2) for s in SYMMETRIES] == [8, 4, 4]
 
 
+@pytest.mark.parametrize("gait_class", [Harmonic(1), Harmonic(12), Harmonic(12, "bilateral"), BSpline(8, symmetry="bilateral")])
+def test_a_mesh_grows_from_sixteen_intervals_a_period_or_two_a_wave_and_not_from_twice_as_many(gait_class):
+    last = gait_class.fraction
+    edges = gait_class.first_edges(np.linspace(0.0, last, 200))
+    assert (edges[0], edges[-1]) == (0.0, last)
+    coarse = min(1 / 16, 0.5 / gait_class.harmonics)
+    assert np.all(np.abs(np.diff(edges) / coarse - 0.75) < 0.25 + 1e-12)
+
+
 def test_statements_read_back_as_what_they_were():
     for gait_class in CLASSES:
         gait = member(gait_class)

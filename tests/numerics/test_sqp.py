@@ -80,6 +80,20 @@ def test_a_kink_of_the_objective_is_found():
     assert found.objective < 1e-3
 
 
+@pytest.mark.parametrize(("stiff", "wanted"), [(1.9, [-0.9, 0.05]), (4, [-3, 0]), (40, [-39, -3, 0])])
+def test_a_step_that_is_too_long_is_cut_to_the_least_of_a_parabola_between_a_tenth_and_half(stiff, wanted):
+    """A model of curvature 1 leads from 1 to 1 - stiff."""
+    tried = []
+    nothing = lambda x: np.zeros(0), lambda x: np.zeros((0, 1)), [], [], 1
+    minimised(
+        Program(lambda x: tried.append(x[0]) or 0.5 * stiff * x[0] ** 2, lambda x: stiff * x, *nothing),
+        np.ones(1),
+        np.inf,
+        1e-12,
+    )
+    assert tried[: 1 + len(wanted)] == pytest.approx([1, *wanted], abs=1e-12)
+
+
 def test_the_box_is_kept_and_its_edge_is_told():
     program = hock_schittkowski_71()
     found = minimised(program, np.array([1.0, 4.0, 4.5, 2.0]), 0.1, 1e-12)

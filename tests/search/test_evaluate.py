@@ -146,6 +146,24 @@ def test_by_what_gaits_differ(changed, differs):
     assert found.total == pytest.approx(nearest, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("changes", "alike"),
+    [
+        ({}, (True, True, True)),
+        ({"friction": colloc.Friction(1, 1, 1.5)}, (True, False, False)),
+        ({"body": colloc.Chain((0.3, 0.3, 0.4))}, (False, True, False)),
+    ],
+)
+def test_gaits_are_alike_turned_about_if_the_body_is_symmetric_and_backwards_if_friction_is(changes, alike):
+    turned = colloc.Fourier(GAIT.mean[::-1], GAIT.cos[::-1], GAIT.sin[::-1])
+    back, both = colloc.Fourier(GAIT.mean, GAIT.cos, -GAIT.sin), colloc.Fourier(-turned.mean, -turned.cos, turned.sin)
+    rough = PROBLEM.with_(delta=0.1, mesh_tolerance=1e-2, **changes)
+    own, *others = (colloc.evaluate(rough, gait) for gait in (GAIT, turned, back, both))
+    apart = np.array([gait_difference(own, other).total for other in others])
+    assert tuple(apart < 0.01) == alike  # of 0.96; phases of a start are 1/512 apart
+    assert apart[~np.array(alike)].min(initial=1.0) > 0.1
+
+
 def test_the_command_says_yours_and_the_best(tmp_path, monkeypatch, capsys, evaluated):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('p', delta=1e-3)\n")

@@ -58,8 +58,9 @@ def test_paths_keep_both_sides_use_them_and_mirror(gait):
     assert second.max() < 1.0 + 1e-5
 
 
-def test_a_range_that_is_even_is_a_limit():
+def test_a_range_that_is_even_is_a_limit_and_one_may_go_to_half_a_turn():
     assert problem(((-1, 1), 2.0)).joint_limit == problem((1.0, 2.0)).joint_limit
+    assert problem(((-np.pi, 1), (-1, np.pi))).joint_limit == ((-np.pi, 1), (-1, np.pi))
 
 
 def test_shapes_are_held_against_one_limit_on_either_side():
@@ -71,7 +72,10 @@ def test_shapes_are_held_against_one_limit_on_either_side():
 @pytest.mark.parametrize(
     ("limit", "gait", "words"),
     [
-        (((0.2, 1.0), 1.0), Harmonic(1), "straight body"),
+        (((0.0, 1.0), 1.0), Harmonic(1), "straight body"),
+        (((-1.0, 0.0), 1.0), Harmonic(1), "straight body"),
+        (((-1.0, 3.142), 1.0), Harmonic(1), "neither beyond 3.142"),
+        (((-3.142, 1.0), 1.0), Harmonic(1), "neither beyond 3.142"),
         (((-30, 60), 1.0), Harmonic(1), "radians"),
         (((-1, 1, 2), 1.0), Harmonic(1), "least and its largest"),
         (((-1, 2),), Harmonic(1), "give one for all joints"),

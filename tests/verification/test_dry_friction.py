@@ -152,3 +152,23 @@ def test_where_either_foot_may_hold_the_motion_is_bounded_only_loosely():
     found = dry_balance(Chain((0.5, 0.5), feet=1), ISOTROPIC, np.array([[0.8]]), np.array([[1.0]]))
     assert found.most - found.least < 1e-8
     assert found.apart.max() > 1e-2
+
+
+@pytest.mark.parametrize(
+    ("lengths", "places", "rates"), [((1 / 3,) * 3, (0.5,) * 3, (1, 1)), ((0.2, 0.5, 0.3), (0.1, 0.2, 0.9), (0.3, 1))]
+)
+def test_of_three_feet_in_a_row_any_two_may_rest_and_the_bounds_hold_all_these_motions(lengths, places, rates):
+    """Where each bears as much as makes it cost the same whichever of them moves: the middle one half."""
+    masses, hinges = (0.5, 0.2, 0.3), np.array([0.0, lengths[0], lengths[0] + lengths[1]])
+    at, middle = hinges + np.array(places) * lengths, np.dot(masses, hinges + 0.5 * np.array(lengths))
+    weights = np.array([at[2] - at[1], at[2] - at[0], at[1] - at[0]]) / (2 * (at[2] - at[0]))
+    feet = tuple(Foot(k, places[k], weight=weights[k]) for k in range(3))
+    found = dry_balance(Chain(lengths, feet=feet, masses=masses), ISOTROPIC, np.zeros((2, 1)), np.array(rates)[:, None])
+    bent = np.array(rates) @ np.maximum(at - hinges[1:, None], 0.0)  # speeds across while the tail rests
+    rest = np.array([np.linalg.solve([[1, at[i]], [1, at[j]]], -bent[[i, j]]) for i, j in ((0, 1), (1, 2), (0, 2))])
+    speeds = bent + rest @ [np.ones(3), at]
+    assert np.abs(speeds) @ weights == pytest.approx(np.repeat(found.most, 3), rel=1e-7)
+    across, spin = np.abs((rest - found.z[1:, 0]) @ [[1, 0], [middle, 1]]).max(axis=0)
+    assert found.apart[0, 0] < 1e-5
+    assert across <= found.apart[1, 0]
+    assert spin <= found.apart[2, 0] < 1.5 * np.ptp(rest[:, 1])
