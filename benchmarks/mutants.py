@@ -3,10 +3,11 @@
     python -m benchmarks.mutants --number 40 --seed 1
 
 A place is a comparison, an operation, a sign, an `and`, a `not`, a `min` or an index off by one, drawn evenly from all of
-`colloc/`. All tests are run once on the whole library, in which every place drawn notes the file of tests that comes by; a
-mutant is then tried with these files, the quickest first: the others cannot see it. A file that fails on the whole library
-sees nothing. What is done is kept in results/mutants-SEED.jsonl: an interrupted run goes on where it stopped. A mutant
-that no test sees is one that changes nothing, or a test that lacks.
+`colloc/`. All tests are run once on the whole library, in which every place drawn notes the tests that come by; a mutant is
+then tried with these, the quickest first, and where what many tests share comes by (a fixture, an import) with all of that
+file: the others cannot see it. A file that fails on the whole library sees nothing. What is done is kept in
+results/mutants-SEED.jsonl: an interrupted run goes on where it stopped. A mutant that no test sees is one that changes
+nothing, or a test that lacks.
 """
 
 from __future__ import annotations
@@ -39,13 +40,16 @@ MEMORY = 8 << 30
 """Of a process of the tests, in bytes."""
 SLOWEST = 10
 """Tests that take so many times as long as on the whole library, and a minute, go round in circles: they have seen a mutant."""
-PASSING = """import os
+PASSING = """import os, sys
 def by(place, seen=set()):
-    now = place, os.environ.get("PYTEST_CURRENT_TEST", "*").split("::")[0]
+    test, _, stage = os.environ.get("PYTEST_CURRENT_TEST", "*").rpartition(" ")
+    if sys._getframe(1).f_code.co_name == "<module>":
+        test, stage = "", "*"  # whichever test came first
+    now = place, test if stage == "(call)" else test.split("::")[0] or stage
     if now not in seen:
         seen.add(now)
         with open({kept!r}, "a") as file:
-            print(*now, file=file)
+            print(*now, sep="\t", file=file)
 """
 """A module of the tree in which all places drawn note who passes."""
 
@@ -110,8 +114,9 @@ def drawn(number: int, seed: int) -> list[Mutant]:
     return [everything[k] for k in np.random.default_rng(seed).permutation(len(everything))[:number]]
 
 
-def passing(tree: Path, places: list[Mutant], workers: int) -> tuple[dict[str, float], list[set[str]]]:
-    """The seconds that each file of tests takes, and for each place those that come by; files that fail are left out."""
+def passing(tree: Path, places: list[Mutant], workers: int) -> list[list[dict[str, float]]]:
+    """For each place, the tests that come by, and the files to which it belongs that all tests of share: what to try in turn,
+    and the seconds that each takes, the quickest first. Files that fail are left out."""
     added: defaultdict[str, list[tuple[int, bytes]]] = defaultdict(list)
     for k, place in enumerate(places):
         added[place.module] += [
@@ -133,14 +138,17 @@ def passing(tree: Path, places: list[Mutant], workers: int) -> tuple[dict[str, f
     seconds: defaultdict[str, float] = defaultdict(float)
     failed = set()
     for case in ElementTree.parse(times).iter("testcase"):
-        seconds[case.attrib["file"]] += float(case.attrib["time"])
+        for one in (case.attrib["file"], f"{case.attrib['file']}::{case.attrib['name']}"):
+            seconds[one] += float(case.attrib["time"])
         if case.find("failure") is not None or case.find("error") is not None:
             failed.add(case.attrib["file"])
     print(f"Left out, since they fail on the whole library: {', '.join(sorted(failed)) or 'none'}.", flush=True)
-    good = {file: seconds[file] for file in sorted(seconds, key=seconds.__getitem__) if file not in failed}
-    passed = [line.split() for line in kept.read_text().splitlines()]
-    files = [{file for at, file in passed if int(at) == k} for k in range(len(places))]
-    return good, [set(good) if "*" in those else those & set(good) for those in files]
+    good = {one: seconds[one] for one in sorted(seconds, key=seconds.__getitem__) if one.split("::")[0] not in failed}
+    by: list[set[str]] = [set() for _ in places]
+    for line in kept.read_text().splitlines():
+        number, one = line.split("\t")
+        by[int(number)] |= {one} if one != "*" else {each for each in good if "::" not in each}
+    return [[{one: good[one] for one in good if one in of and ("::" in one) != whole} for whole in (False, True)] for of in by]
 
 
 def tested(tree: Path, workers: int, seconds: float | None, *options: str) -> subprocess.CompletedProcess[str]:
@@ -152,12 +160,12 @@ def tested(tree: Path, workers: int, seconds: float | None, *options: str) -> su
     return subprocess.run(command, cwd=tree, env=environment, **how)
 
 
-def seen_by(tree: Path, workers: int, files: dict[str, float]) -> str:
-    """The first test of these files that fails on a tree; "" if none does."""
-    if not files:
+def seen_by(tree: Path, workers: int, tests: dict[str, float]) -> str:
+    """The first of these tests, or of files of them, that fails on a tree; "" if none does."""
+    if not tests:
         return ""
     try:
-        done = tested(tree, workers, 60 + SLOWEST * sum(files.values()), "-x", "--tb=no", *files)
+        done = tested(tree, workers, 60 + SLOWEST * sum(tests.values()), "-x", "--tb=no", *tests)
     except subprocess.TimeoutExpired:
         return "time"
     failed = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
@@ -182,13 +190,12 @@ def main() -> None:
         tree = Path(folder, "colloc")
         shutil.copytree(ROOT, tree, ignore=_unneeded)
         places = drawn(options.number, options.seed)[len(done) :]
-        seconds, passed = passing(tree, places, options.workers)
-        for mutant, near in zip(places, passed, strict=True):
+        for mutant, near in zip(places, passing(tree, places, options.workers), strict=True):
             whole = (tree / mutant.module).read_bytes()
             (tree / mutant.module).write_bytes(mutant.within(tree))
-            test = seen_by(tree, options.workers, {file: took for file, took in seconds.items() if file in near})
+            test = next(filter(None, (seen_by(tree, options.workers, tests) for tests in near)), "")
             (tree / mutant.module).write_bytes(whole)
-            done.append({**mutant._asdict(), "files": len(near), "seen by": test})
+            done.append({**mutant._asdict(), "tests": len(near[0]), "files": len(near[1]), "seen by": test})
             with kept.open("a") as file:
                 file.write(json.dumps(done[-1]) + "\n")
     print("| place | before | after | seen by |\n|---|---|---|---|")
