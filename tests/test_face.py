@@ -159,6 +159,27 @@ def test_a_missing_library_is_named(three_link, monkeypatch):
         three_link.to_dataframe()
 
 
+def test_as_many_starts_are_tried_as_are_asked_for_else_as_the_file_states(tmp_path, monkeypatch):
+    from colloc.commands.main import main
+
+    asked = []
+
+    def stopping(problem, starts, *_):
+        asked.append(starts)
+        raise colloc.ProblemError("enough")
+
+    monkeypatch.setattr("colloc.search.solve.explore", stopping)
+    path, to = tmp_path / "p.py", tmp_path / "p.h5"
+    for stated in ("", "\nSTARTS = 3"):
+        path.write_text(f"from colloc import *\nPROBLEM = Problem('p'){stated}\n", encoding="utf-8")
+        for given in ((), (5,)):
+            for output in (None, to):
+                with pytest.raises(colloc.ProblemError, match="enough"):
+                    colloc.solve(path, *given, output=output)
+            assert main(["solve", str(path), "--output", str(to), *(f"--starts={n}" for n in given)]) == 2
+    assert asked == [None] * 3 + [5] * 3 + [3] * 3 + [5] * 3
+
+
 def test_progress_is_told_and_printed_only_if_asked(capsys):
     problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     told, outcomes = [], []

@@ -71,6 +71,17 @@ def test_gradients_are_those_of_differences(case):
     np.testing.assert_allclose(program.row_slopes(v), rows, atol=2e-6)
 
 
+@pytest.mark.parametrize("case", [case for case in CASES if "path" in case])
+def test_the_metric_of_paths_is_the_mean_square_that_a_step_moves_the_shapes_and_a_little_of_every_parameter(case):
+    space, v, _ = near_start(case)
+    metric, h = space.metric(v), 1e-6
+    slopes = [(space.member(v + e).shapes - space.member(v - e).shapes).ravel() / (2 * h) for e in h * np.eye(space.n)]
+    moved = np.inner(slopes, slopes) / space.member(v).edges.size
+    added = metric - moved
+    np.testing.assert_allclose(added, added[0, 0] * np.eye(space.n), atol=1e-8 * moved.max())
+    assert 0 < added[0, 0] < 0.2 * moved.max()
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_no_equation_among_the_rows_is_redundant(case):
     """An SQP step solves the linearised equations: dependent ones would have no solution."""

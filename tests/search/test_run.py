@@ -326,10 +326,6 @@ def test_progress_is_told_from_the_first_moment_and_says_how_long():
     assert solution.certificate.replayed
 
 
-def test_a_problem_file_says_how_many_starts(undisturbed):
-    assert read_problem_file(undisturbed[0]).starts is None
-
-
 def test_friction_of_any_size_is_kept_in_the_units_of_the_problem(tmp_path, at_once):
     light = QUICK.with_(friction=Friction(1e-3, 1e-3, 1e-3))
     solution = solve(light, 1, keep=tmp_path / "x.run.sqlite")
