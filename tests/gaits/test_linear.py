@@ -158,6 +158,14 @@ def test_interpolation_states_its_error():
         assert 0.1 * basis.error < true < 3 * basis.error
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1, 40])
+def test_columns_have_the_harmonics_that_hold_all_but_a_millionth_of_their_mean_square_rates(unit):
+    wave = lambda size, k: unit * size * np.sin(2 * np.pi * k * PHASES)  # noqa: E731
+    for share, harmonics in ((0.8e-6, 3), (1.2e-6, 12)):
+        both = wave(1, 3), wave(np.sqrt(share) * 3 / 12, 12)
+        assert Basis([both[0] + both[1]]).harmonics == Basis(both).harmonics == harmonics
+
+
 def test_a_file_of_columns_is_read_with_or_without_its_last_line(tmp_path):
     t = np.linspace(0, 3, 97)
     rows = np.column_stack([t, bump(t / 3), bump(t / 3 - 0.25)])

@@ -42,6 +42,7 @@ def test_the_whole_period_closes_and_has_the_symmetry(symmetry, n_joint):
     t = np.linspace(0.0, 0.999, 57)
     q = gait.angles(t)
     assert np.abs(gait.angles(np.array([0.0, 1.0])) @ [1, -1]).max() < 1e-12
+    assert gait.extent == pytest.approx(np.ptp(gait.angles(gait.phases), axis=1).max())
     if symmetry in ("bilateral", "both"):
         assert np.allclose(gait.angles(1 - t), -q[::-1], atol=1e-12)
     if symmetry in ("antipodal", "both"):

@@ -326,6 +326,20 @@ def test_progress_is_told_from_the_first_moment_and_says_how_long():
     assert solution.certificate.replayed
 
 
+def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess():
+    seen = []
+
+    def stopping(news):
+        seen.append(news.best)
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    first, best = solve(QUICK, seconds=1e-9), solve(QUICK, 2, progress=stopping)
+    assert (first.status, best.status) == ("interrupted",) * 2
+    np.testing.assert_allclose(first.gait.angles(np.arange(9) / 9), QUICK.guess.angles(np.arange(9) / 9), atol=1e-12)
+    assert best.value == seen[-1].value > 1.5 * first.value
+
+
 def test_friction_of_any_size_is_kept_in_the_units_of_the_problem(tmp_path, at_once):
     light = QUICK.with_(friction=Friction(1e-3, 1e-3, 1e-3))
     solution = solve(light, 1, keep=tmp_path / "x.run.sqlite")
