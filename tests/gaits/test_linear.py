@@ -151,11 +151,11 @@ def test_splines_with_inertia_are_certified():
 
 
 def test_interpolation_states_its_error():
-    """To a factor of 3 where steps are small; of few samples it is too large, as their error has not yet come to fall fast."""
-    for n in (24, 48, 96):
+    """Well where steps are small; of few samples it is too large, as their error has not yet come to fall fast."""
+    for n, most in ((24, 10), (48, 1.5), (96, 1.2)):
         basis, t = Basis([bump(np.arange(n) / n)]), np.linspace(0, 1, 5001)
         true = np.abs(basis.functions(t)[0] - bump(t)).max() / bump(0.0)
-        assert 0.1 * basis.error < true < 3 * basis.error
+        assert 1.0 < basis.error / true < most
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1, 40])

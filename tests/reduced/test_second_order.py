@@ -142,6 +142,25 @@ def test_a_way_down_that_ends_at_once_is_none():
     assert curvature(Kinked(), np.ones(1)).smallest > 0
 
 
+class Skew(Quadratic):
+    """-x^2 + c x^3: at a thousandth, where a way down has to go on, both parts are alike."""
+
+    def __init__(self, c):
+        super().__init__(np.diag([-2.0]))
+        self.c = c
+
+    def objective(self, v):
+        return super().objective(v) + self.c * v[0] ** 3
+
+    def gradient(self, v):
+        return super().gradient(v) + 3 * self.c * v**2
+
+
+@pytest.mark.parametrize("c", [-1e3, 1e3])
+def test_what_rises_one_way_as_it_falls_the_other_curves_nothing(c):
+    assert curvature(Skew(c), np.zeros(1)).smallest == pytest.approx(-2.0, rel=1e-6)
+
+
 def test_rows_on_both_sides_of_one_instant_hold_one_direction():
     twice = curvature(Quadratic(np.diag([1.0, 1.0, -1.0]), [[1, 0, 0], [1, 1e-3, 0]]), np.zeros(3))
     assert twice.n_free == 2
