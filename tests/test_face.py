@@ -147,10 +147,16 @@ def test_a_gait_is_exported_from_python_as_by_the_command(three_link, tmp_path, 
         words = [f"--{key.replace('_', '-')} {' '.join(map(str, np.ravel(value)))}" for key, value in settings.items()]
         assert main(["export", str(tmp_path / "x.h5"), "--output", str(tmp_path / name), *" ".join(words).split()]) == 0
         assert (tmp_path / name).read_text(encoding="utf-8") == by_hand
-    with pytest.raises(colloc.ProblemError, match=r"should end in \.csv or \.json"):
-        three_link.export(tmp_path / "x.txt", period=4)
-    with pytest.raises(colloc.ProblemError, match="periods must be at least 1"):
-        three_link.export(tmp_path / "x.csv", period=4, periods=0)
+    (tmp_path / "x.csv").unlink()
+    for name, settings, words in (
+        ("x.txt", {}, r"should end in \.csv or \.json"),
+        ("x.csv", {"periods": 0}, "periods must be at least 1"),
+        ("x.csv", {"length": 1.0}, "both the length and the mass"),
+        ("x.csv", {"mass": 2.0}, "both the length and the mass"),
+    ):
+        with pytest.raises(colloc.ProblemError, match=words):
+            three_link.export(tmp_path / name, period=4, **settings)
+        assert not (tmp_path / name).exists()
 
 
 def test_a_missing_library_is_named(three_link, monkeypatch):

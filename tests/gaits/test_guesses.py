@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.gaits.guesses import SAFE, largest_factor
-from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
@@ -22,6 +22,18 @@ def test_a_guess_on_the_bound_of_the_shape_speed_counts_as_moving(share, moves):
     else:
         with pytest.raises(ProblemError, match="guess hardly moves"):
             Problem("small", guess, gait=Harmonic(1, "bilateral"), smallest_shape_speed=slowest)
+
+
+@pytest.mark.parametrize(("width", "words"), [(0.0, "links cross each other"), (0.02, "links overlap")])
+def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
+    """In the phases of its class, in which the first joint is bent most at 0."""
+    body, wave = Chain(width=width), Fourier(np.full(2, 1.9), np.array([[0.2], [0.2]]), np.array([[0.0], [0.8]]))
+    with pytest.raises(ProblemError, match=f"{words} at phase") as refused:
+        Problem("crossed", wave, body, gait=Harmonic(1))
+    phase = float(str(refused.value).rstrip(".").split()[-1])
+    depth = body.crossing_depth(Harmonic(1).guessed(wave)[0].angles(np.append(phase, np.arange(400) / 400)))
+    assert 0.05 < phase < 0.4
+    assert depth[0] == pytest.approx(depth.max(), rel=1e-3)
 
 
 def test_a_straight_body_may_be_enlarged_without_end():

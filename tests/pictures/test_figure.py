@@ -15,7 +15,7 @@ from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import draw_filmstrip, forbidden, strips
+from colloc.pictures.figure import draw_filmstrip, draw_lab, draw_shape_path, forbidden, strips
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
 from colloc.pictures.style import save
@@ -39,6 +39,55 @@ def test_strips_have_the_width_of_the_links_and_round_ends():
     assert np.ptp(strips(ends, 0.1)[0], axis=0) == pytest.approx([0.5, 0.1])
 
 
+def snake(size):
+    """A wave down five links that hardly slide sideways; a large one is two fifths of a body length a period."""
+    wave = Fourier(
+        np.zeros(4), size * np.cos(0.4 * np.pi * np.arange(4.0))[:, None], size * np.sin(0.4 * np.pi * np.arange(4.0))[:, None]
+    )
+    return Problem("snake", wave, Chain((0.2,) * 5), Friction(10.0, 1.0, 1.0), gait=Harmonic(1), delta=1e-2, intervals=8)
+
+
+def bodies(axes):
+    """Outlines ``(2, n_point)`` of those that are drawn."""
+    return [np.array(line.get_data()) for line in axes.lines if line.get_linewidth() == 2.4]
+
+
+@pytest.mark.parametrize("size", [0.4, 1.2])
+def test_paths_in_the_lab_go_on_until_the_body_has_left_its_place_if_it_soon_does(size, unsolved):
+    solution, axes = unsolved(snake(size)), Figure().add_subplot()
+    draw_lab(axes, solution)
+    tail, head, centre = (np.array(line.get_data()) for line in axes.lines[:3])
+    periods = (tail.shape[1] - 1) / 600
+    motion = solution.sample(np.linspace(0.0, periods, tail.shape[1]))
+    links = motion.theta + np.cumsum(np.insert(motion.angles, 0, 0.0, axis=0), axis=0)
+    np.testing.assert_allclose(tail, motion.tail, atol=1e-12)
+    np.testing.assert_allclose(centre, motion.centre, atol=1e-12)
+    np.testing.assert_allclose(head, tail + np.mean([np.cos(links), np.sin(links)], axis=1), atol=1e-12)
+    drawn = bodies(axes)
+    np.testing.assert_allclose(drawn[-1][:, [0, -1]], np.stack([tail[:, -1], head[:, -1]], axis=1), atol=1e-12)
+    if size < 1:
+        assert (periods, len(drawn)) == (1, 1)
+    else:
+        long, step = np.ptp(drawn[0][0]), centre[0, 600] - centre[0, 0]  # it advances along x
+        assert (periods - 1) * step < 1.05 * long < periods * step
+        assert drawn[0][0].max() < drawn[1][0].min()
+
+
+@pytest.mark.parametrize(("size", "half"), [(0.01, 0.03), (0.5, 0.6), (1.2, 1.02 * np.pi)])
+def test_a_path_of_shapes_is_drawn_whole_with_its_sense_and_from_close_by_if_it_is_small(size, half, unsolved):
+    problem, axes = snake(1.2), Figure().add_subplot()
+    q = np.array([[0.3], [-0.2]]) + size * np.array([np.cos(angle := np.linspace(0, 2 * np.pi, 500)), np.sin(angle)])
+    draw_shape_path(axes, problem, q)
+    pieces = axes.collections[-1].get_segments()
+    assert all((one[-1] == other[0]).all() for one, other in pairwise(pieces))
+    np.testing.assert_array_equal(np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)]), q.T)
+    (arrow,) = axes.texts
+    way, there = np.subtract(arrow.xy, arrow.xyann), np.subtract(arrow.xyann, [0.3, -0.2])
+    assert there[0] * way[1] > there[1] * way[0]
+    middle = (0.3, -0.2) if half < 3 else (0.0, 0.0)
+    np.testing.assert_allclose([axes.get_xlim(), axes.get_ylim()], np.add.outer(middle, [-half, half]), atol=1e-3 * half)
+
+
 @pytest.mark.parametrize(("n_link", "size"), [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (8, 0.3)])
 def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
     solution = unsolved(crawler(n_link, size))
@@ -52,8 +101,12 @@ def test_the_solved_problem_can_be_read(three_link):
 
 
 @pytest.mark.parametrize("name", ["lab", "angles", "speeds", "power", "convergence", "mesh", "shape-1-2", "filmstrip"])
-def test_panels_alone_can_be_read(name, three_link):
-    assert_readable(panels(three_link)[name].figure())
+def test_panels_alone_can_be_read_and_hold_all_that_is_drawn(name, three_link):
+    figure = panels(three_link)[name].figure()
+    assert_readable(figure)
+    (axes,) = figure.axes
+    for seen, drawn in ((axes.viewLim.intervalx, axes.dataLim.intervalx), (axes.viewLim.intervaly, axes.dataLim.intervaly)):
+        assert min(seen) <= min(drawn) <= max(drawn) <= max(seen)
 
 
 def test_a_reader_of_words_sees_an_overlap():
@@ -65,13 +118,20 @@ def test_a_reader_of_words_sees_an_overlap():
 
 
 @pytest.mark.parametrize("n_link", [2, 3, 5])
-def test_snapshots_never_touch(n_link, unsolved):
-    axes = Figure().add_subplot()
-    draw_filmstrip(axes, unsolved(crawler(n_link, 1.5)))
-    bodies = [line.get_xdata() for line in axes.lines if line.get_linestyle() == "-"]
-    assert len(bodies) == 11
-    for left, right in pairwise(bodies):
-        assert right.min() - left.max() > 0.1
+def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved_to_their_places(n_link, unsolved):
+    solution, axes = unsolved(crawler(n_link, 1.5)), Figure().add_subplot()
+    draw_filmstrip(axes, solution)
+    drawn, motion = bodies(axes), solution.sample(np.linspace(0.0, 1.0, 11))
+    assert len(drawn) == 11
+    for left, right in pairwise(drawn):
+        assert 0.1 < right[0].min() - left[0].max() < 0.6
+    tails = np.stack([body[:, 0] for body in drawn], axis=1)
+    centres = np.concatenate([line.get_data() for line in axes.lines if line.get_marker() == "+"], axis=1)
+    np.testing.assert_allclose(tails[1], motion.tail[1], atol=1e-12)
+    np.testing.assert_allclose(centres - tails, motion.centre - motion.tail, atol=1e-12)
+    said = [float(text.get_text().replace("−", "-")) for text in axes.texts]
+    np.testing.assert_allclose(said[::2], np.linspace(0.0, 1.0, 11))
+    np.testing.assert_allclose(said[1::2], motion.centre[0], atol=5.1e-3)
 
 
 def test_forbidden_shapes_are_the_exact_set_of_the_three_link_body():
@@ -141,6 +201,5 @@ def test_a_flat_motion_is_drawn_higher_and_says_so(size, times, unsolved):
     problem = Problem("flat", gait, body, gait=Harmonic(1), delta=1e-2, intervals=8, smallest_shape_speed=1e-3)
     draw_filmstrip(axes, unsolved(problem))
     said = [text.get_text() for text in axes.texts if "heights" in text.get_text()]
-    drawn = np.ptp(np.concatenate([line.get_ydata() for line in axes.lines if line.get_linestyle() == "-"]))
-    assert drawn > 0.2
+    assert np.ptp(np.concatenate(bodies(axes), axis=1)[1]) > 0.2
     assert said == ([] if times == 1 else [f"heights drawn {times} times as large"])
