@@ -87,20 +87,22 @@ def _speed(rates: np.ndarray) -> np.ndarray:
 
 
 def _solved(moving: Moving, starts: np.ndarray, method: str = "direct") -> tuple[np.ndarray, np.ndarray]:
-    """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where that is no solution."""
+    """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where none is, or one again."""
     count, n_time = starts.shape[0], starts.shape[2]
     body, friction, angles, rates, delta, load = tiled = moving.at(np.tile(np.arange(n_time), count))
     at, start = (body, friction, angles, rates, delta), np.concatenate(list(starts), axis=1)
     solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, method=method)
-    sign = np.where((solved.residual <= _ACCEPTED) | solved.converged, np.sign(_determinant(tiled, solved)), 0.0)
-    return np.stack(np.split(solved.z, count, axis=1)), sign.reshape(count, -1)
+    z, found = np.stack(np.split(solved.z, count, axis=1)), (solved.residual <= _ACCEPTED) | solved.converged
+    new = found.reshape(count, -1) & ~_repeated(np.where(found.reshape(count, 1, -1), z, np.nan), _speed(moving.rates))
+    return z, np.sign(_determinant(tiled, solved, np.flatnonzero(new))).reshape(count, -1)
 
 
-def _determinant(moving: Moving, solved: BalanceSolution) -> np.ndarray:
-    """Of `balance_jacobian`, ``(n_time,)``; the reference does not matter, but the slowest link loses no digits."""
-    result = np.empty(solved.anchor.size)
-    for link, chosen in groups(solved.anchor):
-        result[chosen] = np.linalg.det(_jacobian(moving.at(chosen), solved.anchor_velocity[:, chosen], link))
+def _determinant(moving: Moving, solved: BalanceSolution, where: np.ndarray) -> np.ndarray:
+    """Of `balance_jacobian`, ``(n_time,)``, else 0; the reference does not matter, but the slowest link loses no digits."""
+    result = np.zeros(solved.anchor.size)
+    for link, chosen in groups(solved.anchor[where]):
+        at = where[chosen]
+        result[at] = np.linalg.det(_jacobian(moving.at(at), solved.anchor_velocity[:, at], link))
     return result
 
 
@@ -122,14 +124,18 @@ def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
 
 def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
     """Solutions less their repetitions, those that remain in their order, and no longer than needed."""
-    z, sign = np.where(sign[:, None] == 0, np.nan, z), sign.copy()
-    for i in range(len(z)):
-        same = (np.abs(z[:i] - z[i]).max(axis=1) < DISTINCT * speed).any(axis=0)
-        z[i, :, same], sign[i, same] = np.nan, 0.0
+    z = np.where(sign[:, None] == 0, np.nan, z)
+    again = _repeated(z, speed)
+    z, sign = np.where(again[:, None], np.nan, z), np.where(again, 0.0, sign)
     order = np.argsort(sign == 0, axis=0, kind="stable")
     z, sign = np.take_along_axis(z, order[:, None], axis=0), np.take_along_axis(sign, order, axis=0)
     most = max(1, int((sign != 0).sum(axis=0).max(initial=1)))
     return Branches(z[:most], sign[:most])
+
+
+def _repeated(z: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Which of velocities ``(n, 3, n_time)`` one before is already, ``(n, n_time)``; NaN is none."""
+    return np.stack([(np.abs(z[:i] - z[i]).max(axis=1) < DISTINCT * speed).any(axis=0) for i in range(len(z))])
 
 
 def _merged(everywhere: Branches, chosen: np.ndarray, there: Branches) -> Branches:
