@@ -150,12 +150,17 @@ def test_splines_with_inertia_are_certified():
     assert colloc.solve(Problem("paced", gait=BSpline(8, symmetry="antipodal"), froude=1e-3), starts=4).status == "solved"
 
 
-def test_interpolation_states_its_error():
-    """Well where steps are small; of few samples it is too large, as their error has not yet come to fall fast."""
-    for n, most in ((24, 10), (48, 1.5), (96, 1.2)):
-        basis, t = Basis([bump(np.arange(n) / n)]), np.linspace(0, 1, 5001)
-        true = np.abs(basis.functions(t)[0] - bump(t)).max() / bump(0.0)
-        assert 1.0 < basis.error / true < most
+@pytest.mark.parametrize(
+    ("column", "least", "most"),
+    [(bump, 1.0, (10, 1.5, 1.2)), (lambda t: np.abs(np.sin(np.pi * (t - 0.3141))) ** 3, 0.3, (4, 4, 4))],
+)
+def test_interpolation_states_its_error(column, least, most):
+    """Well where steps are small; of few samples it is too large, as their error has not yet come to fall fast. Of a rough one
+    it is known to a factor."""
+    for n, factor in zip((24, 48, 96), most, strict=True):
+        basis, t = Basis([column(np.arange(n) / n)]), np.linspace(0, 1, 5001)
+        true = np.abs(basis.functions(t)[0] - column(t)).max() / column(t).max()
+        assert least < basis.error / true < factor
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1, 40])
@@ -166,13 +171,22 @@ def test_columns_have_the_harmonics_that_hold_all_but_a_millionth_of_their_mean_
         assert Basis([both[0] + both[1]]).harmonics == Basis(both).harmonics == harmonics
 
 
-def test_a_file_of_columns_is_read_with_or_without_its_last_line(tmp_path):
-    t = np.linspace(0, 3, 97)
-    rows = np.column_stack([t, bump(t / 3), bump(t / 3 - 0.25)])
-    for number, kept in enumerate((rows, rows[:-1])):
-        path = tmp_path / f"{number}.csv"
-        np.savetxt(path, kept, delimiter=",", header="time,one,two", comments="")
-        np.testing.assert_allclose(Basis(str(path)).functions(T), Basis([rows[:-1, 1], rows[:-1, 2]]).functions(T), atol=1e-12)
+def test_a_file_of_columns_is_read_with_or_without_its_last_line_and_by_even_steps_only(tmp_path):
+    """The last line is the first again where every column is back to a tenth of a step: the last but one of the last is too."""
+    t, path = np.linspace(0, 3, 97), tmp_path / "columns.csv"
+    rows = np.column_stack([t, *(bump(t / 3 - late) for late in (0.0, 0.25, -0.5 / 96))])
+    again = rows + 0.08 * np.abs(np.diff(rows[:, 1:], axis=0)).max(axis=1).mean() * (t == 3)[:, None] * [0, 1, 1, 1]
+    for kept in (rows, rows[:-1], again):
+        np.savetxt(path, kept, delimiter=",", header="time,one,two,three", comments="")
+        np.testing.assert_allclose(Basis(str(path)).functions(T), Basis(list(rows[:-1, 1:].T)).functions(T), atol=1e-12)
+    for times in (-t, 0 * t, np.where(t == 3, 3.01, t), 0.01 * np.where(t == 3, 3.01, t)):
+        np.savetxt(path, np.column_stack([times, rows[:, 1:]]), delimiter=",", header="time,one,two,three", comments="")
+        with pytest.raises(ProblemError, match="must rise by even steps"):
+            Basis(str(path))
+
+
+def test_a_joint_may_rest_in_a_column():
+    assert Basis([np.stack([np.cos(2 * np.pi * PHASES), np.ones(96)])]).size(2) == 1
 
 
 @pytest.mark.parametrize(

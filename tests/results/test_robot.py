@@ -84,6 +84,14 @@ def test_no_end_joint_carries_more_than_its_link_swung_broadside(robot):
     assert max(robot.facts["peak_torque_N_m"]) <= 3 * 9.81 / 3 * 1.2 / 6 * (1 + 1e-9)
 
 
+def test_every_side_of_a_polygon_is_sampled_eight_times_however_many_there_are(three_link, monkeypatch):
+    corners = np.arange(1, 400) / 400
+    monkeypatch.setattr(colloc.Fourier, "corner_phases", corners)
+    seconds = three_link.robot(**SIZE).columns["t"].values
+    sides = np.concatenate([[0.0], corners, [1.0]]) - 1e-9
+    assert np.histogram(seconds[:-1] / SIZE["period"], sides)[0].min() == 8
+
+
 def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
     """Friction is proportional to the weight, torques to the length too; the pace is in speeds and powers alone."""
     other = three_link.robot(length=2.4, mass=6, period=10, gravity=9.81 / 2).facts

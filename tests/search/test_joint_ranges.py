@@ -64,9 +64,9 @@ def test_a_range_that_is_even_is_a_limit_and_one_may_go_to_half_a_turn():
 
 
 def test_shapes_are_held_against_one_limit_on_either_side():
-    stretched, limit = under_one_limit(np.array([[-0.6, 1.5, 0.75]]), ((-0.6, 1.5),))
+    stretched, limit = under_one_limit(np.array([[-0.6, 1.5, 0.75], [0.5, -0.3, 0.0]]), ((-0.6, 1.5), 0.5))
     assert limit == 1.5
-    np.testing.assert_allclose(stretched, [[-1.5, 1.5, 0.75]])
+    np.testing.assert_allclose(stretched, [[-1.5, 1.5, 0.75], [1.5, -0.9, 0.0]])
 
 
 @pytest.mark.parametrize(
@@ -77,6 +77,9 @@ def test_shapes_are_held_against_one_limit_on_either_side():
         (((-1.0, 3.142), 1.0), Harmonic(1), "neither beyond 3.142"),
         (((-3.142, 1.0), 1.0), Harmonic(1), "neither beyond 3.142"),
         (((-30, 60), 1.0), Harmonic(1), "radians"),
+        (3.142, Harmonic(1), r"lie in \(0, pi\], not 3.142"),
+        ((1.0, 0.0), Harmonic(1), r"lie in \(0, pi\], not 0"),
+        ("wide", Harmonic(1), "not 'wide'"),
         (((-1, 1, 2), 1.0), Harmonic(1), "least and its largest"),
         (((-1, 2),), Harmonic(1), "give one for all joints"),
         (((-1, 2), (-1, 2)), Harmonic(1, "bilateral"), "mirrored joints"),
