@@ -77,6 +77,26 @@ def test_a_free_path_closes_smoothly_at_unit_shape_speed_with_its_symmetry(symme
         np.testing.assert_allclose(path.angles(t + 0.5), -path.angles(t), atol=1e-8)
 
 
+@pytest.mark.parametrize("body", [None, Chain((0.25,) * 4)])
+def test_a_path_is_the_member_of_its_parameters_the_first_of_which_is_its_shape_speed(body):
+    path, kind = member("antipodal", body=body), FreePath(4.0, "antipodal")
+    v = kind.parameters(path)
+    assert v.size == kind.size(path.n_joint, path.edges.size - 1)
+    assert v[0] == pytest.approx(path.shape_speed)
+    again, t = kind.member(v, path.n_joint, path.edges), np.arange(100) / 100
+    np.testing.assert_allclose(again.angles(t), path.angles(t), atol=1e-14)
+    np.testing.assert_allclose(again.rates(t), path.rates(t), atol=1e-12)
+
+
+def test_part_of_a_period_has_that_part_of_the_intervals_and_a_dense_search_some_250_numbers():
+    for kind in (lambda s: FreePath(symmetry=s), lambda s: Harmonic(3, s)):
+        whole, half = kind("none"), kind("antipodal")
+        assert whole.intervals(2) == 2 * half.intervals(2)
+    path, half = FreePath(), FreePath(symmetry="antipodal")
+    assert 0 < 2 * half.coarse_intervals(2) == path.coarse_intervals(2) < 0.5 * path.intervals(2)
+    assert [each * path.most_arcs(n) for n, each in ((2, 1), (5, 5), (10, 10))] == [250] * 3
+
+
 def test_finer_arcs_are_the_same_path():
     path = member("bilateral")
     edges = np.sort(np.concatenate([path.edges, 0.3 * path.edges[1:] + 0.7 * path.edges[:-1]]))
@@ -257,6 +277,9 @@ def test_a_circle_of_arcs_has_one_curvature_and_winds_once_its_way(way):
     np.testing.assert_allclose(circle.curvatures(), 2 * way)
     assert circle.largest_curvature() == pytest.approx(2)
     assert circle.winding == way
+    for allowed, beyond in ((1.6, 0.25), (2.5, 0.0)):
+        checks = {name: value for name, value, *_ in FreePath(allowed).own_checks(circle)}
+        assert checks == {"joins": circle.largest_jump(), "curvature": pytest.approx(beyond)}
 
 
 def test_a_pair_of_closed_joints_that_travels_along_a_folded_chain_wastes_nothing_in_the_limit():

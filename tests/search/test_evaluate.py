@@ -130,6 +130,7 @@ def test_kept_and_loaded_it_is_the_same(evaluated, tmp_path):
         (colloc.Fourier([0.0, 0.0], [[1.2], [0.0]], [[0.0], [0.9]]), "the amplitude"),
         (colloc.Fourier([0.0, 0.0], [[0.8], [0.3]], [[0.0], [0.8 * 0.927]]), "the phase between the joints"),
         (colloc.Fourier([0.0, 0.0], [[0.8, 0.2], [0.0, 0.0]], [[0.0, 0.0], [0.8, 0.1]]), "the higher harmonics"),
+        (GAIT, "the offset of the joints"),  # and by all else
     ],
 )
 def test_by_what_gaits_differ(changed, differs):

@@ -136,10 +136,20 @@ def test_feet_beside_each_other_move_together():
     assert [foot.place for foot in moved] == pytest.approx([0.3, 0.3, 0.6])
 
 
-def test_wheels_have_numbers_of_their_own():
-    body = colloc.Chain(feet=tuple(colloc.Wheel(k, rolling=0.05) for k in range(3)))
-    names = [each.name for each in parameters(colloc.Problem("x", body=body))]
-    assert names[:3] == [f"friction {way} of feet 1, 2 and 3" for way in WAYS]
+@pytest.mark.parametrize(
+    ("middle", "others"),
+    [
+        (colloc.Foot(1), [f"friction {way}" for way in WAYS]),
+        (colloc.Wheel(1, rolling=0.1), [f"friction {way} of foot 2" for way in WAYS]),
+    ],
+)
+def test_wheels_have_numbers_of_their_own(middle, others):
+    body = colloc.Chain(feet=(colloc.Wheel(0, rolling=0.05), middle, colloc.Wheel(2, rolling=0.05)))
+    stated = {each.name: each for each in parameters(colloc.Problem("x", body=body))}
+    own = [f"friction {way} of feet 1 and 3" for way in WAYS]
+    assert {name for name in stated if "friction" in name} == {*others, *own}
+    changed = [foot.friction for foot in stated[own[1]].changed(0.2).body.feet]
+    assert changed == [colloc.Friction(1, 0.06, 0.05), body.feet[1].friction, colloc.Friction(1, 0.06, 0.05)]
 
 
 @pytest.mark.parametrize(
