@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Basis, BSpline, Chain, Friction, Harmonic, Problem, ProblemError
+from colloc import Basis, BSpline, Chain, Friction, Harmonic, ModalBody, Problem, ProblemError
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.gait_fields import class_from, fields, gait_from
 from colloc.gaits.symmetry import SYMMETRIES
@@ -69,6 +69,50 @@ def test_members_have_the_symmetry_of_their_class_and_are_found_again(symmetry, 
         # as anybody's gait: by its angles alone
         again = gait_class.member(gait_class.parameters(gait.mapped(np.eye(n_joint))), n_joint)
         np.testing.assert_allclose(again.angles(T), gait.angles(T), atol=1e-4)
+
+
+@pytest.mark.parametrize("body", [Chain(), ModalBody(2)])
+@pytest.mark.parametrize("gait_class", CLASSES)
+def test_what_a_class_says_of_its_parameters_is_true_of_its_gaits(gait_class, body):
+    gait, t = member(gait_class), np.arange(4000) / 4000
+    v, (first, second) = gait_class.parameters(gait), gait.angles(t)
+    assert v @ gait_class.mean_square_rate(2) @ v == pytest.approx((gait.rates(t) ** 2).sum(axis=0).mean(), rel=1e-4)
+    area = 0.5 * np.sum(first * np.roll(second, -1) - second * np.roll(first, -1))
+    assert v @ gait_class.enclosed_area(2) @ v == pytest.approx(area, rel=1e-4, abs=1e-9)
+    np.testing.assert_allclose(gait.scaled(-3.0).angles(t), -3.0 * gait.angles(t))
+    for parameters in (v, *np.eye(v.size)):
+        low, high = gait_class.bounds(body, body.largest_angles(gait_class.member(parameters, 2).angles(t)).max())
+        assert np.all((low - 1e-9 <= parameters) & (parameters <= high + 1e-9))
+    points = gait_class.fewest_intervals(3)[0] * 3
+    assert 4 * gait_class.harmonics <= points < max(4 * gait_class.harmonics + 3, 7)
+
+
+@pytest.mark.parametrize("gait_class", [Basis(FOUR, "antipodal"), Basis(ELLIPSES)])
+def test_random_combinations_of_columns_are_drawn_about_rest_each_up_to_a_radian(gait_class):
+    unit = np.random.default_rng(5).uniform(size=gait_class.dimension(2))
+    drawn, opposite = (gait_class.drawn(u, 2).angles(T) for u in (unit, 1 - unit))
+    np.testing.assert_allclose(drawn, -opposite, atol=1e-12)
+    for one in 0.5 + 0.5 * np.eye(unit.size):
+        assert np.abs(gait_class.drawn(one, 2).angles(gait_class.instants)).max() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("unit", [0.01, 40])
+def test_a_hop_moves_angles_by_normals_of_its_step_whatever_the_units_of_a_column(unit):
+    kind, rng = (
+        Basis([unit * np.stack([np.cos(2 * np.pi * PHASES), 0.3 * np.sin(2 * np.pi * PHASES)])]),
+        np.random.default_rng(3),
+    )
+    gait = kind.member(np.ones(1) / unit, 2)
+    hops = [kind.moved(gait, 0.2, 1, rng).angles(T)[0, 0] - 1.0 for _ in range(400)]
+    assert (np.mean(hops), np.std(hops)) == pytest.approx((0.0, 0.2), abs=0.02)
+
+
+def test_a_search_begins_with_a_wave_or_where_a_class_has_none_with_all_of_it_as_fast():
+    wave, twice = colloc.ellipse(0.0, 1.2, 0.7), [np.cos(4 * np.pi * PHASES), np.sin(4 * np.pi * PHASES)]
+    for gait_class in (*CLASSES, Basis(twice)):
+        assert gait_class.first_guess(wave).shape_speed == pytest.approx(wave.shape_speed)
+    np.testing.assert_allclose(BSpline(24).first_guess(wave).angles(T), wave.angles(T), atol=1e-4)
+    assert np.ptp(Basis(twice).first_guess(wave).angles(T) / np.sum(Basis(twice).functions(T), axis=0)) < 1e-9
 
 
 def test_a_symmetry_halves_the_parameters():

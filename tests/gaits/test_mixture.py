@@ -87,23 +87,25 @@ def test_a_mixture_taken_apart_is_the_polygon_and_its_mean_follows_the_same_shap
     assert np.allclose(gait.mean.shapes, gait.shapes, atol=1e-12)
 
 
-@pytest.mark.parametrize("n_joint", [2, 3])
-def test_loops_run_counter_clockwise_or_clockwise_as_asked(n_joint):
-    """Three directions that add up to nothing make one loop: it encloses the same area with either sign."""
-    turn = 2 * np.pi * np.array([0.3, 2.3, 1.3]) / 3  # neither order of the directions as they are stated
-    plane = np.linalg.qr(np.random.default_rng(7).standard_normal((n_joint, n_joint)))[0][:2] if n_joint > 2 else np.eye(2)
-    directions = np.stack([np.cos(turn), np.sin(turn)], axis=1) @ plane
-    gait = Mixture([[0.2, 0.2, 0.2]], [directions], np.zeros(n_joint))
+@pytest.mark.parametrize(("n_joint", "drift"), [(2, 0.0), (3, 0.0), (3, 0.8)])
+def test_loops_run_counter_clockwise_or_clockwise_as_asked(n_joint, drift):
+    """Four directions that add up to nothing, or to a drift across their plane, make one loop there: it encloses the same area
+    with either sign."""
+    turn = 2 * np.pi * np.array([0.3, 2.3, 1.3, 3.3]) / 4  # neither order of the directions as they are stated
+    axes = np.linalg.qr(np.random.default_rng(7).standard_normal((n_joint, n_joint)))[0] if n_joint > 2 else np.eye(2)
+    plane, size = axes[:2], np.sqrt(1 - drift**2)
+    directions = size * np.stack([np.cos(turn), np.sin(turn)], axis=1) @ plane + drift * axes[-1]
+    gait = Mixture([[0.2] * 4], [directions], np.zeros(n_joint))
 
     def area(sense):
         x, y = plane @ gait.unmixed(1, sense).shapes
         return 0.5 * np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])
 
-    triangle = 0.2**2 * np.sqrt(3) / 4
+    square = (0.2 * size) ** 2
     if n_joint == 2:
-        assert (area(1), area(-1)) == pytest.approx((triangle, -triangle))
+        assert (area(1), area(-1)) == pytest.approx((square, -square))
     else:  # which side of their plane is above is not said
-        assert sorted((area(1), area(-1))) == pytest.approx([-triangle, triangle])
+        assert sorted((area(1), area(-1))) == pytest.approx([-square, square])
 
 
 def test_splitting_pieces_changes_no_motion():
@@ -114,10 +116,23 @@ def test_splitting_pieces_changes_no_motion():
     assert np.allclose(finer.angles(t), gait.angles(t), atol=1e-12)
 
 
-def test_what_takes_longest_is_split_and_again_where_a_part_still_does():
-    gait = Mixture([[3.0], [2.0], [0.0]], [[[1.0, 0.0]], [[0.0, 1.0]], [[1.0, 0.0]]], [0.0, 0.0])
-    np.testing.assert_allclose(gait.split(5).durations[:, 0], np.ones(5))
-    np.testing.assert_allclose(gait.split(6).durations[:, 0], [0.75] * 4 + [1.0] * 2)
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_what_takes_longest_is_split_and_again_where_a_part_still_does_and_what_takes_no_time_goes(size):
+    gait = Mixture(size * np.array([[3.0], [2.0], [1e-10]]), [[[1.0, 0.0]], [[0.0, 1.0]], [[1.0, 0.0]]], [0.0, 0.0])
+    np.testing.assert_allclose(gait.split(5).durations[:, 0] / size, np.ones(5))
+    np.testing.assert_allclose(gait.split(6).durations[:, 0] / size, [0.75] * 4 + [1.0] * 2)
+    np.testing.assert_allclose(gait.mean.durations[:, 0] / size, [3, 2])
+    np.testing.assert_allclose(gait.unmixed().durations[:, 0] / size, [3, 2])
+
+
+def test_a_class_has_240_pieces_a_period_or_some_400_numbers_and_makes_polygons_of_vertices():
+    assert [Relaxed(2, symmetry).intervals(2) for symmetry in ("both", "none")] == [60, 100]
+    assert [each * Relaxed(2).intervals(n) for n, each in ((3, 8), (4, 10))] == [400, 400]
+    assert Relaxed(9).intervals(9) == 8
+    kind, vertices = Relaxed(3, "none"), np.random.default_rng(0).normal(size=(5, 3))
+    gait = kind.member(vertices.ravel(), 3, np.linspace(0, 1, 5))
+    assert kind.size(3, 4) == vertices.size
+    np.testing.assert_allclose(gait.corners, vertices.T[:, : gait.n_corner])
 
 
 def test_gaits_and_classes_survive_being_written_down():
@@ -132,7 +147,8 @@ def test_gaits_and_classes_survive_being_written_down():
     ("arguments", "complaint"),
     [
         (([[1.0]], [[[2.0, 0.0]]], [0.0, 0.0]), "unit vectors"),
-        (([[-1.0]], [[[1.0, 0.0]]], [0.0, 0.0]), "negative"),
+        (([[-1.0, 2.0]], [[[1.0, 0.0]] * 2], [0.0, 0.0]), "negative"),
+        (([[0.0]], [[[1.0, 0.0]]], [0.0, 0.0]), "nor all zero"),
         (([[1.0, 1.0]], [[[1.0, 0.0]]], [0.0, 0.0]), "disagree"),
         (([[np.nan]], [[[1.0, 0.0]]], [0.0, 0.0]), "finite"),
     ],
