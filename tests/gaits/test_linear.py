@@ -120,6 +120,10 @@ def test_a_symmetry_halves_the_parameters():
     assert [Basis(FOUR, symmetry=s).size(2) for s in SYMMETRIES] == [8, 4, 4]
 
 
+def test_starts_of_many_knots_are_as_smooth_as_three_harmonics():
+    assert [BSpline(knots).dimension(2) for knots in (5, 12, 64)] == [Harmonic(n).dimension(2) for n in (2, 3, 3)]
+
+
 @pytest.mark.parametrize("gait_class", [Harmonic(1), Harmonic(12), Harmonic(12, "bilateral"), BSpline(8, symmetry="bilateral")])
 def test_a_mesh_grows_from_sixteen_intervals_a_period_or_two_a_wave_and_not_from_twice_as_many(gait_class):
     last = gait_class.fraction

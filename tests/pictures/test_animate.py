@@ -13,6 +13,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.animation import pictures
+from colloc.pictures.motion_frames import frames, lab_outline
 from colloc.pictures.movie import write_movie
 from colloc.pictures.publication import save_panels
 from colloc.results.store import save
@@ -25,21 +26,29 @@ def crawler(n_link):
 
 
 def dark(picture):
-    """Centre of the dark pixels of the left part: the body."""
-    left = picture[40:, : int(0.68 * picture.shape[1])]
-    rows, columns = np.nonzero(left.max(axis=2) < 80)
-    return columns.mean(), rows.mean()
+    """Middle and extents of the dark pixels of the left part: the body."""
+    rows, columns = np.nonzero(picture[60:, : int(0.68 * picture.shape[1])].max(axis=2) < 80)
+    left, right, top, bottom = columns.min(), columns.max(), 60 + rows.min(), 60 + rows.max()
+    return 0.5 * (left + right), 0.5 * (top + bottom), right - left, bottom - top
 
 
-def test_the_body_advances_by_its_distance_from_period_to_period(three_link):
-    drawn = list(pictures(three_link, 2, 3, width=600))
+def test_every_picture_shows_the_body_where_it_is_then(three_link):
+    """At equal scales in both directions, as large as fits in."""
+    drawn, (low, high) = list(pictures(three_link, 2, 3)), frames(three_link, 3).window
     assert len(drawn) == 6
-    assert len({picture.shape for picture in drawn}) == 1
-    assert all(edge % 2 == 0 for edge in drawn[0].shape[:2])  # video wants even numbers
-    x = [dark(picture)[0] for picture in drawn]
-    assert x[2] - x[0] == pytest.approx(x[4] - x[2], abs=1.5)
-    assert x[2] - x[0] > 20
-    assert dark(drawn[0])[1] == pytest.approx(dark(drawn[4])[1], abs=1.5)
+    tall, wide, _ = drawn[0].shape
+    assert (wide, tall % 2, {picture.shape for picture in drawn}) == (900, 0, {drawn[0].shape})  # video wants even numbers
+    scale = 0.68 * wide / (high - low)[0]
+    motion = three_link.sample(np.arange(6) / 2)
+    x, y = lab_outline(three_link.problem.body, motion.angles, motion.theta, motion.tail)
+    room = tall - 0.13 * wide  # the lower part, of this height
+    columns = 0.015 * wide + scale * (0.5 * (x.min(axis=0) + x.max(axis=0)) - low[0])
+    rows = 0.97 * tall - 0.5 * room - scale * (0.5 * (y.min(axis=0) + y.max(axis=0)) - 0.5 * (low + high)[1])
+    middle_x, middle_y, across, upwards = np.transpose([dark(picture) for picture in drawn])
+    np.testing.assert_allclose(middle_x, columns, atol=1.0)
+    np.testing.assert_allclose(middle_y, rows, atol=3.0)  # the head is a disc
+    for seen, extent in ((across, np.ptp(x, axis=0)), (upwards, np.ptp(y, axis=0))):
+        assert np.all(np.abs(seen - scale * extent - 8.0) < 4.0)  # pixels, of the lines
 
 
 @pytest.mark.parametrize("n_link", [2, 8])

@@ -15,7 +15,7 @@ from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import draw_filmstrip, draw_lab, draw_shape_path, forbidden, strips
+from colloc.pictures.figure import draw_allowed, draw_filmstrip, draw_lab, draw_shape_path, draw_speeds, forbidden, strips
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
 from colloc.pictures.style import save
@@ -30,13 +30,15 @@ def crawler(n_link, size=0.6):
     return Problem("crawler", guess, Chain(lengths), Friction(1.5, 1.0, 1.2), gait=Harmonic(1), delta=1e-2, intervals=8)
 
 
-def test_strips_have_the_width_of_the_links_and_round_ends():
+@pytest.mark.parametrize("turned", [0.0, 0.7, 2.5])
+def test_strips_have_the_width_of_the_links_and_round_ends(turned):
     ends = np.array([[0.0, 0.4, 0.4], [0.0, 0.0, 0.6]])
-    for strip, length in zip(strips(ends, 0.1), (0.4, 0.6), strict=True):
+    axes = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+    for strip, length, own in zip(strips(axes @ ends, 0.1), (0.4, 0.6), (axes, axes[:, ::-1]), strict=True):
         x, y = strip.T
         area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
         assert area == pytest.approx(0.1 * length + np.pi * 0.05**2, rel=0.01)
-    assert np.ptp(strips(ends, 0.1)[0], axis=0) == pytest.approx([0.5, 0.1])
+        assert np.ptp(strip @ own, axis=0) == pytest.approx([length + 0.1, 0.1])
 
 
 def snake(size):
@@ -76,14 +78,17 @@ def test_paths_in_the_lab_go_on_until_the_body_has_left_its_place_if_it_soon_doe
 @pytest.mark.parametrize(("size", "half"), [(0.01, 0.03), (0.5, 0.6), (1.2, 1.02 * np.pi)])
 def test_a_path_of_shapes_is_drawn_whole_with_its_sense_and_from_close_by_if_it_is_small(size, half, unsolved):
     problem, axes = snake(1.2), Figure().add_subplot()
-    q = np.array([[0.3], [-0.2]]) + size * np.array([np.cos(angle := np.linspace(0, 2 * np.pi, 500)), np.sin(angle)])
+    angle = np.linspace(0, 2 * np.pi, 500)
+    q = np.array([[0.3], [-0.2]]) + size * np.array([np.cos(angle), 0.5 * np.sin(angle)])
     draw_shape_path(axes, problem, q)
     pieces = axes.collections[-1].get_segments()
     assert all((one[-1] == other[0]).all() for one, other in pairwise(pieces))
     np.testing.assert_array_equal(np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)]), q.T)
     (arrow,) = axes.texts
-    way, there = np.subtract(arrow.xy, arrow.xyann), np.subtract(arrow.xyann, [0.3, -0.2])
-    assert there[0] * way[1] > there[1] * way[0]
+    x, y = np.subtract([arrow.xyann, arrow.xy], [0.3, -0.2]).T
+    sense = np.unwrap(np.arctan2(2 * y, x))
+    np.testing.assert_allclose(np.hypot(x, 2 * y), size, rtol=1e-3)
+    assert 0 < sense[1] - sense[0] < 0.1
     middle = (0.3, -0.2) if half < 3 else (0.0, 0.0)
     np.testing.assert_allclose([axes.get_xlim(), axes.get_ylim()], np.add.outer(middle, [-half, half]), atol=1e-3 * half)
 
@@ -107,6 +112,18 @@ def test_panels_alone_can_be_read_and_hold_all_that_is_drawn(name, three_link):
     (axes,) = figure.axes
     for seen, drawn in ((axes.viewLim.intervalx, axes.dataLim.intervalx), (axes.viewLim.intervaly, axes.dataLim.intervaly)):
         assert min(seen) <= min(drawn) <= max(drawn) <= max(seen)
+
+
+def test_speeds_are_drawn_down_to_rest(unsolved):
+    """All joints of a standing wave rest at once, and so does the body."""
+    wave, axes = Fourier(np.zeros(4), np.array([[0.6], [0.3], [0.5], [0.2]]), np.zeros((4, 1))), Figure().add_subplot()
+    solution = unsolved(snake(1.2).with_(guess=wave))
+    draw_speeds(axes, solution, np.linspace(0.0, 1.0, 101))
+    low, high = axes.get_ylim()
+    drawn = np.array([line.get_ydata() for line in axes.lines[:5]])
+    delta = solution.delta_per_period
+    assert 0.1 * delta <= drawn.min() < 0.2 * delta < 10 * delta < drawn.max()
+    assert low < drawn.min() < drawn.max() < high
 
 
 def test_a_reader_of_words_sees_an_overlap():
@@ -158,6 +175,8 @@ def test_forbidden_shapes_are_the_exact_set_of_the_three_link_body():
 )
 def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     grid, excess = forbidden(body, limit, *plane)
+    draw_allowed(axes := Figure().add_subplot(), body, limit, *plane)
+    assert len(axes.collections) == (excess.max() > 0)
     if share is not None:
         assert (excess > 0).mean() == pytest.approx(share, abs=0.01)
     shapes = np.random.default_rng(7).uniform(-np.pi, np.pi, (body.n_joint, 20000))
@@ -194,12 +213,21 @@ def test_pictures_of_the_gallery_can_be_read(n_link, size, unsolved):
     assert_readable(picture(unsolved(crawler(n_link, size))))
 
 
-@pytest.mark.parametrize(("size", "times"), [(0.02, 21), (0.6, 1)])
-def test_a_flat_motion_is_drawn_higher_and_says_so(size, times, unsolved):
-    body, gait = Chain((0.25,) * 4), Fourier(np.zeros(3), size * np.ones((3, 1)), size * np.array([[1.0], [0.0], [-1.0]]))
+@pytest.mark.parametrize(("size", "times"), [(0.02, 23), (0.6, 1)])
+def test_a_flat_motion_is_drawn_higher_with_its_feet_and_says_so(size, times, unsolved):
+    body, gait = (
+        Chain((0.25,) * 4, feet=1),
+        Fourier(np.zeros(3), size * np.ones((3, 1)), size * np.array([[1.0], [0.0], [-1.0]])),
+    )
     axes = Figure().add_subplot()
     problem = Problem("flat", gait, body, gait=Harmonic(1), delta=1e-2, intervals=8, smallest_shape_speed=1e-3)
     draw_filmstrip(axes, unsolved(problem))
     said = [text.get_text() for text in axes.texts if "heights" in text.get_text()]
-    assert np.ptp(np.concatenate(bodies(axes), axis=1)[1]) > 0.2
+    drawn = bodies(axes)
+    assert np.ptp(np.concatenate(drawn, axis=1)[1]) > 0.2
     assert said == ([] if times == 1 else [f"heights drawn {times} times as large"])
+    feet = np.concatenate(
+        [np.array(line.get_data()).reshape(2, 2, -1)[:, 0] for line in axes.lines if line.get_marker() == "s"], axis=1
+    )
+    middles = np.concatenate([0.5 * (body[:, 1:] + body[:, :-1]) for body in drawn], axis=1)
+    np.testing.assert_allclose(sorted(feet.T.tolist()), sorted(middles.T.tolist()), atol=1e-12)

@@ -1,6 +1,7 @@
 """Figures of relaxed gaits draw what they are given."""
 
 import numpy as np
+import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -20,8 +21,12 @@ def axes() -> Axes:
 def test_mixed_pieces_are_drawn_as_loops_and_others_are_not():
     drawn = axes()
     draw_mixture(drawn, PROBLEM, GAIT)
-    loops = [line for line in drawn.lines if len(line.get_xdata()) == 4]
+    loops = [np.array(line.get_data()) for line in drawn.lines if len(line.get_xdata()) == 4]
     assert len(loops) == 2  # the mixed piece and its image
+    for loop, piece in zip(loops, (1, 2), strict=True):
+        assert np.hypot(*np.diff(loop)).sum() == pytest.approx(0.25)
+        np.testing.assert_allclose(loop[:, 3] - loop[:, 0], 0.25 * 0.25 * np.array(GAIT.whole.directions[piece][0]), atol=1e-12)
+        np.testing.assert_allclose(loop.mean(axis=1), GAIT.whole.shapes[:, piece + 1], atol=1e-12)
 
 
 def test_shares_of_every_direction_are_drawn_over_the_period():

@@ -224,13 +224,19 @@ def test_chains_of_two_to_eight_links(n_link, unsolved):
 @pytest.mark.parametrize("n_link", [2, 3, 5])
 def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     problem = crawler(n_link, delta=1e-3)
-    shown = frames(unsolved(problem), count=25, arrows=1200)
+    shown = frames(solution := unsolved(problem), count=241, arrows=300)
     lengths = np.hypot(*np.diff(shown.ends, axis=1))
     np.testing.assert_allclose(lengths, np.full_like(lengths, 1 / n_link), atol=1e-12)
     # the arrows are friction per length: their sum is the net force, which vanishes up to the midpoint rule; at collocation
     # points only, between them z is interpolated: hence the loose bound on a mesh of eight intervals
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
+    spent = -(shown.arrow * np.gradient(shown.arrow_base, shown.t, axis=2)).sum(axis=0).mean(axis=0)
+    assert np.trapezoid(spent, shown.t) == pytest.approx(solution.measured.work, rel=5e-3)
+    drawn, (low, high) = shown.arrow_scale * shown.arrow, shown.window
+    assert np.hypot(*drawn).max() == pytest.approx(0.12)
+    tips = np.concatenate([before.of((shown.arrow_base + drawn).reshape(2, -1)) for before in shown.before], axis=1)
+    assert np.all((low < tips.min(axis=1)) & (tips.max(axis=1) < high) & (high - low < np.ptp(tips, axis=1) + 0.48))
 
 
 def test_what_the_page_draws_is_what_the_frames_hold(unsolved):
@@ -362,12 +368,18 @@ def test_a_notebook_shows_a_card(three_link):
     text = " ".join(card.text)
     for words in ("three_link", "solved", "0.26003", "checks, all hold", "distance d"):
         assert words in text
-    frames = [frame.split() for frame in re.search(r'points" values="([^"]+)"', three_link._repr_html_())[1].split(";")]
-    head = np.array([[float(x) for x in frame[-1].split(",")] for frame in frames])
-    half = len(frames) // 2
-    steps = head[half:] - head[:half]  # the second period repeats the first one, a distance further on
-    assert np.ptp(steps, axis=0).max() <= 0.3  # pixels, of tenths
-    assert abs(steps[0]).max() > 5
+    film = [frame.split() for frame in re.search(r'points" values="([^"]+)"', three_link._repr_html_())[1].split(";")]
+    drawn = np.array([[[float(x) for x in point.split(",")] for point in frame] for frame in film])  # (time, point, 2) [pixels]
+    half, scale = len(film) // 2, 3 * np.hypot(*(drawn[0, 1] - drawn[0, 0]))
+    np.testing.assert_allclose(np.hypot(*np.diff(drawn, axis=1).transpose(2, 0, 1)), scale / 3, atol=0.15)
+    steps = drawn[half:] - drawn[:half]  # the second period repeats the first one, a distance further on
+    np.testing.assert_allclose(np.hypot(*steps.transpose(2, 0, 1)), scale * three_link.measured.distance, atol=0.3)
+    size = [float(x) for x in re.search(r'<svg width="(\d+)" height="(\d+)"', three_link._repr_html_()).groups()]
+    assert np.all((drawn > 0) & (drawn < size))
+    assert max(size[0] / 320, size[1] / 200) == 1
+    start = three_link.sample(0.0)
+    upwards = lab_outline(three_link.problem.body, start.angles, start.theta, start.tail)[1, :, 0]
+    np.testing.assert_allclose(drawn[0, :, 1] - drawn[0, 0, 1], -scale * (upwards - upwards[0]), atol=0.3)
     failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     assert "not converged" in " ".join(outline(failed._repr_html_()).text)
 
