@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -144,17 +145,23 @@ def _smooth_abs(xp, value: Array) -> Array:
 
 def _side(body: Links, angles: Array, line: int, link: int) -> Array:
     """How far `link` stays on one side of the line through the link `line`; negative if its ends are on both sides."""
-    xp = namespace(angles)
-    step = 1 if link > line else -1
-    height, turn = 0.0, 0.0
-    # walk along the chain, in the frame of `line`, to the near end of `link`
-    for k in range(line + step, link + step, step):
-        joint = k - 1 if step > 0 else k
-        turn = turn + angles[joint : joint + 1, :]
-        rise = body.lengths[k] * xp.sin(turn)
-        near, height = height, height + rise
-    mean, spread = 0.5 * (near + height), 0.5 * (height - near)
+    xp, (turns, rises) = namespace(angles), _walk(tuple(body.lengths), line, link)
+    heights = xp.matmul(rises, xp.sin(xp.matmul(turns, angles)))
+    mean, spread = heights[0:1, :], heights[1:2, :]
     return _smooth_abs(xp, mean) - xp.sqrt(spread * spread + CLEARANCE_SMOOTHING**2)
+
+
+@lru_cache(maxsize=4096)
+def _walk(lengths: tuple[float, ...], line: int, link: int) -> tuple[np.ndarray, np.ndarray]:
+    """Along the chain, in the frame of `line`, to the end of `link`: the turns of the links passed, of joint angles
+    ``(n, n_joint)``, and of their sines the mean height of that link's ends, and half their difference, ``(2, n)``."""
+    step = 1 if link > line else -1
+    passed = list(range(line + step, link + step, step))
+    turns = np.cumsum(np.eye(len(lengths))[[k - 1 if step > 0 else k for k in passed], :-1], axis=0)
+    rises = np.tile(np.take(lengths, passed), (2, 1))
+    rises[:, -1] *= 0.5
+    rises[1, :-1] = 0.0
+    return turns, rises
 
 
 def separate_pairs(body: Links) -> list[tuple[int, int]]:
