@@ -80,18 +80,57 @@ def test_a_kink_of_the_objective_is_found():
     assert found.objective < 1e-3
 
 
+def of_one(f, slope, lower=-np.inf, upper=np.inf):
+    """A program of one number without rows."""
+    return Program(f, lambda x: slope(x).reshape(1), lambda x: np.zeros(0), lambda x: np.zeros((0, 1)), [], [], 1, lower, upper)
+
+
 @pytest.mark.parametrize(("stiff", "wanted"), [(1.9, [-0.9, 0.05]), (4, [-3, 0]), (40, [-39, -3, 0])])
 def test_a_step_that_is_too_long_is_cut_to_the_least_of_a_parabola_between_a_tenth_and_half(stiff, wanted):
     """A model of curvature 1 leads from 1 to 1 - stiff."""
     tried = []
-    nothing = lambda x: np.zeros(0), lambda x: np.zeros((0, 1)), [], [], 1
-    minimised(
-        Program(lambda x: tried.append(x[0]) or 0.5 * stiff * x[0] ** 2, lambda x: stiff * x, *nothing),
-        np.ones(1),
-        np.inf,
-        1e-12,
-    )
+    minimised(of_one(lambda x: tried.append(x[0]) or 0.5 * stiff * x[0] ** 2, lambda x: stiff * x), np.ones(1), np.inf, 1e-12)
     assert tried[: 1 + len(wanted)] == pytest.approx([1, *wanted], abs=1e-12)
+
+
+def test_a_curvature_that_is_negative_counts_as_a_fifth_of_the_modelled_one():
+    found = minimised(of_one(lambda x: -0.5 * x[0] ** 2, lambda x: -x), np.array([0.1]), 1.0, 1e-12, iterations=1)
+    assert (found.iterations, found.v[0], found.curvature[0, 0]) == (1, pytest.approx(0.2), pytest.approx(0.2))
+
+
+def test_where_no_step_is_an_improvement_the_start_is_what_is_found():
+    found = minimised(of_one(lambda x: x[0], lambda x: -np.ones(1)), np.array([0.3]), 1.0, 1e-12)
+    assert (found.v[0], found.objective, found.iterations) == (0.3, 0.3, 1)
+
+
+def test_steps_that_lead_away_from_what_a_row_asks_for_are_cut():
+    """Newton's method for arctan(x) = 0 diverges from beyond 1.39."""
+    program = Program(
+        lambda x: 0.0, lambda x: np.zeros(1), lambda x: np.arctan(x), lambda x: 1 / (1 + x[None] ** 2), [0.0], [0.0], 1
+    )
+    assert minimised(program, np.array([3.0]), np.inf, 1e-12).v[0] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("least_at", "bound", "v", "on_edge"), [(0.6, 1, 0.6, False), (2, 1, 0.9, True), (-2, 1, -0.1, True), (2, 0.7, 0.7, False)]
+)
+def test_only_the_box_has_an_edge_and_the_bounds_of_a_program_have_none(least_at, bound, v, on_edge):
+    for way in (1, -1):
+        mirrored = of_one(lambda x, c=way * least_at: 0.5 * (x[0] - c) ** 2, lambda x, c=way * least_at: x - c, -bound, bound)
+        found = minimised(mirrored, np.array([0.4 * way]), 0.5, 1e-12)
+        assert (found.v[0], found.on_edge) == (pytest.approx(way * v), on_edge)
+
+
+def test_multipliers_and_violations_are_those_of_bounds_by_hand():
+    """3 x - 2 y within a square is least in its corner (0, 1); a row that does not bind has no multiplier."""
+    slopes = np.array([3.0, -2.0])
+    program = Program(
+        lambda x: slopes @ x, lambda x: slopes, lambda x: x[:1] + x[1:], lambda x: np.ones((1, 2)), [-5], [5], 2, 0, 1
+    )
+    for off in (0.0, 0.01):
+        found = stationarity(program, np.array([-off, 1.0]))
+        assert (found.kkt_error, found.violation, found.complementarity) == pytest.approx((0.0, off, 3 * off))
+        assert (found.on_rows, found.on_bounds) == (pytest.approx([0.0]), pytest.approx([-3.0, 2.0]))
 
 
 def test_the_box_is_kept_and_its_edge_is_told():

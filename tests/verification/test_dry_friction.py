@@ -167,7 +167,9 @@ def test_of_three_feet_in_a_row_any_two_may_rest_and_the_bounds_hold_all_these_m
     bent = np.array(rates) @ np.maximum(at - hinges[1:, None], 0.0)  # speeds across while the tail rests
     rest = np.array([np.linalg.solve([[1, at[i]], [1, at[j]]], -bent[[i, j]]) for i, j in ((0, 1), (1, 2), (0, 2))])
     speeds = bent + rest @ [np.ones(3), at]
-    assert np.abs(speeds) @ weights == pytest.approx(np.repeat(found.most, 3), rel=1e-7)
+    power = np.abs(speeds) @ weights
+    assert np.all((found.least <= power) & (power <= found.most))
+    assert found.most - found.least < 1e-12
     across, spin = np.abs((rest - found.z[1:, 0]) @ [[1, 0], [middle, 1]]).max(axis=0)
     assert found.apart[0, 0] < 1e-5
     assert across <= found.apart[1, 0]
