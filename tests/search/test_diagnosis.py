@@ -1,5 +1,6 @@
 """Failures are named in mechanical words, and redundant equations are found before a solve."""
 
+import re
 import time
 from dataclasses import replace
 
@@ -68,7 +69,9 @@ def test_a_broken_balance_is_named_with_its_window():
     result = solver.solve(x, 0.1)
     text = explanation(t, result, 0.1)
     assert "torque" in text or "balance" in text or "rotation" in text
-    assert "phase" in text
+    first, last, worst = map(float, re.search(r"between phases (.*) and (.*), worst at (0\.\d+)", text).groups())
+    assert first <= worst <= last < first + 0.3
+    assert first < t.mesh.times[11] < last + 0.125
     assert "Try to" in text
 
 
