@@ -18,12 +18,14 @@ from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.results.distinct_optima import reversed_in_time, swapped
 from colloc.results.outcome import CRASHED, PASSED_OVER, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, Work, start_key
-from colloc.studies.gait_class import DIRECT, RETROGRADE, gait_class, wave_direction, winding
+from colloc.studies.gait_class import DIRECT, RETROGRADE, STANDING, GaitClass, gait_class, wave_direction, winding
 from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.run import StudyRun
 from colloc.studies.store import load_study, save_study
@@ -444,13 +446,41 @@ def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
     assert (winding(back), wave_direction(back)) == (-1, pytest.approx(-1.0))
     together = Fourier([0, 0], [[1.0], [1.0]], [[0.0], [0.0]])
     assert wave_direction(together) == pytest.approx(0.0)
+    # a small wave of twice the pace is as much as one of half its square: it runs twice about the mean, and back
+    both = Fourier([0.8, -0.5], [[1.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [1.0, -0.5]])
+    assert wave_direction(both) == pytest.approx((1 - 2 * 0.25) / (1 + 2 * 0.25))
+    assert winding(both) == 1
+    twice = Fourier([0.8, -0.5], [[0.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [0.0, -0.5]])
+    assert (winding(twice), wave_direction(twice)) == (-2, pytest.approx(-1.0))
+
+
+@pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
+def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_end_all_runs_the_other_way(symmetry):
+    kind = Harmonic(3, symmetry)
+    gait = kind.member(0.4 * np.random.default_rng(3).normal(size=kind.size(2)), 2)
+    body, friction = Chain(), Friction(3.0, 1.0, 1.0)
+    found = gait_class(gait, body, friction)
+    assert found.symmetry == symmetry
+    assert not found.retraced
+    for other in (reversed_in_time(gait), swapped(gait, body)):
+        image = gait_class(other, body, friction)
+        assert (image.kind, image.symmetry, image.winding) == (found.kind, symmetry, -found.winding)
+        assert (image.wave, image.forward) == pytest.approx((-found.wave, -found.forward), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("retraced", "wave", "forward", "kind"),
+    [(True, 1, 1, STANDING), (False, 0.04, 1, STANDING), (False, 0.5, 0.04, STANDING), (False, -0.5, -0.3, DIRECT)],
+)
+def test_a_gait_is_standing_if_it_goes_back_its_way_or_hardly_has_a_wave_or_hardly_moves_along_itself(
+    retraced, wave, forward, kind
+):
+    assert GaitClass(False, False, retraced, 0, wave, forward).kind == kind
 
 
 @pytest.mark.parametrize(("mu_t", "kind"), [(20.0, RETROGRADE), (0.1, DIRECT)])
 def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
     # the paper, section I: retrograde waves where transverse friction is large, direct ones where it is small
-    from colloc.mechanics.chain import Chain
-
     for sign in (1, -1):
         gait = Fourier([0, 0], [[0.4], [0.0]], [[0.0], [sign * 0.4]])
         found = gait_class(gait, Chain(), Friction(mu_t, 1, 1))
@@ -461,8 +491,6 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
 
 
 def test_the_displacement_that_decides_the_class_is_that_of_the_replay():
-    from colloc.mechanics.chain import Chain
-
     gait, friction = Fourier([0, 0], [[0.9], [-0.3]], [[0.0], [0.8]]), Friction(5, 1, 1)
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
     assert replay(Chain(), friction, path, 1e-3, instants=400, most_instants=400).distance > 0.01

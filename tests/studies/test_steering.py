@@ -1,11 +1,15 @@
 """Gaits that steer: certified at every turn, and between two of them a controller can interpolate."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, Serpenoid, replay, steer
 from colloc.gaits.fitted_gait import fitted_gait
+from colloc.gaits.harmonic import Fourier
 from colloc.pictures.steering_figure import steering_figure
+from colloc.studies.steering import Steering
 
 PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=Friction(4, 1, 1), delta=1e-2, mesh_tolerance=1e-4)
 TURNS = np.radians([-10, 0, 10])
@@ -45,6 +49,15 @@ def test_the_table_holds_the_joint_angles_of_every_gait(family):
         np.testing.assert_array_equal(np.transpose(angles), point.gait.angles(np.arange(8) / 8 + begin))
     assert family.begins[1] == 0
     assert table["radius_body_lengths"][1] is None
+
+
+def test_gaits_begin_where_they_are_nearest_to_their_neighbours():
+    """Those that differ in phase alone begin alike."""
+    later, turns = np.array([0.3, 0.07, 0.55, 0.9, 0.62]), (-0.4, -0.2, 0.1, 0.3, 0.5)
+    a = np.array([[1.0], [0.5]]) * np.exp(2j * np.pi * np.add.outer([0.0, 0.3], later))
+    gaits = [Fourier([0.2, 0.1], a.real[:, [k]], -a.imag[:, [k]]) for k in range(5)]
+    family = Steering(PROBLEM, turns, tuple(SimpleNamespace(gait=gait) for gait in gaits))
+    np.testing.assert_allclose(family.begins, (later[2] - later) % 1, atol=1e-12)
 
 
 def test_an_offset_turns_a_serpenoid_snake():
