@@ -29,7 +29,7 @@ def unit_vectors(rng, n, spread):
 
 
 @pytest.mark.parametrize("n_joint", [2, 3, 5])
-@pytest.mark.parametrize("spread", [1e-7, 1e-3, 0.05, 0.5])
+@pytest.mark.parametrize("spread", [1e-7, 1e-3, 0.02, 0.05, 0.5])
 def test_an_arc_is_the_integral_of_its_unit_tangent_and_turns_evenly(n_joint, spread):
     rng = np.random.default_rng(0)
     if n_joint == 2:
@@ -40,14 +40,14 @@ def test_an_arc_is_the_integral_of_its_unit_tangent_and_turns_evenly(n_joint, sp
     tau = rng.uniform(size=(1, 6))
     nodes, weights = np.polynomial.legendre.leggauss(24)
     integral = sum(0.5 * w * tau * direction(t0, t1, 0.5 * (x + 1) * tau) for x, w in zip(nodes, weights, strict=True))
-    np.testing.assert_allclose(advance(t0, t1, tau), integral, atol=2e-15)
-    np.testing.assert_allclose(np.linalg.norm(direction(t0, t1, tau), axis=0), 1, atol=1e-14)
+    np.testing.assert_allclose(advance(t0, t1, tau), integral, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(direction(t0, t1, tau), axis=0), 1, rtol=0, atol=1e-14)
     # the angle from the start is tau times the whole
     start, here, end = (
         direction(t0, t1, np.full((1, 6), x)) if np.isscalar(x) else direction(t0, t1, x) for x in (0.0, tau, 1.0)
     )
     angle = [2 * np.arcsin(0.5 * np.linalg.norm(b - start, axis=0)) for b in (here, end)]
-    np.testing.assert_allclose(angle[0], tau[0] * angle[1], atol=1e-14)
+    np.testing.assert_allclose(angle[0], tau[0] * angle[1], rtol=0, atol=1e-14)
 
 
 def member(symmetry, curvature=4.0, n=16, body=None):
@@ -84,8 +84,8 @@ def test_a_path_is_the_member_of_its_parameters_the_first_of_which_is_its_shape_
     assert v.size == kind.size(path.n_joint, path.edges.size - 1)
     assert v[0] == pytest.approx(path.shape_speed)
     again, t = kind.member(v, path.n_joint, path.edges), np.arange(100) / 100
-    np.testing.assert_allclose(again.angles(t), path.angles(t), atol=1e-14)
-    np.testing.assert_allclose(again.rates(t), path.rates(t), atol=1e-12)
+    np.testing.assert_allclose(again.angles(t), path.angles(t), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(again.rates(t), path.rates(t), rtol=0, atol=1e-12)
 
 
 def test_part_of_a_period_has_that_part_of_the_intervals_and_a_dense_search_some_250_numbers():
@@ -129,7 +129,7 @@ def test_harmonics_survive_the_way_through_points(symmetry):
 
     back = target.through(Opaque())
     t = np.linspace(0, 1, 50)
-    np.testing.assert_allclose(back.angles(t), gait.angles(t), atol=1e-10)
+    np.testing.assert_allclose(back.angles(t), gait.angles(t), rtol=0, atol=1e-10)
 
 
 def test_a_symmetric_gait_is_recognised_whatever_phase_it_starts_at():
