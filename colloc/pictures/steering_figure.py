@@ -53,13 +53,12 @@ def _draw_cost(axes: Axes, family: Steering) -> None:
 
 def _draw_tracks(axes: Axes, family: Steering) -> None:
     colours = snapshot_colours(len(family.points))
-    tracks = [*zip(family.points, family.turns, colours, "o" * len(colours), strict=True)]
+    tracks = [*zip(family.points, colours, "o" * len(colours), strict=True)]
     if (spot := family.on_the_spot) is not None:
-        tracks += zip(spot.points, spot.turns, [VERMILION] * len(spot.points), "s" * len(spot.points), strict=True)
+        tracks += zip(spot.points, [VERMILION] * len(spot.points), "s" * len(spot.points), strict=True)
     t = np.linspace(0.0, _PERIODS, _PERIODS * _PHASES + 1)
-    for point, turn, colour, mark in tracks:
-        # half the turn lies behind the first chord, so that all tracks leave the origin in one direction
-        ahead = np.exp(0.5j * turn) * (point.motion.sample(t).centre * np.array([[1.0], [1j]])).sum(axis=0)
-        axes.plot(ahead.real, ahead.imag, color=colour, lw=1.0)
-        axes.plot(ahead.real[::_PHASES], ahead.imag[::_PHASES], mark, color=colour, ms=3)
+    for point, colour, mark in tracks:
+        track = point.motion.sample(t).centre  # all arcs set out along +x
+        axes.plot(*track, color=colour, lw=1.0)
+        axes.plot(*track[:, ::_PHASES], mark, color=colour, ms=3)
     axes.set(xlabel="x  [body lengths]", ylabel="y  [body lengths]", aspect="equal")

@@ -468,6 +468,13 @@ def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_en
         assert (image.wave, image.forward) == pytest.approx((-found.wave, -found.forward), abs=1e-4)
 
 
+@pytest.mark.parametrize("size", [0.05, 1.0])
+def test_what_is_off_by_a_hundredth_of_a_gait_still_counts_as_symmetric(size):
+    for off, symmetry in ((0.01, "both"), (0.03, "none")):
+        gait = Fourier([0, 0], [[size, off * size], [0.0, 0.0]], [[0.0, 0.0], [size, 0.0]])
+        assert gait_class(gait, Chain(), Friction(3, 1, 1)).symmetry == symmetry
+
+
 @pytest.mark.parametrize(
     ("retraced", "wave", "forward", "kind"),
     [(True, 1, 1, STANDING), (False, 0.04, 1, STANDING), (False, 0.5, 0.04, STANDING), (False, -0.5, -0.3, DIRECT)],

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, Serpenoid, replay, steer
 from colloc.gaits.fitted_gait import fitted_gait
@@ -84,6 +85,17 @@ def test_the_figure_names_its_axes(family):
     cost, floor = steering_figure(family).axes
     assert "turn" in cost.get_xlabel()
     assert floor.get_aspect() == 1
+
+
+def test_all_tracks_set_out_along_x_and_have_a_dot_a_period(family):
+    """So the chord of a period points to where half of its turn, and all those before, lead."""
+    axes = family.plot(ax=Figure().add_subplot(), panel="tracks")
+    dots = np.array([line.get_xydata() for line in axes.lines if line.get_marker() == "o"])
+    chords = np.diff(dots @ [1, 1j])
+    assert chords.shape == (3, 6)
+    np.testing.assert_allclose(np.angle(chords), np.outer(TURNS, np.arange(6) + 0.5), atol=0.02)
+    np.testing.assert_allclose(np.abs(chords), np.abs(chords[:, :1]) * np.ones(6))
+    np.testing.assert_allclose(np.abs(chords[:, 0]), family.table()["chord_body_lengths"], rtol=0.02)
 
 
 @pytest.mark.parametrize("turns", [[], [4.0], [float("nan")]])
