@@ -1,5 +1,7 @@
 """Figures of relaxed gaits draw what they are given."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -7,7 +9,7 @@ from matplotlib.figure import Figure
 
 from colloc import Problem, Relaxed
 from colloc.gaits.relaxed import Mixture
-from colloc.pictures.relaxed_figure import draw_mixture, draw_shares
+from colloc.pictures.relaxed_figure import draw_mixture, draw_realised, draw_shares
 
 THIRDS = [[1.0, 0.0], [-0.5, np.sqrt(0.75)], [-0.5, -np.sqrt(0.75)]]
 GAIT = Mixture([[0.5, 0.0, 0.0], [0.2, 0.1, 0.1]], [THIRDS, THIRDS], [0.5, -0.5], "bilateral")
@@ -33,3 +35,20 @@ def test_shares_of_every_direction_are_drawn_over_the_period():
     drawn = axes()
     draw_shares(drawn, GAIT)
     assert len(drawn.patches) == 3
+
+
+def test_what_finite_gaits_lose_is_drawn_and_a_line_by_which_it_falls_with_their_repeats():
+    """Of a loss that does, the two are one."""
+    repeats, lost = (1, 2, 4), np.array([0.02, 0.01, 0.005])
+    finite = [
+        SimpleNamespace(repeats=m, corners=3 * m, certificate=SimpleNamespace(efficiency=0.5 - less))
+        for m, less in zip(repeats, lost, strict=True)
+    ]
+    drawn = axes()
+    draw_realised(drawn, SimpleNamespace(certificate=SimpleNamespace(efficiency=0.5), realised=finite))
+    assert len(drawn.lines) == 2
+    for line in drawn.lines:
+        np.testing.assert_allclose(line.get_xydata(), np.stack([repeats, lost], axis=1))
+    assert drawn.get_xlim()[0] < 1 < 4 < drawn.get_xlim()[1] < 10
+    assert 0.001 < drawn.get_ylim()[0] < 0.005 < 0.02 < drawn.get_ylim()[1] < 0.1
+    assert [text.get_text() for text in drawn.texts] == ["3 corners\n0.4800", "6 corners\n0.4900", "12 corners\n0.4950"]

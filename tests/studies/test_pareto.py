@@ -1,6 +1,7 @@
 """A front of two objectives: no gait of it is better in both, and its ends are the best by one alone."""
 
 import csv
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -49,6 +50,19 @@ def test_the_front_bulges_beyond_its_chord(front):
     speed, efficiency = front.values.T
     chord = np.interp(efficiency, efficiency[[0, -1]], speed[[0, -1]])
     assert (speed[1:-1] > chord[1:-1]).all()
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1, 1), (-1, 1, -1, 1), (1, -1, -1, -1)])
+def test_the_figure_draws_every_value_and_mirror_images_alike(front, signs):
+    gaits = [point.gait.scaled(sign) for sign, point in zip(signs, front.points, strict=True)]
+    points = [replace(p, answer=replace(p.answer, gait=gait)) for p, gait in zip(front.points, gaits, strict=True)]
+    values, plane = front_figure(replace(front, points=tuple(points))).axes
+    np.testing.assert_array_equal(values.lines[0].get_xydata(), front.values[:, ::-1])
+    assert not values.lines[1].get_xydata().size  # of what is not certified
+    *others, last = (line.get_xydata() for line in plane.lines)
+    np.testing.assert_allclose(last.T, gaits[-1].angles(np.linspace(0.0, 1.0, 1001)), atol=1e-12)
+    assert len(others) == 3
+    assert all(np.abs(path - last).sum() < np.abs(path + last).sum() for path in others)
 
 
 def test_one_objective_twice_is_no_front():
