@@ -5,7 +5,7 @@ import pytest
 
 import colloc
 from colloc.mechanics.inertia import moment_of_inertia, momenta, momentum_rates, tail_velocity
-from colloc.motion.slow_enough import SCHEME, GaitOnMesh
+from colloc.motion.slow_enough import SCHEME, GaitOnMesh, inertial_loss
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.verification.inertial_motion import GaitWithInertia
@@ -164,6 +164,13 @@ def test_slow_enough_is_where_the_part_is_lost(friction):
     slow = colloc.replay(CHAIN, friction, GAIT, 1e-3).efficiency
     played = colloc.inertial_motion(CHAIN, friction, GAIT, 1e-3, froude, tolerance=1e-4)
     assert abs(1 - played.efficiency / slow) == pytest.approx(0.01, rel=0.06)
+
+
+@pytest.mark.parametrize("loss", [0.01, 0.2])
+def test_on_a_rougher_floor_slow_enough_is_as_much_faster_and_there_the_part_is_lost(loss):
+    froude = [colloc.slow_enough(CHAIN, colloc.Friction(mu, mu, mu), GAIT, 1e-2, loss) for mu in (1.0, 30.0)]
+    assert froude[1] == pytest.approx(30 * froude[0], rel=1e-6)
+    assert abs(inertial_loss(CHAIN, ISOTROPIC, GAIT, 1e-2, froude[0])) == pytest.approx(loss, rel=0.05)
 
 
 def test_a_gait_whose_efficiency_no_pace_changes_much_is_slow_enough_at_none():
