@@ -35,8 +35,9 @@ from colloc.search.spaces import heading, space_near, transcribed, with_far
 
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
-_OPTIONS: dict[str, object] = {"mu_init": 1e-10}
-"""The barrier begins where it ends, as multipliers are known: most gaits are confirmed by one or two steps."""
+_OPTIONS: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
+"""The barrier begins where it ends, as multipliers are known: one to four steps confirm most gaits, and more than these lead
+away."""
 _MOST_PARAMETERS = 150
 """Curvature is measured for so many parameters at most: it takes two gradients for each, 8 s for a free path of 256."""
 
@@ -107,8 +108,6 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, _OPTIONS)
     before = solver.measured(x, delta, *_multipliers(reduced, conditions, program))
-    if before.optimal or optimum.optimal:
-        solver.expect_little()
     here = replace(before, status=STATIONARY, kkt_error=optimum.kkt_error, complementarity=optimum.complementarity)
     failed = replace(before, status=NOT_STATIONARY, iterations=optimum.iterations)
     if optimum.violation > RADIUS:  # no gait within reach is admissible

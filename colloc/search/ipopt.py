@@ -35,9 +35,6 @@ LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
 """With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along
 negative curvature would otherwise carry them away for good. The price is up to 120 short steps a level. The velocity map
 needs no such leash and is slowed by it."""
-_CONFIRMING = 30
-"""Steps at a point where the conditions hold, in the reduced space at least: one to four confirm it, and more than these lead
-away."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +100,6 @@ class Solver:
     @cached_property
     def _solver(self) -> ca.Function:
         return ca.nlpsol("colloc", "ipopt", self.oracles.nlp, self._settings)
-
-    def expect_little(self) -> None:
-        """Before IPOPT is first asked: the conditions hold where it begins, and it gets as many steps as that is worth."""
-        self._settings["ipopt.max_iter"] = _CONFIRMING
 
     def solve(
         self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None = None, radius: float = np.inf
