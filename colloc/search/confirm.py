@@ -28,16 +28,13 @@ from colloc.search.certify import EXACT, VIOLATION
 from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
 from colloc.search.diagnosis import explanation
 from colloc.search.effort import ROUGH, SKETCH
-from colloc.search.ipopt import NlpResult, Solver
+from colloc.search.ipopt import CONFIRMING, NlpResult, Solver
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
 from colloc.search.spaces import heading, space_near, transcribed, with_far
 
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
-_OPTIONS: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
-"""The barrier begins where it ends, as multipliers are known: one to four steps confirm most gaits, and more than these lead
-away."""
 _MOST_PARAMETERS = 150
 """Curvature is measured for so many parameters at most: it takes two gradients for each, 8 s for a free path of 256."""
 
@@ -106,7 +103,7 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
     program = transcribed(optimum.problem, optimum.gait, mesh.edges, mesh.scheme.name, space.given.far)
     x = feasible_point(program, space.full_parameters(optimum.v), delta)
     program = _limited(reduced, heading(program, x))
-    solver = Solver(program, _OPTIONS)
+    solver = Solver(program, CONFIRMING)
     before = solver.measured(x, delta, *_multipliers(reduced, conditions, program))
     here = replace(before, status=STATIONARY, kkt_error=optimum.kkt_error, complementarity=optimum.complementarity)
     failed = replace(before, status=NOT_STATIONARY, iterations=optimum.iterations)

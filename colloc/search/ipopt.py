@@ -35,6 +35,9 @@ LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
 """With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along
 negative curvature would otherwise carry them away for good. The price is up to 120 short steps a level. The velocity map
 needs no such leash and is slowed by it."""
+CONFIRMING: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
+"""To confirm a gait. The barrier begins where it ends, as multipliers are known: one to four steps confirm most gaits, and
+more than these lead away."""
 
 
 @dataclass(frozen=True, eq=False)
