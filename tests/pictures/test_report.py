@@ -1,5 +1,6 @@
 """The report is one self-contained, well-formed page that trusts nothing in the file, and a browser runs it without a word."""
 
+import dataclasses
 import json
 import re
 import shutil
@@ -252,6 +253,12 @@ def test_what_the_page_draws_is_what_the_frames_hold(unsolved):
         np.testing.assert_allclose([data[name] for name in names], rows, atol=1e-3)
     (left, low), (right, high) = shown.window
     np.testing.assert_allclose(data["window"], [left, right, low, high], atol=1e-4)
+    for size in (0.2, 1.0, 9.0):
+        wide = dataclasses.replace(shown, ends=size * shown.ends)
+        low, high = wide.window
+        lines = (high - low).max() / (grid := motion_data(wide, problem.body)["grid"])
+        assert lines < 16
+        assert lines > 6 or grid == 0.1
 
 
 @pytest.fixture(scope="module")

@@ -170,6 +170,14 @@ def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution, mon
     assert len(heard) > 1
 
 
+@pytest.mark.parametrize(
+    "asked", [{"objective": "speed"}, {"gait": Relaxed(3, "none"), "rotation": None}, {"at_least": {"distance": 0.1}}]
+)
+def test_whatever_is_asked_for_besides_the_efficiency_is_refused(asked):
+    with pytest.raises(ProblemError, match="efficiency alone"):
+        solve(problem().with_(**asked), starts=1)
+
+
 def test_other_searches_say_that_relaxed_gaits_are_not_for_them():
     with pytest.raises(ProblemError, match="no full program"):
         solve(problem(), search="full")

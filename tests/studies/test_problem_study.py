@@ -322,6 +322,11 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
     alone = [study_cell.run_guess(stated, lambda a=a: a.outcome.guess, 0, 300.0) for a in passed]
     assert {end.status for end in alone} == {SOLVED}
     assert max(end.value for end in alone) <= best * (1 + study_cell.BETTER)
+    # a cell that was solved before is solved again for what does better, and for nothing else
+    for incumbent, status in ((0.9 * best, SOLVED), (1.1 * best, PASSED_OVER)):
+        again = dataclasses.replace(work, incumbent=incumbent, cold=())
+        attempts = {a.origin: a.outcome.status for a in study_cell.visit(again, {}).attempts}
+        assert attempts[WARM] == status
 
 
 def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
