@@ -2,12 +2,12 @@
 
     python -m benchmarks.mutants --number 40 --seed 1
 
-A place is a comparison, an operation, a sign, an `and`, a `not`, a `min` or an index off by one, drawn evenly from all of
-`colloc/`. All tests are run once on the whole library, in which every place drawn notes the tests that come by; a mutant is
-then tried with these, the quickest first, and where what many tests share comes by (a fixture, an import) with all of that
-file: the others cannot see it. A file that fails on the whole library sees nothing. What is done is kept in
-results/mutants-SEED.jsonl: an interrupted run goes on where it stopped. A mutant that no test sees is one that changes
-nothing, or a test that lacks.
+A place is a comparison (made its opposite: `<=` for `<` changes nothing among real numbers), an operation, a sign, an `and`, a
+`not`, a `min` or an index off by one, drawn evenly from all of `colloc/`. All tests are run once on the whole library, in
+which every place drawn notes the tests that come by; a mutant is then tried with these, the quickest first, and where what
+many tests share comes by (a fixture, an import) with all of that file: the others cannot see it. A file that fails on the
+whole library sees nothing. What is done is kept in results/mutants-SEED.jsonl: an interrupted run goes on where it stopped. A
+mutant that no test sees is one that changes nothing, or a test that lacks.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 OTHERS: dict[type, str] = {
-    ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==", ast.And: "or", ast.Or: "and",
+    ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "==", ast.And: "or", ast.Or: "and",
     ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*",
 }  # fmt: skip
 EXTREMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "argmin": "argmax", "argmax": "argmin"}
