@@ -300,13 +300,12 @@ def overlap(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None
     Of all, or of pairs of links.
     """
     ends = np.stack(body.joints(angles))
-    if pairs is None:
-        return _overlap(ends, separate_pairs(body), body.width, ends_and_links(body))
-    return _overlap(ends, pairs, body.width, _their_ends(pairs))
+    every, apart = (separate_pairs(body), ends_and_links(body)) if pairs is None else (pairs, _their_ends(pairs))
+    return _overlap(ends, _within_reach(ends, every), body.width, apart)
 
 
 def _overlap(ends: np.ndarray, pairs: Sequence[Pair], width: float, apart: Sequence[Pair]) -> np.ndarray:
-    depth = _crossing(ends, _within_reach(ends, pairs))
+    depth = _crossing(ends, pairs)
     return depth if width == 0 else depth + np.maximum(width - np.where(depth > 0, 0.0, _gap(ends, apart)), 0.0)
 
 
