@@ -2,7 +2,8 @@
 
 The load is Python and small NumPy calls, as a search is, and is measured before and after every work: a busy or slow machine
 changes both. Every work runs in a process of its own, forked from this one, whose memory is the least that is seen.
-Error over processor time: python -m benchmarks.work_precision.
+Error over processor time: python -m benchmarks.work_precision. What it calls is public, so the same file measures an earlier
+colloc too: in its tree, python -m benchmarks.speed with this file in place of its own.
 """
 
 from __future__ import annotations
@@ -21,8 +22,6 @@ import numpy as np
 import colloc
 from benchmarks.tables import markdown_table
 from benchmarks.zoo import zoo_problem
-from colloc.gaits.problem_file import read_problem_file
-from colloc.search.solve import solve
 
 MAIN = Path(__file__).resolve().parents[1] / "problems/three_link.py"
 SHELL = {
@@ -72,8 +71,8 @@ def measured(work: Callable[[], object], rounds: int = 1) -> tuple[float, float,
 
 def works(rounds: int, zoo: int) -> str:
     """The main job as a whole and in parts, a warm start, and random problems."""
-    problem = read_problem_file(str(MAIN)).problem
-    known = solve(problem)
+    problem = colloc.load_problem(MAIN)
+    known = colloc.solve(problem)
     warm = problem.with_(guess=known.gait)
     rows: list[Sequence[object]] = []
     with TemporaryDirectory() as place:
@@ -83,36 +82,53 @@ def works(rounds: int, zoo: int) -> str:
             command = partial(os.execve, sys.executable, [sys.executable, *words], ordinary)
             in_a_process(command)
             rows.append((name, *measured(command, rounds)))
-    rows.append(("solve, loaded before", *measured(partial(solve, problem), rounds)))
-    rows.append(("solve from the answer", *measured(partial(solve, warm, 1), rounds)))
+    rows.append(("solve, loaded before", *measured(partial(colloc.solve, problem), rounds)))
+    rows.append(("solve from the answer", *measured(partial(colloc.solve, warm, 1), rounds)))
     rows.append(("certificate of its gait alone", *measured(partial(colloc.evaluate, problem, known.gait), rounds)))
-    each = [measured(partial(solve, zoo_problem(number))) for number in range(zoo)]
+    each = [measured(partial(colloc.solve, zoo_problem(number))) for number in range(zoo)]
     rows.append((f"median of the zoo's first {zoo}", *np.median(each, axis=0)))
-    rows.append(("ten links, one harmonic", *measured(partial(solve, grown(links=10)))))
+    rows.append(("ten links, one harmonic", *measured(partial(colloc.solve, grown(links=10)))))
     return markdown_table(("work", "times the load", "s", "MB"), rows)
 
 
 def grown(links: int = 3, harmonics: int = 1, intervals: int = 24, feet: int = 0) -> colloc.Problem:
-    """A problem of some size."""
-    body, kind = colloc.Chain((1 / links,) * links, feet=feet or ()), colloc.Harmonic(harmonics, "bilateral")
-    return colloc.Problem("grown", body=body, friction=colloc.Friction(2, 1, 1), gait=kind, intervals=intervals, delta=1e-3)
+    """A problem of some size. Two links get nowhere where friction forward and backward is alike."""
+    body = colloc.Chain((1 / links,) * links, feet=feet) if feet else colloc.Chain((1 / links,) * links)
+    friction, kind = colloc.Friction(2, 1, 2 if links == 2 else 1), colloc.Harmonic(harmonics, "bilateral")
+    return colloc.Problem("grown", body=body, friction=friction, gait=kind, intervals=intervals, delta=1e-3)
+
+
+def swept(cells: int) -> object:
+    """A study of so many coefficients of friction."""
+    axis = colloc.Axis("mu_t", tuple(np.geomspace(0.5, 8.0, cells)))
+    return colloc.sweep(colloc.Study("grown", (axis,), lambda mu_t: grown().with_(friction=colloc.Friction(mu_t, 1, 1))))
 
 
 def growth(quick: bool) -> str:
-    """A solve from one start against sizes: the largest tried, and the exponent of its last doubling."""
+    """One start, or more, or a sweep against sizes: the largest tried, and the exponent between the last two."""
     sizes = {
-        "links": (3, 5, 10) if quick else (3, 5, 10, 20, 40),
+        "links": (2, 3, 5, 10) if quick else (2, 3, 5, 10, 20, 40),
         "harmonics": (1, 4) if quick else (1, 4, 8, 16),
         "intervals": (24, 96) if quick else (24, 96, 384),
         "feet": (1, 2) if quick else (1, 2, 4),
+        "starts": (2, 8) if quick else (2, 8, 32, 128),
+        "cells": (2, 8) if quick else (2, 8, 32, 128),
     }
     rows = []
     for name, tried in sizes.items():
-        found = np.array([measured(partial(solve, grown(**{name: size}), 1)) for size in tried])
+        found = np.array([measured(_sized(name, size)) for size in tried])
         powers = np.log(found[-1] / found[-2]) / np.log(tried[-1] / tried[-2])
         each = ", ".join(f"{size}: {ratio:.3g}" for size, ratio in zip(tried, found[:, 0], strict=True))
         rows.append((name, each, powers[0], found[-1, 2], powers[2]))
     return markdown_table(("of", "size: times the load", "exponent", "MB at the largest", "its exponent"), rows)
+
+
+def _sized(name: str, size: int) -> Callable[[], object]:
+    if name == "cells":
+        return partial(swept, size)
+    if name == "starts":
+        return partial(colloc.solve, grown(), size)
+    return partial(colloc.solve, grown(**{name: size}), 1)
 
 
 def main() -> None:

@@ -44,7 +44,7 @@ def near_peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limi
     for check in checks:
         beyond = check.magnitudes(shapes[check.derivative], limit) - check.bounds(limit)[1] + check.middle(limit)
         highest = beyond.reshape(mesh.n, -1).max(axis=1)
-        around = np.pad(highest, 1, constant_values=-np.inf)
+        around = np.concatenate([[-np.inf], highest, [-np.inf]])
         peak = (highest >= around[:-2]) & (highest >= around[2:])
         cells = np.flatnonzero((highest > -_NEAR) | (peak & (highest > -_FAR)))
         found.append((cells, _worst(gait, mesh, check, cells, limit) if cells.size else np.empty(0)))

@@ -128,13 +128,15 @@ def corners_through(gait: Gait, target: Polygon) -> Corners:
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
     """Indices of the ``pieces + 1`` points, ends included, whose chords are nearest to all points (dynamic programming)."""
     n = points.shape[1]
-    cost = np.full((n, n), np.inf)
+    cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
     for i in range(n - 1):
         # points beyond i, seen from it: the chord to each of them, and all that lie before that one
         seen = points[:, i + 1 :] - points[:, i : i + 1]
         dots, squares = seen.T @ seen, np.sum(seen**2, axis=0)
-        along = np.clip(dots / np.maximum(squares, 1e-300), 0.0, 1.0)
-        cost[i, i + 1 :] = np.triu(squares[:, None] - 2 * along * dots + along**2 * squares).sum(axis=0)
+        along = dots / np.maximum(squares, 1e-300)
+        np.clip(along, 0.0, 1.0, out=along)
+        nearer = along * (2 * dots - along * squares)
+        cost[i, i + 1 :] = np.cumsum(squares) - squares - np.einsum("kj,kj->j", nearer, before[: n - i - 1, : n - i - 1])
     best, back = cost[0].copy(), []
     for _ in range(pieces - 1):
         total = best[:, None] + cost

@@ -16,10 +16,11 @@ import multiprocessing
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 
@@ -107,6 +108,10 @@ def built_kernel(sources: Path) -> ctypes.CDLL | None:
     return found if made_of.decode("ascii") == now.hexdigest() else None
 
 
+@overload
+def address(array: np.ndarray) -> int: ...
+@overload
+def address(array: np.ndarray | None) -> int | None: ...
 def address(array: np.ndarray | None) -> int | None:
     """Where an array's data are, for a call."""
     return None if array is None else array.ctypes.data
@@ -116,10 +121,16 @@ def call_for_all(
     function: Callable[..., int], body: Links, friction: Law, n_time: int, *arguments: object, piece: int = _PIECE
 ) -> None:
     """Call a function of the kernel for all instants: with the chain, the law and the instants of a piece, then arguments."""
+    chain, _numbers = _stated(body, friction)  # kept through the calls, which read them
+    _each_piece(n_time, piece, lambda first, last: function(*chain, n_time, first, last, *arguments))
+
+
+@lru_cache(maxsize=64)
+def _stated(body: Links, friction: Law) -> tuple[tuple[int, ...], tuple[np.ndarray, ...]]:
+    """A chain and its law as calls are told them: how many links, and where the numbers are, which come with it."""
     law = np.array(body.contact.kernel_law(friction).numbers, dtype=float)
     numbers = np.array(body.lengths), body.pressure_column().ravel(), body.mass_column().ravel(), law
-    chain = (body.n_link, *map(address, numbers), n_time)
-    _each_piece(n_time, piece, lambda first, last: function(*chain, first, last, *arguments))
+    return (body.n_link, *map(address, numbers)), numbers
 
 
 def _each_piece(n_time: int, piece: int, treat: Callable[[int, int], int]) -> None:
@@ -127,12 +138,11 @@ def _each_piece(n_time: int, piece: int, treat: Callable[[int, int], int]) -> No
     returns anything but 0."""
     starts = range(0, n_time, piece)
     ends = [min(first + piece, n_time) for first in starts]
-    workers = min(available_threads(), len(ends)) if len(ends) > 1 else 1
-    if workers > 1:
+    if len(ends) > 1 and (workers := min(available_threads(), len(ends))) > 1:
         with ThreadPoolExecutor(workers) as pool:
             failed = any(list(pool.map(treat, starts, ends)))
     else:
-        failed = any(treat(first, last) for first, last in zip(starts, ends, strict=True))
+        failed = any(map(treat, starts, ends))
     if failed:
         raise MemoryError("no memory for the links of a body.")
 
@@ -144,14 +154,14 @@ def compiled_balance(
     n_time = moving.angles.shape[1]
     angles, rates = np.ascontiguousarray(moving.angles), np.ascontiguousarray(moving.rates)
     load, start = (None if a is None else np.ascontiguousarray(a) for a in (moving.load, start))
-    z, anchor_velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
-    iterations, anchor = np.empty(n_time, dtype=np.int64), np.empty(n_time, dtype=np.int64)
-    found = z, residual, iterations, anchor, anchor_velocity
+    numbers, counts = np.empty((7, n_time)), np.empty((2, n_time), dtype=np.int64)
+    (first, row), (first_count, count_row) = ((address(a), a.strides[0]) for a in (numbers, counts))
     before, after = map(address, (angles, rates)), map(address, (load, start))
     how = tolerance, max_iterations, METHODS.index(method)
+    found = first, first + 6 * row, first_count, first_count + count_row, first + 3 * row
     function, delta = library.colloc_balance, moving.delta
-    call_for_all(function, moving.body, moving.friction, n_time, *before, delta, *after, *how, *map(address, found))
-    return found
+    call_for_all(function, moving.body, moving.friction, n_time, *before, delta, *after, *how, *found)
+    return numbers[:3], numbers[6], counts[0], counts[1], numbers[3:6]
 
 
 def compiled_motion(

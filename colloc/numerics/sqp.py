@@ -123,7 +123,8 @@ class _Point:
 
     @classmethod
     def at(cls, program: NonlinearProgram, v: np.ndarray) -> _Point:
-        value, rows = program.objective(v), np.nan_to_num(program.rows(v), nan=_NOWHERE)
+        value, rows = program.objective(v), program.rows(v)
+        rows = np.where(np.isfinite(rows), rows, _NOWHERE)
         outside = np.maximum(np.maximum(program.row_lower - rows, rows - program.row_upper), 0.0)
         return cls(v, value if np.isfinite(value) else _NOWHERE, rows, outside)
 

@@ -60,11 +60,11 @@ class LinearSpace:
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
-        angles, rates = np.split((self._matrix @ v).T, 2)
-        return angles, rates, self._pace
+        shapes, n_joint = (self._matrix @ v).T, self._matrix.shape[1] // 2
+        return shapes[:n_joint], shapes[n_joint:], self._pace
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
+        return np.asarray(on_shape.reshape(len(on_shape), -1) @ self._matrix.reshape(-1, self._matrix.shape[2]))
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """Shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed."""

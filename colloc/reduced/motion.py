@@ -9,7 +9,7 @@ says (`colloc.motion.kinds`), and of integrals (`colloc.mechanics.densities`). G
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -48,6 +48,8 @@ class _State:
     out: np.ndarray
     pose: CollocatedPose
     passed: Passed
+    values: dict[str, float] = field(default_factory=dict)
+    """What a period comes to, once it was asked for."""
 
     @property
     def z(self) -> np.ndarray:
@@ -60,7 +62,7 @@ class ReducedMotion:
 
     def __init__(self, kind: Kind, mesh: Mesh, shapes: Shapes, integrals: Sequence[Quantity] = ()) -> None:
         self.body, self.friction, self.shapes, self.mesh = kind.body, kind.friction, shapes, mesh
-        self.kind, self._integrals, self._weight = kind, integrals, stage_weights(mesh)
+        self.kind, self._integrals, self._weight, self._point_weight = kind, integrals, stage_weights(mesh), point_weights(mesh)
         self._last: _State | None = None
         self._near: tuple[_State, np.ndarray, np.ndarray] | None = None
         self.solves = 0
@@ -90,7 +92,7 @@ class ReducedMotion:
 
     def _even(self, pace: np.ndarray) -> float:
         """Rotation rate of the axes that turn evenly, over the pace [rad]."""
-        return self.kind.turn / float(point_weights(self.mesh) @ pace) if self.kind.turn else 0.0
+        return self.kind.turn / float(self._point_weight @ pace) if self.kind.turn else 0.0
 
     def _start(self, angles: np.ndarray, rates: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
         """States to start from, those of the last gait, and tail velocities: those of the last gait differentiated, moved along
@@ -114,16 +116,18 @@ class ReducedMotion:
 
     def values(self, v: np.ndarray, delta: float) -> dict[str, float]:
         """What a period comes to, as the kind of motion counts it, and the integrals; NaN where there is no motion."""
-        s, now = self.at(v, delta), self.instants(v, delta)
-        found = self.kind.counted(s.passed)
-        for quantity in self._integrals:
-            found[quantity.name] = self.kind.periods * float((quantity.at(now)[0] * s.pace) @ self._on_columns(s))
-        return found
+        s = self.at(v, delta)
+        if not s.values:
+            s.values = self.kind.counted(s.passed)
+            if self._integrals:
+                now, weight = self.instants(v, delta), self.kind.periods * s.pace * self._on_columns(s)
+                s.values |= {each.name: float(each.at(now)[0] @ weight) for each in self._integrals}
+        return s.values
 
     def instants(self, v: np.ndarray, delta: float) -> Instants:
         """The collocated motion at every column, as formulas see it."""
         s = self.at(v, delta)
-        theta = np.tile(s.pose.theta_on(self.mesh), s.pace.size // self.mesh.n_point)
+        theta = np.concatenate([s.pose.theta_on(self.mesh)] * (s.pace.size // self.mesh.n_point))
         return self.kind.instants(Moving(s.angles, s.rates, delta), theta, s.z)
 
     def theta(self, v: np.ndarray, delta: float, t: np.ndarray) -> np.ndarray:
@@ -136,21 +140,22 @@ class ReducedMotion:
 
     def _on_columns(self, s: _State) -> np.ndarray:
         """Weight of every point of every block in an integral over the part of the period that is solved."""
-        weight = point_weights(self.mesh)
-        return np.tile(weight, s.pace.size // self.mesh.n_point)
+        return np.concatenate([self._point_weight] * (s.pace.size // self.mesh.n_point))
 
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
         """Derivatives of `values`, ``(n,)`` each."""
-        s, now, kind = self.at(v, delta), self.instants(v, delta), self.kind
+        s, kind = self.at(v, delta), self.kind
         shares, weight, n_joint = kind.shares(s.passed), self._on_columns(s), len(s.rates)
         on_points = np.zeros((len(shares) + len(self._integrals), 2 * n_joint + 1, s.pace.size))
         on_pace = np.zeros((len(on_points), s.pace.size))
         for row, share in enumerate(shares.values()):
             on_points[row, n_joint:-1] = share.bend * weight * s.pace
             on_pace[row] = share.bend * weight * s.rates.sum(axis=0)
-        for row, quantity in enumerate(self._integrals, len(shares)):
+        if self._integrals:
             from colloc.reduced.density_slopes import density_slopes  # loads CasADi, which a certificate can do without
 
+            now = self.instants(v, delta)
+        for row, quantity in enumerate(self._integrals, len(shares)):
             on_points[row] = kind.periods * weight * s.pace * density_slopes(quantity, now)[0]
             on_pace[row] = kind.periods * weight * quantity.at(now)[0]
         found = self._through(s, [*shares.values(), *(Share() for _ in self._integrals)], on_points, on_pace)
@@ -173,10 +178,10 @@ class ReducedMotion:
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
-        on_out = np.tile(on_out, blocks)
+        on_out = np.concatenate([on_out] * blocks, axis=2)
         on_pace = on_pace + np.einsum("krt,rt->kt", on_out[:, : len(s.out)], s.out)
         if kind.turn:  # the axes turn less on what a longer path makes a smaller part of the period
-            weight, even = point_weights(mesh), self._even(s.pace)
+            weight, even = self._point_weight, self._even(s.pace)
             on_pace += np.outer(on_out[:, 0] @ s.pace, even / (weight @ s.pace) * weight)
         on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS]) + on_points[:, :-1].transpose(0, 2, 1)
         found = self.shapes.pulled_back(s.v, on_shape, on_pace)

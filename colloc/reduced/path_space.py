@@ -189,8 +189,8 @@ class PathSpace:
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
         out = self._value(self.full_parameters(v)[self._gather], self._given).copy()
-        angles, rates = np.split(out[:-1], 2)
-        return angles, rates, out[-1]
+        n_joint = len(self.shapes)
+        return out[:n_joint], out[n_joint:-1], out[-1]
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         on_local = self._pulled(self.full_parameters(v)[self._gather], self._given, on_shape, on_pace)
