@@ -148,8 +148,6 @@ def path_through(control: ControlProblem, gait: Gait, edges: np.ndarray | None, 
         knots = _arc_knots(control, gait, edges)
         return arcs_through(gait, kind, knots), control.mesh(knots if edges is None else with_knots(edges, knots), scheme)
     mesh, corners = control.mesh(edges, scheme), corners_through(gait, kind)
-    if isinstance(gait, Corners) and gait.symmetry == kind.symmetry and gait.corners.shape == corners.corners.shape:
-        corners = gait
     return corners, Mesh(mesh.scheme, _with_vertices(mesh.edges, corners.phases))
 
 

@@ -113,7 +113,10 @@ def _end_correction(headings: np.ndarray, target: FreePath, at: np.ndarray) -> n
 
 
 def corners_through(gait: Gait, target: Polygon) -> Corners:
-    """The polygon of the class nearest to the path of `gait`, its corners on the path (least squares, exact search)."""
+    """The polygon of the class nearest to the path of `gait`, its corners on the path (least squares, exact search); one with as
+    many corners as it is."""
+    if isinstance(gait, Corners) and gait.symmetry == target.symmetry and gait.vertices.shape[1] == target.pieces + 1:
+        return gait
     points = symmetric_samples(gait, target.symmetry)
     points, _ = _by_arc_length(points, np.linspace(0.0, 1.0, _POLYGON_POINTS))
     chosen = _best_corners(points, target.pieces)

@@ -58,11 +58,12 @@ class ChosenRows:
     ) -> None:
         self._linear, blocks = linear[kept], []
         for block, given in zip(of_blocks, parameters, strict=True):
+            if not np.diff(block.scatter.indptr)[kept].any():
+                continue
             scatter, n_out = block.scatter[kept], block.function.n_out
             used = np.unique(scatter.indices // n_out)
-            if used.size:
-                columns = (used[:, None] * n_out + np.arange(n_out)).ravel()
-                blocks.append(Block(block.function, block.gather[:, used], scatter[:, columns], given[:, used]))
+            columns = (used[:, None] * n_out + np.arange(n_out)).ravel()
+            blocks.append(Block(block.function, block.gather[:, used], scatter[:, columns], given[:, used]))
         terms = jacobian_terms(self._linear, blocks)
         key = terms.row.astype(int) * linear.shape[1] + terms.column
         self._places, self._weights = summed(key, terms.source, terms.weight, terms.n_source)

@@ -182,6 +182,8 @@ class PathSpace:
 
     def _through(self, gait: AnyGait) -> np.ndarray:
         kind = self.control.admissible.gait
+        if gait is self.given.near:
+            return kind.parameters(self._paths.near)
         if self._arcs:
             return kind.parameters(arcs_through(gait, kind, self._paths.near.edges))
         return kind.parameters(path_through(self.control, gait, self.mesh.edges)[0])
