@@ -113,8 +113,8 @@ def _end_correction(headings: np.ndarray, target: FreePath, at: np.ndarray) -> n
 
 
 def corners_through(gait: Gait, target: Polygon) -> Corners:
-    """The polygon of the class nearest to the path of `gait`, its corners on the path (least squares, exact search); one with as
-    many corners as it is."""
+    """The polygon of the class nearest to the path of `gait`, its corners on the path (least squares, exact search); one that
+    is in the class already as it is."""
     if isinstance(gait, Corners) and gait.symmetry == target.symmetry and gait.vertices.shape[1] == target.pieces + 1:
         return gait
     points = symmetric_samples(gait, target.symmetry)

@@ -84,7 +84,7 @@ class PathSpace:
         self._pulled = along_arcs(n_joint) if self._arcs and n_joint > 2 else along_shape(piece)
         self._given = self._paths.given(np.tile(mesh.scheme.c, mesh.n))
         self._gather = np.repeat(self._paths.shape, mesh.scheme.s, axis=1)
-        self._scatter = selector(self._gather.ravel(), self._fixed.size)
+        self._scatter = selector(self._gather.ravel(), self._fixed.size).T.tocsr()
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """The parameters of `colloc.gaits.free_path`: shapes where arcs meet follow from the start."""
@@ -196,7 +196,7 @@ class PathSpace:
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         on_local = self._pulled(self.full_parameters(v)[self._gather], self._given, on_shape, on_pace)
-        return self.from_full(v, on_local.reshape(len(on_local), -1) @ self._scatter)
+        return self.from_full(v, (self._scatter @ on_local.reshape(len(on_local), -1).T).T)
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """The rows of the class, and checks where they might bind. They stay where they are placed: no path was seen to swing,
