@@ -21,8 +21,8 @@ from colloc.system.errors import ProblemError
 
 WAVES = -1.0
 """Waves along the body: one, towards the tail, which carries a body with mu_t > mu_f head first."""
-_SHARE, _LARGEST = 0.6, 1.5
-"""Amplitude: a share of the largest admissible one, and at most so much [rad]."""
+_SHARE, _LARGEST, _MOVING = 0.6, 1.5, 1.05
+"""Amplitude: a share of the largest admissible one, and at most so much [rad], or so many times the least that moves enough."""
 _PHASES = np.linspace(0.0, 1.0, 201)
 SAFE = 1 - 1e-3
 """Shapes as large as may be are scaled by this, to be clearly admissible."""
@@ -52,13 +52,19 @@ def largest_factor(body: Body, joint_limit: Limit, angles: np.ndarray) -> float:
     return low * SAFE
 
 
-def travelling_wave(body: Body, joint_limit: Limit, waves: float = WAVES, share: float = _SHARE) -> Fourier:
+def travelling_wave(body: Body, joint_limit: Limit, waves: float = WAVES, share: float = _SHARE, least: float = 0.0) -> Fourier:
     """A wave of bending along a body: so many waves stand along it, positive ones travel towards the head. Its amplitude is a
-    share of the largest that is admissible, at most 1.5 rad."""
+    share of the largest that is admissible, at most 1.5 rad; where its shape speed would be below `least`, it is larger, and
+    each joint bends in proportion to its own limit."""
     cos, sin = body.wave(waves)
     unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
-    size = min(share * largest_factor(body, joint_limit, unit.angles(_PHASES)), _LARGEST)
-    return unit.grown(size)
+    wave = unit.grown(min(share * largest_factor(body, joint_limit, unit.angles(_PHASES)), _LARGEST))
+    if wave.shape_speed >= least:
+        return wave
+    angles = unit.angles(_PHASES)
+    stretched = np.abs(under_one_limit(angles, joint_limit)[0]).max(axis=1)
+    each = unit.mapped(np.diag(np.abs(angles).max(axis=1) / np.maximum(stretched, np.finfo(float).tiny)))
+    return each.grown(min(largest_factor(body, joint_limit, each.angles(_PHASES)), _MOVING * least / each.shape_speed))
 
 
 def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
@@ -66,18 +72,18 @@ def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
     return float((np.abs(gait.rates(_PHASES)).max(axis=1) / np.array(speeds)).max()) if speeds else 0.0
 
 
-def slowed(gait: Any, speeds: tuple[float, ...], smallest_shape_speed: float) -> Any:
-    """The gait with all angles multiplied by one factor, at most 1, so that no joint is faster than allowed. `ProblemError` if
-    it then hardly moves."""
-    if (share := largest_share(gait, speeds)) <= 1:
-        return gait
-    slow = gait.scaled(1 / share)
-    if slow.shape_speed < smallest_shape_speed:
+def usual_guess(body: Body, gait_class: Any, joint_limit: Limit, speeds: tuple[float, ...], smallest_shape_speed: float) -> Any:
+    """A wave laid into a class, no joint of it faster than allowed. `ProblemError` if it hardly moves."""
+    gait = gait_class.first_guess(travelling_wave(body, joint_limit, least=smallest_shape_speed))
+    if fast := largest_share(gait, speeds) > 1:
+        gait = gait.scaled(1 / largest_share(gait, speeds))
+    _, rms = gait_class.guessed(gait)
+    if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
         raise ProblemError(
-            f"with speed_limit the usual first gait has a root-mean-square shape speed of {slow.shape_speed:.2g}, less than "
-            f"smallest_shape_speed = {smallest_shape_speed:g}: make that smaller, or give a guess."
+            f"with {'speed_limit' if fast else 'joint_limit'} the usual first gait has a root-mean-square shape speed of "
+            f"{rms:.2g}, less than smallest_shape_speed = {smallest_shape_speed:g}: make that smaller, or give a guess."
         )
-    return slow
+    return gait
 
 
 def check_guess(body: Body, gait_class: Any, stated: Any, joint_limit: Limit, smallest_shape_speed: float) -> None:

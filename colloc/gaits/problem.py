@@ -9,7 +9,7 @@ import numpy as np
 
 from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
-from colloc.gaits.guesses import check_guess, slowed, travelling_wave
+from colloc.gaits.guesses import check_guess, usual_guess
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.inertia import Free, paced_from
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
@@ -178,10 +178,9 @@ class Problem:
         regime.check(self)
         self._check_gaits()
         if self.guess is None:
+            limits = self.joint_limit, self.largest_speeds, self.smallest_shape_speed
             free = self.gait.free
-            wave = self.gait.first_guess(travelling_wave(self.body, self.joint_limit)) if free else None
-            start = slowed(wave, self.largest_speeds, self.smallest_shape_speed) if free else self.gait.member(np.empty(0), 2)
-            self._fill(guess=start)
+            self._fill(guess=usual_guess(self.body, self.gait, *limits) if free else self.gait.member(np.empty(0), 2))
         check_kind("guess", self.guess, gait_fields.GAITS)
         check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 

@@ -6,6 +6,7 @@ import pytest
 from colloc.gaits.guesses import SAFE, largest_factor
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
+from colloc.gaits.starts import latin_hypercube_gait
 from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 
@@ -34,6 +35,21 @@ def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
     depth = body.crossing_depth(Harmonic(1).guessed(wave)[0].angles(np.append(phase, np.arange(400) / 400)))
     assert 0.05 < phase < 0.4
     assert depth[0] == pytest.approx(depth.max(), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "asked", [{"smallest_shape_speed": 1.6}, {"joint_limit": (0.1, 1.5)}, {"joint_limit": ((-0.1, 1.5), 1.5)}]
+)
+def test_without_a_guess_a_search_begins_where_the_body_moves_enough(asked):
+    """Larger than usual, and each joint as far as its own limit lets it."""
+    problem = Problem("fast", gait=Harmonic(1), **asked)
+    assert problem.guess.shape_speed > problem.smallest_shape_speed
+    assert latin_hypercube_gait(problem, 0, 0).shape_speed > problem.smallest_shape_speed
+
+
+def test_where_no_wave_moves_enough_the_limit_that_is_in_the_way_is_named():
+    with pytest.raises(ProblemError, match="with joint_limit the usual first gait .* less than smallest_shape_speed = 0.1"):
+        Problem("stiff", gait=Harmonic(1), joint_limit=0.05)
 
 
 def test_a_straight_body_may_be_enlarged_without_end():
