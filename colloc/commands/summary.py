@@ -94,6 +94,8 @@ def _besides(solution: Solution) -> list[str]:
     if (held := solution.share_held).any():
         shares = ", ".join(f"{100 * share:.0f}" for share in held)
         lines.append(f"  feet hold       {shares} % of the period, from the tail")
+    if (travels := solution.travels) != "head first":
+        lines.append(f"  travels         {travels}")
     if problem.rotation != 0:
         lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
     return lines
@@ -131,6 +133,7 @@ def summary_dict(solution: Solution, path: Path | None, reference: Reference | N
         "efficiency": solution.efficiency,
         "distance": solution.distance,
         "work": solution.work,
+        "travels": solution.travels,
         "iterations": sum(step.iterations for step in solution.history),
         "class": solution.problem.gait.describe(),
         "program": solution.answer.program,

@@ -203,6 +203,10 @@ class ClassOfGaits:
         if self.unit_speed and n_joint < 2:
             raise ProblemError(f"the class {type(self).__name__} needs a body of at least three links, or two modes.")
 
+    def retraces(self, n_joint: int) -> bool:
+        """Whether every member goes back the way it came, in as many shape coordinates."""
+        return n_joint == 1
+
     @property
     def fraction(self) -> float:
         """The part of the period that has to be solved; symmetry gives the rest."""

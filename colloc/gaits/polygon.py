@@ -176,6 +176,9 @@ class Polygon(ClassOfGaits):
         axis = f" through a {self.axis}" if self.symmetry == BILATERAL and self.corners % 2 == 0 else ""
         return f"polygons of {self.corners} corners, symmetry {self.symmetry}{axis}"
 
+    def retraces(self, n_joint: int) -> bool:
+        return self.corners == 2 or super().retraces(n_joint)
+
     @property
     def half_ends(self) -> tuple[bool, bool]:
         """Whether the solved part starts, and ends, in the middle of a side."""

@@ -341,11 +341,13 @@ class Problem:
         if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
-        if self.body.n_joint == 1 and self.law.reversible and not self.froude:
+        if self.law.reversible and not self.froude and self.gait.retraces(self.body.n_joint):
+            alone = self.body.n_joint == 1
+            which = f"a body with one {self.body.coordinate}" if alone else f"every gait of the class ({self.gait.describe()})"
+            more = "the body another one" if alone else "the class more freedom"
             raise ProblemError(
-                "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
-                "reverse the motion (the scallop theorem). Give the body three links, mu_b different from mu_f, or the problem "
-                "a froude."
+                f"{which} goes back the way it came, and reversed rates reverse the motion when mu_f = mu_b (the scallop "
+                f"theorem): it goes nowhere. Give {more}, mu_b different from mu_f, or the problem a froude."
             )
         if self.keeps_heading and self.rotation:
             raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")

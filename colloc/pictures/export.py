@@ -2,7 +2,7 @@
 and the robot itself as a model for simulators.
 
 Where the pace of a gait matters (viscous drag, power limits), its own pace is kept, and limits on the speeds make the period
-longer: so the numbers of the result hold for what is written.
+longer. With inertia the numbers of the result hold for a robot of one length at that period, which is said.
 """
 
 from __future__ import annotations
@@ -86,7 +86,8 @@ def write_export(
         return _written_model(Robot(solution, length, mass, period, gravity), path)
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
     trajectory = timed(solution.gait, rate, period, limits, keep_pace=bool(solution.problem.paced_by))
-    facts, series = _about(solution, trajectory, rate, limits), {"rad": trajectory.angles, "rad_per_s": trajectory.speeds}
+    facts = _about(solution, trajectory, rate, limits) | _pace(solution, trajectory.period, gravity)
+    series = {"rad": trajectory.angles, "rad_per_s": trajectory.speeds}
     if length is not None or mass is not None:
         if length is None or mass is None:
             raise ProblemError("torques need both the length and the mass of the robot.")
@@ -110,8 +111,7 @@ def _written_model(robot: Robot, path: Path) -> dict[str, Any]:
 
 
 def _about(solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None) -> dict[str, Any]:
-    measured, reason = solution.measured, solution.problem.paced_by
-    paced = {"pace": f"the gait's own, as {reason}; distance and work are those in a period of 1"} if reason else {}
+    measured = solution.measured
     return {
         "name": solution.problem.name,
         "status": solution.status,
@@ -126,12 +126,23 @@ def _about(solution: Solution, trajectory: Trajectory, rate: float, limits: np.n
         "objective": solution.problem.objective.name,
         "value": measured.value,
         "distance_per_period_body_lengths": measured.distance,
+        "travels": solution.travels,
         "rotation_per_period_rad": solution.rotation,
         "turning_radius_body_lengths": solution.turning_radius if solution.turning else None,
         "work_per_period_weight_times_length": measured.work,
         "problem_hash": solution.problem.hash,
-        **paced,
     }
+
+
+def _pace(solution: Solution, period: float, gravity: float) -> dict[str, Any]:
+    """Why the gait keeps its own pace, and of which robot distance and work are, where these depend on it."""
+    reason, froude = solution.problem.paced_by, solution.froude
+    if not reason:
+        return {}
+    if not froude:
+        return {"pace": f"the gait's own, as {reason}; distance and work are those in a period of 1"}
+    robot = f"those at the Froude number {froude:.4g}: of a robot of {froude * gravity * period**2:.3g} m in this period"
+    return {"pace": f"the gait's own, as {reason}; distance and work are {robot}", "froude_number": froude}
 
 
 def _csv(facts: dict[str, Any], time: np.ndarray, series: dict[str, np.ndarray], coordinate: str) -> str:

@@ -205,6 +205,7 @@ class Robot:
             "gravity_m_per_s2": float(self.gravity),
             "speed_m_per_s": measured.distance * self.length / self.period,
             "body_lengths_per_period": measured.distance,
+            "travels": self.solution.travels,
             "work_per_period_J": work,
             "motor_work_per_period_J": self.period * float(_mean(np.maximum(powers, 0.0)).sum()),
             "mean_power_W": work / self.period,
@@ -256,7 +257,7 @@ class Robot:
         f = self.facts
         found = [
             f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period ({f['status']})",
-            f"  speed              {f['speed_m_per_s']:.4g} m/s; {f['body_lengths_per_period']:.4g} body lengths a period",
+            f"  speed              {f['speed_m_per_s']:.4g} m/s; {f['body_lengths_per_period']:.4g} body lengths a period, {f['travels']}",
             f"  work               {f['work_per_period_J']:.4g} J a period; "
             f"{f['motor_work_per_period_J']:.4g} J if motors take none back",
             f"  power              mean {f['mean_power_W']:.4g} W, peak {f['peak_power_W']:.4g} W",

@@ -315,6 +315,14 @@ class Solution:
         stands = self.problem.body.footprints(self.gait.angles(_INSTANTS[:1])).size
         return self.holding(self.sample(_INSTANTS)).mean(axis=1) if stands else np.empty(0)
 
+    @property
+    def travels(self) -> str:
+        """Which way the body points as it travels, on average: "head first", "tail first" or "sideways"."""
+        motion = self.sample(_INSTANTS)
+        (x, y), (ahead, aside) = (motion.centre - motion.tail).mean(axis=1), motion.centre[:, -1] - motion.centre[:, 0]
+        along, across = x * ahead + y * aside, abs(x * aside - y * ahead)
+        return "sideways" if abs(along) <= across else "head first" if along > 0 else "tail first"
+
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         return self.motion.sliding(motion.angles, motion.rates, motion.z).power[0]
