@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.gaits.inertia import Paced
+from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
@@ -34,7 +35,8 @@ farthest step between the logarithms of two."""
 
 
 class Played(NamedTuple):
-    """A period of a gait played at some pace, and its states at the points of the mesh, ``(n_state, n_point)``."""
+    """A period of a gait played at some pace, and its states at the points of the mesh, ``(n_state, n_point)``. Its distance is
+    the chord of the arc that it crawls, which does not depend on the phase at which it begins (`colloc.gaits.period`)."""
 
     efficiency: float
     states: np.ndarray
@@ -72,8 +74,9 @@ class GaitOnMesh:
         along = kind.along(self._mesh, Shapes(self._angles, self._rates, delta), np.empty(0), (states, None))
         if not along.held.all():
             raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
-        pose = CollocatedPose.on_mesh(self._mesh, along.z[OMEGA], along.now.centre)
-        return Played(float(abs(pose.place[-1]) / (point_weights(self._mesh) @ along.now.power)), along.states)
+        turn, work = point_weights(self._mesh) @ np.array([along.z[OMEGA], along.now.power]).T
+        pose = CollocatedPose.on_mesh(self._mesh, along.z[OMEGA] - turn, along.now.centre)
+        return Played(chord_per_way(turn) * float(abs(pose.place[-1]) / work), along.states)
 
 
 def slow_enough(

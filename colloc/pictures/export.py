@@ -17,7 +17,7 @@ import numpy as np
 
 from colloc.gaits.gait_fields import fields
 from colloc.mechanics.inertia import GRAVITY
-from colloc.results.robot import Robot
+from colloc.results.robot import Robot, pressing
 from colloc.results.robot_model import FORMATS
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
@@ -91,7 +91,8 @@ def write_export(
     if length is not None or mass is not None:
         if length is None or mass is None:
             raise ProblemError("torques need both the length and the mass of the robot.")
-        torques = Robot(solution, length, mass, trajectory.period, gravity).torques(trajectory.phase)
+        # the period as it is asked for: that of whole samples may be another pace
+        torques = Robot(solution, length, mass, period or trajectory.period, gravity).torques(trajectory.phase)
         series |= {"N_m": torques, "W": torques * trajectory.speeds}
         facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
     time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
@@ -141,7 +142,7 @@ def _pace(solution: Solution, period: float, gravity: float) -> dict[str, Any]:
         return {}
     if not froude:
         return {"pace": f"the gait's own, as {reason}; distance and work are those in a period of 1"}
-    robot = f"those at the Froude number {froude:.4g}: of a robot of {froude * gravity * period**2:.3g} m in this period"
+    robot = f"those at the Froude number {froude:.4g}: of a robot of {froude * pressing(solution, gravity) * period**2:.3g} m in this period"
     return {"pace": f"the gait's own, as {reason}; distance and work are {robot}", "froude_number": froude}
 
 

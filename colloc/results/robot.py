@@ -85,6 +85,11 @@ def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarr
     return froude * inertial_moments(body, angles, link, growth)
 
 
+def pressing(solution: Solution, gravity: float) -> float:
+    """The part of gravity that presses a robot on the ground: less than all of it on a slope."""
+    return gravity * math.cos(math.atan(solution.problem.grade))
+
+
 @dataclass(frozen=True, eq=False)
 class Robot:
     """What a gait does on a robot: `colloc.Solution.robot` makes it, and ``print`` shows it.
@@ -146,8 +151,8 @@ class Robot:
 
     @property
     def pressing(self) -> float:
-        """The part of gravity that presses the robot on the ground [m/s^2]: less than all of it on a slope."""
-        return self.gravity * math.cos(math.atan(self.solution.problem.grade))
+        """The part of gravity that presses the robot on the ground [m/s^2]."""
+        return pressing(self.solution, self.gravity)
 
     @property
     def torque_unit(self) -> float:

@@ -123,6 +123,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
             most_instants=most_instants,
             breaks=gait.corner_phases,
             objective=problem.objective,
+            turn=problem.rotation or 0.0,
         )
     except CollocError:
         return 0.0

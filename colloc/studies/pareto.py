@@ -156,9 +156,8 @@ def _uninterrupted(problem: Problem, starts: int) -> Solution:
 
 def _value(solution: Solution, aim: Objective) -> float:
     """An objective of a solution, of its certificate or, where that does not hold what it takes, of a replay."""
-    value = aim(solution.certificate.values)
-    if not np.isnan(value):
-        return value
-    problem, gait = solution.problem, solution.gait
-    at = (problem.body, problem.law, gait, solution.delta_per_period)
-    return replayer(problem.regime)(*at, breaks=gait.corner_phases, objective=aim).value
+    known, problem, gait = solution.certificate.values, solution.problem, solution.gait
+    if set(aim.uses) <= set(known):
+        return aim(known)
+    at: Any = (problem.body, problem.law, gait, solution.delta_per_period)
+    return replayer(problem.regime)(*at, breaks=gait.corner_phases, objective=aim, turn=problem.rotation or 0.0).value

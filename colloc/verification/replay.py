@@ -167,8 +167,8 @@ def replay(
     left, width = edges[:-1], np.diff(edges)
     t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
     # one-sided limits at jumps
-    t[np.isin(left, ends[1:-1]), 0] += ONE_SIDED
-    t[np.isin(edges[1:], ends[1:-1]), 4] -= ONE_SIDED
+    t[np.isin(left, breaks), 0] += ONE_SIDED
+    t[np.isin(edges[1:], breaks), 4] -= ONE_SIDED
     start = None if near is None else near.tail_velocity(t.ravel())
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     names = "rotation", "distance", "work", *(each.name for each in asked)
@@ -202,7 +202,8 @@ def replay(
         new = at(between, start, whole=False)
         panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new, changed[chosen]))
     several, apart = _others(panels, np.abs(place - place[-1]).max())
-    known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
+    known = panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)
+    known[np.isin(panels.left, breaks), 0] += ONE_SIDED
     balanced = [1.0, values["distance"], values["work"], *(each.needs_forces * abs(values[each.name]) for each in asked)]
     return Replay(
         values=values,
@@ -214,7 +215,7 @@ def replay(
         error=float(gap.sum()) + residual,
         several=several,
         instants=4 * panels.left.size,
-        tail=(known, panels.z[:, :4].reshape(-1, 3).T),
+        tail=(known.ravel(), panels.z[:, :4].reshape(-1, 3).T),
         shares=panels.shares.max(axis=(0, 1)),
         objective=objective,
     )
