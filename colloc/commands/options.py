@@ -144,6 +144,16 @@ def _is_folder(output: str | None) -> bool:
     return output is None or output.endswith(("/", os.sep)) or not Path(output).suffix or os.path.isdir(output)
 
 
+def output_folder(output: str) -> Path:
+    """The folder that the user named. `ProblemError` if it looks like a file."""
+    if not _is_folder(output):
+        raise ProblemError(
+            f"--output {output} should be a folder, as files in it have their own names; a folder of that name is written "
+            f"{output}/."
+        )
+    return Path(output)
+
+
 def _wrong_ending(output: str, wanted: str) -> ProblemError:
     return ProblemError(f"--output {output} should end in {wanted}; a folder of that name is written {output}/.")
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
-from colloc.commands.options import add_printing, new_parser, tell
+from colloc.commands.options import add_printing, new_parser, output_folder, tell
 from colloc.studies.study import Study, read_study_file
 from colloc.system.errors import CollocError, ProblemError, StoreError
 
@@ -68,7 +68,7 @@ def _run(study: Study, source: str, command: str, options: argparse.Namespace) -
     from colloc.studies.run import StudyRun
     from colloc.system.file_lock import locked
 
-    out = Path(options.output)
+    out = output_folder(options.output)
     folder, quiet = out / f"{study.name}.study", options.quiet or options.json
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -149,10 +149,11 @@ def _save(run, out: Path, source: str, command: str) -> Path:
 
 
 def _summary(run, path: Path) -> dict:
-    from colloc.studies.table import NO_PROBLEM
+    from colloc.studies.table import NO_PROBLEM, NOT_TRIED
 
     counts = Counter(
-        "solved" if s.best else NO_PROBLEM if s.problem is None else "no certified gait" for s in run.cells.values()
+        "solved" if s.best else NO_PROBLEM if s.problem is None else "no certified gait" if s.attempts else f"{NOT_TRIED} yet"
+        for s in run.cells.values()
     )
     below = [run.study.coordinates(cell) for cell in run.cells if run.below_neighbour(cell)]
     return {
@@ -175,9 +176,9 @@ def _summary_lines(run, path: Path) -> list[str]:
     for cell in below[:_MOST_FAILURES_SHOWN]:
         found, could = run.cells[cell].best.outcome.value, run.neighbour_value(cell)
         lines.append(f"  {cell_text(run.study, cell)}: {found:.6f}, where a neighbour's gait achieves {could:.6f}")
-    failed = [(cell, state) for cell, state in run.cells.items() if not state.best]
+    failed = [(cell, state) for cell, state in run.cells.items() if not state.best and (state.attempts or state.message)]
     for cell, state in failed[:_MOST_FAILURES_SHOWN]:
-        message = state.attempts[-1].outcome.message if state.attempts else state.message or "not tried yet"
+        message = state.attempts[-1].outcome.message if state.attempts else state.message
         lines.append(f"  {cell_text(run.study, cell)}: {message}")
     if len(failed) > _MOST_FAILURES_SHOWN:
         lines.append(f"  ... and {len(failed) - _MOST_FAILURES_SHOWN} more; all are in the file, with their messages")

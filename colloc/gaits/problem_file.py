@@ -150,10 +150,20 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-        where = f", line {lines[-1]}" if lines else ""
-        what = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"
+        what = words_of(error)
         if isinstance(error, SystemExit):
             what = f"the file ends the program ({what}); it should only state {kind.upper()}."
-        raise ProblemError(f"{path}{where}: {what}") from None
+        raise ProblemError(f"{place_of(error) or path}: {what}") from None
     return path, names, source
+
+
+def place_of(error: BaseException) -> str:
+    """File and line of somebody's code that raised, seen from where that was called; "" if it was not reached."""
+    theirs = traceback.extract_tb(error.__traceback__)[1:]
+    lines = [frame.lineno for frame in theirs if frame.filename == theirs[0].filename]
+    return f"{theirs[0].filename}, line {lines[-1]}" if lines else ""
+
+
+def words_of(error: BaseException) -> str:
+    """What an exception says; with its kind, unless it was made for people."""
+    return str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"

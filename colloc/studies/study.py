@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from colloc.gaits.problem import Problem
-from colloc.gaits.problem_file import stated_names
+from colloc.gaits.problem_file import place_of, stated_names, words_of
 from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
 from colloc.system.result_names import check_name
@@ -149,14 +149,14 @@ class Study:
         Raises
         ------
         ProblemError
-            Whatever the study's function raises, with the coordinates.
+            Whatever the study's function raises, with the coordinates, its file and the line.
         """
         where = ", ".join(f"{k} = {v}" for k, v in self.coordinates(cell).items())
         try:
             problem = self.problem(**self.coordinates(cell))
         except Exception as error:
-            what = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"
-            raise ProblemError(f"no problem at {where}: {what}") from None
+            place = place_of(error)
+            raise ProblemError(f"no problem at {where}: {place}{': ' * bool(place)}{words_of(error)}") from None
         if not isinstance(problem, Problem):
             raise ProblemError(f"no problem at {where}: the study's function gave a {type(problem).__name__}.")
         return problem
