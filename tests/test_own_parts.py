@@ -229,5 +229,8 @@ def test_limits_that_cannot_be_kept_or_read_are_refused():
         WEAK.with_(limits=[PathLimit("heat", "moment**2", (1.0, 1.0, 1.0))])
     with pytest.raises(ProblemError, match="the speed is limited"):
         WEAK.with_(torque_limit=None, gait=FreePath(4.0, "bilateral"), limits=[PathLimit("speed", "rate", 9.0)])
-    with pytest.raises(ProblemError, match="PathLimit"):
-        WEAK.with_(limits=["moment < 1"])
+    for none in (["moment < 1"], 3):
+        with pytest.raises(ProblemError, match="PathLimit"):
+            WEAK.with_(limits=none)
+    alone = PathLimit("heat", "moment**2", 1.0)
+    assert WEAK.with_(limits=alone).limits == (alone,)

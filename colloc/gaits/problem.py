@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -91,7 +92,7 @@ class Problem:
     torque_limit, power_limit : float or sequence of float, optional
         The most that the joints' actuators can do, all or each: magnitude of the moment [weight x body length], power
         delivered [weight x body length / period]. With a power limit the pace matters.
-    limits : sequence of PathLimit, optional
+    limits : PathLimit or sequence of PathLimit, optional
         Others, on functions of an instant of your own (docs/howto/motors.md).
     speed_limit : float or sequence of float, optional
         The largest speed of the joints at any instant, all or each [rad per period]: that of a motor [rad/s] times the period
@@ -242,7 +243,8 @@ class Problem:
     def _check_actuators(self) -> None:
         for name in ("torque_limit", "power_limit", "speed_limit"):
             object.__setattr__(self, name, checked_actuator_limit(name, getattr(self, name), self.body.n_joint))
-        object.__setattr__(self, "limits", tuple(stated_limit(each) for each in self.limits))
+        given = self.limits if isinstance(self.limits, Iterable) else (self.limits,)
+        object.__setattr__(self, "limits", tuple(stated_limit(each) for each in given))
         limits = self.path_limits
         forced = [each.name for each in self.integrals if each.needs_forces]
         asks = forced[0] if forced else f"a limit on the {limits.each[0].name}" if limits.each else ""
@@ -342,12 +344,12 @@ class Problem:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
         if self.law.reversible and not self.froude and self.gait.retraces(self.body.n_joint):
-            alone = self.body.n_joint == 1
-            which = f"a body with one {self.body.coordinate}" if alone else f"every gait of the class ({self.gait.describe()})"
-            more = "the body another one" if alone else "the class more freedom"
+            coordinate, alone = self.body.coordinate, self.body.n_joint == 1
+            which = f"a body with one {coordinate}" if alone else f"the class ({self.gait.describe()})"
+            more = f"the body a second {coordinate}" if alone else "the class more freedom"
             raise ProblemError(
-                f"{which} goes back the way it came, and reversed rates reverse the motion when mu_f = mu_b (the scallop "
-                f"theorem): it goes nowhere. Give {more}, mu_b different from mu_f, or the problem a froude."
+                f"no gait of {which} goes anywhere when mu_f = mu_b: it retraces its path, and reversed rates reverse the motion "
+                f"(the scallop theorem). Give {more}, mu_b different from mu_f, or the problem a froude."
             )
         if self.keeps_heading and self.rotation:
             raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")

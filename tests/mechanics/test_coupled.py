@@ -155,3 +155,5 @@ def test_other_bodies_and_inertia_are_refused_in_a_sentence():
         Problem("fast", body=BROKEN, gait=Harmonic(1), froude=0.05)
     with pytest.raises(ProblemError, match="only a Chain"):
         Problem("up", body=BROKEN, gait=Harmonic(1), grade=0.05)
+    with pytest.raises(ProblemError, match=r"a body with one motor .* Give the body a second motor"):
+        Problem("scallop", body=Coupled(Chain((0.2,) * 5), gears=((1,),) * 4))
