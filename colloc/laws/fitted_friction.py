@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
@@ -141,12 +142,16 @@ def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
 def _read(table: str | os.PathLike[str] | np.ndarray) -> tuple[str, np.ndarray]:
     """Where the samples are from, and speed, along, across and, where it differs, back ``(n, 3 or 4)``."""
     if not isinstance(table, (str, os.PathLike)):
-        values = np.array(table, dtype=float) if np.ndim(table) == 2 else np.empty((0, 0))
-        if values.shape[0] < _FEWEST or values.shape[1] not in (3, 4) or not np.isfinite(values).all():
+        cells = np.array(table, dtype=object)
+        if cells.ndim != 2 or len(cells) < _FEWEST or cells.shape[1] not in (3, 4):
             raise ProblemError(
                 f"the table of friction must be numbers with a row for each of at least {_FEWEST} speeds: the speed, the "
                 "coefficient along, across and, if it differs, backwards."
             )
+        values = np.vectorize(_number, otypes=[float])(cells)
+        for k, j in np.argwhere(~np.isfinite(values)):
+            what = f"{tuple(_NAMES)[j]} is {cells[k, j]!r}"
+            raise ProblemError(f"the table of friction, sample {k + 1}: {what}, and must be a finite number.")
         return "the table of friction", values
     names, values = csv_table(Path(table), _FEWEST)
     if not names:
@@ -163,6 +168,14 @@ def _read(table: str | os.PathLike[str] | np.ndarray) -> tuple[str, np.ndarray]:
             raise ProblemError(f"{table} has no column {wanted!r}: its columns are {', '.join(names)}.")
         order += found[:1]
     return str(table), values[:, order]
+
+
+def _number(cell: Any) -> float:
+    """What a cell of a table says; NaN where that is no number."""
+    try:
+        return float(cell)
+    except (TypeError, ValueError):
+        return np.nan
 
 
 def _check(name: str, speed: np.ndarray, coefficients: np.ndarray) -> None:

@@ -93,6 +93,7 @@ class OwnLaw(FormulaLaw):
 
     def describe(self) -> str:
         scale = "" if self.unit == 1 else f", over {self.unit:g}"
+        scale += "" if self.speed_unit == 1 else f"; a body length per period is a speed of {self.speed_unit:g} (speed_unit)"
         return f"{self.tangential} along, {self.normal} across the body{scale}"
 
     def in_units_of(self, unit: float) -> OwnLaw:

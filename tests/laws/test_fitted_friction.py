@@ -61,7 +61,9 @@ def test_metres_and_seconds_are_the_same_law():
     """A robot of 0.5 m that takes 4 s: one body length per period is 0.125 m/s."""
     own = fitted_friction(table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2))).law
     scaled = table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2)) * [0.125, 1, 1]
-    metres = fitted_friction(scaled, length=0.5, period=4.0).law
+    fitted = fitted_friction(scaled, length=0.5, period=4.0)
+    metres = fitted.law
+    assert "a body length per period is a speed of 0.125 (speed_unit)" in str(fitted)
     np.testing.assert_allclose(forces(metres, SPEED, 0.7), forces(own, SPEED, 0.7), rtol=1e-4)
 
 
@@ -115,6 +117,9 @@ def test_arguments_that_cannot_be_are_refused_in_a_sentence(tmp_path):
         fitted_friction(tmp_path / "nowhere.csv")
     with pytest.raises(ProblemError, match="a row for each of at least 3 speeds"):
         fitted_friction(np.ones((3, 2)))
+    for cell in (np.nan, "rough", None):
+        with pytest.raises(ProblemError, match=f"sample 2: along is {cell!r}"):
+            fitted_friction([[0.1, 0.5, 0.9], [0.2, cell, 0.9], [0.3, 0.5, 0.9]])
     with pytest.raises(ProblemError, match="take both"):
         fitted_friction(table(SPEED, SPEED), length=1.0)
     with pytest.raises(ProblemError, match="length"):
