@@ -18,8 +18,13 @@ def csv_table(path: Path, fewest: int) -> tuple[list[str], np.ndarray]:
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProblemError(f"cannot read {path} as text: {getattr(error, 'strerror', None) or error}.") from None
+    except OSError as error:
+        raise ProblemError(f"cannot read {path}: {error.strerror or error}.") from None
+    except UnicodeDecodeError:
+        raise ProblemError(
+            f"{path} is no text in UTF-8: a CSV file is read here, lines of numbers with commas between, such as a spreadsheet "
+            "or colloc export writes."
+        ) from None
     rows = list(csv.reader(line for line in text.splitlines() if line.strip() and not line.startswith("#")))
     names = [name.strip().lower() for name in rows[0]] if rows and not _are_numbers(rows[0]) else []
     rows = rows[bool(names) :]
