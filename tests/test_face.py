@@ -116,6 +116,8 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
         assert three_link.plot(axes, panel) is axes
     with pytest.raises(colloc.ProblemError, match="there is no panel 'pwoer'; there are gait, filmstrip, lab, angles"):
         three_link.plot(axes, "pwoer")
+    with pytest.raises(colloc.ProblemError, match=r"ax must be a matplotlib Axes .* not 'x.png'; .*savefig"):
+        three_link.plot("x.png")
     assert three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200).stat().st_size > 1000
     with pytest.raises(colloc.ProblemError, match=r"should end in \.gif or \.mp4"):
         three_link.animate(tmp_path / "x.avi")

@@ -41,7 +41,10 @@ class Panel(NamedTuple):
     draw: Callable[[Axes], object]
 
     def draw_on(self, axes: Axes) -> Axes:
-        """Draw it there, and return the axes."""
+        """Draw it there, and return the axes. `ProblemError` if these are none."""
+        if not isinstance(axes, Axes):
+            how = 'plot().savefig("mine.png"), or .pdf, or .svg, writes a file'
+            raise ProblemError(f"ax must be a matplotlib Axes to draw on, not {axes!r}; {how}.")
         self.draw(axes)
         return axes
 
