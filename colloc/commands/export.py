@@ -72,7 +72,7 @@ def _export(options: argparse.Namespace) -> int:
     facts = solution.export(path, **settings)
     if kind in ("xml", "urdf"):
         said = f"saved {path}: a robot of {facts['length_m']:g} m and {facts['mass_kg']:g} kg; its joint angles: --format csv"
-        tell(options, {**facts, "file": str(path)}, [said])
+        tell(options, {**facts, "file": str(path)}, [said, *([f"  note: {facts['note']}"] if "note" in facts else [])])
         return OK
     samples = facts["samples_per_period"] * options.periods
     fastest = ", ".join(f"{speed:.3g}" for speed in facts["largest_speed_rad_per_s"])

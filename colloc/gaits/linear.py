@@ -169,7 +169,7 @@ class LinearClass(ClassOfGaits):
     def retraces(self, n_joint: int) -> bool:
         """As where one function moves all joints: whether the rates of a member drawn by chance have one direction."""
         drawn = np.random.default_rng(0).normal(size=self._basis(n_joint).shape[1])
-        return bool(np.linalg.matrix_rank((self.rate_matrix(self.instants, n_joint) @ drawn)) <= 1)
+        return bool(np.linalg.matrix_rank(self.rate_matrix(self.instants, n_joint) @ drawn) <= 1)
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
         """The gait of a parameter vector; the mesh does not matter."""

@@ -348,8 +348,8 @@ class Problem:
             which = f"a body with one {coordinate}" if alone else f"the class ({self.gait.describe()})"
             more = f"the body a second {coordinate}" if alone else "the class more freedom"
             raise ProblemError(
-                f"no gait of {which} goes anywhere when mu_f = mu_b: it retraces its path, and reversed rates reverse the motion "
-                f"(the scallop theorem). Give {more}, mu_b different from mu_f, or the problem a froude."
+                f"no gait of {which} goes anywhere when mu_f = mu_b: it retraces its path, and reversed rates reverse the "
+                f"motion (the scallop theorem). Give {more}, mu_b different from mu_f, or the problem a froude."
             )
         if self.keeps_heading and self.rotation:
             raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")

@@ -18,7 +18,7 @@ import numpy as np
 from colloc.gaits.gait_fields import fields
 from colloc.mechanics.inertia import GRAVITY
 from colloc.results.robot import Robot, pressing
-from colloc.results.robot_model import FORMATS
+from colloc.results.robot_model import FORMATS, one_coefficient
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.system.replaced_file import replaced_file
@@ -108,7 +108,9 @@ def _written_model(robot: Robot, path: Path) -> dict[str, Any]:
     text, size = FORMATS[path.suffix](robot), {"length_m": robot.length, "mass_kg": robot.mass, "period_s": robot.period}
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
-    return {name: robot.facts[name] for name in ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")} | size
+    note = one_coefficient(robot) if path.suffix == ".xml" else ""
+    facts = {name: robot.facts[name] for name in ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")} | size
+    return facts | ({"note": note} if note else {})
 
 
 def _about(solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None) -> dict[str, Any]:
@@ -122,7 +124,7 @@ def _about(solution: Solution, trajectory: Trajectory, rate: float, limits: np.n
         "max_speed_rad_per_s": None if limits is None else np.ravel(limits).tolist(),
         "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
         "body": solution.problem.body.describe(),
-        "friction": fields(solution.problem.friction),
+        "friction": fields(solution.problem.law),
         "efficiency": measured.efficiency,
         "objective": solution.problem.objective.name,
         "value": measured.value,
@@ -142,7 +144,8 @@ def _pace(solution: Solution, period: float, gravity: float) -> dict[str, Any]:
         return {}
     if not froude:
         return {"pace": f"the gait's own, as {reason}; distance and work are those in a period of 1"}
-    robot = f"those at the Froude number {froude:.4g}: of a robot of {froude * pressing(solution, gravity) * period**2:.3g} m in this period"
+    length = froude * pressing(solution, gravity) * period**2
+    robot = f"those at the Froude number {froude:.4g}: of a robot of {length:.3g} m in this period"
     return {"pace": f"the gait's own, as {reason}; distance and work are {robot}", "froude_number": froude}
 
 

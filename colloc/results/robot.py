@@ -262,7 +262,8 @@ class Robot:
         f = self.facts
         found = [
             f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period ({f['status']})",
-            f"  speed              {f['speed_m_per_s']:.4g} m/s; {f['body_lengths_per_period']:.4g} body lengths a period, {f['travels']}",
+            f"  speed              {f['speed_m_per_s']:.4g} m/s {f['travels']}; "
+            f"{f['body_lengths_per_period']:.4g} body lengths a period",
             f"  work               {f['work_per_period_J']:.4g} J a period; "
             f"{f['motor_work_per_period_J']:.4g} J if motors take none back",
             f"  power              mean {f['mean_power_W']:.4g} W, peak {f['peak_power_W']:.4g} W",

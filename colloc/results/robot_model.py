@@ -24,6 +24,8 @@ _THIN = 0.02
 _STIFF = 200.0
 """Gain of the position servos, over the largest torque of the gait, per rad: holds angles to about 1/200 rad."""
 _COLOUR = "0.85 0.4 0.1 1"
+_SAME = 1e-9
+"""Relative difference of coefficients that counts as none."""
 _REACH = 1.5
 """Effort that is allowed of a joint, over the largest that the gait needs."""
 
@@ -196,6 +198,15 @@ def _ranges(robot: Robot) -> list[tuple[float, float]]:
 
 def _mean_friction(law: Law) -> float:
     return float(np.sqrt(law.smallest * law.largest))
+
+
+def one_coefficient(robot: Robot) -> str:
+    """What MJCF makes of friction that has a direction, in a sentence; "" where it has none."""
+    own = robot.solution.problem.friction
+    laws = [foot.friction or own for foot in _chain(robot).standing_on] or [own]
+    turned = dict.fromkeys(law for law in laws if law.largest > law.smallest * (1 + _SAME))
+    made = ", ".join(f"{law.label} is {_mean_friction(law):.3g}" for law in turned)
+    return f"a contact of MuJoCo has one coefficient of friction for all directions: {made}" if made else ""
 
 
 def _text(root: Element) -> str:

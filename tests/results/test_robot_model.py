@@ -48,12 +48,18 @@ def test_an_mjcf_has_the_links_masses_ranges_and_feet_of_the_robot(uneven):
     assert start[-2:] == pytest.approx(uneven.gait.angles(np.zeros(1))[:, 0])
 
 
-def test_every_foot_slides_by_the_mean_of_its_own_friction(uneven):
+def test_every_foot_slides_by_the_mean_of_its_own_friction(uneven, tmp_path):
     feet = (Foot(0), Foot(1, friction=Friction(4, 1, 1)), Wheel(2, rolling=0.04, sideways=1.0))
     problem = uneven.problem.with_(body=Chain(feet=feet), friction=Friction(9, 1, 1), joint_limit=3.0)
-    root = ElementTree.fromstring(mjcf(colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7)).robot(**SIZE)))
+    solution = colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
+    root = ElementTree.fromstring(mjcf(solution.robot(**SIZE)))
     found = {geom.get("name"): numbers(geom.get("friction"))[0] for geom in root.iter("geom") if geom.get("priority") == "1"}
     assert found == pytest.approx({"foot_1": 3.0, "foot_2": 2.0, "foot_3": 0.2})
+    said = solution.export(tmp_path / "x.xml", **SIZE)["note"]
+    assert "one coefficient of friction for all directions: friction (9, 1, 1) is 3, friction (4, 1, 1) is 2, fr" in said
+    assert "note" not in solution.export(tmp_path / "x.urdf", **SIZE)
+    stated = solution.export(tmp_path / "x.csv", period=4.0)["friction"]
+    assert [law["mu_t"] for law in stated["laws"]] == [9, 4, 1]
 
 
 def test_a_urdf_is_a_tree_of_links_with_efforts_and_speeds_that_suffice(uneven):
@@ -80,7 +86,9 @@ def test_the_command_writes_both_and_says_what_is_missing(three_link, tmp_path, 
     assert main([source, *size, "--output", str(tmp_path / "mine.urdf")]) == 0
     assert ElementTree.parse(tmp_path / "mine.xml").getroot().tag == "mujoco"
     assert ElementTree.parse(tmp_path / "mine.urdf").getroot().tag == "robot"
-    assert "a robot of 1.2 m and 3 kg" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "a robot of 1.2 m and 3 kg" in printed
+    assert "note" not in printed  # the same friction in all directions
     assert main([source, "--format", "urdf"]) == 2
     assert "needs the period [s], the length [m] and the mass [kg]" in capsys.readouterr().err
     assert main([source, *size, "--format", "urdf", "--max-speed", "2"]) == 2
