@@ -6,8 +6,8 @@ Exit codes: 0 every row holds, 2 bad table or result, or one that is not better,
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
-from importlib import resources
 
 from colloc.commands.ending import FAILED, OK, run
 from colloc.commands.options import add_printing, new_parser, tell
@@ -20,12 +20,13 @@ certified, and better than what is known of the same question: body, friction, c
 
   colloc referee
   colloc referee --only three_link
-  colloc referee --add results/mine.h5 --by "colloc solve mine.py" --table known.json"""
+  colloc referee --add results/mine.h5 --by "colloc solve mine.py"      into known.json, begun as a copy"""
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("referee", "Check the best gaits that are known, from the gaits alone; take in better ones.", _EPILOG)
-    parser.add_argument("--table", metavar="FILE.json", help="another table than the one that comes with colloc")
+    table = "another table than the one that comes with colloc; with --add (default: known.json) begun as a copy of that"
+    parser.add_argument("--table", metavar="FILE.json", help=table)
     parser.add_argument("--only", metavar="NAME", help="rows of the problem of this name")
     parser.add_argument("--dry", action="store_true", help="check bounds under dry friction as well")
     parser.add_argument("--add", metavar="FILE.h5", help="a result to take in")
@@ -76,8 +77,8 @@ def _taken_in(options: argparse.Namespace) -> int:
     solution = load(options.add)
     check_trusted(solution, options.add)
     new = row_of(solution, options.by)
-    table = options.table or str(resources.files("colloc.studies") / "known.json")
-    save_known(with_row(known(table), new), table)
+    table = options.table or "known.json"
+    save_known(with_row(known(table if os.path.exists(table) else None), new), table)
     said = f"{new.statement['name']}: {new.value:.8f} +- {new.value_error:.0e} is the best that is known; saved {table}"
     tell(options, {"name": new.statement["name"], "value": new.value, "table": table}, [said])
     return OK

@@ -97,6 +97,19 @@ def test_the_referee_takes_a_result_and_holds_it(best, tmp_path, capsys):
         known(tmp_path / "none.json")
 
 
+def test_without_a_table_the_referee_begins_a_copy_of_its_own_where_it_is_called(best, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    colloc.save(best, "quick.h5")
+    arguments = ["referee", "--add", "quick.h5", "--by", "colloc solve quick.py"]
+    assert main(arguments) == 0
+    assert main([*arguments, "--table", "mine.json"]) == 0
+    assert known() == ROWS
+    assert known("known.json") == known("mine.json")
+    assert known("known.json")[:-1] == ROWS
+    assert known("known.json")[-1].statement["name"] == "quick"
+    assert main(arguments) == 2  # it goes on from the table that is there
+
+
 def test_bounds_under_dry_friction_are_saved_and_checked_again(tmp_path, capsys):
     result, table = tmp_path / "quick.h5", tmp_path / "known.json"
     solution = colloc.solve(PROBLEM, starts=1)
