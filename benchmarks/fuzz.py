@@ -147,7 +147,7 @@ def other_json(rng: np.random.Generator, data: bytes) -> bytes:
         elif kind == 1 and isinstance(holder[key], int | float):
             holder[key] *= float(rng.choice([-1, 1e-3, 1e3, 1 + 1e-6]))
         else:
-            holder[key] = ODD[rng.integers(len(ODD))] if kind < 3 else copy.deepcopy(other[there])
+            holder[key] = copy.deepcopy(ODD[rng.integers(len(ODD))] if kind < 3 else other[there])
     return json.dumps(value).encode()
 
 

@@ -142,7 +142,8 @@ class Serpenoid(Harmonic):
 
     def fourier(self, parameters: np.ndarray, n_joint: int) -> SerpenoidSeries:
         """The gait of parameters, of which the own ones count."""
-        table = np.array(self.coefficients(parameters[: self.n_own], n_joint), dtype=float)
+        with np.errstate(over="ignore", invalid="ignore"):  # a series refuses what is not finite
+            table = np.array(self.coefficients(parameters[: self.n_own], n_joint), dtype=float)
         return SerpenoidSeries(table[:, 0], table[:, 1::2], table[:, 2::2], float(parameters[0]))
 
     def parameters(self, gait: Fourier) -> np.ndarray:

@@ -17,6 +17,10 @@ from colloc.mechanics.line_integrals import LineIntegrals, line_integrals
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import check_positive, named_arguments
+from colloc.system.errors import ProblemError
+
+_LARGEST = 1e9
+"""Coefficient that is taken, far beyond any rail, and far enough from where numbers overflow."""
 
 
 class Coefficients:
@@ -80,6 +84,8 @@ class Friction(Coefficients):
 
     def __post_init__(self) -> None:
         check_positive(self, "mu_t", "mu_f", "mu_b", of="friction.")
+        if max(self.mu_t, self.mu_f, self.mu_b) > _LARGEST:
+            raise ProblemError(f"friction holds more than {_LARGEST:g} times what presses: no floor does.")
 
     @property
     def kernel(self) -> KernelLaw:

@@ -37,6 +37,7 @@ import numpy as np
 
 from colloc.smooth.motion import Motion
 from colloc.smooth.prescribed_body import PrescribedBody
+from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 
 ODD_SCALE = 7**3.5 / 6**3
@@ -98,6 +99,7 @@ class Concertina(PrescribedBody):
     def __post_init__(self) -> None:
         if self.bumps not in (1, 2):
             raise ProblemError(f"bumps must be 1 or 2, not {self.bumps!r}.")
+        check_finite(epsilon=self.epsilon, share=self.share, amplitude=self.amplitude)
         widest = 0.5 / self.bumps
         if not 0 < self.epsilon < widest:
             raise ProblemError(f"epsilon must lie between 0 and {widest:g} for {self.bumps} bump(s), not {self.epsilon!r}.")

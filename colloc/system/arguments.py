@@ -39,6 +39,8 @@ def named_arguments(cls: type[T]) -> type[T]:
                 near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
                 hint = f"did you mean {_either(near)}?" if near else f"it takes {', '.join(known)}."
                 raise ProblemError(f"{cls.__name__} has no argument {name!r}; {hint}")
+        if len(given) > len(known):
+            raise ProblemError(f"{cls.__name__} has {len(known)} arguments, {', '.join(known)}, and {len(given)} were given.")
         if missing := [name for name in needed if name in known[len(given) :] and name not in named]:
             raise ProblemError(f"{cls.__name__} needs {' and '.join(missing)}.")
         made(self, *given, **named)
@@ -52,9 +54,9 @@ def _either(names: list[str]) -> str:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether it is a finite real number, and no truth value."""
+    """Whether it is a finite real number, and no truth value; a whole one that NumPy takes."""
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    return real and bool(abs(value) < math.inf)  # type: ignore[arg-type]
+    return real and bool(abs(value) < (2**63 if isinstance(value, int) else math.inf))  # type: ignore[arg-type]
 
 
 def is_whole(value: object, least: float = -math.inf, most: float = math.inf) -> TypeGuard[int]:

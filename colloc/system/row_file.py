@@ -79,8 +79,10 @@ def _opened(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
 
 
 def _is_empty(connection: sqlite3.Connection, path: Path, kind: str) -> bool:
-    """Whether there is no table yet; any other than that of `kind` is refused."""
+    """Whether there is no table yet; any other than that of `kind` is refused, and so is a file that has lost its own."""
     found = connection.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 2").fetchall()
+    if not found and path.stat().st_size > 0:
+        raise sqlite3.DatabaseError("its table is missing")
     if found and found != [(_table(kind).encode(),)]:
         raise StoreError(f"{path} is not a {kind}: another version of colloc wrote it, or another program; move it away.")
     return not found

@@ -151,6 +151,17 @@ def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hol
         solution.export(tmp_path / "x.json", max_speed=limits, period=0.99 * stated["period_s"])
 
 
+def test_with_inertia_it_is_said_of_which_robot_the_numbers_are(unsolved, tmp_path):
+    """Of one whose length makes the period the pace that was solved for: L = Fr g T^2."""
+    solution = unsolved(Problem("fast", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, froude=0.05))
+    stated = solution.export(tmp_path / "x.csv", period=2.0)
+    assert stated["froude_number"] == 0.05
+    assert "of a robot of 1.96 m in this period" in stated["pace"]
+    # the period is made one of whole samples, which may be another pace by a little
+    period = float(np.sqrt(1.2 / (9.81 * 0.05)))
+    assert solution.export(tmp_path / "x.csv", period=period, length=1.2, mass=3.0, rate=10)["period_s"] > 1.01 * period
+
+
 def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
     guess = Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
     solution = unsolved(Problem("soft", guess, ModalBody(2, panels=4), Friction(3), Harmonic(1, "antipodal"), intervals=6))

@@ -6,8 +6,10 @@ import pytest
 from colloc.collocation.shape_checks import shape_checks
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.columns import Basis
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, overlapping_pairs, passing_depth
@@ -177,6 +179,13 @@ def test_scallop_theorem(lengths, friction):
 def test_two_links_without_directional_friction_are_refused_in_words():
     with pytest.raises(ProblemError, match="scallop"):
         Problem("two", Fourier([0.0], [[1.0]], [[0.0]]), body=Chain((0.5, 0.5)), gait=Harmonic(1, "antipodal"))
+
+
+@pytest.mark.parametrize("kind", [Polygon(2), Basis([np.sin(2 * np.pi * np.arange(50) / 50)])])
+def test_classes_whose_gaits_all_go_back_the_way_they_came_are_refused_unless_that_leads_somewhere(kind):
+    with pytest.raises(ProblemError, match="it retraces its path, and reversed rates"):
+        Problem("back", gait=kind)
+    assert Problem("forth", gait=kind, friction=Friction(1, 1, 2)).gait is kind
 
 
 def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_friction_gives(solved):

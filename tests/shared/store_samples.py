@@ -91,7 +91,7 @@ class Samples:
             return {k: np.asarray(v).tolist() for k, v in read_arrays(path).items()}
         if kind == "study":
             found = load_study(path)
-            return found.attributes.get("source"), found.variables["efficiency"].tolist()
+            return found.attributes, {name: repr(values.tolist()) for name, values in found.variables.items()}
         if kind == "journal":
             text = read_journal(path.parent)
             return sorted(a.key for r in text.records for a in r.attempts), text.damaged

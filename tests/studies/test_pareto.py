@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from colloc import Friction, Harmonic, Problem, ProblemError, load, pareto_front
+from colloc import Friction, Harmonic, Problem, ProblemError, load, pareto_front, replay
 from colloc.commands.main import main
 from colloc.pictures.front_figure import front_figure
 from colloc.search.solve import solve
@@ -68,6 +68,14 @@ def test_the_figure_draws_every_value_and_mirror_images_alike(front, signs):
 def test_one_objective_twice_is_no_front():
     with pytest.raises(ProblemError, match="two objectives"):
         pareto_front(PROBLEM, "speed", "distance/length")
+
+
+def test_an_objective_that_certificates_do_not_know_is_measured():
+    ends = pareto_front(PROBLEM, "speed", "driven efficiency", 2, starts=1)
+    driven = [
+        replay(PROBLEM.body, PROBLEM.law, end.gait, end.delta_per_period, objective=ends.objectives[1]) for end in ends.points
+    ]
+    np.testing.assert_allclose(ends.values[:, 1], [each.value for each in driven], rtol=1e-5)
 
 
 @pytest.mark.slow

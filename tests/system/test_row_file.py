@@ -55,6 +55,19 @@ def test_a_file_with_anything_but_its_one_table_is_refused_by_readers_and_writer
     assert path.read_bytes() == before
 
 
+def test_a_file_that_lost_its_table_is_no_empty_one(tmp_path):
+    """One changed byte takes it: as many tables as the first page says there are."""
+    path = tmp_path / "x.sqlite"
+    put_rows(path, KIND, {"a": 1})
+    data = bytearray(path.read_bytes())
+    data[103:105] = b"\0\0"
+    path.write_bytes(data)
+    for attempt in (lambda: read_rows(path, KIND), lambda: put_rows(path, KIND, {"b": 2})):
+        with pytest.raises(StoreError, match="its table is missing"):
+            attempt()
+    assert path.read_bytes() == data
+
+
 def test_rows_of_forged_types_are_left_out(tmp_path):
     path = tmp_path / "x.sqlite"
     forged(path, f"""INSERT INTO "{KIND}" VALUES (NULL, 1, 2), ('b', x'00', NULL), ('c', 'd', 'e')""")

@@ -127,6 +127,15 @@ def test_the_interval_of_a_period_holds_what_a_certificate_states_for_delta_to_z
     assert dry.open == 0.0
 
 
+@pytest.mark.parametrize("body", [Chain(), Chain(feet=2)])
+def test_corners_where_rates_jump_do_not_widen_the_interval_of_a_period(body):
+    gait = colloc.Corners([[1.5, 0.3, -1.5, -0.3], [0.3, -1.5, -0.3, 1.5]])
+    least, most = dry_friction(body, ISOTROPIC, gait, breaks=gait.corner_phases).efficiency
+    assert most - least < 2e-4
+    replayed = colloc.replay(body, ISOTROPIC, gait, 1e-5, breaks=gait.corner_phases).efficiency
+    assert least - 1e-4 < replayed < most + 1e-4
+
+
 def test_unequal_coefficients_drag_and_curved_bodies_have_no_bounds():
     gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
     with pytest.raises(ProblemError, match="no bounds for delta = 0"):

@@ -181,6 +181,17 @@ def test_a_gait_whose_efficiency_no_pace_changes_much_is_slow_enough_at_none():
     assert abs(1 - colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 10.0).efficiency / slow) < 0.3
 
 
+def test_what_inertia_takes_from_a_gait_that_turns_does_not_depend_on_where_its_period_begins():
+    """Its way does: the body wriggles about the circle that it follows."""
+    turning = colloc.Fourier([1.2, 0.6], [[0.9], [0.1]], [[0.1], [0.9]])
+    begun = [lambda t, s=shift: turning((t + s) % 1.0) for shift in (0.0, 0.3, 0.6)]
+    assert abs(colloc.replay(CHAIN, ISOTROPIC, turning, 1e-2).rotation) > 0.1
+    lost = [inertial_loss(CHAIN, ISOTROPIC, gait, 1e-2, 0.02) for gait in begun]
+    np.testing.assert_allclose(lost, lost[0], rtol=0, atol=1e-3)
+    paces = [colloc.slow_enough(CHAIN, ISOTROPIC, gait, 1e-2) for gait in begun]
+    np.testing.assert_allclose(paces, paces[0], rtol=0.03)
+
+
 def test_what_has_no_inertia_is_refused_in_words():
     with pytest.raises(colloc.ProblemError, match="froude must be"):
         colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.0)
