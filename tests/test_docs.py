@@ -262,7 +262,8 @@ def results_of_a_reader(three_link, tmp_path, monkeypatch):
     from colloc.commands.export import main
 
     monkeypatch.chdir(tmp_path)
-    save(three_link, "results/mine.h5")
+    for name in ("mine", "three_link"):
+        save(three_link, f"results/{name}.h5")
     assert main(["results/mine.h5", "--period", "4"]) == 0
     sides, symmetries = {"mu_t": [0.5, 1.0], "mu_b": [1.0, 2.0]}, ["bilateral", "none"]
     values = xarray.DataArray(np.ones((2, 2, 2)), sides | {"symmetry": symmetries}, ("mu_t", "mu_b", "symmetry"))

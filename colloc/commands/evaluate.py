@@ -23,9 +23,9 @@ _EPILOG = """\
 The file has a line for each instant: its time, then the angle of each joint, from tail to head. Names and '#' lines are
 optional; what colloc export writes can be read. Angles are radians, or degrees with --degrees or names that end in _deg.
 
-  colloc evaluate problems/three_link.py mine.csv                                    results/mine.h5
+  colloc evaluate problems/three_link.py mine.csv                                    results/mine-evaluated.h5
   colloc evaluate problems/three_link.py mine.csv --best results/three_link.h5       and by what it differs from that
-  colloc animate results/mine.h5"""
+  colloc animate results/mine-evaluated.h5"""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -38,7 +38,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--harmonics", type=int, metavar="N", help="of the fit (default: as many as the samples are worth)")
     parser.add_argument("--degrees", action="store_true", help="angles are degrees")
-    parser.add_argument("--output", metavar="PATH", help="folder or .h5 file (default: results/GAIT.h5)")
+    parser.add_argument("--output", metavar="PATH", help="folder or .h5 file (default: results/GAIT-evaluated.h5)")
     add_printing(parser)
     add_verbose(parser)
     return parser
@@ -60,7 +60,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     stated = read_problem_file(options.problem)
     best = None if options.best is None else load(options.best)
     given = {"period": options.period, "harmonics": options.harmonics, "degrees": options.degrees}
-    default = Path("results") / f"{_name(options.gait)}.h5"
+    default = Path("results") / f"{_name(options.gait)}-evaluated.h5"  # not where the result is that it was exported from
     solution = evaluate(stated.problem.with_(name=default.stem), options.gait, **given)
     difference = None if best is None else gait_difference(solution, best)
     path = output_path(options.output, default)

@@ -96,16 +96,26 @@ def library(own_law: str = "") -> ctypes.CDLL | None:
 
 def built_kernel(sources: Path) -> ctypes.CDLL | None:
     """The library that was built of these very sources with the package, if there is one."""
+    now = hashlib.sha256(b"".join(file.read_bytes() for file in sorted(sources.glob("*.[ch]")))).hexdigest()
+    for file in _built_files():
+        with contextlib.suppress(OSError, ValueError):  # of another machine, or of something else
+            found = ctypes.CDLL(file)
+            made_of = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(found, "colloc_sources")))
+            if made_of.decode("ascii") == now:
+                return found
+    return None
+
+
+def _built_files() -> Iterator[str]:
+    """Where a built kernel may be: beside this file; or, where Python runs a clone's source, with what was installed of it."""
     spec = find_spec("colloc.mechanics._kernel")
-    if spec is None or spec.origin is None:
-        return None
-    now = hashlib.sha256(b"".join(file.read_bytes() for file in sorted(sources.glob("*.[ch]"))))
-    try:
-        found = ctypes.CDLL(spec.origin)
-        made_of = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(found, "colloc_sources")))
-    except (OSError, ValueError):  # of another machine, or of something else
-        return None
-    return found if made_of.decode("ascii") == now.hexdigest() else None
+    if spec is not None and spec.origin is not None:
+        yield spec.origin
+        return
+    from importlib.metadata import distributions  # takes a while
+
+    for installed in distributions(name="colloc"):
+        yield from map(str, Path(str(installed.locate_file("colloc/mechanics"))).glob("_kernel.*"))
 
 
 @overload

@@ -13,7 +13,7 @@ import numpy as np
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 
-_PHASES = 512
+_PHASES, _STEPS = 512, 4
 
 
 class GaitDifference(NamedTuple):
@@ -67,8 +67,13 @@ def gait_difference(mine: Solution, best: Solution) -> GaitDifference:
 
 
 def _nearest(a: np.ndarray, b: np.ndarray, starts: np.ndarray) -> GaitDifference:
-    """With the second gait, of harmonics b, begun at the phase at which it is nearest."""
-    b = b * starts[np.argmax((starts @ (a.conj() * b).sum(axis=0)).real)]
+    """With the second gait, of harmonics b, begun at the phase at which it is nearest: by Newton's method from one of `starts`."""
+    alike, rates = (a.conj() * b).sum(axis=0), 2j * np.pi * np.arange(b.shape[1])
+    begun = starts[np.argmax((starts @ alike).real)]
+    for _ in range(_STEPS):
+        slope, bend = ((begun * rates**order @ alike).real for order in (1, 2))
+        begun = begun * np.exp(-rates * slope / bend) if bend < 0 else begun
+    b = b * begun
     first = np.abs(a[:, 1]), np.abs(b[:, 1])
     apart = np.maximum(np.abs(a[:, 1] - b[:, 1]) ** 2 - (first[0] - first[1]) ** 2, 0.0)
     return GaitDifference(

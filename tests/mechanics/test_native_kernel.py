@@ -3,6 +3,10 @@
 import shutil
 import subprocess
 import sys
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -73,6 +77,16 @@ def test_a_library_of_other_sources_is_compiled_anew_to_the_same_bits(fresh, tmp
     fresh.setattr(native_kernel_module, "SOURCES", changed)
     assert native_kernel() is not None
     np.testing.assert_array_equal(solve_balance(Chain(), Friction(), *random_instants(50), 1e-3).z, known)
+
+
+@pytest.mark.skipif(find_spec("colloc.mechanics._kernel") is None, reason="not built")
+def test_a_clone_that_was_not_built_uses_the_kernel_that_was_installed(fresh):
+    """As `python -m colloc.solve` does in a clone, after an installation from it."""
+    built = Path(find_spec("colloc.mechanics._kernel").origin)
+    fresh.setattr(native_kernel_module, "find_spec", lambda name: None)
+    fresh.setattr(metadata, "distributions", lambda name: [SimpleNamespace(locate_file=lambda folder: built.parent)])
+    fresh.setattr(native_kernel_module, "compiled_library", lambda *given: pytest.fail("compiled again"))
+    assert native_kernel() is not None
 
 
 @pytest.mark.parametrize(("compiler", "why"), [("", "there is no C compiler"), (shutil.which("false"), "failed .no message")])
