@@ -67,7 +67,7 @@ def gait_difference(mine: Solution, best: Solution) -> GaitDifference:
 
 
 def _nearest(a: np.ndarray, b: np.ndarray, starts: np.ndarray) -> GaitDifference:
-    """With the second gait, of harmonics b, begun at the phase at which it is nearest: by Newton's method from one of `starts`."""
+    """With the second gait, of harmonics b, begun at the phase at which it is nearest, by Newton's method."""
     alike, rates = (a.conj() * b).sum(axis=0), 2j * np.pi * np.arange(b.shape[1])
     begun = starts[np.argmax((starts @ alike).real)]
     for _ in range(_STEPS):
