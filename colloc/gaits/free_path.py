@@ -141,6 +141,11 @@ class ArcPath(UnitSpeedGait):
         """A polygon of many corners along the path whose shapes are these, multiplied by a matrix ``(m, n_joint)``."""
         return Corners.through(matrix @ self.angles(np.linspace(0.0, self.edges[-1], _CORNERS + 1)), self.symmetry)
 
+    @property
+    def mirrored(self) -> ArcPath:
+        tangents = self.tangents + np.pi if self.n_joint == 2 else -self.tangents
+        return replace(self, shapes=-self.shapes, tangents=tangents)
+
     def resampled(self, edges: np.ndarray) -> ArcPath:
         """The same path with other edges; exact if every old edge is a new one."""
         k, h, tau = self._at(edges)

@@ -64,6 +64,11 @@ class GaitFunction:
         raise NotImplementedError
 
     @property
+    def mirrored(self) -> Any:
+        """Its mirror image: all angles are negative."""
+        return self.mapped(-np.eye(self.n_joint))
+
+    @property
     def delta_unit(self) -> float:
         """What the delta of the gait's class is multiplied by to get delta per period."""
         return 1.0

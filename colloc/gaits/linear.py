@@ -103,6 +103,10 @@ class Combination(GaitFunction):
         """The gait with all angles multiplied by a factor."""
         return Combination(self.basis, factor * self.table)
 
+    @property
+    def mirrored(self) -> Combination:
+        return self.scaled(-1.0)
+
     def grown(self, factor: float) -> Combination:
         """The gait with all angles multiplied by a factor: a class need not have constant angles."""
         return self.scaled(factor)

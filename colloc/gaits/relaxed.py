@@ -69,6 +69,11 @@ class Mixture:
     def n_joint(self) -> int:
         return self.start.size
 
+    @property
+    def mirrored(self) -> Mixture:
+        """Its mirror image: all angles are negative."""
+        return replace(self, directions=-self.directions, start=-self.start)
+
     @cached_property
     def shapes(self) -> np.ndarray:
         """Joint angles where pieces meet, ``(n_joint, n_piece + 1)``."""

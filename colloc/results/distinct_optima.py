@@ -53,7 +53,7 @@ def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
             continue
         if reversal != swap and not friction.reversible:
             continue
-        image = gait.scaled(-1.0) if mirror else gait
+        image = gait.mirrored if mirror else gait
         image = reversed_in_time(image) if reversal else image
         result.append(swapped(image, body) if swap else image)
     return result

@@ -2,8 +2,8 @@
 
 The straight gait comes first, of the problem's own class. The others are sought in the class without symmetry, for no
 symmetric gait turns, each from its neighbour outwards; a turn to the right from the mirror image of that to the left, if that
-is asked for, too. Gaits that turn on the spot are those of least work for their turn. Joint angles between those of two
-neighbours turn by about as much as lies between, so that a controller can interpolate.
+is asked for, too, and is of the same body. Gaits that turn on the spot are those of least work for their turn. Joint angles
+between those of two neighbours turn by about as much as lies between, so that a controller can interpolate.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from colloc.gaits.limits import one_sided
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
-from colloc.gaits.symmetry import NONE
+from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
 from colloc.search.solve import solve
@@ -166,15 +166,16 @@ def steer(
         raise ProblemError(f"the straight gait is not certified, so there is nothing to steer: {straight.message}")
     free = {"gait": replace(problem.gait, symmetry=NONE)}
     from_neighbour = free | {"delta_start": problem.delta}
+    mirrors = ANTIPODAL in problem.body.symmetries and not one_sided(problem.joint_limit)
 
     def turned(stated: Problem, wanted: Sequence[float], known: dict[float, Solution]) -> tuple[Solution, ...]:
         """Outwards from those that are known, to the left first; from all starts if there is none."""
         for side in ([turn for turn in wanted if turn > 0], [turn for turn in reversed(wanted) if turn < 0]):
             near = known.get(0.0)
             for turn in side:
-                if -turn in known and not one_sided(problem.joint_limit):
-                    near = known[-turn]
-                    near = put(turn, solve(stated.with_(rotation=turn, guess=near.gait.scaled(-1.0), **from_neighbour), 1))
+                if -turn in known and mirrors:
+                    guess = known[-turn].gait.mirrored
+                    near = put(turn, solve(stated.with_(rotation=turn, guess=guess, **from_neighbour), 1))
                 elif near is not None:
                     near = put(turn, solve(stated.with_(rotation=turn, guess=near.gait, **from_neighbour), 1))
                 else:

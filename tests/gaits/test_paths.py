@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc import ArcPath, BSpline, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.gaits.harmonic import shifted
 from colloc.gaits.path_samples import (
     corners_through,
     graded_edges,
     path_length,
 )
+from colloc.gaits.relaxed import Mixture
 from colloc.gaits.starts import prolonged
 from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
@@ -102,6 +103,24 @@ def test_finer_arcs_are_the_same_path():
     edges = np.sort(np.concatenate([path.edges, 0.3 * path.edges[1:] + 0.7 * path.edges[:-1]]))
     t = np.random.default_rng(0).uniform(size=200)
     np.testing.assert_allclose(path.resampled(edges).angles(t), path.angles(t), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "gait",
+    [
+        TRIANGLE,
+        member("none"),
+        member("antipodal", body=Chain((0.25,) * 4)),
+        ellipse(0.1, 2.0, 1.2),
+        BSpline(6).member(np.linspace(-1, 1, 12), 2),
+        Mixture([[1.0, 0.5]], [[[0.6, 0.8], [-1.0, 0.0]]], [0.3, 0.1]),
+    ],
+)
+def test_the_mirror_image_of_a_gait_is_one_of_its_class(gait):
+    t = np.linspace(0, 1, 97)
+    assert type(gait.mirrored) is type(gait)
+    np.testing.assert_allclose(gait.mirrored.angles(t), -gait.angles(t), atol=1e-12)
+    np.testing.assert_allclose(gait.mirrored.rates(t), -gait.rates(t), atol=1e-10)
 
 
 def test_a_sharp_guess_is_bent_back_to_the_curvature_allowed():

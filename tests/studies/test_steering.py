@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from colloc import Chain, Friction, Harmonic, Problem, ProblemError, Serpenoid, replay, steer
+from colloc import Chain, Coupled, FreePath, Friction, Harmonic, Polygon, Problem, ProblemError, Serpenoid, replay, steer
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.steering_figure import steering_figure
@@ -42,6 +42,21 @@ def test_a_turn_to_the_right_is_the_mirror_image_of_that_to_the_left(family):
     apart = min(np.abs(right.gait.angles(t) + left.gait.angles(t + later)).max() for later in (0, 0.5))
     assert apart < 2e-4
     assert (right.value, right.distance) == pytest.approx((left.value, left.distance), rel=PROBLEM.mesh_tolerance)
+
+
+@pytest.mark.parametrize("kind", [Polygon(3, "bilateral"), FreePath(2, "bilateral")])
+def test_gaits_of_every_class_have_a_mirror_image(kind):
+    family = steer(Problem("p", gait=kind, friction=Friction(4, 1, 1), delta=1e-2), [-0.2, 0.2], starts=1)
+    right, left = family.points
+    assert family.certified
+    # sought from the other's mirror image, on a mesh and so with arcs of its own
+    assert right.value > (1 - 1e-3) * left.value
+
+
+def test_a_body_that_is_not_its_mirror_image_turns_to_both_sides():
+    bent = Coupled(Chain((0.2,) * 5), stuck={1: 0.5})
+    problem = Problem("stuck", body=bent, friction=Friction(2, 1, 1), gait=Harmonic(1), delta=1e-2)
+    assert steer(problem, [-0.2, 0.2], starts=2).certified
 
 
 def test_the_table_holds_the_joint_angles_of_every_gait(family):
