@@ -18,6 +18,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.feet import Foot
 from colloc.mechanics.law import Law
+from colloc.system.arguments import is_number
 
 _COEFFICIENTS = {
     "mu_t": "friction sideways",
@@ -96,8 +97,9 @@ def _of_friction(problem: Problem) -> Iterator[Parameter]:
 
 
 def _coefficients(law: Law) -> list[tuple[str, float]]:
-    own = {field.name for field in fields(law)}  # type: ignore[arg-type]
-    return [(field, float(getattr(law, field))) for field in _COEFFICIENTS if field in own]
+    """Fields of a law that are coefficients, with their values; those of a law of formulas may bear the same names."""
+    own = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
+    return [(field, float(own[field])) for field in _COEFFICIENTS if is_number(own.get(field))]
 
 
 def _scaled(part: Any, field: str, by: float) -> Any:

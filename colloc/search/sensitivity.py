@@ -242,17 +242,19 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
     own = _on_its_mesh(answer)
     finer = _on_halved_mesh(answer, own)
     for parameter in parameters(answer.problem):
-        slope = _slope(finer, parameter)
-        error = abs(_slope(own, parameter) - slope) + abs(_slope(finer, parameter, 2 * _STEP) - slope)
-        effect = Effect(parameter.name, parameter.value, parameter.relative, slope, error, tuple(_beside(parameter, _STEP)))
+        sides = tuple(_beside(parameter, 4 * _STEP))  # as far as the differences go
+        if not sides:  # such as the place of a pad as long as its link
+            continue
+        slope = _slope(finer, parameter, sides)
+        error = abs(_slope(own, parameter, sides) - slope) + abs(_slope(finer, parameter, sides, 2 * _STEP) - slope)
+        effect = Effect(parameter.name, parameter.value, parameter.relative, slope, error, sides)
         if resolve and abs(slope) > _NOTHING * abs(solution.value):
             beside = _beside(parameter, change)
             again = tuple(_again(solution, problem, side * change) for side, problem in beside.items())
             effect = replace(effect, again=again)
         effects.append(effect)
-    return Sensitivity(
-        solution.problem.name, solution.problem.objective.short, certificate.value, certificate.value_error, tuple(effects)
-    )
+    problem, at = solution.problem, (certificate.value, certificate.value_error)
+    return Sensitivity(problem.name, problem.objective.short, *at, tuple(effects))
 
 
 def _check_is_optimum(solution: Solution) -> None:
@@ -339,14 +341,13 @@ def _beside(parameter: Parameter, step: float) -> dict[int, Problem]:
     return found
 
 
-def _slope(value: Callable[[Problem], float], parameter: Parameter, step: float = _STEP) -> float:
+def _slope(value: Callable[[Problem], float], parameter: Parameter, sides: tuple[int, ...], step: float = _STEP) -> float:
     """Derivative along a change of a number; where it can change to one side only, to that side."""
-    sides = _beside(parameter, step)
     if len(sides) == 2:
-        return (value(sides[1]) - value(sides[-1])) / (2 * step)
-    ((side, beside),) = sides.items()
-    here, farther = value(parameter.changed(0.0)), value(parameter.changed(2 * side * step))
-    return side * (4 * value(beside) - 3 * here - farther) / (2 * step)
+        return (value(parameter.changed(step)) - value(parameter.changed(-step))) / (2 * step)
+    (side,) = sides
+    here, beside, farther = (value(parameter.changed(side * k * step)) for k in range(3))
+    return side * (4 * beside - 3 * here - farther) / (2 * step)
 
 
 def _again(solution: Solution, problem: Problem, change: float) -> Again:
@@ -356,7 +357,8 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
     found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
     best = found.certificate if found.success else UNCERTIFIED
     at = problem.body, problem.law, gait, delta * gait.delta_unit
-    kept = replayer(problem.regime)(*at, breaks=gait.corner_phases, objective=problem.objective)
+    asked: Any = {"objective": problem.objective, "quantities": problem.integrals, "turn": problem.rotation or 0.0}
+    kept = replayer(problem.regime)(*at, breaks=gait.corner_phases, **asked)
     breaks = "; ".join(_broken(problem, kept, ReducedProgram(space, delta).place_rows(v)))
     return Again(change, best.value, best.value_error, found.status, kept.value, kept.error * abs(kept.value), breaks)
 
