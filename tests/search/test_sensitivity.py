@@ -189,6 +189,14 @@ def test_a_gait_on_file_that_is_asked_to_turn_is_paid_for_its_chord(of):
         )
 
 
+def test_slopes_of_paths_of_arcs_say_what_their_errors_leave_out(three_link):
+    assert not three_link.sensitivity().note
+    free = colloc.solve(colloc.Problem("x", gait=colloc.FreePath(2, "bilateral"), delta=1e-2), starts=1).sensitivity()
+    assert "arcs" in free.note
+    assert free.note in str(free)
+    assert free.facts()["note"] == free.note
+
+
 @pytest.mark.parametrize(
     "changes",
     [
