@@ -55,7 +55,9 @@ class Corners(UnitSpeedGait):
         object.__setattr__(self, "corners", finite_array("polygon.corners", self.corners, 2))
         if self.corners.shape[0] < 1 or self.corners.shape[1] < 2:
             raise ProblemError("polygon.corners needs a row per joint and at least two columns.")
-        if not (np.diff(self.phases) > 0).all():
+        with np.errstate(invalid="ignore"):
+            apart = np.diff(self.phases) > 0  # as far as rounding shows
+        if not apart.all():
             raise ProblemError("polygon.corners has two equal neighbours.")
 
     @property
