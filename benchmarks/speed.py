@@ -3,7 +3,7 @@
 The load is Python and small NumPy calls, as a search is, and is measured before and after every work: a busy or slow machine
 changes both. Every work runs in a process of its own, forked from this one, whose memory is the least that is seen.
 Error over processor time: python -m benchmarks.work_precision. What it calls is public, so the same file measures an earlier
-colloc too: in its tree, python -m benchmarks.speed with this file in place of its own.
+colloc too: in its tree, python -m benchmarks.speed with this file in place of its own. What that has not yet is nan.
 """
 
 from __future__ import annotations
@@ -60,11 +60,14 @@ def in_a_process(work: Callable[[], object]) -> tuple[float, float]:
 
 
 def measured(work: Callable[[], object], rounds: int = 1) -> tuple[float, float, float]:
-    """Median over rounds of processor time over that of the load, seconds, and memory."""
+    """Median over rounds of processor time over that of the load, seconds, and memory; nan where the work fails."""
     found = []
     for _ in range(rounds):
         before = load()
-        seconds, memory = in_a_process(work)
+        try:
+            seconds, memory = in_a_process(work)
+        except ChildProcessError:
+            seconds = memory = np.nan
         found.append((2 * seconds / (before + load()), seconds, memory))
     return tuple(np.median(found, axis=0))
 
@@ -84,7 +87,7 @@ def works(rounds: int, zoo: int) -> str:
             rows.append((name, *measured(command, rounds)))
     rows.append(("solve, loaded before", *measured(partial(colloc.solve, problem), rounds)))
     rows.append(("solve from the answer", *measured(partial(colloc.solve, warm, 1), rounds)))
-    rows.append(("certificate of its gait alone", *measured(partial(colloc.evaluate, problem, known.gait), rounds)))
+    rows.append(("certificate of its gait alone", *measured(lambda: colloc.evaluate(problem, known.gait), rounds)))
     each = [measured(partial(colloc.solve, zoo_problem(number))) for number in range(zoo)]
     rows.append((f"median of the zoo's first {zoo}", *np.median(each, axis=0)))
     rows.append(("ten links, one harmonic", *measured(partial(colloc.solve, grown(links=10)))))
@@ -126,9 +129,7 @@ def growth(quick: bool) -> str:
 def _sized(name: str, size: int) -> Callable[[], object]:
     if name == "cells":
         return partial(swept, size)
-    if name == "starts":
-        return partial(colloc.solve, grown(), size)
-    return partial(colloc.solve, grown(**{name: size}), 1)
+    return lambda: colloc.solve(grown(), size) if name == "starts" else colloc.solve(grown(**{name: size}), 1)
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from colloc.results.arc import arc
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.certify import certify
+from colloc.search.evaluate import evaluate
 from colloc.search.solve import solve
 from colloc.verification.replay import replay
 
@@ -40,6 +41,17 @@ def test_a_deliberately_poor_guess_reaches_the_paper_s_optimum(three_link):
 def test_iterations_stay_within_budget(three_link):
     assert sum(level.iterations for level in three_link.history) < 120
     assert all(level.optimal for level in three_link.history)
+
+
+def test_a_gait_that_is_named_from_the_other_end_travels_the_other_end_first():
+    """Each joint takes the part of its mirror image, and the angles their opposite: the same motion of equal links."""
+    gait = Fourier([0.0, 0.2], [[1.4], [0.9]], [[0.2], [1.1]])
+    turned = Fourier(-gait.mean[::-1], -gait.cos[::-1], -gait.sin[::-1])
+    back = Fourier(gait.mean, gait.cos, -gait.sin)
+    problem = Problem("named", gait=Harmonic(1), delta=1e-2, rotation=None)
+    one, other, reversed_ = (evaluate(problem, each).travels for each in (gait, turned, back))
+    assert {one, other} == {"head first", "tail first"}
+    assert reversed_ == other
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
