@@ -79,7 +79,7 @@ def test_a_library_of_other_sources_is_compiled_anew_to_the_same_bits(fresh, tmp
     np.testing.assert_array_equal(solve_balance(Chain(), Friction(), *random_instants(50), 1e-3).z, known)
 
 
-@pytest.mark.skipif(find_spec("colloc.mechanics._kernel") is None, reason="not built")
+@pytest.mark.skipif(native_kernel_module.built_kernel(Path(str(native_kernel_module.SOURCES))) is None, reason="not built")
 def test_a_clone_that_was_not_built_uses_the_kernel_that_was_installed(fresh):
     """As `python -m colloc.solve` does in a clone, after an installation from it."""
     built = Path(find_spec("colloc.mechanics._kernel").origin)
