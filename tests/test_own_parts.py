@@ -184,6 +184,13 @@ def test_what_a_quantity_is_proportional_to_follows_from_its_formula():
     mixed = Quantity("mixed", "sum(moment**2 + rate**2)")
     assert [each.friction_degree for each in (heat, effort, mixed)] == [2.0, 1.0, None]
     assert [each.pace_degree for each in (heat, effort, mixed)] == [0.0, 1.0, None]
+    # what has a scale of its own is proportional to nothing, though beyond that scale it seems to be
+    soft, gears = (
+        Quantity("soft", "sum(tanh((moment / 0.01)**2))"),
+        Quantity("gears", "sum(abs(rate) * where(abs(rate) > 17, 9, 1))"),
+    )
+    assert soft.friction_degree is None
+    assert gears.pace_degree is None
     assert Objective("distance * work / heat", quantities=[heat]).degree == -1.0
     assert Objective("distance / mixed", quantities=[mixed]).degree is None
     for name, density, why in [("heat", "moment**2", "no sum over the joints"), ("work", "sum(rate)", "a name of its own")]:

@@ -14,7 +14,7 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 
-_FEWEST, _MOST = 3, 12
+_FEWEST, _MOST, _LONGER = 3, 12, 1e6
 _EPILOG = """\
   colloc init mine.py --links 4 --feet 1
   colloc init mine.py --lengths 22 30 30 22 --wheels
@@ -73,6 +73,8 @@ def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bo
         raise ProblemError(f"a chain must have {_FEWEST} to {_MOST} links here, not {links}.")
     if not (all(length > 0 for length in lengths) and math.isfinite(whole)):
         raise ProblemError(f"--lengths must be positive numbers, not {', '.join(f'{length:g}' for length in lengths)}.")
+    if max(lengths) > _LONGER * min(lengths):
+        raise ProblemError(f"the longest of --lengths is more than {_LONGER:g} times as long as the shortest.")
     if path.suffix != ".py":
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
     Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))  # refuses what files cannot have
@@ -84,7 +86,7 @@ def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bo
         name=path.stem,
         names=", ".join(names),
         floor=floor.format(
-            lengths=f"({', '.join(f'{length:.6g} / {whole:.6g}' for length in lengths)})", feet=feet, links=links
+            lengths=f"({', '.join(f'{length:.12g} / {whole:.12g}' for length in lengths)})", feet=feet, links=links
         ),
         symmetry="bilateral" if list(lengths) == list(reversed(lengths)) else "none",
     )

@@ -33,6 +33,8 @@ SUMMED = (*FUNCTIONS, "sum")
 """What it may use; ``sum`` is over the joints."""
 _OF_FORCES = {"moment", "power", "idle"}
 _WITH_PACE, _WITH_FRICTION = ("rate", "power", "idle"), ("moment", "power", "idle")
+_DOUBLINGS = -20, 1, 4, 20
+"""By which powers of two a formula's degree is found: far enough to meet whatever scale it has of its own."""
 _TAKEN = ("distance", "work", "rotation", "across", "period", "efficiency", "value", "instants")
 
 
@@ -143,9 +145,9 @@ class OfInstants:
     def _degree(self, scaled: tuple[str, ...]) -> float | None:
         at = sample()
         before = self._formula(at)
-        after = [self._formula({k: v * factor if k in scaled else v for k, v in at.items()}) for factor in (2.0, 16.0)]
         with np.errstate(all="ignore"):
-            powers = np.concatenate([np.log2(after[0] / before), np.log2(after[1] / before) / 4.0])
+            after = [self._formula({k: v * 2.0**p if k in scaled else v for k, v in at.items()}) for p in _DOUBLINGS]
+            powers = np.concatenate([np.log2(a / before) / p for a, p in zip(after, _DOUBLINGS, strict=True)])
         near = float(np.round(powers.flat[0], 6)) + 0.0
         return near if np.allclose(powers, near, rtol=0, atol=1e-9) else None
 

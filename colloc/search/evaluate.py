@@ -77,8 +77,9 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
     answer = evaluated_answer(stated, fitted.gait)
     turned = answer.motion.rotation
     if abs(turned) < GAP * answer.distance:
-        stated = stated.with_(rotation=0.0)
-        answer = replace(answer, problem=stated)
+        if not problem.uses("rotation"):  # which then may be anything
+            stated = stated.with_(rotation=0.0)
+            answer = replace(answer, problem=stated)
     else:  # how far it goes is then the chord of its arc
         stated = stated.with_(rotation=turned)
         answer = evaluated_answer(stated, fitted.gait)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,10 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
+from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.reduced.motion import ReducedMotion
 from colloc.results.answer import EVALUATED, PRESCRIBED, REALISED, Answer, Step
 from colloc.search.certify import goes_nowhere
 from colloc.search.refine import MESHES
@@ -69,12 +72,27 @@ def realised(problem: Problem, gait: Corners, history: tuple[Step, ...]) -> Answ
     return replace(answer, knots=gait.phases, history=(*history, answer.step))
 
 
+class _Given(NamedTuple):
+    """A gait at the points of a mesh, whatever the parameters are."""
+
+    gait: AnyGait
+    mesh: Mesh
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return *self.gait(self.mesh.times), np.ones(self.mesh.n_point)
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        raise NotImplementedError("nothing is sought")
+
+
 def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, word: str) -> Answer:
     """A gait with everything else following from its balance."""
     control = control_problem(problem)
-    layout = layout_of(control, mesh)
+    layout, aim = layout_of(control, mesh), control.aims.objective
     x = balanced_variables(control.dynamics, layout, mesh, gait, parameters, problem.delta)
     distance, work = distance_and_work(control, layout, x)
+    motion = ReducedMotion(kind_of_motion(control.dynamics), mesh, _Given(gait, mesh), aim.integrals)
+    value = control.stated(float(aim(motion.values(parameters, problem.delta * gait.delta_unit))))
     return Answer(
         problem,
         gait,
@@ -85,7 +103,7 @@ def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
-        value=distance / work,
+        value=value,
         distance=distance,
         work=work,
         kkt_error=0.0,

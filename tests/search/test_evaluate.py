@@ -180,6 +180,19 @@ def test_the_command_says_yours_and_the_best(tmp_path, monkeypatch, capsys, eval
     assert json.loads(capsys.readouterr().out)["best"]["amplitude"] > 0.1
 
 
+@pytest.mark.parametrize("objective", ["speed", "towing", "driven efficiency", "distance / (work + 0.1 * length)"])
+@pytest.mark.parametrize("mu", [1.0, 0.02])
+def test_a_gait_is_certified_in_whatever_is_asked_of_it(objective, mu):
+    solution = colloc.evaluate(PROBLEM.with_(objective=objective, friction=colloc.Friction(mu, mu, mu)), GAIT)
+    assert solution.status == "solved"
+    assert solution.answer.value == pytest.approx(solution.value, rel=1e-4)
+
+
+def test_a_gait_that_does_not_turn_is_refused_by_no_objective_of_its_turn():
+    turning = PROBLEM.with_(objective="turning", rotation=None, delta=1e-2)
+    assert colloc.evaluate(turning, colloc.ellipse(A0=0, A1=1.5, B1=1.0)).value == pytest.approx(0, abs=1e-9)
+
+
 REST = "5,0,0\n6,0,0\n7,0,0\n8,0,0\n"
 BAD = {
     "t,a,b\n0,1,nan\n1,2,3\n" + REST: "sample 1: '0,1,nan' is not 3 finite numbers",

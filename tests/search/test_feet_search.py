@@ -181,6 +181,8 @@ def test_init_writes_a_problem_on_feet(tmp_path, capsys):
     assert colloc(["init", str(tmp_path / "mine.py"), "--links", "4", "--feet", "2"]) == 0
     assert read_problem_file(tmp_path / "mine.py").problem.body == Chain((0.25,) * 4, feet=2)
     assert colloc(["init", str(tmp_path / "other.py"), "--feet", "99"]) == 2
+    assert colloc(["init", str(tmp_path / "other.py"), "--lengths", "1", "1e-9", "1"]) == 2
+    assert colloc(["init", str(tmp_path / "near.py"), "--lengths", "1", "1e-5", "1.0000001"]) == 0
     assert "0 (a line) to 20" in capsys.readouterr().err
 
 
