@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from colloc.commands.ending import OK, run
+from colloc.commands.ending import OK, command
 from colloc.commands.options import add_printing, new_parser, tell
 from colloc.gaits.objective import EFFICIENCY
 from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE
@@ -112,12 +111,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _compare, arguments)
-
-
-def _compare(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     a, b = load(options.first), load(options.second)
     same, sentence = verdict(a, b)
     table = {name.strip() or "name": [x, y] for name, x, y in rows(a, b)}

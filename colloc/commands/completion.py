@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import argparse
 import importlib
-from collections.abc import Sequence
 
-from colloc.commands.ending import OK, run
+from colloc.commands.ending import OK, command
 from colloc.commands.options import add_printing, new_parser, tell
 
 _EPILOG = """\
@@ -56,12 +55,8 @@ def completion_script(parsers: dict[str, argparse.ArgumentParser]) -> str:
     return _SCRIPT.format(commands=" ".join(parsers), choices="\n".join(choices), options="\n".join(options))
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _completion, arguments)
-
-
-def _completion(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     from colloc.commands.main import SUBCOMMANDS  # knows this module by name
 
     modules = {name: importlib.import_module(f"colloc.commands.{module}") for name, (module, _) in SUBCOMMANDS.items()}

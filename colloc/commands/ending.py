@@ -24,14 +24,20 @@ from colloc.system.interruption import interruptible
 
 OK, BAD_PROBLEM, NONE_FOUND, FAILED, UNREAD = 0, 2, 3, 4, 141  # the last as shells report SIGPIPE
 _IN_WORDS = {"π": " pi ", "δ": "delta", "μ": "mu", "±": "+-", "→": "->", "·": "*", "…": "..."}
+_Command = Callable[[argparse.Namespace], int]
 _page: list[TextIO] = []
 """Standard output, while it is kept for one JSON object."""
 
 
-def run(parser: argparse.ArgumentParser, command: Callable[[argparse.Namespace], int], arguments: Sequence[str] | None) -> int:
+def run(parser: argparse.ArgumentParser, command: _Command, arguments: Sequence[str] | None) -> int:
     """Parse the arguments (None: those of the process) and run a command on them; returns the exit code."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     return exit_code(lambda: command(parser.parse_args(words)), as_json="--json" in words)
+
+
+def command(parser: Callable[[], argparse.ArgumentParser]) -> Callable[[_Command], Callable[..., int]]:
+    """Make ``main(arguments)``, see `run`, of what a command does with its options."""
+    return lambda main: lambda arguments=None: run(parser(), main, arguments)
 
 
 def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import run
+from colloc.commands.ending import command
 from colloc.commands.options import add_printing, add_verbose, new_parser, output_path, tell
 from colloc.commands.solve import EXIT
 from colloc.commands.summary import kept_facts, kept_lines, summary_dict, summary_lines
@@ -44,17 +43,13 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _evaluate, arguments)
-
-
 def _name(path: str) -> str:
     """That of a file, of letters that a problem's name may have."""
     return re.sub(r"[^A-Za-z0-9_.-]", "_", Path(path).stem)
 
 
-def _evaluate(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     from colloc.search.evaluate import evaluate
 
     stated = read_problem_file(options.problem)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import OK, run
+from colloc.commands.ending import OK, command
 from colloc.commands.options import add_printing, new_parser, tell
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
@@ -92,12 +92,8 @@ def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bo
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _init, arguments)
-
-
-def _init(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     path: Path = options.problem
     lengths = options.lengths or [1.0] * options.links
     text = problem_text(path, lengths, options.feet, options.wheels)

@@ -6,10 +6,9 @@ Exit codes: 0 opened, 2 bad file or option, 3 not converged, 4 certificate faile
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import NONE_FOUND, OK, run
+from colloc.commands.ending import NONE_FOUND, OK, command
 from colloc.commands.multistart import summary_dict, summary_lines
 from colloc.commands.options import add_printing, add_verbose, new_parser, output_path, tell
 from colloc.commands.solve import EXIT
@@ -42,12 +41,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _open, arguments)
-
-
-def _open(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     archive = archive_at(options.archive)
     problem, outcomes = archive.problem, archive.of_search(options.sampler, options.seed)
     if options.start is None:

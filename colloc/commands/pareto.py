@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import FAILED, OK, run, said_if_interrupted
+from colloc.commands.ending import FAILED, OK, command, said_if_interrupted
 from colloc.commands.options import add_printing, add_problem, changed, new_parser, output_path, tell
 from colloc.commands.summary import kept_facts, kept_lines
 from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
@@ -45,12 +44,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _pareto, arguments)
-
-
-def _pareto(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     if options.starts is not None and options.starts < 1:
         raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
     if options.points < 2:

@@ -9,7 +9,7 @@ import argparse
 import os
 from collections.abc import Sequence
 
-from colloc.commands.ending import FAILED, OK, run
+from colloc.commands.ending import FAILED, OK, command
 from colloc.commands.options import add_printing, new_parser, tell
 from colloc.system.errors import CollocError, ProblemError
 from colloc.system.progress import StatusLine
@@ -35,12 +35,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _referee, arguments)
-
-
-def _referee(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     if (options.add is None) != (options.by is None):
         raise ProblemError("--add and --by go together: a result, and the command that finds it.")
     from colloc.studies.known import known

@@ -6,10 +6,9 @@ Exit codes: 0 written, 2 bad file or option.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import OK, run
+from colloc.commands.ending import OK, command
 from colloc.commands.options import (
     add_pace,
     add_printing,
@@ -50,12 +49,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _report, arguments)
-
-
-def _report(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
     path = output_path(options.output, source.with_suffix(".html"))

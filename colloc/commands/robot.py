@@ -6,10 +6,9 @@ Exit codes: 0 printed, 2 bad file or option.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import OK, run
+from colloc.commands.ending import OK, command
 from colloc.commands.options import (
     add_pace,
     add_printing,
@@ -45,12 +44,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _robot, arguments)
-
-
-def _robot(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
     check_trusted(solution, options.result)

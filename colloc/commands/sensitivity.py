@@ -6,9 +6,8 @@ Exit codes: 0 printed, 2 bad file or option.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 
-from colloc.commands.ending import OK, run
+from colloc.commands.ending import OK, command
 from colloc.commands.options import add_printing, add_result, new_parser, tell
 from colloc.commands.verify import check_trusted
 from colloc.results.store import load
@@ -30,12 +29,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _sensitivity, arguments)
-
-
-def _sensitivity(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     solution = load(options.result)
     check_trusted(solution, options.result)
     with StatusLine(enabled=options.again and not (options.quiet or options.json)) as line:

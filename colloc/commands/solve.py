@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from colloc.commands import ending
-from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run, said_if_interrupted
+from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, command, said_if_interrupted
 from colloc.commands.options import add_bound, add_printing, add_problem, add_verbose, changed, new_parser, output_path, tell
 from colloc.commands.summary import kept_facts, kept_lines, summary_dict, summary_lines
 from colloc.gaits.problem_file import read_problem_file
@@ -71,12 +70,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _solve, arguments)
-
-
-def _solve(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     if options.starts is not None and options.starts < 1:
         raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
     if not options.seconds > 0:

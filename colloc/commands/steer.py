@@ -8,10 +8,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import FAILED, OK, run, said_if_interrupted
+from colloc.commands.ending import FAILED, OK, command, said_if_interrupted
 from colloc.commands.options import add_printing, add_problem, changed, new_parser, output_path, tell
 from colloc.commands.summary import kept_facts, kept_lines
 from colloc.gaits.problem_file import read_problem_file
@@ -48,12 +47,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _steer, arguments)
-
-
-def _steer(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     if options.starts is not None and options.starts < 1:
         raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
     if not all(abs(turn) < 180 for turn in (*options.turn, *options.spot)) or 0 in options.spot:

@@ -7,12 +7,11 @@ the solver recorded, since it takes derivatives of the whole program.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from colloc.commands.ending import FAILED, OK, run
+from colloc.commands.ending import FAILED, OK, command
 from colloc.commands.options import add_printing, add_result, new_parser, tell
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
@@ -130,12 +129,8 @@ def _besides(before: Solution, now: Solution, tolerance: float) -> list[dict]:
     ]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    return run(_parser(), _verify, arguments)
-
-
-def _verify(options: argparse.Namespace) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     if not 0 < options.tolerance < 1:
         raise ProblemError(f"--tolerance must lie between 0 and 1, not {options.tolerance:g}.")
     solution = load(options.result)
