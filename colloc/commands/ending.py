@@ -30,9 +30,11 @@ _page: list[TextIO] = []
 
 
 def run(parser: argparse.ArgumentParser, command: _Command, arguments: Sequence[str] | None) -> int:
-    """Parse the arguments (None: those of the process) and run a command on them; returns the exit code."""
+    """Parse the arguments (None: those of the process) and run a command on them, `options.command` being all that was typed;
+    returns the exit code."""
     words = sys.argv[1:] if arguments is None else list(arguments)
-    return exit_code(lambda: command(parser.parse_args(words)), as_json="--json" in words)
+    typed = argparse.Namespace(command=" ".join([parser.prog, *words]))
+    return exit_code(lambda: command(parser.parse_args(words, typed)), as_json="--json" in words)
 
 
 def command(parser: Callable[[], argparse.ArgumentParser]) -> Callable[[_Command], Callable[..., int]]:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
+from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, command
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path, tell
 from colloc.commands.summary import bound_facts
 from colloc.gaits.gait_fields import fields
@@ -118,13 +118,8 @@ def _others_lines(kept: Mapping[StartName, Outcome], shown: int) -> list[str]:
     return [f"  starts in the file besides: {len(kept) - shown}{what if kept[best].status == SOLVED else ''}"]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    command = " ".join(["colloc multistart", *(sys.argv[1:] if arguments is None else arguments)])
-    return run(_parser(), lambda options: _run(options, command), arguments)
-
-
-def _run(options: argparse.Namespace, command: str) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     _checked(options)
     problem = changed(read_problem_file(options.problem).problem, options)
     path = output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
@@ -159,7 +154,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
                 line.say(f"{problem.name}: {count} of {to_go} starts", left)
     except KeyboardInterrupt:
         interrupted = True
-    save_archive(archive, command)
+    save_archive(archive, options.command)
     outcomes = [o for k, o in archive.of_search(options.sampler, options.seed).items() if k < options.starts]
     found = basins(problem, outcomes)
     lines, bound = summary_lines(problem, outcomes, found), None

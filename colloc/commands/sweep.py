@@ -7,12 +7,12 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import replace
 from pathlib import Path
 
-from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
+from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, command
 from colloc.commands.options import add_printing, new_parser, output_folder, tell
 from colloc.studies.study import Study, read_study_file
 from colloc.system.errors import CollocError, ProblemError, StoreError
@@ -38,20 +38,15 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    command = " ".join(["colloc sweep", *(sys.argv[1:] if arguments is None else arguments)])
-    return run(_parser(), lambda options: _study(options, command), arguments)
-
-
-def _study(options: argparse.Namespace, command: str) -> int:
+@command(_parser)
+def main(options: argparse.Namespace) -> int:
     for name, value in (("workers", options.workers), ("chunk", options.chunk)):
         if value is not None and value < 1:
             raise ProblemError(f"--{name} must be at least 1, not {value}.")
     study, source = read_study_file(options.study)
     if options.chunk is not None:
         study = replace(study, chunk=options.chunk)
-    return _run(study, source, command, options)
+    return _run(study, source, options)
 
 
 def _executor(options: argparse.Namespace) -> tuple[Callable[[int], Executor] | None, int]:
@@ -63,7 +58,7 @@ def _executor(options: argparse.Namespace) -> tuple[Callable[[int], Executor] | 
     return connected(options.dask, options.workers, lambda text: print(f"colloc: {text}", file=sys.stderr, flush=True))
 
 
-def _run(study: Study, source: str, command: str, options: argparse.Namespace) -> int:
+def _run(study: Study, source: str, options: argparse.Namespace) -> int:
     # heavy imports only now: a bad study is refused at once
     from colloc.studies.run import StudyRun
     from colloc.system.file_lock import locked
@@ -81,11 +76,11 @@ def _run(study: Study, source: str, command: str, options: argparse.Namespace) -
         if not quiet:
             _announce(run, folder)
         try:
-            interrupted = _work(run, options, quiet, lambda: _save(run, out, source, command))
+            interrupted = _work(run, options, quiet, lambda: _save(run, out, source, options.command))
         except CollocError:
-            _save(run, out, source, command)
+            _save(run, out, source, options.command)
             raise
-        path = _save(run, out, source, command)
+        path = _save(run, out, source, options.command)
     tell(options, _summary(run, path), _summary_lines(run, path))
     if interrupted:
         print("colloc: interrupted; what is done is kept, and the same command goes on from there.", file=sys.stderr)
