@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Branches, Lifted, Sliding
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Lifted, Sliding
 from colloc.mechanics.bodies import ARROWS, Body, Pairs
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.contact import (
@@ -66,6 +66,8 @@ class Chain(Links, Body):
     """
 
     looks_for_all_velocities = True
+    solve, motion, all_velocities = solve_balance, chain_motion, all_balanced_velocities
+    crossing_depth, passing_depth = overlap, passing_depth
 
     @property
     def force_names(self) -> tuple[str, ...]:
@@ -103,17 +105,6 @@ class Chain(Links, Body):
     def largest_forces(self, friction: Law) -> np.ndarray:
         return self.contact.largest_forces(friction)
 
-    def solve(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
-        tolerance: float = 1e-11,
-    ) -> BalanceSolution:  # fmt: skip
-        return solve_balance(self, friction, angles, rates, delta, start=start, tolerance=tolerance)
-
-    def motion(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
-    ) -> BalancedMotion:
-        return chain_motion(self, friction, angles, rates, delta, solved)
-
     def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
         return chain_slopes(self, friction, angles, rates, delta, solved)[1]
 
@@ -123,9 +114,6 @@ class Chain(Links, Body):
         """By the solver itself: forces on links are integrals in closed form."""
         solved = solve_balance(self, friction, angles, rates, delta, start=start).require()
         return chain_motion(self, friction, angles, rates, delta, solved), solved.residual
-
-    def all_velocities(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
-        return all_balanced_velocities(self, friction, angles, rates, delta)
 
     def slowness(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
         """Speed of the slowest point of each link, or of each foot; along it where directions differ; none where nothing is
@@ -158,12 +146,6 @@ class Chain(Links, Body):
     @property
     def far_pairs(self) -> Pairs:
         return tuple(far_pairs(self))
-
-    def crossing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
-        return overlap(self, angles, pairs)
-
-    def passing_depth(self, angles: np.ndarray) -> float:
-        return passing_depth(self, angles)
 
     def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.joints(angles)

@@ -40,11 +40,11 @@ class PanelShapes(Protocol):
         """Derivatives of both along (shape, rates), ``(n_place, 2 n_joint, n_time)`` each, or 1 where the same at all times."""
 
 
-def panel_sliding(body: PanelShapes, friction: Law, q: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+def panel_sliding(body: PanelShapes, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
     """The balance for shapes and their rates ``(n_joint, n_time)`` (paper, eqs. ftb and W); NumPy and CasADi."""
-    xp, grid = namespace(q, rates, z), body.grid
+    xp, grid = namespace(angles, rates, z), body.grid
     s = grid.nodes[:, 0]
-    now: Curve = curve(grid, body.angle(s, q), body.angle_rate(s, q, rates), TAIL, np.zeros((1, 1)))
+    now: Curve = curve(grid, body.angle(s, angles), body.angle_rate(s, angles, rates), TAIL, np.zeros((1, 1)))
     vs, vn = node_velocity(now, z)
     fs, fn = friction.density(vs, vn, delta)
     power = -xp.sum_rows(now.weight * (fs * vs + fn * vn))
@@ -61,7 +61,7 @@ def _fields(body: PanelShapes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
 def solved_on_panels(
     body: PanelShapes,
     friction: Law,
-    q: np.ndarray,
+    angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
     start: np.ndarray | None = None,
@@ -72,11 +72,11 @@ def solved_on_panels(
 
     Delta is in body lengths per unit of time of the rates; the tolerance is the largest residual that counts as converged.
     """
-    n = q.shape[1]
+    n = angles.shape[1]
     # work in units of the largest rate: the law is homogeneous once delta scales along
-    speed = np.abs(body.angle_rate(body.grid.nodes[:, 0], q, rates)).max(axis=0)
+    speed = np.abs(body.angle_rate(body.grid.nodes[:, 0], angles, rates)).max(axis=0)
     speed[(speed == 0) | (friction.degree is None)] = 1.0
-    fields = _fields(body, q, rates / speed)
+    fields = _fields(body, angles, rates / speed)
 
     def make(members: np.ndarray, reference: int) -> PanelBatch:
         return PanelBatch(fields, friction, members, reference)
@@ -116,14 +116,14 @@ def _at_anchor(
 
 
 def panel_motion(
-    body: PanelShapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: PanelShapes, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> BalancedMotion:
     """The motion at instants that were solved for."""
-    n = q.shape[1]
+    n = angles.shape[1]
     centre, power, bending = np.empty((2, n)), np.empty(n), np.empty(n)
     for reference, at in groups(solved.anchor):
         velocity = solved.anchor_velocity[:, at]
-        batch, now, vs, vn, fs, fn = _at_anchor(body, friction, q[:, at], rates[:, at], delta, reference, velocity)
+        batch, now, vs, vn, fs, fn = _at_anchor(body, friction, angles[:, at], rates[:, at], delta, reference, velocity)
         centre[:, at] = mean_velocity(now, vs, vn)
         power[at] = -(now.weight * (fs * vs + fn * vn)).sum(axis=0)
         bending[at] = bending_power(batch.panels, now, fs, fn, batch.fields.rate)
@@ -131,13 +131,13 @@ def panel_motion(
 
 
 def panel_slopes(
-    body: PanelShapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: PanelShapes, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> np.ndarray:
     """Derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to shapes and rates."""
-    slopes = np.empty((6, 2 * len(q), q.shape[1]))
+    slopes = np.empty((6, 2 * len(angles), angles.shape[1]))
     for reference, at in groups(solved.anchor):
         velocity = solved.anchor_velocity[:, at]
-        slopes[:, :, at] = _slopes(body, friction, q[:, at], rates[:, at], delta, reference, velocity)
+        slopes[:, :, at] = _slopes(body, friction, angles[:, at], rates[:, at], delta, reference, velocity)
     return slopes
 
 

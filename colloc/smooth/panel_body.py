@@ -7,9 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Sliding
 from colloc.mechanics.bodies import Usual
-from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_balance import panel_motion, panel_sliding, panel_slopes, solved_on_panels
@@ -48,19 +46,4 @@ class PanelBody(SmoothBody):
         """Derivatives of both."""
         raise NotImplementedError
 
-    def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
-        return panel_sliding(self, friction, angles, rates, z, delta)
-
-    def solve(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
-        tolerance: float = 1e-11,
-    ) -> BalanceSolution:  # fmt: skip
-        return solved_on_panels(self, friction, angles, rates, delta, start, tolerance)
-
-    def motion(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
-    ) -> BalancedMotion:
-        return panel_motion(self, friction, angles, rates, delta, solved)
-
-    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
-        return panel_slopes(self, friction, angles, rates, delta, solved)
+    sliding, solve, motion, slopes = panel_sliding, solved_on_panels, panel_motion, panel_slopes
