@@ -45,6 +45,9 @@ from colloc.numerics.mesh import Mesh
 _MORE = slice(-len(STATES), None)
 _VISCOUS, _WETTER = 3.0, 10**0.5
 """Delta [body lengths per period] at which friction is as good as viscous, and the factor from each tried to the next."""
+Near = tuple[np.ndarray | None, np.ndarray | None]
+"""States and tail velocities to start from, as far as they are known."""
+NOWHERE: Near = (None, None)
 TOLERANCE = 1e-12
 _ACCEPTED = 1e3
 """Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
@@ -127,15 +130,8 @@ class Kind(Protocol):
     followed: bool
     """Whether what a mesh misses is told by a differential equation (`colloc.verification.collocated_course.course_in`)."""
 
-    def along(
-        self,
-        mesh: Mesh,
-        shapes: Shapes,
-        begin: np.ndarray,
-        near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
-        tolerance: float = TOLERANCE,
-    ) -> Along:
-        """The motion along a mesh from the begin of its states; `near`: states and tail velocities to start from."""
+    def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
+        """The motion along a mesh from the begin of its states."""
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
         """What formulas see of shapes ``(n_joint, n)`` at orientations ``(n,)`` and tail velocities ``(3, n)``; unless these
@@ -174,14 +170,7 @@ class SlowOnLevel:
         self._chords = self.periods * chord_per_way(turn)
         self.bends = (heading_shares(symmetry) or (0.0, 0.0))[1] != 0.0
 
-    def along(
-        self,
-        mesh: Mesh,
-        shapes: Shapes,
-        begin: np.ndarray,
-        near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
-        tolerance: float = TOLERANCE,
-    ) -> Along:
+    def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
         at = self.friction, shapes.angles, shapes.rates, shapes.delta
         solved = self.body.solve(*at, start=near[1], tolerance=tolerance)
         if near[1] is None and solved.converged.all():
@@ -263,14 +252,7 @@ class SlowOnSlope(_WithStates):
         self.body, self.friction, self._slope = body, friction, slope
         self._chain = checked_chain(body, friction, slope.grade)
 
-    def along(
-        self,
-        mesh: Mesh,
-        shapes: Shapes,
-        begin: np.ndarray,
-        near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
-        tolerance: float = TOLERANCE,
-    ) -> Along:
+    def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
         states, z = near
         z = np.zeros((3, mesh.n_point)) if z is None else z
         at = shapes.angles, shapes.rates, shapes.delta
@@ -338,14 +320,7 @@ class WithInertia(_WithStates):
     def shares(self, passed: Passed) -> dict[str, Share]:
         return self._slow.shares(passed) | {name: Share(told=float(np.exp(passed.told[0]))) for name in self._timed}
 
-    def along(
-        self,
-        mesh: Mesh,
-        shapes: Shapes,
-        begin: np.ndarray,
-        near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
-        tolerance: float = TOLERANCE,
-    ) -> Along:
+    def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
         near_states = self._slow_states(mesh, shapes, begin) if near[0] is None else near[0]
         states, out, held = self._closed(mesh, shapes, near_states, begin)
         z, centre, power, rates = np.split(out, [3, 5, 6])
