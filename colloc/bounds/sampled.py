@@ -20,13 +20,13 @@ from colloc.bounds.coulomb_motion import MOST_LINKS, swaps_ends
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampling import Domain
-from colloc.gaits.gait_fields import fields
+from colloc.gaits.gait_fields import fields, statement_hash
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
-from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
+from colloc.system.row_file import CACHE, put_rows, read_rows
 
 VERSION = 6
 """Part of the cache key: raise it when the computation changes its result."""
@@ -201,7 +201,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
 def bound_key(domain: Domain, budget: Budget) -> str:
     """SHA-256 of what a bound depends on."""
     stated = {"body": fields(domain.body), "friction": fields(domain.friction), "joint_limit": domain.joint_limit}
-    return hash_of({"version": VERSION, "domain": stated, "budget": asdict(budget)})
+    return statement_hash({"version": VERSION, "domain": stated, "budget": asdict(budget)})
 
 
 def known_bound(

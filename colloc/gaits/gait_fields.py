@@ -136,6 +136,6 @@ def problem_arguments(stated: dict[str, Any]) -> dict[str, Any]:
     return {**stated, **{name: kind(stated[name]) for name, kind in kinds.items()}, **own}
 
 
-def statement_hash(stated: dict[str, Any]) -> str:
-    """SHA-256 of what `problem_fields` gave."""
+def statement_hash(stated: Any) -> str:
+    """SHA-256 of plain numbers, strings, lists and dictionaries, such as `problem_fields` gives."""
     return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()

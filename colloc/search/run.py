@@ -28,7 +28,7 @@ from colloc.search.optimum import Optimum
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.interruption import interruptible, time_limit
 from colloc.system.plain_values import Codec, Own
-from colloc.system.row_file import hash_of, put_rows, read_rows
+from colloc.system.row_file import put_rows, read_rows
 
 Value = TypeVar("Value")
 ROWS = "colloc run 1"
@@ -154,7 +154,7 @@ class Run:
         keeps = self.remembers or self.path is not None
         if not keeps and not self._known:
             return compute()
-        key = f"{stage} {hash_of(self.written(given))}"
+        key = f"{stage} {gait_fields.statement_hash(self.written(given))}"
         if key in self._known:
             with suppress(KeyError, TypeError, ValueError):
                 found = self.read(self._known[key])

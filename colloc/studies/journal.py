@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from colloc.gaits.gait_fields import statement_hash
 from colloc.results.outcome import outcome_fields, outcome_from
 from colloc.studies.cell import Attempt
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.row_file import hash_of, put_rows, read_rows
+from colloc.system.row_file import put_rows, read_rows
 
 KIND, NAME = "colloc journal 1", "journal.sqlite"
 
@@ -65,4 +66,4 @@ def read_journal(folder: Path) -> Journal:
 def append_records(folder: Path, records: Sequence[Record]) -> None:
     """Put records on the disk; when this returns they are there. StoreError if that is not possible."""
     entries = [_record_fields(record) for record in records]
-    put_rows(folder / NAME, KIND, {hash_of(entry): entry for entry in entries})
+    put_rows(folder / NAME, KIND, {statement_hash(entry): entry for entry in entries})

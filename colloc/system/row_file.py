@@ -43,11 +43,6 @@ class Rows:
     damaged: tuple[str, ...] = ()
 
 
-def hash_of(value: Any) -> str:
-    """SHA-256 of plain numbers, strings, lists and dictionaries."""
-    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
-
-
 def _sum(key: bytes, text: bytes) -> bytes:
     return hashlib.sha256(key + b"\0" + text).hexdigest().encode()
 
