@@ -30,9 +30,6 @@ class ImplicitVelocity(ca.Callback):
     def get_n_in(self) -> int:
         return 4
 
-    def get_n_out(self) -> int:
-        return 1
-
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
         return ca.Sparsity.dense(
             *((self._body.n_joint, self._n_time), (self._body.n_joint, self._n_time), (3, self._n_time), (1, 1))[index]

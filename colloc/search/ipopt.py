@@ -249,9 +249,6 @@ class StopRequest(ca.Callback):
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
 
-    def get_n_out(self) -> int:
-        return 1
-
     def get_name_in(self, index: int) -> str:
         return ca.nlpsol_out(index)
 
