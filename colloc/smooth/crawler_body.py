@@ -179,10 +179,6 @@ class CrawlerBody(PanelBody):
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
         return np.abs(self.modes_at(np.linspace(-1.0, 1.0, 401)) @ angles[1:]).max(axis=0)
 
-    @property
-    def bending(self) -> np.ndarray:
-        return np.diff(self.limited, axis=0)
-
     # gaits
     def concertina(self, amplitude: float, sides: int = 4, way: tuple[float, float] = (LAP, 0.0)) -> np.ndarray:
         """The paper's crawler (`colloc.smooth.concertina`): a bump of one profile that grows, travels and is flattened.

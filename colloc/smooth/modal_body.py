@@ -140,10 +140,6 @@ class ModalBody(PanelBody):
         """The same modes at all instants, which is faster."""
         return np.abs(self.modes_at(np.linspace(0.0, 1.0, 401)) @ angles).max(axis=0)
 
-    @property
-    def bending(self) -> np.ndarray:
-        return np.diff(self.limited, axis=0)
-
     def laid(self, lengths: np.ndarray) -> np.ndarray:
         """``(modes, n_joint)``: amplitudes of the smooth shape nearest (in the mean square) to a chain of given joint angles.
 

@@ -47,3 +47,7 @@ class PanelBody(SmoothBody):
         raise NotImplementedError
 
     sliding, solve, motion, slopes = panel_sliding, solved_on_panels, panel_motion, panel_slopes
+
+    @property
+    def bending(self) -> np.ndarray:
+        return np.diff(self.limited, axis=0)
