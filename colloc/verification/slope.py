@@ -112,7 +112,7 @@ class GaitOnSlope(NamedTuple):
     path: Path
     delta: float
     breaks: tuple[float, ...]
-    grade: float
+    slope: Slope
 
     def course(self, tolerance: float) -> float:
         """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
@@ -137,16 +137,13 @@ class GaitOnSlope(NamedTuple):
         upto = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
         return upto[:, np.searchsorted(edges, ends)]
 
-    def pull(self, theta: np.ndarray) -> np.ndarray:
-        """Of the weight, in the body's axes, ``(2, n)``."""
-        return Slope(self.grade).pull(theta[None])
-
     def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
         """Part of the time at which several motions are balanced, from phases and orientations there, ``(n,)``."""
         if self.friction.associated:
             return 0.0
         angles, rates = self.path(phases % 1.0)
-        several = all_balanced_velocities(self.body, self.friction, angles, rates, self.delta, self.pull(theta)).number > 1
+        at, load = (self.body, self.friction, angles, rates, self.delta), self.slope.pull(theta[None])
+        several = all_balanced_velocities(*at, load).number > 1
         return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
 
     def run(self, course: float, heading: float, periods: int, tolerance: float, longest: float = np.inf) -> SlopeMotion:
@@ -159,20 +156,18 @@ class GaitOnSlope(NamedTuple):
             states.append(through)
         theta, *sums = np.stack(ends, axis=1)
         climb, aside, friction_work, joint_work, steering = np.diff(sums)
+        ways = climb, aside, friction_work, joint_work
         unknown = np.concatenate(phases), np.concatenate(states, axis=1)
-        works = friction_work, joint_work
-        return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, np.nan, *unknown)
+        return SlopeMotion(self.slope.grade, course, theta + course, *ways, np.exp(steering), np.nan, np.nan, *unknown)
 
     def _rates(self, t: float, state: np.ndarray, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next balance may start."""
         shapes, theta = (*self.path(np.array([t])), self.delta), state[0]
-        solved, now, _, on_theta = balance_on_slope(
-            self.body, self.friction, Slope(self.grade), shapes, np.array([theta]), start=near
-        )
+        solved, now, _, on_theta = balance_on_slope(self.body, self.friction, self.slope, shapes, np.array([theta]), start=near)
         if not solved.converged.all():
             raise NotConvergedError(
-                f"no balance at phase {t:.4f} on a slope of grade {self.grade:g} (residual {solved.residual[0]:.1e}): friction "
-                "may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
+                f"no balance at phase {t:.4f} on a slope of grade {self.slope.grade:g} (residual {solved.residual[0]:.1e}): "
+                "friction may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
             )
         moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
         unknowns = now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], on_theta[_OMEGA, 0]
@@ -180,7 +175,7 @@ class GaitOnSlope(NamedTuple):
 
     def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
         """What formulas see at phases, from the orientations there ``(n,)``, and what balance leaves over, ``(n,)``."""
-        at, load = (self.body, self.friction, *self.path(phases), self.delta), self.pull(theta)
+        at, load = (self.body, self.friction, *self.path(phases), self.delta), self.slope.pull(theta[None])
         solved = solve_balance(*at, load=load)
         return Instants(*at, z=solved.z, load=load), solved.residual
 
@@ -192,7 +187,7 @@ def gait_on_slope(
     chain = checked_chain(body, friction, grade)
     if len(gait(np.zeros(1))) != 2:
         raise ProblemError("a relaxed gait cannot be put on a slope, where it matters how long each of its directions lasts.")
-    return GaitOnSlope(chain, friction, gait, delta, tuple(sorted(float(t) for t in breaks)), float(grade))
+    return GaitOnSlope(chain, friction, gait, delta, tuple(sorted(float(t) for t in breaks)), Slope(float(grade)))
 
 
 def slope_motion(
