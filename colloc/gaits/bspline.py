@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.harmonic import Harmonic, harmonics_within
+from colloc.gaits.harmonic import Harmonic, series_of
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.system.arguments import is_whole, named_arguments
@@ -55,6 +55,8 @@ class BSpline(LinearClass):
     degree: int = 4
     symmetry: str = "none"
 
+    series = series_of
+
     def __post_init__(self) -> None:
         if not is_whole(self.degree, 3, 5):
             raise ProblemError(f"gait.degree must be 3, 4 or 5, not {self.degree!r}.")
@@ -78,10 +80,6 @@ class BSpline(LinearClass):
         one = Piecewise.basis_element(np.arange(self.degree + 2), extrapolate=False)
         since = (self.knots * t - np.arange(self.knots)[:, None] + 0.5 * (self.degree + 1)) % self.knots
         return self.knots**derivative * np.nan_to_num(one(since, nu=derivative), nan=0.0)
-
-    def series(self, harmonics: int) -> Harmonic:
-        """Fourier series that stand for its gaits."""
-        return harmonics_within(harmonics, self.symmetry)
 
     def describe(self) -> str:
         return f"periodic B-splines of degree {self.degree}, {self.knots} knots, symmetry {self.symmetry}"

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from colloc.gaits.harmonic import Harmonic, harmonics_within
+from colloc.gaits.harmonic import series_of
 from colloc.gaits.linear import LinearClass
 from colloc.system.arguments import named_arguments
 from colloc.system.csv_table import csv_table
@@ -68,6 +68,8 @@ class Basis(LinearClass):
     columns: tuple
     symmetry: str = "none"
 
+    series = series_of
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", _checked(self.columns))
         self._check_symmetry()
@@ -113,10 +115,6 @@ class Basis(LinearClass):
         if self._whole and len(self.columns[0]) != n_joint:
             raise ProblemError(f"the columns have angles of {len(self.columns[0])} joints, and the body has {n_joint}.")
         super().check_joints(n_joint)
-
-    def series(self, harmonics: int) -> Harmonic:
-        """Fourier series that stand for its gaits."""
-        return harmonics_within(harmonics, self.symmetry)
 
     def describe(self) -> str:
         count = len(self.columns)

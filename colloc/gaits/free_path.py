@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
-from colloc.gaits.harmonic import Harmonic, harmonics_within
+from colloc.gaits.harmonic import series_of
 from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction
 from colloc.numerics.arcs import advance, direction
@@ -183,6 +183,7 @@ class FreePath(ClassOfGaits):
     unit_speed = True
     delta_start = DELTA_START
     of_arcs = without_cusps = may_tell = True
+    series = series_of
 
     def __post_init__(self) -> None:
         check_positive(self, "curvature", of="gait.")
@@ -218,10 +219,6 @@ class FreePath(ClassOfGaits):
     def laid_on(self, path: ArcPath, edges: np.ndarray) -> ArcPath:
         """A member with every interval of a mesh an arc, or as it is if those are too many."""
         return path.resampled(edges) if edges.size - 1 <= self.most_arcs(path.n_joint) else path
-
-    def series(self, harmonics: int) -> Harmonic:
-        """Fourier series in arc length that stand for its gaits."""
-        return harmonics_within(harmonics, self.symmetry)
 
     def own_checks(self, gait: ArcPath) -> list[tuple[str, float, float, str]]:
         """What a certificate checks of a member beyond what all gaits have to keep: name, value, allowed, meaning."""

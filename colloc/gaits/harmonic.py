@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import GaitFunction, finite_array
+from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, symmetric_samples
 from colloc.mechanics.bodies import Body
@@ -311,6 +311,11 @@ class Harmonic(LinearClass):
 def harmonics_within(highest: int, symmetry: str) -> Harmonic:
     """The class of all harmonics up to `highest` that gaits of a symmetry have."""
     return Harmonic(highest - 1 if symmetry == ANTIPODAL and highest % 2 == 0 else highest, symmetry)
+
+
+def series_of(gait_class: ClassOfGaits, harmonics: int) -> Harmonic:
+    """The class of Fourier series up to about so many harmonics that stand for the gaits of a class."""
+    return harmonics_within(harmonics, gait_class.symmetry)
 
 
 def shifted(gait: Fourier, phase: float) -> Fourier:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
-from colloc.gaits.harmonic import Harmonic, harmonics_within
+from colloc.gaits.harmonic import series_of
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, both_halves, fraction
 from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
@@ -156,6 +156,7 @@ class Polygon(ClassOfGaits):
     shortest_side: float = 0.02
 
     unit_speed = may_tell = True
+    series = series_of
     delta_start = DELTA_START
 
     def __post_init__(self) -> None:
@@ -200,10 +201,6 @@ class Polygon(ClassOfGaits):
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         """Intervals that a mesh needs at least, and for what."""
         return 2 * self.pieces, "the sides"
-
-    def series(self, harmonics: int) -> Harmonic:
-        """Fourier series in arc length that stand for its gaits."""
-        return harmonics_within(harmonics, self.symmetry)
 
     def size(self, n_joint: int, n_interval: int | None = None) -> int:
         return n_joint * (self.pieces + 1)
