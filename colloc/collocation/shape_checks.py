@@ -107,8 +107,8 @@ def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) ->
     known = _contact_checks(body)
     checks += [known.get(each.name) or known.setdefault(each.name, _minimum_check(each, angles)) for each in body.contacts(far)]
     unit = np.eye(body.n_joint)
-    named = [(f"speed of {body.coordinate} {j + 1}", most) for j, most in enumerate(speeds)]
-    return checks + [_speed_check(name, angles, unit[j] / most) for j, (name, most) in enumerate(named)]
+    rates = (_angle_check(f"speed of {body.coordinate} {j + 1}", angles, unit[j] / most, -1) for j, most in enumerate(speeds))
+    return checks + [replace(rate, fixed=(-1.0, 1.0), derivative=1) for rate in rates]
 
 
 @lru_cache(maxsize=64)
@@ -131,11 +131,6 @@ def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> Shape
         row,
         place,
     )
-
-
-def _speed_check(name: str, rates: ca.SX, row: np.ndarray) -> ShapeCheck:
-    """The rate of a shape coordinate over the largest allowed."""
-    return replace(_angle_check(name, rates, row, -1), fixed=(-1.0, 1.0), derivative=1)
 
 
 def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> ShapeCheck:

@@ -43,11 +43,6 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _name(path: str) -> str:
-    """That of a file, of letters that a problem's name may have."""
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", Path(path).stem)
-
-
 @command(_parser)
 def main(options: argparse.Namespace) -> int:
     from colloc.search.evaluate import evaluate
@@ -55,7 +50,8 @@ def main(options: argparse.Namespace) -> int:
     stated = read_problem_file(options.problem)
     best = None if options.best is None else load(options.best)
     given = {"period": options.period, "harmonics": options.harmonics, "degrees": options.degrees}
-    default = Path("results") / f"{_name(options.gait)}-evaluated.h5"  # not where the result is that it was exported from
+    name = re.sub(r"[^A-Za-z0-9_.-]", "_", Path(options.gait).stem)  # of letters that a problem's name may have
+    default = Path("results") / f"{name}-evaluated.h5"  # not where the result is that it was exported from
     solution = evaluate(stated.problem.with_(name=default.stem), options.gait, **given)
     difference = None if best is None else gait_difference(solution, best)
     path = output_path(options.output, default)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -103,7 +104,8 @@ def panels(solution: Solution) -> dict[str, Panel]:
         "mesh": Panel(COLUMN, 2.2, lambda axes: draw_mesh(axes, solution, mesh_errors(solution))),
     }
     for j in range(len(angles) - 1 if solution.problem.gait.free else 0):
-        found[f"shape-{j + 1}-{j + 2}"] = Panel(COLUMN, 3.2, _plane(solution, angles, j))
+        drawn = partial(draw_shape_path, problem=solution.problem, angles=angles, first=j, second=j + 1)
+        found[f"shape-{j + 1}-{j + 2}"] = Panel(COLUMN, 3.2, drawn)
     if (relaxed := solution.relaxed) is not None:
         found["mixture"] = Panel(COLUMN, 3.2, lambda axes: draw_mixture(axes, solution.problem, relaxed.gait))
         found["shares"] = Panel(COLUMN, 2.2, lambda axes: draw_shares(axes, relaxed.gait))
@@ -122,10 +124,6 @@ def chosen(found: dict[str, Panel], name: str) -> Panel:
     if name not in found:
         raise ProblemError(f"there is no panel {name!r}; there are {', '.join(found)}.")
     return found[name]
-
-
-def _plane(solution: Solution, angles: np.ndarray, j: int) -> Callable[[Axes], None]:
-    return lambda axes: draw_shape_path(axes, solution.problem, angles, j, j + 1)
 
 
 def save_panels(solution: Solution, stem: Path) -> list[Path]:

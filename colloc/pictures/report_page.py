@@ -123,7 +123,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             dry=_dry(solution),
             floor=_floor(solution),
             gap=gap.strip(),
-            reference=_comparison(solution, reference),
+            reference=reference.verdict(solution.tends_to.efficiency) if reference and solution.certificate.replayed else "",
             relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
             plain=PLAIN | TURNING if solution.problem.rotation else PLAIN,
             policy=_POLICY,
@@ -196,12 +196,6 @@ def _floor(solution: Solution) -> list[list[str]]:
     except (ProblemError, NotConvergedError):
         return []
     return [[effect.name, f"{effect.now:.4g}", *found.beside(effect)] for effect in found.seen]
-
-
-def _comparison(solution: Solution, reference: Reference | None) -> str:
-    if reference is None or not solution.certificate.replayed:
-        return ""
-    return reference.verdict(solution.tends_to.efficiency)
 
 
 def _commands(solution: Solution) -> str:

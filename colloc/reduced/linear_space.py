@@ -12,7 +12,7 @@ from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, followed, held_shares, moving, near_peaks
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.limits import Limit, widest
+from colloc.gaits.limits import widest
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
@@ -39,7 +39,7 @@ class LinearSpace:
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
         self.lower, self.upper = gait.bounds(body, widest(limit))
         self.own = np.arange(self.n)
-        self._peaks = remembered(partial(self._near_peaks, limit))
+        self._peaks = remembered(lambda v: near_peaks(self.member(v), self.mesh, self.checks, limit))
 
     def member(self, v: np.ndarray) -> AnyGait:
         return self._admissible.member(v)
@@ -89,9 +89,6 @@ class LinearSpace:
             return Constraints(kinds, lower, upper, excess, *self._rows(at_worst))
 
         return Constraints(kinds, lower, upper, excess, *self._rows(lambda v: placed), moving_on)
-
-    def _near_peaks(self, limit: Limit, v: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        return near_peaks(self.member(v), self.mesh, self.checks, limit)
 
     def _rows(self, placed: Callable[[np.ndarray], list[_Placed]]) -> tuple[Function, Function]:
         """Values and slopes of the rows, with checks where they stand for parameters v."""

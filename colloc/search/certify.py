@@ -149,7 +149,7 @@ def gait_certificate(
     run = replayer(problem.regime)
     settings |= {"quantities": problem.integrals, "limits": problem.path_limits, "run": run}
     known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
-    fine = known.fine
+    fine, at_zero, allowed = known.fine, known.value.limit.value, problem.body.usual.delta_influence
     checks = (
         *before,
         *_motion(problem, path, fine, breaks, tolerance, claimed),
@@ -158,7 +158,7 @@ def gait_certificate(
         *_direction(problem, fine),
         _one_motion(problem, fine),
         *after,
-        *_delta(problem, fine, known.value.limit.value),
+        Check("delta influence", at_zero / fine.value - 1, allowed, "same gait at delta -> 0, relative change"),
     )
     return Certificate(
         values=fine.values,
@@ -171,7 +171,7 @@ def gait_certificate(
         error_at_zero_delta=known.efficiency.limit.error,
         value=fine.value,
         value_error=known.value.error,
-        value_at_zero_delta=known.value.limit.value,
+        value_at_zero_delta=at_zero,
         value_error_at_zero_delta=known.value.limit.error,
     )
 
@@ -317,8 +317,3 @@ def _mesh(answer: Answer) -> list[Check]:
     return [
         Check("mesh error", error.estimate, tolerance, f"of the {problem.objective.name}, relative, from defects between nodes")
     ]
-
-
-def _delta(problem: Problem, fine: Replay, at_zero: float) -> list[Check]:
-    allowed = problem.body.usual.delta_influence
-    return [Check("delta influence", at_zero / fine.value - 1, allowed, "same gait at delta -> 0, relative change")]

@@ -112,7 +112,8 @@ def mesh_error(
         return MeshError(**course_defects(control, mesh, gait, delta, fine), violation=violation)
     known = Known(control, gait, delta, fine)
     own = _collocated_intervals(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])
-    exact = control.aims.objective(_period(control, _fine_part(known)))
+    seen = _part(control, own.pose.place[-1], own.pose.theta[-1], own.totals)
+    collocated, exact = (control.aims.objective(_period(control, part)) for part in (seen, _fine_part(known)))
     return MeshError(
         own.rotation,
         np.abs(own.displacement),
@@ -120,7 +121,7 @@ def mesh_error(
         _velocity_error(mesh, own.rates, fine),
         own.value,
         constraint_violation(control.admissible, mesh, gait),
-        _collocated_value(known, own) / exact - 1,
+        collocated / exact - 1,
         float(fine.unresolved.sum()),
         abs(float(_turning(known, own).sum())),
     )
@@ -183,12 +184,6 @@ def _fine_part(known: Known) -> dict[str, float]:
     """What the solved part comes to."""
     fine = known.fine
     return _part(known.control, fine.path[-1], fine.theta[-1], fine.totals[:, -1])
-
-
-def _collocated_value(known: Known, own: _Own) -> float:
-    """The objective as the scheme sees it."""
-    control = known.control
-    return control.aims.objective(_period(control, _part(control, own.pose.place[-1], own.pose.theta[-1], own.totals)))
 
 
 def _direction(control: ControlProblem, end: complex, rotation: float) -> complex:
