@@ -75,12 +75,12 @@ def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
 def usual_guess(body: Body, gait_class: Any, joint_limit: Limit, speeds: tuple[float, ...], smallest_shape_speed: float) -> Any:
     """A wave laid into a class, no joint of it faster than allowed. `ProblemError` if it hardly moves."""
     gait = gait_class.first_guess(travelling_wave(body, joint_limit, least=smallest_shape_speed))
-    if fast := largest_share(gait, speeds) > 1:
-        gait = gait.scaled(1 / largest_share(gait, speeds))
+    if (share := largest_share(gait, speeds)) > 1:
+        gait = gait.scaled(1 / share)
     _, rms = gait_class.guessed(gait)
     if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
         raise ProblemError(
-            f"with {'speed_limit' if fast else 'joint_limit'} the usual first gait has a root-mean-square shape speed of "
+            f"with {'speed_limit' if share > 1 else 'joint_limit'} the usual first gait has a root-mean-square shape speed of "
             f"{rms:.2g}, less than smallest_shape_speed = {smallest_shape_speed:g}: make that smaller, or give a guess."
         )
     return gait

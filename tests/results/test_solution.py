@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from colloc.commands.summary import summary_lines
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.mechanics.balance import instant
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import panels
@@ -52,6 +54,14 @@ def test_a_gait_that_is_named_from_the_other_end_travels_the_other_end_first():
     one, other, reversed_ = (evaluate(problem, each).travels for each in (gait, turned, back))
     assert {one, other} == {"head first", "tail first"}
     assert reversed_ == other
+
+
+@pytest.mark.parametrize(("mu_f", "mu_b", "first"), [(1.0, 5.0, "head first"), (5.0, 1.0, "tail first")])
+def test_a_body_travels_to_the_side_to_which_it_slides_easily(mu_f, mu_b, first):
+    problem = Problem("eased", body=Chain((0.5, 0.5)), friction=Friction(1.0, mu_f, mu_b), gait=Harmonic(1), delta=1e-2)
+    solution = evaluate(problem, Fourier([0.0], [[1.0]], [[0.0]]))
+    assert solution.travels == first
+    assert any(first in line for line in summary_lines(solution, None)) == (first != "head first")  # which is told if it is not
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])

@@ -16,7 +16,7 @@ import pytest
 from colloc.commands import sweep as sweep_study
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
@@ -25,7 +25,7 @@ from colloc.results.distinct_optima import reversed_in_time, swapped
 from colloc.results.outcome import CRASHED, PASSED_OVER, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
-from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, Work, start_key
+from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, Work, start_key, value_as_it_is
 from colloc.studies.gait_class import DIRECT, RETROGRADE, STANDING, GaitClass, gait_class, wave_direction, winding
 from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.run import StudyRun
@@ -598,3 +598,11 @@ def test_without_a_dask_scheduler_or_a_journal_folder_the_error_is_clear(fake, t
     assert "no Dask scheduler at nonsense://x" in capsys.readouterr().err
     with pytest.raises(StoreError, match="cannot write"):
         finished(StudyRun(grid(), path / "below a file"))
+
+
+def test_a_start_that_turns_as_it_should_is_worth_the_same_whatever_phase_it_begins_at():
+    turning = Fourier([1.2, 0.6], [[0.9], [0.1]], [[0.1], [0.9]])
+    turned = replay(Chain(), Friction(), turning, 1e-2).rotation
+    problem = Problem("turning", gait=Harmonic(1), delta=1e-2, rotation=turned)
+    values = [value_as_it_is(problem, shifted(turning, phase)) for phase in (0.0, 0.3, 0.6)]
+    np.testing.assert_allclose(values, values[0], rtol=2e-3)
