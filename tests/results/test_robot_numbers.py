@@ -1,0 +1,90 @@
+"""Numbers of a robot whose joints also brake, at the pace of its gait alone, on a slope; and what an arc is."""
+
+import math
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate, slope_motion, solve
+from colloc.results.arc import Arc, arc
+
+LENGTH, MASS, FROUDE = 1.2, 3.0, 1.0
+PERIOD = (LENGTH / 9.81 / FROUDE) ** 0.5
+
+
+@pytest.fixture(scope="module")
+def braking(once):
+    """At this pace links swing on, and joint 1 brakes harder than it drives."""
+    gait = Fourier([0.1, 0.2], [[0.0, 0.0], [0.5, 0.0]], [[1.0, 0.25], [0.4, 0.0]])
+    problem = Problem("brakes", gait=Harmonic(2), delta=1e-2, froude=FROUDE, mesh_tolerance=1e-3)
+    return once("braking", lambda: evaluate(problem, gait))
+
+
+def test_peak_power_of_a_joint_is_the_most_it_drives_with_not_the_most_it_brakes_with(braking):
+    robot = braking.robot(LENGTH, MASS, PERIOD)
+    powers = robot.columns["joint_torques"].values * robot.columns["joint_speeds"].values
+    assert -powers[0].min() > 1.2 * powers[0].max()  # what this gait is here for
+    assert robot.facts["peak_joint_power_W"] == pytest.approx(powers.max(axis=1))
+    assert robot.facts["peak_power_W"] == pytest.approx(powers.sum(axis=0).max())
+
+
+def test_motors_that_take_no_power_back_work_by_what_they_drive_with_each_for_itself(braking):
+    robot = braking.robot(LENGTH, MASS, PERIOD)
+    powers, seconds = robot.columns["joint_powers"].values, robot.columns["t"].values
+    drive = np.trapezoid(np.maximum(powers, 0.0), seconds, axis=1).sum()
+    assert robot.facts["motor_work_per_period_J"] == pytest.approx(drive, rel=1e-4)
+    assert robot.facts["motor_work_per_period_J"] > 1.5 * robot.facts["work_per_period_J"]
+    # work against friction is what is left of driving and braking
+    assert np.trapezoid(powers.sum(axis=0), seconds) == pytest.approx(robot.facts["work_per_period_J"], rel=2e-3)
+
+
+def test_the_sheet_of_a_gait_with_inertia_is_of_its_own_pace_alone(braking):
+    for factor in (0.95, 1.05):
+        with pytest.raises(
+            ProblemError, match=f"the best gait for the Froude number 1: a robot of 1.2 m has to take {PERIOD:.4g} s"
+        ):
+            braking.robot(LENGTH, MASS, factor * PERIOD)
+    assert braking.robot(LENGTH, MASS, 1.004 * PERIOD).froude == pytest.approx(FROUDE, rel=1e-2)
+
+
+@pytest.fixture(scope="module")
+def towards_left(once):
+    """A gait asked to go half a radian to the left of straight uphill."""
+    problem = Problem("aside", friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), grade=0.1, towards=0.5, delta=1e-2)
+    return once("aside", lambda: solve(problem.with_(intervals=24, mesh_tolerance=1e-3), 1))
+
+
+def test_a_gait_goes_the_way_it_is_asked_to_on_a_slope_and_its_distance_is_that_way(towards_left):
+    assert towards_left.success, towards_left.message
+    motion = towards_left.sample(np.array([0.0, 1.0]))
+    ahead, aside = motion.centre[:, 1] - motion.centre[:, 0]
+    assert np.arctan2(aside, ahead) == pytest.approx(0.5, abs=1e-6)
+    assert towards_left.distance == pytest.approx(np.hypot(ahead, aside), rel=1e-3)
+    problem, gait = towards_left.problem, towards_left.gait
+    followed = slope_motion(problem.body, problem.friction, gait, problem.delta, problem.grade, theta=gait.theta)
+    assert followed.climb[0] == pytest.approx(towards_left.distance * np.cos(0.5), rel=1e-3)
+    assert followed.aside[0] == pytest.approx(towards_left.distance * np.sin(0.5), rel=1e-3)
+
+
+def test_gravity_of_an_exported_model_leans_downhill_as_seen_from_its_tail(towards_left, tmp_path):
+    """Its size is that on earth, its part across the ground the grade; the tail link lies along +x."""
+    model = tmp_path / "model.xml"
+    towards_left.export(model, length=LENGTH, mass=MASS, period=20.0)
+    gravity = np.array([float(part) for part in ElementTree.parse(model).find("option").get("gravity").split()])
+    assert np.linalg.norm(gravity) == pytest.approx(9.81)
+    across = complex(*gravity[:2])
+    assert abs(across) / -gravity[2] == pytest.approx(towards_left.problem.grade)
+    assert across / abs(across) == pytest.approx(-np.exp(-1j * towards_left.gait.theta))
+
+
+@pytest.mark.parametrize("angle", [4.0, -4.0, 1.0, 3.5])
+def test_an_arc_of_any_angle_has_the_radius_of_its_circle_and_goes_the_shorter_way(angle):
+    radius = 2.0
+    t = np.linspace(0, 1, 2001)
+    path = radius * np.exp(1j * angle * t)
+    measured = arc(angle, np.array([path.real, path.imag]))
+    assert measured.radius == pytest.approx(radius)
+    assert measured.chord == pytest.approx(2 * radius * abs(math.sin(angle / 2)))
+    assert measured.length == pytest.approx(radius * min(abs(angle), 2 * math.pi - abs(angle)))
+    assert Arc(0.0, 0.3).length == 0.3
