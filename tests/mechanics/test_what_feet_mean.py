@@ -25,7 +25,7 @@ def test_a_foot_without_a_weight_bears_what_the_others_of_its_link_leave_in_equa
 def test_feet_may_bear_all_of_a_link_only_if_each_says_what():
     with pytest.raises(ProblemError, match="the feet on link 0 bear all that it weighs"):
         Chain(LENGTHS, feet=(Foot(0, 0.1, weight=0.3), Foot(0, 0.9), Foot(1), Foot(2)))
-    with pytest.raises(ProblemError, match="weights of the feet must add up to 1, not 0.95"):
+    with pytest.raises(ProblemError, match=r"weights of the feet must add up to 1, not 0\.95"):
         Chain(LENGTHS, feet=(Foot(0, weight=0.25), Foot(1), Foot(2)))
 
 
@@ -46,7 +46,8 @@ def test_a_turned_wheel_rolls_along_its_own_direction(angle):
 
 
 def test_forwards_of_a_foot_is_towards_the_head():
-    ahead, back = (Chain(LENGTHS, feet=rows(lambda link: [Foot(link, friction=law)])) for law in (EASY_AHEAD, EASY_BACK))
+    ahead = Chain(LENGTHS, feet=rows(lambda link: [Foot(link, friction=EASY_AHEAD)]))
+    back = Chain(LENGTHS, feet=rows(lambda link: [Foot(link, friction=EASY_BACK)]))
     assert one_instant(ahead, ISOTROPIC, [1, 0, 0])[0] == pytest.approx(-0.2)
     assert one_instant(ahead, ISOTROPIC, [-1, 0, 0])[0] == pytest.approx(0.9)
     assert one_instant(back, ISOTROPIC, [1, 0, 0])[0] == pytest.approx(-0.9)

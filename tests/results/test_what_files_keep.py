@@ -1,0 +1,86 @@
+"""What files keep: changed by hand, refused by the disk, or read again with more than was asked."""
+
+import h5py
+import numpy as np
+import pytest
+
+from colloc import Friction, Harmonic, Problem, load, save, solve
+from colloc.commands.main import main
+from colloc.gaits.starts import latin_hypercube_gait
+from colloc.search import run as run_module
+from colloc.search.run import ROWS, Run
+from colloc.system.errors import ReadOnlyRunWarning, StoreError
+from colloc.system.row_file import read_rows
+
+QUICK = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-5)
+FILE = """
+from colloc import *
+PROBLEM = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-5)
+"""
+
+
+@pytest.fixture(scope="module")
+def quick(once):
+    return once("quick of files", lambda: solve(QUICK, 1))
+
+
+def test_a_result_that_was_changed_by_hand_is_not_lost_when_the_problem_is_solved_again(tmp_path):
+    (tmp_path / "quick.py").write_text(FILE, encoding="utf-8")
+    command = ["solve", str(tmp_path / "quick.py"), "--starts", "1", "--no-figure", "--quiet", "--output", f"{tmp_path}/"]
+    assert main(command) == 0
+    with h5py.File(tmp_path / "quick.h5", "a") as file:
+        file["certificate"].attrs["distance"] = 0.123
+        file.attrs["remark"] = "measured on the robot"
+    assert main(command) == 0
+    (former,) = (file for file in tmp_path.glob("quick*.h5") if file.name != "quick.h5")
+    with h5py.File(former) as file:
+        assert file.attrs["remark"] == "measured on the robot"
+    assert load(tmp_path / "quick.h5").distance != 0.123
+
+
+def test_bounds_for_dry_friction_are_read_again_with_a_result(quick, tmp_path):
+    assert quick.success
+    assert quick.certificate.dry is None
+    assert load(save(quick, tmp_path / "a.h5")).certificate.dry is None
+    again = load(save(quick, tmp_path / "b.h5"))
+    again.certify_dry()
+    least, most = again.certificate.dry
+    assert least < most < quick.efficiency + 0.1
+    assert load(save(again, tmp_path / "c.h5")).certificate.dry == (least, most)
+
+
+def test_a_delta_that_was_lowered_for_a_small_gait_is_that_of_the_result_as_read(tmp_path):
+    """Its motion, and what it is worth, are of the lower one; the problem is as it was stated."""
+    problem = Problem("tiny", friction=Friction(mu_t=0.5, mu_f=1, mu_b=5), gait=Harmonic(1, "bilateral"), delta=0.3)
+    solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 0)), 1)
+    assert solution.answer.delta < 0.5 * solution.problem.delta
+    again = load(save(solution, tmp_path / "tiny.h5"))
+    assert again.answer.delta == again.answer.problem.delta == solution.answer.delta
+    assert again.problem.delta == 0.3
+    assert (again.status, again.value) == (solution.status, solution.value)
+    t = np.linspace(0, 1, 7)
+    np.testing.assert_array_equal(again.sample(t).z, solution.sample(t).z)
+
+
+def test_rows_that_the_disk_refused_are_written_when_it_takes_them_again(tmp_path, monkeypatch):
+    path = tmp_path / "x.run.sqlite"
+    run = Run(path, QUICK)
+    run.kept("stage", (1.0,), lambda: 10.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module, "put_rows", lambda *_: (_ for _ in ()).throw(StoreError("the disk is full.")))
+        with pytest.warns(ReadOnlyRunWarning, match="the disk is full"):
+            run.write()
+        run.kept("stage", (2.0,), lambda: 20.0)
+    run.write()
+    assert sorted(value for key, value in read_rows(path, ROWS).values.items() if key != "problem") == [10.0, 20.0]
+    again = Run(path, QUICK)
+    assert [again.kept("stage", (x,), lambda: None) for x in (1.0, 2.0)] == [10.0, 20.0]
+
+
+def test_what_another_process_computed_is_in_the_file_of_the_run(tmp_path):
+    other = Run(problem=QUICK, remembers=True)
+    other.kept("stage", (1.0,), lambda: 10.0)
+    run = Run(tmp_path / "x.run.sqlite", QUICK)
+    run.learn(other.rows)
+    run.write()
+    assert Run(tmp_path / "x.run.sqlite", QUICK).kept("stage", (1.0,), lambda: None) == 10.0
