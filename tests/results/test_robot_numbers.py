@@ -88,3 +88,11 @@ def test_an_arc_of_any_angle_has_the_radius_of_its_circle_and_goes_the_shorter_w
     assert measured.chord == pytest.approx(2 * radius * abs(math.sin(angle / 2)))
     assert measured.length == pytest.approx(radius * min(abs(angle), 2 * math.pi - abs(angle)))
     assert Arc(0.0, 0.3).length == 0.3
+
+
+def test_on_a_slope_less_than_the_weight_presses_and_transport_is_paid_by_the_whole_of_it(towards_left):
+    robot, presses = towards_left.robot(LENGTH, MASS, 20.0), 9.81 * math.cos(math.atan(0.1))
+    facts, way = robot.facts, LENGTH * towards_left.distance
+    assert facts["work_per_period_J"] == pytest.approx(MASS * presses * LENGTH * towards_left.work)
+    assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (MASS * 9.81 * way))
+    assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 20.0**2))
