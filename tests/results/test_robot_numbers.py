@@ -4,6 +4,7 @@ import math
 from xml.etree import ElementTree
 
 import numpy as np
+import pandas
 import pytest
 
 from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate, slope_motion, solve
@@ -27,6 +28,18 @@ def test_peak_power_of_a_joint_is_the_most_it_drives_with_not_the_most_it_brakes
     assert -powers[0].min() > 1.2 * powers[0].max()  # what this gait is here for
     assert robot.facts["peak_joint_power_W"] == pytest.approx(powers.max(axis=1))
     assert robot.facts["peak_power_W"] == pytest.approx(powers.sum(axis=0).max())
+    torques, speeds = (robot.columns[f"joint_{name}"].values[:, :-1] for name in ("torques", "speeds"))
+    assert robot.facts["rms_torque_N_m"] == pytest.approx(np.linalg.norm(torques, axis=1) / torques.shape[1] ** 0.5)
+    assert robot.facts["rms_speed_rad_per_s"] == pytest.approx(np.linalg.norm(speeds, axis=1) / speeds.shape[1] ** 0.5)
+
+
+def test_powers_of_an_exported_motion_are_negative_where_a_joint_brakes(braking, tmp_path):
+    braking.export(tmp_path / "brakes.csv", period=PERIOD, rate=400.0, length=LENGTH, mass=MASS)
+    table = pandas.read_csv(tmp_path / "brakes.csv", comment="#")
+    for joint in (1, 2):
+        torque, speed, power = (table[f"joint_{joint}_{unit}"].to_numpy() for unit in ("N_m", "rad_per_s", "W"))
+        np.testing.assert_allclose(power, torque * speed, rtol=1e-6, atol=1e-6 * np.abs(power).max())
+        assert power.min() < 0 < power.max()
 
 
 def test_motors_that_take_no_power_back_work_by_what_they_drive_with_each_for_itself(braking):
