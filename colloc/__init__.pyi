@@ -42,7 +42,6 @@ from colloc.verification.slope import slope_motion as slope_motion
 from colloc.verification.inertial_motion import inertial_motion as inertial_motion
 from colloc.verification.inertial_motion import motion_from_rest as motion_from_rest
 from colloc.motion.slow_enough import slow_enough as slow_enough
-from colloc.verification.heading_map import heading_map as heading_map
 from colloc.mechanics.fixed_point import solve_balance as solve_balance
 from colloc.system.errors import (
     CollocError as CollocError,

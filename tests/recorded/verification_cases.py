@@ -11,7 +11,6 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.measured import measured
 from colloc.verification.adaptive_motion import fine_motion
-from colloc.verification.heading_map import heading_map
 from colloc.verification.kinks import kink_phases
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.refinement import planned_mesh
@@ -138,12 +137,6 @@ def gaits_on_slopes():
     corners = slope_motion(Chain(), Friction(), SQUARE, 0.1, 0.2, theta=0.3, tolerance=1e-6, breaks=SQUARE.corner_phases)
     names = ("course", "headings", "climb", "aside", "friction_work", "joint_work", "steering")
     return [np.round(getattr(ran, name), 4) for ran in (steep, corners) for name in names], repr(corners)
-
-
-def headings_on_a_slope():
-    gait = Fourier([0, 0], [[1.5], [0]], [[0], [1]])
-    found = heading_map(Chain(), Friction(2, 1, 1), gait, 1e-1, 0.1, count=4, tolerance=1e-3)
-    return np.round(found.turns, 2), found.headings, found.neutral, [ran.stable for ran in found.lasting], repr(found)
 
 
 def trajectories():
