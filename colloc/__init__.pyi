@@ -27,7 +27,6 @@ from colloc.gaits.bspline import BSpline as BSpline
 from colloc.gaits.columns import Basis as Basis
 from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath
 from colloc.gaits.polygon import Polygon as Polygon, Corners as Corners
-from colloc.gaits.relaxed import Relaxed as Relaxed
 from colloc.studies.calls import solve as solve, multistart as multistart, Starts as Starts, sweep as sweep
 from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.pareto import pareto_front as pareto_front

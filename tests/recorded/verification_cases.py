@@ -30,13 +30,6 @@ WEIGHTY = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 UNEQUAL = Friction(1.7, 1.0, 1.3)
 
 
-def _mixed(t):
-    """Angles of one gait, and the rates of two in turn."""
-    angles, rates = SKEW(t)
-    share = 0.5 + 0.3 * np.sin(2 * np.pi * t)
-    return angles, np.stack([rates, rates[::-1] + 0.4]), np.stack([share, 1 - share])
-
-
 def replay_of_equal_coefficients():
     return replay(Chain(), Friction(), ellipse(0.0, 2.8, 1.25), 1e-3, instants=160, tolerance=1e-5)
 
@@ -55,10 +48,6 @@ def replays_of_other_objectives():
     """The error is that of the objective."""
     aims = Objective("turning"), Objective("driven efficiency"), Objective("distance / length")
     return [replay(Chain(), UNEQUAL, SKEW, 1e-2, instants=80, tolerance=1e-2, objective=aim) for aim in aims]
-
-
-def replay_of_a_mixture():
-    return replay(Chain(), UNEQUAL, _mixed, 1e-2, instants=80, tolerance=1e-3)
 
 
 def replay_where_several_motions_are_balanced():

@@ -213,7 +213,6 @@ def test_rates_may_jump_where_that_is_said():
         ({"theta": "up"}, "theta must be a finite number"),
         ({"tolerance": 0.0}, "tolerance must be a positive finite number"),
         ({"delta": -1.0}, "delta must be a positive finite number"),
-        ({"gait": lambda t: (*SKEW(t), np.ones((1, np.size(t))))}, "a relaxed gait"),
     ],
 )
 def test_what_cannot_be_is_named(changed, said):
