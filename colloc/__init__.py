@@ -35,6 +35,11 @@ _HOME = {
 }
 """Public name to the module where it lives, as the stub beside this file states it."""
 __all__ = sorted(_HOME)
+_GONE = {
+    "Relaxed": "take Polygon(n) with many corners, which come as near as one likes (docs/known.md).",
+    "heading_map": "colloc.slope_motion and a root finder find headings that last (docs/howto/slopes.md).",
+}
+"""Public names there were, and what to write instead."""
 
 # what a solution offers and packages above it do
 bind(
@@ -68,4 +73,8 @@ def __getattr__(name: str) -> object:
         return getattr(importlib.import_module(_HOME[name]), name)
     if name == "__version__":
         return version_of("colloc")
+    if name in _GONE:
+        from colloc.system.errors import ProblemError
+
+        raise ProblemError(f"colloc.{name} is gone: {_GONE[name]}")
     raise AttributeError(f"module 'colloc' has no attribute {name!r}")

@@ -27,7 +27,6 @@ from colloc.gaits.bspline import BSpline as BSpline
 from colloc.gaits.columns import Basis as Basis
 from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath
 from colloc.gaits.polygon import Polygon as Polygon, Corners as Corners
-from colloc.gaits.relaxed import Relaxed as Relaxed
 from colloc.studies.calls import solve as solve, multistart as multistart, Starts as Starts, sweep as sweep
 from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.pareto import pareto_front as pareto_front
@@ -42,7 +41,6 @@ from colloc.verification.slope import slope_motion as slope_motion
 from colloc.verification.inertial_motion import inertial_motion as inertial_motion
 from colloc.verification.inertial_motion import motion_from_rest as motion_from_rest
 from colloc.motion.slow_enough import slow_enough as slow_enough
-from colloc.verification.heading_map import heading_map as heading_map
 from colloc.mechanics.fixed_point import solve_balance as solve_balance
 from colloc.system.errors import (
     CollocError as CollocError,

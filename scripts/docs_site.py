@@ -47,7 +47,7 @@ ORDER = (
     ("Reference", ("reference.md", "known.md", "limits.md", "commands.md", "api.md", "modules.md", "changelog.md", "cite.md")),
     (
         "Explanation",
-        ("theory.md", "search.md", "gait_classes.md", "relaxed.md", "bound.md", "bodies.md", "smooth_bodies.md"),
+        ("theory.md", "search.md", "gait_classes.md", "bound.md", "bodies.md", "smooth_bodies.md"),
     ),
 )
 PICTURES = (".png", ".gif")

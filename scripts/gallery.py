@@ -19,7 +19,6 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from colloc.gaits.problem_file import Reference
-from colloc.gaits.relaxed import Relaxed
 from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_shape_path
 from colloc.pictures.style import styled
 from colloc.results.solution import Solution
@@ -47,9 +46,8 @@ class Example:
 
 
 def examples() -> list[Example]:
-    """All files in problems/ but those of relaxed gaits, which have a page of their own (docs/relaxed.md)."""
-    found = [Example(path.stem, runpy.run_path(str(path))) for path in _problem_files()]
-    return [example for example in found if not isinstance(example.stated["PROBLEM"].gait, Relaxed)]
+    """All files in problems/."""
+    return [Example(path.stem, runpy.run_path(str(path))) for path in _problem_files()]
 
 
 def _problem_files() -> list[Path]:

@@ -13,7 +13,7 @@ VALUES = {
     "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FeetLaw", "Foot",
     "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Period", "Polygon",
     "Coupled", "Known", "Paced", "PacedOnSlope", "PathLimit", "PathLimits", "PotentialSpace", "Quantity", "Regime", "Slope",
-    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "Saved", "TensorSpline",
+    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Replay", "Rows", "Saved", "TensorSpline",
     "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
 }
 MUTABLE = {

@@ -203,7 +203,6 @@ ADAPTIVE = (
     "adaptive_motion",
     "slope",
     "slope_replay",
-    "heading_map",
     "inertial_motion",
     "inertial_replay",
     "dry_balance",

@@ -88,7 +88,7 @@ def test_a_program_refuses_what_it_does_not_understand(path, ended):
 
 def test_nothing_that_can_be_started_is_left_out():
     names = {path.stem for path in PROGRAMS}
-    assert {"frontier", "reproduce_paper", "kernel", "peer_table", "curate"} <= names
+    assert {"reproduce_paper", "kernel", "peer_table", "curate"} <= names
     assert {path.stem for path in MODULES if not path.stem.startswith("__") and has_main(path)} <= names
 
 

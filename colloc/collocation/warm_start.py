@@ -39,7 +39,7 @@ def balanced_variables(
     centre, weight, points = np.array(now.centre), unit * stage_weights(mesh), mesh.points
     pose = CollocatedPose.on_mesh(mesh, unit * z[OMEGA] - kind.turn, unit * centre, first_theta(kind, begin))
     power = (weight * now.power[points]).sum(axis=1)
-    shares = kind.shares(Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(power.sum()), begin))
+    shares = kind.shares(Passed(complex(pose.place[-1]), float(pose.rotations.sum()), float(power.sum()), begin))
     heading = float(np.angle(shares["distance"].side))
     ahead = (pose.place * np.exp(-1j * heading)).real
     climbed = (pose.place * np.conj(shares["work"].side)).real

@@ -27,7 +27,6 @@ SUBCOMMANDS = {
     "robot": ("robot", "speed, power and torques of a result on a robot of so many metres and kilograms"),
     "sensitivity": ("sensitivity", "what a wrong floor costs: how the best value changes with friction, lengths, feet, limits"),
     "referee": ("referee", "check the best gaits that are known from the gaits alone; take in better ones"),
-    "completion": ("completion", "what the Tab key needs to complete all this in bash"),
 }
 """Name to module of this package with a ``main(arguments)`` that returns an exit code, and what it does."""
 

@@ -45,7 +45,7 @@ def _parser() -> argparse.ArgumentParser:
         "--starts",
         type=int,
         metavar="N",
-        help="starts to find the best gait of, at least (default: 32, of relaxed gaits 8); 1: the guess alone",
+        help="starts to find the best gait of, at least (default: 32); 1: the guess alone",
     )
     parser.add_argument(
         "--seconds",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
-from colloc.results.answer import EVALUATED, PRESCRIBED, REALISED, REDUCED
+from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.system.errors import NotConvergedError
@@ -27,11 +27,7 @@ def summary_lines(solution: Solution, reference: Reference | None, *, verbose: b
     certificate = solution.certificate
     lines = [verdict]
     if certificate.replayed:
-        alone = solution.answer.program in (
-            PRESCRIBED,
-            REALISED,
-            EVALUATED,
-        )  # what these are the best of, `_search_lines` tells
+        alone = solution.answer.program in (PRESCRIBED, EVALUATED)  # what these are the best of, `_search_lines` tells
         best = solution.problem.objective
         lines = [
             verdict if alone else f"{verdict} ({solution.standing[0]})",
@@ -44,11 +40,8 @@ def summary_lines(solution: Solution, reference: Reference | None, *, verbose: b
         ]
         lines += _background(solution) if verbose else []
         lines += _check_lines(certificate, verbose)
-        if solution.relaxed is not None:
-            lines += [f"  relaxed         {text}" for text in solution.relaxed.lines()]
-            lines += _check_lines(solution.relaxed.certificate, verbose)
         if reference is not None:
-            lines.append(f"  {reference.verdict(solution.tends_to.efficiency)}")
+            lines.append(f"  {reference.verdict(solution.certificate.efficiency)}")
     if solution.message:
         lines.append(f"  {solution.message}")
     return lines
@@ -108,9 +101,6 @@ def _search_lines(solution: Solution) -> list[str]:
         return [f"nothing is free: the motion is prescribed, measured on a mesh of {answer.edges.size - 1} intervals"]
     if answer.program == EVALUATED:
         return [f"nothing is sought: the gait was given, measured on a mesh of {answer.edges.size - 1} intervals"]
-    if answer.program == REALISED:
-        intervals = answer.edges.size - 1
-        return [f"a polygon that repeats what a relaxed gait mixes, measured on {intervals} intervals", *solution.standing]
     rows = f"{answer.x.size} variables, {answer.lam_g.size} constraints"
     how = f"{answer.iterations} iterations of IPOPT" if answer.program != REDUCED else answer.status
     lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {answer.kkt_error:.0e}"]
@@ -142,7 +132,6 @@ def summary_dict(solution: Solution, path: Path | None, reference: Reference | N
         "kkt_error": solution.answer.kkt_error,
         "starts": solution.starts,
         "shrunk": None if solution.shrunk is None else solution.shrunk.value,
-        "relaxed": _relaxed_dict(solution),
         "feet_hold": solution.share_held.tolist() if certificate.replayed else [],
         "others": [
             {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
@@ -163,19 +152,6 @@ def summary_dict(solution: Solution, path: Path | None, reference: Reference | N
 def bound_facts(bound: Bound | None) -> dict | None:
     """An upper bound, if there is one, as the one JSON object states it."""
     return None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed}
-
-
-def _relaxed_dict(solution: Solution) -> dict | None:
-    """The relaxed gait and the finite ones near it."""
-    if solution.relaxed is None:
-        return None
-    found = solution.relaxed.certificate
-    keys = ("efficiency", "efficiency_error", "efficiency_at_zero_delta", "distance", "passed")
-    finite = [
-        {"repeats": r.repeats, "corners": r.corners, **{key: getattr(r.certificate, key) for key in keys}}
-        for r in solution.relaxed.realised
-    ]
-    return {**{key: getattr(found, key) for key in keys}, "realised": finite}
 
 
 def kept_lines(saved: Sequence[Saved]) -> list[str]:

@@ -17,7 +17,6 @@ from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.search.certify import certify
-from colloc.search.realise import recertified
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
 
@@ -106,27 +105,11 @@ def check_trusted(solution: Solution, file: str) -> None:
 
 
 def rechecked(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
-    """The solution with new certificates, on other instants than before; first- and second-order conditions are those that the
+    """The solution with a new certificate, on other instants than before; first- and second-order conditions are those that the
     answer states."""
     before = min(solution.certificate.instants or 1600, _MOST_INSTANTS)
     instants = 2 * (3 * before // 8) + 2
-    certificate = certify(solution.answer, tolerance=tolerance, instants=instants)
-    if solution.relaxed is None:
-        return replace(solution, certificate=certificate)
-    relaxed = recertified(solution.problem, solution.relaxed, instants, tolerance)
-    return replace(solution, certificate=certificate, relaxed=relaxed)
-
-
-def _besides(before: Solution, now: Solution, tolerance: float) -> list[dict]:
-    """What is said of a relaxed gait and of every finite one near it."""
-    if before.relaxed is None or now.relaxed is None:
-        return []
-    pairs = zip(before.relaxed.certificates.values(), now.relaxed.certificates.items(), strict=True)
-    keys = ("efficiency", "efficiency_error", "passed")
-    return [
-        {"gait": name, **{key: getattr(new, key) for key in keys}, "complaint": disagreement(old, new, tolerance)}
-        for old, (name, new) in pairs
-    ]
+    return replace(solution, certificate=certify(solution.answer, tolerance=tolerance, instants=instants))
 
 
 @command(_parser)
@@ -137,12 +120,12 @@ def main(options: argparse.Namespace) -> int:
     with StatusLine(enabled=not (options.quiet or options.json)) as line:
         line.say(f"{solution.problem.name}: replaying")
         again = rechecked(solution, options.tolerance)
-    certificate, gaits = again.certificate, _besides(solution, again, options.tolerance)
+    certificate = again.certificate
     complaint = disagreement(solution.certificate, certificate, options.tolerance)
-    good = certificate.passed and not complaint and solution.success and not any(gait["complaint"] for gait in gaits)
+    good = certificate.passed and not complaint and solution.success
     facts = {
         "file": options.result, "objective": solution.problem.objective.name, "name": solution.problem.name,
-        "certified": good, "complaint": complaint, "changed": solution.changed, "gaits": gaits,
+        "certified": good, "complaint": complaint, "changed": solution.changed,
     }  # fmt: skip
     dry = solution.dry() if options.dry or solution.certificate.dry is not None else None
     if dry is not None:
@@ -159,10 +142,6 @@ def main(options: argparse.Namespace) -> int:
         lines.append(f"  in the file     {recorded.value:.8f} +- {recorded.value_error:.0e} ({recorded.instants} instants)")
     if not options.quiet:
         lines += [f"  {check.line()}" for check in certificate.checks]
-    for gait in gaits:
-        failed = "" if gait["passed"] else "   a check fails"
-        words = f"{gait['gait']:<14s}  {gait['efficiency']:.8f} +- {gait['efficiency_error']:.0e}{failed}  {gait['complaint']}"
-        lines.append(f"  {words}".rstrip())
     if solution.changed:
         lines.append("  the file was changed after colloc wrote it; what is said here is of the file as it is now")
     if complaint:

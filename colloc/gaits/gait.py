@@ -184,8 +184,6 @@ class ClassOfGaits:
     """Whether it has more than one member."""
     unit_speed = False
     """Whether delta and rates are those at unit shape speed, so that the pace does not matter."""
-    mixes = False
-    """Whether members mix directions of rates at an instant."""
     delta_start: float | None = None
     """Where a search begins in delta; None: where the body's usual one does."""
     moves_knots = False

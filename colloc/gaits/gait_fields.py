@@ -20,7 +20,6 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.linear import Combination
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
-from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
@@ -45,8 +44,8 @@ AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
 # what files can hold, and is asked for; parts of your own making are added to these lists
-GAITS: list[type] = [Fourier, ArcPath, Combination, Corners, Mixture, Phases, SerpenoidSeries]
-CLASSES: list[type] = [Harmonic, BSpline, Basis, FreePath, Polygon, Relaxed, Prescribed, Serpenoid]
+GAITS: list[type] = [Fourier, ArcPath, Combination, Corners, Phases, SerpenoidSeries]
+CLASSES: list[type] = [Harmonic, BSpline, Basis, FreePath, Polygon, Prescribed, Serpenoid]
 BODIES: list[type] = [Chain, Coupled, ModalBody, CrawlerBody, Concertina, Wave]
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 MOTIONS: list[type] = []

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from colloc.gaits.problem import Problem
-from colloc.gaits.symmetry import BILATERAL, BOTH
+from colloc.gaits.symmetry import BILATERAL
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.feet import Foot
@@ -138,7 +138,7 @@ def _of_body(problem: Problem) -> Iterator[Parameter]:
     body = _chain(problem)
     if body is None:
         return
-    mirrored = problem.gait.symmetry in (BILATERAL, BOTH)
+    mirrored = problem.gait.symmetry == BILATERAL
     for field, words in (("lengths", "length"), ("weights", "weight"), ("masses", "mass")):
         own = getattr(body, field)
         for links in _mirror_sets(len(own), mirrored):

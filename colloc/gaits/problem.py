@@ -54,7 +54,7 @@ class Problem:
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
         Or any other `colloc.mechanics.law.Law` (docs/howto/laws.md).
-    gait : Harmonic, FreePath, Polygon or Relaxed
+    gait : Harmonic, FreePath or Polygon
         The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md). By default one
         harmonic or, for a body whose motion is prescribed, that motion (`colloc.gaits.prescribed`).
     delta : float
@@ -250,13 +250,6 @@ class Problem:
         asks = forced[0] if forced else f"a limit on the {limits.each[0].name}" if limits.each else ""
         if asks and self.formulation != FULL:
             raise ProblemError(f"{asks} needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
-        paced = [each.name for each in self.integrals if each.pace_degree != 1.0]
-        if paced and self.gait.mixes:
-            raise ProblemError(f"a relaxed gait leaves the pace open, on which the {paced[0]} depends: use Harmonic.")
-        if (limits.names or self.speed_limit) and self.gait.mixes:
-            raise ProblemError(
-                "a relaxed gait moves in several directions at once, which no actuator does: leave its limits out."
-            )
         most = float(np.linalg.norm(of_each(self.speed_limit, self.body.n_joint))) if self.speed_limit else np.inf
         if most <= (least := 2 * np.pi * self.smallest_shape_speed):
             raise ProblemError(

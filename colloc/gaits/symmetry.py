@@ -8,8 +8,6 @@ Symmetries of a gait q(t), phase t from 0 to 1 over a period, joints counted fro
   displacement and work. The path starts and ends its half on shapes with S q = q, with tangents that S reverses.
 - ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any friction.
 - ``none``.
-- ``both``: bilateral and antipodal; so q(1/2 - t) is q(t) with its joints in reversed order, and the quarter ends on a shape
-  that equals its reverse. For relaxed gaits only.
 """
 
 from __future__ import annotations
@@ -22,13 +20,12 @@ from colloc.gaits.limits import range_of
 from colloc.system.errors import ProblemError
 
 NONE, BILATERAL, ANTIPODAL = SYMMETRIES = ("none", "bilateral", "antipodal")
-BOTH = "both"
 _DENSE = 2000
 
 
 def fraction(symmetry: str) -> float:
     """The part of the period that has to be solved."""
-    return {NONE: 1.0, BOTH: 0.25}.get(symmetry, 0.5)
+    return 1.0 if symmetry == NONE else 0.5
 
 
 def reduced(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -62,9 +59,6 @@ def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarr
     """
     if symmetry == NONE:
         return gait.angles(np.linspace(0.0, 1.0, count + 1))
-    if symmetry == BOTH:
-        half = symmetric_samples(gait, BILATERAL, 2 * count)
-        return (0.5 * (half + half[::-1, ::-1]))[:, : count + 1]
     n = 2 * count
     t = np.arange(n) / n
     angles = gait.angles(t)
@@ -85,10 +79,12 @@ def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarr
 def end_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
     """Matrices (A, B), independent rows, of the equations ``A q(first) + B q(last) = 0`` that close a path of angles."""
     unit = np.eye(n_joint)
-    if symmetry in (BILATERAL, BOTH):
-        first = [unit[j] + unit[n_joint - 1 - j] if 2 * j + 1 < n_joint else unit[j] for j in range((n_joint + 1) // 2)]
-        last = first if symmetry == BILATERAL else [unit[j] - unit[n_joint - 1 - j] for j in range(n_joint // 2)]
-        return np.vstack([first, np.zeros((len(last), n_joint))]), np.vstack([np.zeros((len(first), n_joint)), last])
+    if symmetry == BILATERAL:
+        rows = np.array(
+            [unit[j] + unit[n_joint - 1 - j] if 2 * j + 1 < n_joint else unit[j] for j in range((n_joint + 1) // 2)]
+        )
+        zero = np.zeros_like(rows)
+        return np.vstack([rows, zero]), np.vstack([zero, rows])
     return (unit if symmetry == ANTIPODAL else -unit), unit
 
 
@@ -102,14 +98,13 @@ def tangent_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndar
     return (unit if symmetry == ANTIPODAL else -unit), unit
 
 
-_ALIKE = {BILATERAL: "mirrored joints", ANTIPODAL: "to both sides", BOTH: "mirrored joints, and to both sides,"}
+_ALIKE = {BILATERAL: "mirrored joints", ANTIPODAL: "to both sides"}
 
 
 def check_symmetric(problem: Any) -> None:
     """A `ProblemError` if the body of a problem has no gaits with the symmetry of its class, or its limits forbid them."""
     symmetry = problem.gait.symmetry
-    needed = {BILATERAL, ANTIPODAL} if symmetry == BOTH else {symmetry}
-    if not needed <= set(problem.body.symmetries):
+    if symmetry not in problem.body.symmetries:
         raise ProblemError(
             f"gaits of symmetry {symmetry} need a body whose lengths, weights and feet read the same from both ends; "
             f"gaits of this one may have the symmetry {' or '.join(problem.body.symmetries)}."
@@ -117,9 +112,9 @@ def check_symmetric(problem: Any) -> None:
     if isinstance(problem.joint_limit, tuple):
         ranges = [range_of(own) for own in problem.joint_limit]
         opposite = [(-high, -low) for low, high in ranges]
-        if (BILATERAL in needed and ranges != opposite[::-1]) or (ANTIPODAL in needed and ranges != opposite):
+        if (symmetry == BILATERAL and ranges != opposite[::-1]) or (symmetry == ANTIPODAL and ranges != opposite):
             raise ProblemError(f"gaits of symmetry {symmetry} bend {_ALIKE[symmetry]} alike: give them the same joint_limit.")
     for name in ("torque_limit", "power_limit", "speed_limit"):
         limit = getattr(problem, name)
-        if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
+        if symmetry == BILATERAL and np.ndim(limit) and limit != limit[::-1]:
             raise ProblemError(f"gaits of symmetry {symmetry} bend mirrored joints alike: give them the same {name}.")

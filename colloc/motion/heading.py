@@ -1,32 +1,23 @@
 """How a symmetry closes a period: the direction in which a gait travels, and its orientations, from the part that is solved.
 
 A bilateral gait repeats its displacement, so it travels along it. The second half of an antipodal gait is the mirror image of
-the first; together they travel along the bisector of the orientations at the ends of the first. A gait with both symmetries is
-solved for a quarter: a mirror image of that, seen from the head, follows, and the bend of the whole body counts, too.
+the first; together they travel along the bisector of the orientations at the ends of the first.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 
 
-def heading_shares(symmetry: str) -> tuple[float, float] | None:
-    """The shares of the solved part's rotation, and of the change of the sum of its joint angles, by which the heading turns
-    from the initial orientation. None: the gait travels along the displacement of the solved part, whatever that is."""
-    return {ANTIPODAL: (0.5, 0.0), BOTH: (1.0, 0.5)}.get(symmetry)
-
-
-def heading(symmetry: str, displacement: complex, rotation: float, bend: float = 0.0) -> float:
-    """Angle of the travel from the initial orientation [rad], from displacement, rotation [rad] and change of the sum of all
-    joint angles [rad] of the solved part."""
-    shares = heading_shares(symmetry)
-    if shares is None:
+def heading(symmetry: str, displacement: complex, rotation: float) -> float:
+    """Angle of the travel from the initial orientation [rad], from displacement and rotation [rad] of the solved part."""
+    if symmetry != ANTIPODAL:
         return float(np.angle(displacement))
-    angle = shares[0] * rotation + shares[1] * bend
-    # it may travel the other way along its axis
-    return float(angle if (displacement * np.exp(-1j * angle)).real >= 0 else angle - np.pi)
+    # it may travel either way along its axis
+    along = (displacement * np.exp(-0.5j * rotation)).real >= 0
+    return float(0.5 * rotation if along else 0.5 * rotation - np.pi)
 
 
 def closing_sign(symmetry: str) -> float | None:

@@ -25,7 +25,7 @@ from colloc.gaits.inertia import Paced, PacedOnSlope
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope, checked_chain
-from colloc.gaits.symmetry import fraction
+from colloc.gaits.symmetry import ANTIPODAL, fraction
 from colloc.mechanics.balance import Moving
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.bodies import Body
@@ -37,7 +37,7 @@ from colloc.mechanics.native_kernel import kernel_repeating, native_kernel
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
 from colloc.motion.followed_motion import on_one_branch
-from colloc.motion.heading import heading, heading_shares, momenta_image
+from colloc.motion.heading import heading, momenta_image
 from colloc.motion.on_slope import balance_on_slope
 from colloc.motion.states import CollocatedStates, Rates
 from colloc.numerics.mesh import Mesh
@@ -89,23 +89,21 @@ class Along(NamedTuple):
 
 class Passed(NamedTuple):
     """What the solved part of a period comes to: displacement from the initial orientation 0 or, where the orientation is a
-    state, in the plane; rotation, change of the sum of all joint angles [rad], work against friction. Displacement and rotation
+    state, in the plane; rotation [rad], work against friction. Displacement and rotation
     are seen from axes that turn evenly (`Kind.turn`). And what the gait tells of it."""
 
     displacement: complex
     rotation: float
-    bend: float
     work: float
     told: np.ndarray = np.empty(0)
 
 
 class Share(NamedTuple):
-    """What makes a number of a period grow: a way along a direction, the size of which counts; rotation, bend, work; and the
+    """What makes a number of a period grow: a way along a direction, the size of which counts; rotation, work; and the
     first that the gait tells."""
 
     side: complex = 0.0
     rotation: float = 0.0
-    bend: float = 0.0
     work: float = 0.0
     told: float = 0.0
 
@@ -123,8 +121,6 @@ class Kind(Protocol):
     """A whole period over the part that is solved."""
     lack: str
     """What may be wrong where a gait has no motion, and what to try."""
-    bends: bool
-    """Whether it matters what the sum of all joint angles changes by over that part; else `Passed.bend` may be 0."""
     turn: float
     """By which a period is asked to turn the body [rad]."""
     followed: bool
@@ -168,7 +164,6 @@ class SlowOnLevel:
         self.body, self.friction, self._symmetry, self.turn = body, friction, symmetry, turn
         self.periods = 1.0 / fraction(symmetry)
         self._chords = self.periods * chord_per_way(turn)
-        self.bends = (heading_shares(symmetry) or (0.0, 0.0))[1] != 0.0
 
     def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
         at = self.friction, shapes.angles, shapes.rates, shapes.delta
@@ -195,7 +190,7 @@ class SlowOnLevel:
         return np.empty((len(on_out), 0)), np.empty((len(on_out), 0, mesh.n))
 
     def _axis(self, passed: Passed) -> complex:
-        return complex(np.exp(1j * heading(self._symmetry, passed.displacement, passed.rotation, passed.bend)))
+        return complex(np.exp(1j * heading(self._symmetry, passed.displacement, passed.rotation)))
 
     def counted(self, passed: Passed) -> dict[str, float]:
         ahead = float((passed.displacement * np.conj(self._axis(passed))).real)
@@ -204,10 +199,9 @@ class SlowOnLevel:
 
     def shares(self, passed: Passed) -> dict[str, Share]:
         axis = self._axis(passed)
-        # a heading that turns with the gait
         aside = self._chords * (passed.displacement * np.conj(axis)).imag
-        on_rotation, on_bend = heading_shares(self._symmetry) or (0.0, 0.0)
-        distance = Share(self._chords * axis, on_rotation * aside, on_bend * aside)
+        turns = 0.5 if self._symmetry == ANTIPODAL else 0.0  # how far the axis turns with the solved part
+        distance = Share(self._chords * axis, turns * aside)
         return {"distance": distance, "work": Share(work=self.periods), "rotation": Share(rotation=1.0)}
 
 
@@ -244,7 +238,6 @@ class SlowOnSlope(_WithStates):
     told: tuple[str, ...] = ("theta",)
     lack: str = "friction does not hold the body on the slope all the way, or its joints brake; take a gentler one"
     periods: float = 1.0
-    bends: bool = False
     turn: float = 0.0
     _grow = np.array([OMEGA])
 
@@ -301,13 +294,7 @@ class WithInertia(_WithStates):
     def __init__(self, slow: SlowOnLevel | SlowOnSlope, regime: Regime, image: np.ndarray | None = None) -> None:
         """Of a body that would move as the kind `slow` says if it had no mass; `image` as of
         `colloc.motion.heading.momenta_image`."""
-        self.body, self.friction, self.turn, self.periods, self.bends = (
-            slow.body,
-            slow.friction,
-            slow.turn,
-            slow.periods,
-            slow.bends,
-        )
+        self.body, self.friction, self.turn, self.periods = slow.body, slow.friction, slow.turn, slow.periods
         self._slow, self._regime, self._image, self._chain = slow, regime, image, checked_mass(slow.body)
         self._timed = ("period",) if regime.free_pace else ()
         self.states, self.told = STATES + slow.states, ("log_period",) * regime.free_pace + slow.told
@@ -415,7 +402,7 @@ def through_motion(
     """Derivatives of m numbers of a period with respect to (rotation rate, velocity of the centre, power, rates of states) at
     the stages, ``(m, 4 + more, n, s)``, then those that `Kind.through_pose` gives; `on_states` as of `Kind.slopes`, `by_theta`
     is what they depend on the orientation by themselves, ``(m, n, s)``."""
-    side, rotation, _, work, _ = (np.array(column) for column in zip(*shares, strict=True))
+    side, rotation, work, _ = (np.array(column) for column in zip(*shares, strict=True))
     weight = stage_weights(mesh)
     on_theta, on_centre = pose.on_pose(side)
     rows = np.zeros((side.size, len(on_states[OUTPUTS]), *weight.shape))

@@ -100,7 +100,7 @@ def slow_enough(
         With the masses of its links.
     friction : Law
     gait : callable
-        Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones.
+        Joint angles and rates at phases in [0, 1]; any gait of colloc.
     delta : float
         Regularisation speed, per period.
     loss : float

@@ -22,7 +22,6 @@ from colloc.pictures.figure import (
     draw_speeds,
     set_log,
 )
-from colloc.pictures.relaxed_figure import draw_mixture, draw_realised, draw_shares
 from colloc.pictures.solution_figure import draw_gait
 from colloc.pictures.style import BLUE, GREY, ORANGE, VERMILION, save, styled
 from colloc.results.solution import Solution
@@ -106,10 +105,6 @@ def panels(solution: Solution) -> dict[str, Panel]:
     for j in range(len(angles) - 1 if solution.problem.gait.free else 0):
         drawn = partial(draw_shape_path, problem=solution.problem, angles=angles, first=j, second=j + 1)
         found[f"shape-{j + 1}-{j + 2}"] = Panel(COLUMN, 3.2, drawn)
-    if (relaxed := solution.relaxed) is not None:
-        found["mixture"] = Panel(COLUMN, 3.2, lambda axes: draw_mixture(axes, solution.problem, relaxed.gait))
-        found["shares"] = Panel(COLUMN, 2.2, lambda axes: draw_shares(axes, relaxed.gait))
-        found["realised"] = Panel(COLUMN, 2.4, lambda axes: draw_realised(axes, relaxed))
     return found
 
 

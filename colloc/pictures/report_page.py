@@ -98,10 +98,6 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
         _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1)) for j, name in enumerate(planes)
     ]
     found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
-    if solution.relaxed is not None:
-        mixed = {"mixture": "the relaxed gait: mean shape, and directions mixed", "shares": "shares of the directions"}
-        mixed["realised"] = "what finite gaits lose to it"
-        found["gait_pictures"] += [_picture(drawn[name], text) for name, text in mixed.items()]
     found["convergence_pictures"] = [
         _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
         _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
@@ -123,8 +119,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             dry=_dry(solution),
             floor=_floor(solution),
             gap=gap.strip(),
-            reference=reference.verdict(solution.tends_to.efficiency) if reference and solution.certificate.replayed else "",
-            relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
+            reference=reference.verdict(solution.certificate.efficiency) if reference and solution.certificate.replayed else "",
             plain=PLAIN | TURNING if solution.problem.rotation else PLAIN,
             policy=_POLICY,
             degrees=math.degrees,

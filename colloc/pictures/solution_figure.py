@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_power, draw_shape_path, draw_speeds
-from colloc.pictures.relaxed_figure import draw_mixture, draw_realised, draw_shares
 from colloc.pictures.style import INK, VERMILION, Picture, styled
 from colloc.results.solution import SOLVED, Solution
 
@@ -19,8 +18,8 @@ _Panels = dict[str, Callable[[Axes], object]]
 
 
 def solution_figure(solution: Solution) -> Figure:
-    """Filmstrip and lab paths of a solution; shape space, speeds and power, or of a relaxed gait the mixture it comes near."""
-    panels = _of_motion(solution) if solution.relaxed is None else _of_mixture(solution)
+    """Filmstrip and lab paths of a solution; shape space, speeds and power."""
+    panels = _panels(solution)
     with styled():
         figure = Picture(figsize=(11, 8.2), layout="none")  # type: ignore[arg-type]  # the places are known: drawn once
         colour = INK if solution.status == SOLVED else VERMILION
@@ -39,20 +38,17 @@ def solution_figure(solution: Solution) -> Figure:
 
 
 def _headline(solution: Solution) -> str:
-    problem, relaxed = solution.problem, solution.relaxed
+    problem = solution.problem
     verdict = "" if solution.status == SOLVED else f"   —   {solution.status.upper()}"
-    near = ""
-    if relaxed is not None:
-        near = f" with {relaxed.best.corners} corners, relaxed {relaxed.certificate.efficiency:.5f}"
     return (
-        f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}{near}   "
+        f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}   "
         f"{problem.law.label},  δ = {solution.answer.delta:.0e}{verdict}\n"
         f"class: {problem.gait.describe()}{f';  {problem.scene}' if problem.scene else ''}"
         f"{f';  {solution.turning}' if solution.turning else ''}"
     )
 
 
-def _of_motion(solution: Solution) -> _Panels:
+def _panels(solution: Solution) -> _Panels:
     t, work = _PHASES, solution.measured.work
     found: _Panels = {"in the lab (black: at the end)": lambda axes: draw_lab(axes, solution)}
     found["shape space (disc: t = 0)" if _is_planar(solution) else "shape"] = lambda axes: draw_gait(axes, solution)
@@ -74,14 +70,3 @@ def draw_gait(axes: Axes, solution: Solution) -> Axes:
     else:
         draw_angles(axes, _PHASES, angles, problem.body)
     return axes
-
-
-def _of_mixture(solution: Solution) -> _Panels:
-    relaxed = solution.relaxed
-    assert relaxed is not None
-    return {
-        "in the lab (black: at the end)": lambda axes: draw_lab(axes, solution),
-        "shape space": lambda axes: draw_mixture(axes, solution.problem, relaxed.gait),
-        "the mixture": lambda axes: draw_shares(axes, relaxed.gait),
-        "finite gaits": lambda axes: draw_realised(axes, relaxed),
-    }

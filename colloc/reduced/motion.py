@@ -25,10 +25,7 @@ class Shapes(Protocol):
     """A class of gaits on the points of a mesh."""
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are multiplied.
-
-        A mixture of several directions has a block of `n_point` columns for each, and its velocities are sums over the blocks.
-        """
+        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are multiplied."""
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         """Derivatives ``(k, n)`` of k numbers, from those with respect to ``(angles, rates)``, ``(k, n_point, 2 n_joint)``,
@@ -79,12 +76,11 @@ class ReducedMotion:
         now, mesh = along.now, self.mesh
         out = np.vstack([now.z[OMEGA] - self._even(pace), now.centre, now.power])
         out[:, ~along.held] = np.nan
-        omega, cx, cy, power = (out * pace).reshape(4, -1, mesh.n_point).sum(axis=1)
+        omega, cx, cy, power = out * pace
         first = first_theta(self.kind, begin)
         pose = CollocatedPose.on_mesh(mesh, omega, np.array([cx, cy]), first)
         work = float((self._weight * power[mesh.points]).sum())
-        bend = self._bend(rates, pace) if self.kind.bends else 0.0
-        passed = Passed(complex(pose.place[-1]), float(pose.theta[-1]) - first, bend, work, begin)
+        passed = Passed(complex(pose.place[-1]), float(pose.theta[-1]) - first, work, begin)
         found = _State(v.copy(), delta, angles, rates, pace, along, out, pose, passed)
         if not self.kind.states or along.held.all():  # a search goes on from states that there are
             self._last = found
@@ -109,26 +105,20 @@ class ReducedMotion:
         moved = np.concatenate([angles - near.angles, rates - near.rates])
         return None, near.z + np.einsum("ijt,jt->it", slopes[:3], moved)
 
-    def _bend(self, rates: np.ndarray, pace: np.ndarray) -> float:
-        """Change of the sum of all joint angles over the solved part [rad]."""
-        bending = (rates.sum(axis=0) * pace).reshape(-1, self.mesh.n_point).sum(axis=0)
-        return float((self._weight * bending[self.mesh.points]).sum())
-
     def values(self, v: np.ndarray, delta: float) -> dict[str, float]:
         """What a period comes to, as the kind of motion counts it, and the integrals; NaN where there is no motion."""
         s = self.at(v, delta)
         if not s.values:
             s.values = self.kind.counted(s.passed)
             if self._integrals:
-                now, weight = self.instants(v, delta), self.kind.periods * s.pace * self._on_columns(s)
+                now, weight = self.instants(v, delta), self.kind.periods * s.pace * self._point_weight
                 s.values |= {each.name: float(each.at(now)[0] @ weight) for each in self._integrals}
         return s.values
 
     def instants(self, v: np.ndarray, delta: float) -> Instants:
-        """The collocated motion at every column, as formulas see it."""
+        """The collocated motion at the points of the mesh, as formulas see it."""
         s = self.at(v, delta)
-        theta = np.concatenate([s.pose.theta_on(self.mesh)] * (s.pace.size // self.mesh.n_point))
-        return self.kind.instants(Moving(s.angles, s.rates, delta), theta, s.z)
+        return self.kind.instants(Moving(s.angles, s.rates, delta), s.pose.theta_on(self.mesh), s.z)
 
     def theta(self, v: np.ndarray, delta: float, t: np.ndarray) -> np.ndarray:
         """The orientation at places t of the mesh, ``(n_time,)``; 0 where it is no state."""
@@ -138,19 +128,12 @@ class ReducedMotion:
         k = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, self.mesh.n - 1)
         return self.at(v, delta).pose.at(k, (t - edges[k]) / self.mesh.h[k])[0]
 
-    def _on_columns(self, s: _State) -> np.ndarray:
-        """Weight of every point of every block in an integral over the part of the period that is solved."""
-        return np.concatenate([self._point_weight] * (s.pace.size // self.mesh.n_point))
-
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
         """Derivatives of `values`, ``(n,)`` each."""
         s, kind = self.at(v, delta), self.kind
-        shares, weight, n_joint = kind.shares(s.passed), self._on_columns(s), len(s.rates)
+        shares, weight, n_joint = kind.shares(s.passed), self._point_weight, len(s.rates)
         on_points = np.zeros((len(shares) + len(self._integrals), 2 * n_joint + 1, s.pace.size))
         on_pace = np.zeros((len(on_points), s.pace.size))
-        for row, share in enumerate(shares.values()):
-            on_points[row, n_joint:-1] = share.bend * weight * s.pace
-            on_pace[row] = share.bend * weight * s.rates.sum(axis=0)
         if self._integrals:
             from colloc.reduced.density_slopes import density_slopes  # loads CasADi, which a certificate can do without
 
@@ -162,8 +145,8 @@ class ReducedMotion:
         return dict(zip((*shares, *(each.name for each in self._integrals)), found, strict=True))
 
     def through_points(self, v: np.ndarray, delta: float, on_points: np.ndarray) -> np.ndarray:
-        """Derivatives ``(m, n)`` of m numbers, from those with respect to (angles, rates, orientation) at the columns, ``(m,
-        2 n_joint + 1, n_column)``."""
+        """Derivatives ``(m, n)`` of m numbers, from those with respect to (angles, rates, orientation) at the points, ``(m,
+        2 n_joint + 1, n_point)``."""
         on_pace = np.zeros((len(on_points), on_points.shape[2]))
         if not on_points[:, -1].any():
             return self.shapes.pulled_back(v, on_points[:, :-1].transpose(0, 2, 1), on_pace)
@@ -171,14 +154,12 @@ class ReducedMotion:
 
     def _through(self, s: _State, shares: Sequence[Share], on_points: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         """The same of numbers that depend on the pace, too, and have shares in what the period comes to."""
-        mesh, kind, blocks = self.mesh, self.kind, s.pace.size // self.mesh.n_point
+        mesh, kind = self.mesh, self.kind
         slopes, on_states = self._slopes(s)
-        by_theta = on_points[:, -1].reshape(len(on_points), blocks, -1).sum(axis=1)
-        rows, on_begin, _ = through_motion(kind, mesh, s.pose, shares, on_states * s.pace, by_theta[:, mesh.points])
+        rows, on_begin, _ = through_motion(kind, mesh, s.pose, shares, on_states * s.pace, on_points[:, -1][:, mesh.points])
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
-        on_out = np.concatenate([on_out] * blocks, axis=2)
         on_pace = on_pace + np.einsum("krt,rt->kt", on_out[:, : len(s.out)], s.out)
         if kind.turn:  # the axes turn less on what a longer path makes a smaller part of the period
             weight, even = self._point_weight, self._even(s.pace)

@@ -15,7 +15,7 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.collocated_motion import CollocatedMotion
 
-REDUCED, PRESCRIBED, REALISED, EVALUATED = "reduced", "prescribed", "realised", "evaluated"
+REDUCED, PRESCRIBED, EVALUATED = "reduced", "prescribed", "evaluated"
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class Answer:
     seconds : float
     program : str
         Where the conditions were measured: "reduced", or the problem's formulation as IPOPT confirms it; "prescribed" where
-        nothing is free, "realised" where a gait stands for a relaxed one.
+        nothing is free.
     second_order : SecondOrder
     message : str
         What does not hold, or holds in a way that should be told; empty otherwise.

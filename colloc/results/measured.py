@@ -12,7 +12,7 @@ from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimit, PathLimits, Quantity
 from colloc.mechanics.law import Law
-from colloc.verification.played import MixedPath, Path, Replay
+from colloc.verification.played import Path, Replay
 from colloc.verification.replay import replay
 
 PARTS_OF_DELTA = (1.0, 0.1, 0.01)
@@ -73,7 +73,7 @@ class Measured(NamedTuple):
 def measured(
     body: Body,
     friction: Law,
-    path: Path | MixedPath,
+    path: Path,
     delta: float,
     *,
     tolerance: float = 1e-6,

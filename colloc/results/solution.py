@@ -23,7 +23,6 @@ from colloc.results.arc import PHASES, Arc, arc
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame, turned
-from colloc.results.relaxation import Relaxation
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.system.versions import versions
@@ -67,8 +66,6 @@ class Solution:
         Distinct gaits they led to, the one of this solution first; empty for a single start.
     shrunk : Solution, optional
         A better gait that is as small as the bound on the shape speed allows, which nobody could build; saved by itself.
-    relaxed : Relaxation, optional
-        The relaxed gait that the gait of this solution comes near, for a class of relaxed gaits.
     interrupted : bool
         Whether the search ended early, by Ctrl-C or because its time was over.
 
@@ -95,7 +92,6 @@ class Solution:
     starts: int = 1
     others: tuple[Alternative, ...] = ()
     shrunk: Solution | None = None
-    relaxed: Relaxation | None = None
     interrupted: bool = False
 
     def __repr__(self) -> str:
@@ -129,11 +125,6 @@ class Solution:
     def measured(self) -> Certificate | Answer:
         """What says the objective, efficiency, distance and work best: the replay if there was one, else the answer."""
         return self.certificate if self.certificate.replayed else self.answer
-
-    @property
-    def tends_to(self) -> Certificate:
-        """The certificate, of a relaxed gait that of the limit: what a value from elsewhere is held against."""
-        return self.certificate if self.relaxed is None else self.relaxed.certificate
 
     @property
     def value(self) -> float:

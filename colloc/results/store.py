@@ -10,8 +10,6 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
     /answer/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, value, distance, work, kkt_error, panels, ...
     /history/{delta,intervals,value,distance,work,...}: how the search came there, a row a step
     /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, distance, distance_error, work, ...
-    /relaxed/{durations,directions,start}, attribute symmetry and those of `results.relaxation.Optimality`, with
-        /relaxed/certificate and /relaxed/realised/000/{corners,certificate}, attributes repeats, sense, symmetry
 """
 
 from __future__ import annotations
@@ -28,14 +26,11 @@ import numpy as np
 from colloc.collocation.layout import layout_of
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
-from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
-from colloc.gaits.relaxed import Mixture
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.answer import REALISED, Alternative, Answer, SecondOrder, Step
+from colloc.results.answer import Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
-from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
 from colloc.system.errors import ChangedFileWarning, StoreError
 from colloc.system.store_file import (
@@ -74,12 +69,8 @@ _GAIT_ARRAYS = {
     "length": ("rad", ""),
     "corners": ("rad", "joint, vertex"),
     "schedule": ("period", "stage"),
-    "durations": ("rad", "piece, direction"),
-    "directions": ("", "piece, direction, joint"),
-    "start": ("rad", "joint"),
 }
 _DRY = "dry_efficiency"
-_MIXTURE = ("durations", "directions", "start")
 
 
 def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
@@ -157,8 +148,6 @@ def _write(file: h5py.File, solution: Solution) -> None:
     _write_motion(file, solution)
     if solution.certificate.replayed:
         _write_certificate(file.create_group("certificate"), solution.certificate)
-    if solution.relaxed is not None:
-        _write_relaxation(file.create_group("relaxed"), solution.relaxed, solution.problem.body.coordinate)
 
 
 def _write_answer(file: h5py.File, answer: Answer) -> None:
@@ -184,9 +173,7 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     knots = array(group, "knots") if "knots" in group else None
     plain = {f.name: attribute(group, f.name) for f in dataclasses.fields(Answer) if f.name not in _APART}
     panels = int(attribute(group, "panels"))
-    if plain["program"] == REALISED:
-        problem = problem.with_(gait=problem.gait.finite)
-    elif panels:
+    if panels:
         problem = problem.with_(body=problem.body.on_panels(panels))
     if plain["delta"] < problem.delta:  # lowered for a small gait
         problem = problem.with_(delta=plain["delta"])
@@ -219,31 +206,6 @@ def _write_motion(file: h5py.File, solution: Solution) -> None:
     group = file.create_group("motion")
     for name, column in solution.columns().items():
         put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
-
-
-def _write_relaxation(group: h5py.Group, relaxed: Relaxation, coordinate: str) -> None:
-    _write_gait(group, relaxed.gait, coordinate)
-    for field in dataclasses.fields(Optimality):
-        put_attribute(group, field.name, getattr(relaxed.optimality, field.name))
-    _write_certificate(group.create_group("certificate"), relaxed.certificate)
-    for index, realised in enumerate(relaxed.realised):
-        one = group.create_group(f"realised/{index:03d}")
-        _write_gait(one, realised.gait, coordinate)
-        for name in ("repeats", "sense"):
-            put_attribute(one, name, getattr(realised, name))
-        _write_certificate(one.create_group("certificate"), realised.certificate)
-
-
-def _read_relaxation(group: h5py.Group) -> Relaxation:
-    mixture = Mixture(**{name: array(group, name) for name in _MIXTURE}, symmetry=str(attribute(group, "symmetry")))
-    optimality = Optimality(**{field.name: attribute(group, field.name) for field in dataclasses.fields(Optimality)})
-    realised = []
-    for name in sorted(child(group, "realised")):
-        one = child(child(group, "realised"), name)
-        gait = Corners(array(one, "corners"), str(attribute(one, "symmetry")))
-        repeats, sense = (int(attribute(one, name)) for name in ("repeats", "sense"))
-        realised.append(Realised(repeats, sense, gait, _read_certificate(child(one, "certificate"))))
-    return Relaxation(mixture, optimality, _read_certificate(child(group, "certificate")), tuple(realised))
 
 
 def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
@@ -290,7 +252,5 @@ def _read(file: h5py.File) -> Solution:
     )
     others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(text(file, "others"))]
     solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
-    if "relaxed" in file:
-        solution.relaxed = _read_relaxation(child(file, "relaxed"))
     solution.interrupted = bool(attribute(file, "interrupted"))
     return solution

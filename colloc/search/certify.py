@@ -11,11 +11,11 @@ from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.chain import BALANCED
-from colloc.results.answer import EVALUATED, REALISED, Answer
+from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.measured import astray, measured
 from colloc.verification.mesh_error import mesh_error
-from colloc.verification.played import MixedPath, Path, Replay
+from colloc.verification.played import Path, Replay
 from colloc.verification.replayer import replayer
 
 EXACT, VIOLATION, CLOSURE, WORK = 1e-6, 1e-8, 1e-9, 1e-7
@@ -105,8 +105,6 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
         each = 0.5 * usual.instants_a_point / problem.gait.fraction
         instants = max(usual.instants, 2 * int(np.ceil(each * answer.mesh.n_point)))
     at = problem, gait, answer.delta_per_period, gait.corner_phases, instants, tolerance
-    if answer.program == REALISED:  # it need not be an optimum, nor is it collocated to be measured by that
-        return gait_certificate(*at)
     if answer.program == EVALUATED:
         return gait_certificate(*at, claimed=answer.value, after=tuple(_mesh(answer)))
     before = (*_first_order(answer), _second_order(answer))
@@ -115,7 +113,7 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
 
 def gait_certificate(
     problem: Problem,
-    path: Path | MixedPath,
+    path: Path,
     delta: float,
     breaks: np.ndarray,
     instants: int = 1600,
@@ -132,7 +130,7 @@ def gait_certificate(
     problem : Problem
         Whose body, friction and joint limit are meant.
     path : callable
-        The gait's angles and rates, and of a relaxed gait shares (`colloc.verification.replay`).
+        The gait's angles and rates (`colloc.verification.replay`).
     delta : float
         Per period.
     breaks : (n,)
@@ -203,10 +201,10 @@ def _second_order(answer: Answer) -> Check:
 
 
 def _motion(
-    problem: Problem, path: Path | MixedPath, fine: Replay, breaks: np.ndarray, tolerance: float, claimed: float | None
+    problem: Problem, path: Path, fine: Replay, breaks: np.ndarray, tolerance: float, claimed: float | None
 ) -> list[Check]:
     body, ends = problem.body, path(np.array([0.0, 1.0]))[0]
-    angles, rates = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))[:2]
+    angles, rates = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))
     stretched, limit = under_one_limit(angles, problem.joint_limit)
     beyond = max(float(body.largest_angles(stretched).max()) - limit, 0.0)
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))

@@ -22,7 +22,6 @@ from colloc.search.ipopt import NlpResult, Solver
 from colloc.search.refine import MESHES
 from colloc.search.run import this_run
 from colloc.search.spaces import heading, nearest_parameters, transcribed
-from colloc.system.errors import ProblemError
 from colloc.verification.refinement import planned_mesh
 
 _ITERATIONS = 1500
@@ -40,14 +39,7 @@ def literal_answer(problem: Problem) -> Answer:
     -------
     Answer
         Its message says what failed.
-
-    Raises
-    ------
-    ProblemError
-        For a class of relaxed gaits, which has no full program.
     """
-    if problem.gait.mixes:
-        raise ProblemError("relaxed gaits have no full program; leave --search full out.")
     program = transcribed(problem)
     parameters, history = nearest_parameters(program, problem.guess), tuple[Step, ...]()
     below = levels(problem, problem.delta_start)

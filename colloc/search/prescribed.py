@@ -1,5 +1,4 @@
-"""Gaits that are collocated as they are, by no optimiser: prescribed motions, gaits that are given, and finite ones that stand
-for relaxed ones."""
+"""Gaits that are collocated as they are, by no optimiser: prescribed motions, and gaits that are given."""
 
 from __future__ import annotations
 
@@ -15,13 +14,12 @@ from colloc.collocation.warm_start import balanced_variables
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.reduced.motion import ReducedMotion
-from colloc.results.answer import EVALUATED, PRESCRIBED, REALISED, Answer, Step
+from colloc.results.answer import EVALUATED, PRESCRIBED, Answer
 from colloc.search.certify import goes_nowhere
 from colloc.search.refine import MESHES
 from colloc.verification.refinement import planned_mesh
@@ -63,13 +61,6 @@ def _on_a_fine_mesh(
     answer = replace(answer_on(mesh), message=message)
     answer = replace(answer, seconds=time.perf_counter() - begin)
     return replace(answer, history=(answer.step,))
-
-
-def realised(problem: Problem, gait: Corners, history: tuple[Step, ...]) -> Answer:
-    """What a polygon achieves with an interval for every side; the problem's class is that of finite gaits."""
-    mesh = Mesh(scheme(problem.scheme), gait.phases)
-    answer = as_it_is(problem, mesh, gait, gait.vertices.ravel(order="F"), REALISED)
-    return replace(answer, knots=gait.phases, history=(*history, answer.step))
 
 
 class _Given(NamedTuple):

@@ -22,7 +22,6 @@ from colloc.gaits.problem import Problem
 from colloc.reduced.given import Given
 from colloc.results.answer import Answer, SecondOrder, Step
 from colloc.results.checks import Certificate, Check
-from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.search.effort import Effort
 from colloc.search.optimum import Optimum
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
@@ -107,7 +106,7 @@ class Run:
         self._stated = self.problem.to_dict()
         stages = [Answer, Certificate, Check, Effort, Given, Optimum, SecondOrder, Step]
         self._codec = Codec(
-            [*stages, Optimality, Realised, Relaxation, *gait_fields.GAITS, *gait_fields.CLASSES],
+            [*stages, *gait_fields.GAITS, *gait_fields.CLASSES],
             {Problem: Own(self._changes, self._with_changes)},
         )
         if self.path is None:

@@ -232,7 +232,7 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
     Raises
     ------
     ProblemError
-        If the gait is no optimum: it was given, or the solve did not end well, or it is a relaxed one.
+        If the gait is no optimum: it was given, or the solve did not end well.
 
     Examples
     --------
@@ -268,8 +268,6 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
 def _check_is_optimum(solution: Solution) -> None:
     if solution.answer.program == EVALUATED or not solution.problem.gait.free:
         raise ProblemError("the gait was given: only of an optimum is it known how the best value changes.")
-    if solution.problem.gait.mixes:
-        raise ProblemError("a relaxed gait has no sensitivity here: solve the problem for a Polygon or a FreePath.")
     if not solution.success:
         raise ProblemError(f"only an optimum has a sensitivity, and this solve ended as: {solution.status}.")
 

@@ -26,12 +26,11 @@ from colloc.search.choose import choose, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is
 from colloc.search.descend import FACTOR, below_saddle, descend
-from colloc.search.explore import CLOSE, ENOUGH, Exploration, begin_at, explore, followed_further, is_finite
+from colloc.search.explore import CLOSE, Exploration, begin_at, explore, followed_further, is_finite
 from colloc.search.literal import literal_answer
 from colloc.search.optimum import Optimum
 from colloc.search.prescribed import prescribed_answer
 from colloc.search.refine import refine
-from colloc.search.relaxed import explore_relaxed, realised_solution, unrefined
 from colloc.search.run import Progress, Run, this_run
 from colloc.search.spaces import space_about
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -63,7 +62,7 @@ def solve(
     problem : Problem
     starts : int, optional
         The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops: at least so many. With 1 the guess
-        alone. By default 32, with inertia 96; fewer once four new ones, and one in eight, met the best. Of relaxed gaits 8.
+        alone. By default 32, with inertia 96; fewer once four new ones, and one in eight, met the best.
     seconds : float
         Wall time allowed. Then the best gait so far is returned, with status "interrupted" unless its certificate holds.
     search : {"reduced", "full"}
@@ -113,19 +112,15 @@ def _solved(problem: Problem, starts: int | None, search: str, until: float, wor
         return solution_of(problem, certified(prescribed_answer(problem)))
     if search == FULL:
         return solution_of(problem, certified(literal_answer(problem)))
-    if problem.gait.mixes:
-        explored = explore_relaxed(problem, starts or ENOUGH, goes_on)
-        solution = realised_solution(explored.optima[0])
-    else:
-        explored = _explored(problem, starts, goes_on)
-        first = descend(explored.optima[0])
-        if not worth(first):
-            return Solution(problem, unconfirmed(first))
-        explored = replace(explored, optima=(first, *explored.optima[1:]))
-        found = _certified_best(problem, explored.optima)
-        if not any(each.holds for each in found) and explored.left:
-            found += _certified_best(problem, followed_further(problem, explored, goes_on))
-        solution = choose(problem, found)
+    explored = _explored(problem, starts, goes_on)
+    first = descend(explored.optima[0])
+    if not worth(first):
+        return Solution(problem, unconfirmed(first))
+    explored = replace(explored, optima=(first, *explored.optima[1:]))
+    found = _certified_best(problem, explored.optima)
+    if not any(each.holds for each in found) and explored.left:
+        found += _certified_best(problem, followed_further(problem, explored, goes_on))
+    solution = choose(problem, found)
     solution.starts, solution.others = explored.starts, explored.others
     return solution
 
@@ -226,7 +221,7 @@ def _interrupted(problem: Problem, run: Run, why: str) -> Solution:
         solution = Solution(problem, found[0].answer)
     else:
         best = run.best or as_it_is(*space_about(problem, problem.guess), problem.delta_start)
-        solution = Solution(problem, (unrefined if problem.gait.mixes else unconfirmed)(best))
+        solution = Solution(problem, unconfirmed(best))
     solution.interrupted = True
     solution.message = f"{why}; this is the best gait so far. {solution.message}".strip()
     return solution

@@ -19,13 +19,11 @@ from colloc.gaits.linear import LinearClass
 from colloc.gaits.polygon import Polygon
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
-from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.serpenoid import Serpenoid
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.heading import whole_turns
 from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
-from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
 from colloc.system.errors import ProblemError
@@ -47,16 +45,9 @@ _LINEAR = Searched(
 )
 _ALONG_PATHS = Searched(transcribe_path, PathSpace)
 _SERPENOID = Searched(_LINEAR.program, lambda control, gait, edges, scheme, far: SerpenoidSpace(control, edges, scheme, far))
-_MIXED = Searched(
-    transcribe_path,
-    lambda control, gait, edges, scheme, far: MixtureSpace(
-        control, control.intervals if edges is None else edges.size - 1, far, scheme
-    ),
-)
 SEARCHED: dict[type, Searched] = {
     FreePath: _ALONG_PATHS,
     Polygon: _ALONG_PATHS,
-    Relaxed: _MIXED,
     Serpenoid: _SERPENOID,
     LinearClass: _LINEAR,
     Prescribed: _LINEAR,

@@ -51,7 +51,7 @@ def solve(
     problem : Problem or path-like
         A problem, or a problem file.
     starts : int, optional
-        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else 32 (relaxed gaits: 8).
+        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else 32.
     seconds : float
         Wall time allowed: then the best gait so far is returned.
     search : {"reduced", "full"}
@@ -167,7 +167,7 @@ class Starts:
 
 def reopened(problem: Problem, outcome: Outcome) -> Solution:
     """The solution that a start led to: solved at the final delta from its gait, or again from its guess if it failed."""
-    if outcome.status != SOLVED or problem.gait.mixes:  # no finite gait says what it comes near
+    if outcome.status != SOLVED:
         return search_solve(problem.with_(guess=outcome.guess), 1)
     return search_solve(problem.with_(guess=outcome.gait, delta_start=problem.delta), 1)
 

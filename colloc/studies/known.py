@@ -165,10 +165,10 @@ def row_of(solution: Solution, command: str) -> Known:
     Raises
     ------
     ProblemError
-        If it is not certified, or no member of its own class (a prescribed motion, or near a relaxed gait).
+        If it is not certified, or no member of its own class (a prescribed motion).
     """
     problem, answer = solution.problem, solution.answer
-    if not solution.success or not problem.gait.free or problem.gait.mixes:
+    if not solution.success or not problem.gait.free:
         raise ProblemError(f"{problem.name} is not the certified gait of a class: a row of the table has to be.")
     edges = answer.edges if answer.knots is None else answer.knots
     return Known(

@@ -104,7 +104,7 @@ def _collocated(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) ->
     now = kind.instants(_shapes(gait, mesh, delta), pose.theta_on(mesh), own.z)
     spent = (weights * own.now.power[mesh.points]).sum(axis=1)
     summed = {each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1) for each in control.aims.integrals}
-    passed = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()), own.begin)
+    passed = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), float(spent.sum()), own.begin)
     return _Collocated(own, pose, spent, summed, _period(kind, passed, summed))
 
 
@@ -120,7 +120,7 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
-    true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()), own.begin)
+    true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), own.begin)
     known, followed = {}, iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
     for each in control.aims.integrals:
         known[each.name] = next(followed) if each.needs_forces else totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)

@@ -251,7 +251,7 @@ def inertial_motion(
         With the masses of its links.
     friction : Law
     gait : callable
-        Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones. Their pace within the period counts.
+        Joint angles and rates at phases in [0, 1]; any gait of colloc. Its pace within the period counts.
     delta : float
         Regularisation speed, per period.
     froude : float

@@ -15,9 +15,6 @@ from colloc.system.errors import NotConvergedError
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
-MixedPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
-"""Of a relaxed gait: joint angles; rates ``(n_direction, n_joint, n_time)`` in every direction; their shares of the time
-``(n_direction, n_time)``, of sum 1."""
 Ran = TypeVar("Ran")
 Numbers = dict[str, float]
 _TENTH, _LEAST = 0.1, 1e-12

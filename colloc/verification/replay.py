@@ -29,7 +29,7 @@ from colloc.motion.follow import ONE_SIDED
 from colloc.motion.followed_motion import FORWARDS, followed_motion
 from colloc.system.errors import ProblemError
 from colloc.verification.panels import WHOLE, Panels, begun, changes, halves, increments, left_over, travelled
-from colloc.verification.played import MixedPath, Path, Replay, lever
+from colloc.verification.played import Path, Replay, lever
 
 _NARROWEST = 1e-10
 
@@ -37,7 +37,7 @@ _NARROWEST = 1e-10
 def _evaluated(
     body: Body,
     friction: Law,
-    path: Path | MixedPath,
+    path: Path,
     delta: float,
     t: np.ndarray,
     near: np.ndarray | None,
@@ -50,36 +50,19 @@ def _evaluated(
 ) -> tuple[np.ndarray, ...]:
     """`Panels` from z to apart at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
 
-    Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole` period, the branch in time. The
-    directions of a relaxed gait are solved for one after the other, and averaged.
+    Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole` period, the branch in time.
     """
-    angles, rates, *mixed = path(t.ravel())
-    if mixed:
-        near = None  # which is a mean, and of no one direction
-    shares = mixed[0] if mixed else np.ones((1, t.size))
-    motions, residual, apart = [], np.zeros(t.size), np.zeros((3 + len(quantities), t.size))
-    densities, used = np.zeros((len(quantities), t.size)), np.full((len(limits.names), t.size), -np.inf)
-    for share, some in zip(shares, rates if mixed else rates[None], strict=True):
-        start = near
-        if not friction.associated:
-            before = None if whole else near
-            followed = followed_motion(body, friction, angles, some, delta, before=before, sense=sense, quantities=quantities)
-            if followed is not None:
-                start, apart = np.nan_to_num(followed.z), apart + share * followed.apart
-        motion, left = body.replayed(friction, angles, some, delta, start)
-        motions.append(motion)
-        now = Instants(body, friction, angles, some, delta, z=motion.z)
-        densities += share * np.concatenate([quantity.at(now) for quantity in quantities])
-        if limits.names:
-            used = np.maximum(used, limits.sizes(limits.at(now)))
-        residual = np.maximum(residual, left)
-
-    def mean(name: str) -> np.ndarray:
-        return np.asarray(sum(share * getattr(motion, name) for share, motion in zip(shares, motions, strict=True)))
-
-    centre = mean("centre")
-    z = mean("z")
-    seen = z, z[2] - turn, centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), densities
+    (angles, rates), start, apart = path(t.ravel()), near, np.zeros((3 + len(quantities), t.size))
+    if not friction.associated:
+        before = None if whole else near
+        followed = followed_motion(body, friction, angles, rates, delta, before=before, sense=sense, quantities=quantities)
+        if followed is not None:
+            start, apart = np.nan_to_num(followed.z), followed.apart
+    motion, residual = body.replayed(friction, angles, rates, delta, start)
+    now, z, centre = Instants(body, friction, angles, rates, delta, z=motion.z), motion.z, motion.centre
+    densities = np.concatenate([quantity.at(now) for quantity in quantities])
+    used = limits.sizes(limits.at(now)) if limits.names else np.empty((0, t.size))
+    seen = z, z[2] - turn, centre[0] + 1j * centre[1], motion.power, motion.actuator_power, densities
     values: tuple[np.ndarray, ...] = (*seen, residual, lever(body, angles), used, apart)
     return tuple(value.T.reshape(*t.shape, *value.shape[:-1]) for value in values)
 
@@ -87,7 +70,7 @@ def _evaluated(
 def replay(
     body: Body,
     friction: Law,
-    path: Path | MixedPath,
+    path: Path,
     delta: float,
     *,
     instants: int = 1600,
@@ -108,8 +91,7 @@ def replay(
     ----------
     body, friction
     path : callable
-        Joint angles and rates at phases in [0, 1]; of a relaxed gait (`MixedPath`) rates and shares of its directions. Then
-        the body moves, and pays, as the mean over the directions.
+        Joint angles and rates at phases in [0, 1].
     delta : float
         Regularisation speed, per period.
     instants : int
@@ -155,7 +137,7 @@ def replay(
         from colloc.verification.inertial_replay import inertial_replay  # which makes replays like this one
 
         played: Any = {"regime": Paced(froude), "tolerance": tolerance, "breaks": breaks, "objective": objective}
-        return inertial_replay(body, friction, path, delta, quantities=quantities, turn=turn, **played)  # type: ignore[arg-type]
+        return inertial_replay(body, friction, path, delta, quantities=quantities, turn=turn, **played)
     if "period" in objective.uses:
         raise ProblemError(f"the objective {objective.name!r} speaks of the period: give the froude at which it is played.")
     if instants < 4 or instants % 2:

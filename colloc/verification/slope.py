@@ -185,8 +185,6 @@ def gait_on_slope(
 ) -> GaitOnSlope:
     """A gait of a body on a slope, or a `ProblemError` that says why it cannot be there."""
     chain = checked_chain(body, friction, grade)
-    if len(gait(np.zeros(1))) != 2:
-        raise ProblemError("a relaxed gait cannot be put on a slope, where it matters how long each of its directions lasts.")
     return GaitOnSlope(chain, friction, gait, delta, tuple(sorted(float(t) for t in breaks)), Slope(float(grade)))
 
 

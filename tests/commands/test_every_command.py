@@ -1,13 +1,10 @@
-"""What holds for every command alike: options, refusals in one sentence or one JSON object, completion in a shell."""
+"""What holds for every command alike: options, and refusals in one sentence or one JSON object."""
 
 import importlib
 import json
-import shutil
-import subprocess
 
 import pytest
 
-from colloc.commands.completion import completion_script
 from colloc.commands.main import SUBCOMMANDS
 from colloc.commands.main import main as colloc
 from colloc.results.store import save
@@ -74,7 +71,6 @@ REFUSED = {
     + [f"problem.py --{option}" for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")],
     "sensitivity": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --no-such"],
     "referee": ["--table nope.json", "--table text.h5", "--add good.h5", "--add nope.h5 --by me", "--only nobody"],
-    "completion": ["--no-such", "x"],
 }
 
 
@@ -122,28 +118,3 @@ def test_a_sensitivity_is_told_as_a_table_and_as_json(place, capsys):
         assert effect["name"] in table
         if abs(effect["slope"]) > 1e-6:
             assert f"{effect['slope']:+.5f}" in table
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
-@pytest.mark.parametrize(
-    ("typed", "offered"),
-    [
-        (["colloc", ""], set(SUBCOMMANDS)),
-        (["colloc", "com"], {"compare", "completion"}),
-        (["colloc", "solve", "--st"], {"--start", "--starts"}),
-        (["colloc", "solve", "p.py", "--search", ""], {"reduced", "full"}),
-        (["colloc", "animate", "x.h5", "--format", "m"], {"mp4"}),
-        (["colloc", "solve", "problems/thr"], set()),
-        (["colloc", "nonsense", "--"], set()),
-    ],
-)
-def test_bash_completes_commands_options_and_choices(typed, offered, tmp_path):
-    """An empty set leaves files to bash."""
-    (tmp_path / "completion").write_text(completion_script(PARSERS))
-    words = " ".join(f"'{word}'" for word in typed)
-    program = (
-        f"source {tmp_path}/completion; COMP_WORDS=({words}); COMP_CWORD={len(typed) - 1}; _colloc; echo ${{COMPREPLY[@]}}"
-    )
-    done = subprocess.run(["bash", "-u", "-c", program], capture_output=True, text=True, check=True)
-    assert set(done.stdout.split()) == offered
-    assert done.stderr == ""

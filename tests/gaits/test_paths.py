@@ -10,7 +10,6 @@ from colloc.gaits.path_samples import (
     graded_edges,
     path_length,
 )
-from colloc.gaits.relaxed import Mixture
 from colloc.gaits.starts import prolonged
 from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
@@ -113,7 +112,6 @@ def test_finer_arcs_are_the_same_path():
         member("antipodal", body=Chain((0.25,) * 4)),
         ellipse(0.1, 2.0, 1.2),
         BSpline(6).member(np.linspace(-1, 1, 12), 2),
-        Mixture([[1.0, 0.5]], [[[0.6, 0.8], [-1.0, 0.0]]], [0.3, 0.1]),
     ],
 )
 def test_the_mirror_image_of_a_gait_is_one_of_its_class(gait):

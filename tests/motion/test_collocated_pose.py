@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.motion.collocated import CollocatedPose, point_weights
 from colloc.motion.heading import closing_sign, heading, whole_turns
 from colloc.numerics.mesh import Mesh
@@ -90,7 +90,6 @@ def test_a_gait_goes_where_its_whole_period_leads():
         assert np.exp(1j * heading(ANTIPODAL, end, rotation)) == pytest.approx(sign * whole / abs(whole))
     for symmetry in (NONE, BILATERAL):
         assert heading(symmetry, displacement, rotation) == pytest.approx(0.9)
-    assert abs(heading(BOTH, displacement, rotation, 0.2)) == pytest.approx(0.6)
 
 
 @pytest.mark.parametrize("backwards", [0.0, np.pi])

@@ -11,7 +11,6 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.measured import measured
 from colloc.verification.adaptive_motion import fine_motion
-from colloc.verification.heading_map import heading_map
 from colloc.verification.kinks import kink_phases
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.refinement import planned_mesh
@@ -29,13 +28,6 @@ OPEN = Fourier([-0.7, -0.4], [[0.3, -0.5], [-0.4, -0.2]], [[-1.6, -0.2], [-0.7, 
 LOPSIDED = Chain((0.25, 0.45, 0.3))
 WEIGHTY = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 UNEQUAL = Friction(1.7, 1.0, 1.3)
-
-
-def _mixed(t):
-    """Angles of one gait, and the rates of two in turn."""
-    angles, rates = SKEW(t)
-    share = 0.5 + 0.3 * np.sin(2 * np.pi * t)
-    return angles, np.stack([rates, rates[::-1] + 0.4]), np.stack([share, 1 - share])
 
 
 def replay_of_equal_coefficients():
@@ -56,10 +48,6 @@ def replays_of_other_objectives():
     """The error is that of the objective."""
     aims = Objective("turning"), Objective("driven efficiency"), Objective("distance / length")
     return [replay(Chain(), UNEQUAL, SKEW, 1e-2, instants=80, tolerance=1e-2, objective=aim) for aim in aims]
-
-
-def replay_of_a_mixture():
-    return replay(Chain(), UNEQUAL, _mixed, 1e-2, instants=80, tolerance=1e-3)
 
 
 def replay_where_several_motions_are_balanced():
@@ -138,12 +126,6 @@ def gaits_on_slopes():
     corners = slope_motion(Chain(), Friction(), SQUARE, 0.1, 0.2, theta=0.3, tolerance=1e-6, breaks=SQUARE.corner_phases)
     names = ("course", "headings", "climb", "aside", "friction_work", "joint_work", "steering")
     return [np.round(getattr(ran, name), 4) for ran in (steep, corners) for name in names], repr(corners)
-
-
-def headings_on_a_slope():
-    gait = Fourier([0, 0], [[1.5], [0]], [[0], [1]])
-    found = heading_map(Chain(), Friction(2, 1, 1), gait, 1e-1, 0.1, count=4, tolerance=1e-3)
-    return np.round(found.turns, 2), found.headings, found.neutral, [ran.stable for ran in found.lasting], repr(found)
 
 
 def trajectories():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import BSpline, Chain, FreePath, Friction, Harmonic, ModalBody, Problem, ProblemError, Relaxed, Serpenoid, Wave
+from colloc import BSpline, Chain, FreePath, Friction, Harmonic, ModalBody, Problem, ProblemError, Serpenoid, Wave
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
@@ -97,7 +97,6 @@ def test_it_is_kept_in_files(slow, tmp_path):
     ("stated", "words"),
     [
         ({"gait": FreePath(8.0)}, "leaves the pace open, but the joints' speed is limited"),
-        ({"gait": Relaxed()}, "leave its limits out"),
         ({"speed_limit": 0.2}, "leaves no gait"),
         ({"speed_limit": 0.5}, "with speed_limit the usual first gait"),
         ({"body": Wave(), "gait": None}, "nothing is free in a prescribed motion"),

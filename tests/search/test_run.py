@@ -12,7 +12,7 @@ import pytest
 
 import colloc
 from benchmarks.kills import contents, lost, stopped
-from colloc import Chain, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, Relaxed, ellipse
+from colloc import Chain, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.store import load
 from colloc.search.certify import certify
@@ -220,14 +220,6 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
     # its space is made anew, and its program says the same
     assert again.program().objective(again.v) == found.program().objective(found.v)
     np.testing.assert_array_equal(again.program().rows(again.v), found.program().rows(found.v))
-
-
-def test_a_relaxed_gait_is_kept_too(tmp_path, at_once):
-    problem = Problem("mixed", gait=Relaxed(3, "both"), delta=1e-2, joint_limit=2.5, intervals=8)
-    first = solve(problem, 1, keep=tmp_path / "x.run.sqlite")
-    again = solve(problem, 1, keep=tmp_path / "x.run.sqlite")
-    assert again.value == first.value
-    np.testing.assert_array_equal(again.gait.corners, first.gait.corners)
 
 
 def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_again(tmp_path, capsys):

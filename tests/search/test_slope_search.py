@@ -15,7 +15,6 @@ from colloc import (
     Polygon,
     Problem,
     ProblemError,
-    Relaxed,
     Viscous,
     Wheel,
     ellipse,
@@ -242,7 +241,6 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"gait": Relaxed()}, "gaits say where the body points, which those of the class Relaxed cannot"),
         ({"gait": FreePath(symmetry="bilateral")}, "no part of a period follows from another: take FreePath"),
         ({"body": CrawlerBody(), "gait": None, "guess": None}, "only a Chain"),
         ({"objective": "turning"}, "the objective speaks of the rotation"),
