@@ -142,9 +142,11 @@ def explore_relaxed(
 
     known.sort(key=rank)
     ends: list[tuple[Optimum, int]] = []
-    for found in _promising(known):
+    promising = _promising(known)
+    for done, found in enumerate(promising):
         if ends and not goes_on():
             break
+        run.told("follow", done, len(promising), min((end for end, _ in ends), key=rank, default=None))
         with suppress(CollocError):
             ends.append((descend_relaxed(found), sum(_alike(found, other) for other in known)))
     if not ends:

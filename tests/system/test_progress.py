@@ -37,6 +37,15 @@ def test_the_line_says_what_and_how_long_and_vanishes():
     assert printed.endswith(WIPED)
 
 
+@pytest.mark.parametrize("left", [float("inf"), float("nan"), 0.0, -3.0])
+def test_a_time_that_nobody_knows_is_not_told(left):
+    stream = Terminal()
+    with StatusLine(stream) as line:
+        line.say("solving", left)
+    assert "solving   0 s" in stream.getvalue()
+    assert "left" not in stream.getvalue()
+
+
 def test_what_is_printed_in_between_stands_on_a_line_of_its_own():
     stream = Terminal()
     with StatusLine(stream) as line:
