@@ -55,8 +55,8 @@ class StatusLine:
                 console=Console(file=self._stream, highlight=False, markup=False),
                 refresh_per_second=2,
                 transient=True,
-                redirect_stdout=False,  # what others print goes where they send it, after `clear`
-                redirect_stderr=False,
+                redirect_stdout=False,  # it may go elsewhere; what is for this terminal is printed after `clear`
+                redirect_stderr=True,  # warnings stand above the line
             )
             self._live.start()
         self._live.refresh()
