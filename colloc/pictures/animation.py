@@ -110,7 +110,7 @@ class _Scene:
             self.quiver.set_UVC(*(shown.arrow_scale * turned(shown.arrow[:, :, k], before.rotation)))
         if self.dot is not None:
             self.dot.set_data(shown.angles[:1, k], shown.angles[1:2, k])
-        self.phase.set_text(f"t = {period + shown.t[k]:.2f}")
+        self.phase.set_text(f"t = {period + shown.t[k]:.2f} of {len(shown.before) * shown.t[-1]:g}")
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[: self.size[0], : self.size[1], :3].copy()
 
