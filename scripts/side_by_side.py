@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 import colloc
 from colloc.pictures.foot_marks import FootMarks
-from colloc.pictures.motion_frames import lab_feet, lab_outline
+from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
 from colloc.results.solution import Solution
@@ -68,7 +68,7 @@ def crawl(solution: Solution) -> Crawl:
     motion = solution.sample(phases(solution, np.linspace(0.0, least * WORK, PICTURES)))
     pose = motion.angles, motion.theta, motion.tail
     label, share = FILES.get(problem.name, problem.gait.describe()), least * solution.efficiency
-    feet = lab_feet(body, *pose), solution.holding(motion), body.foot_kinds
+    feet = lab_feet(body, *pose), solution.holding(motion), foot_kinds(body)
     return Crawl(label, share, lab_outline(body, *pose), motion.centre, *feet)
 
 

@@ -278,11 +278,6 @@ class Body(Moved, Shaped, Protocol):
         along = np.diff(now, axis=1)[:, parts]
         return place, along / np.hypot(*along), velocity
 
-    @property
-    def foot_kinds(self) -> tuple[str, ...]:
-        """What its feet are, in the order of `footprints` (`colloc.mechanics.feet.Foot.kind`)."""
-        return ()
-
     def footprints(self, angles: np.ndarray, wheel: float = 0.0) -> np.ndarray:
         """Where the feet of a body are, seen from the tail, ``(2, 2, n_foot, n_time)``: both ends of pads, and of wheels that
         are `wheel` of their link long, a point twice; `speeds` are then theirs. None for a body that lies on the floor."""

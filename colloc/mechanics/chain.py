@@ -182,10 +182,6 @@ class Chain(Links, Body):
         """Of the midpoints of the links, or of the feet and pads."""
         return self.contact.speeds(self.velocity(self.posture(angles), rates, z))
 
-    @property
-    def foot_kinds(self) -> tuple[str, ...]:
-        return tuple(foot.kind for foot in self.standing_on)
-
     def footprints(self, angles: np.ndarray, wheel: float = 0.0) -> np.ndarray:
         if not self.feet:
             return super().footprints(angles)

@@ -104,7 +104,7 @@ class Coupled(Body):
             raise ProblemError("links cross where joints are stuck.")
 
     force_names, law, largest_forces = map(_of_chain, ("force_names", "law", "largest_forces"))
-    drawn_width, hinges, far_pairs, foot_kinds = map(_of_chain, ("drawn_width", "hinges", "far_pairs", "foot_kinds"))
+    drawn_width, hinges, far_pairs = map(_of_chain, ("drawn_width", "hinges", "far_pairs"))
 
     sliding, with_forces, forces, solve = map(_under_friction, ("sliding", "with_forces", "forces", "solve"))
     motion, replayed, all_velocities = map(_under_friction, ("motion", "replayed", "all_velocities"))

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from colloc.pictures.figure import draw_shape_path
 from colloc.pictures.foot_marks import FootMarks
-from colloc.pictures.motion_frames import Frames, frames, frames_of
+from colloc.pictures.motion_frames import Frames, foot_kinds, frames, frames_of
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
 from colloc.results.motion import turned
 from colloc.results.solution import Solution
@@ -68,7 +68,7 @@ class _Scene:
         (self.joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
         (self.head,) = axes.plot([], [], "o", color=INK, ms=9)
         (self.centre,) = axes.plot([], [], "o", color=VERMILION, ms=5)
-        self.feet = FootMarks(axes, solution.problem.body.foot_kinds, 8.0)
+        self.feet = FootMarks(axes, foot_kinds(solution.problem.body), 8.0)
         if key := self.feet.key():
             axes.legend(key.values(), key.keys(), loc="lower right", ncols=len(key), borderaxespad=0)
         self.quiver: Any = None

@@ -15,7 +15,7 @@ from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.foot_marks import FootMarks
-from colloc.pictures.motion_frames import lab_feet, lab_outline
+from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
 from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SEQUENTIAL, SERIES, VERMILION, snapshot_colours
 from colloc.results.solution import Solution
 
@@ -49,7 +49,7 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     low = float(y.min()) - _MARGIN
     for k, colour in enumerate(snapshot_colours(count)):
         draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body)
-        marks = FootMarks(axes, solution.problem.body.foot_kinds, 4.5)
+        marks = FootMarks(axes, foot_kinds(solution.problem.body), 4.5)
         marks.place(feet[..., k] * [[[1]], [[higher]]] + [[[shift[k]]], [[0]]], held[:, k])
         axes.plot(motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6)
         below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
@@ -109,7 +109,7 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
         draw_body(axes, ends[:, :, k], shade, solution.problem.body)
-        marks = FootMarks(axes, solution.problem.body.foot_kinds, 6.0)
+        marks = FootMarks(axes, foot_kinds(solution.problem.body), 6.0)
         marks.place(feet[..., k], held[:, k])
         axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
     axes.set_aspect("equal", "datalim")
@@ -233,7 +233,7 @@ def draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
         axes.plot(t, row, lw=1.4, color=colours[j], label=f"{j + 1}" if j in named else None)
 
 
-def draw_key(axes: Axes, of: str = "", more: Mapping[str, object] | None = None) -> None:
+def draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) -> None:
     """The names of the lines, and of more marks, in a row above the axes, where no line runs."""
     handles, labels = axes.get_legend_handles_labels()
     handles, labels = [*handles, *(more or {}).values()], [*labels, *(more or {})]
@@ -241,5 +241,5 @@ def draw_key(axes: Axes, of: str = "", more: Mapping[str, object] | None = None)
         labels[0] = f"{of} {labels[0]}"
     axes.legend(
         handles, labels, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(labels), fontsize=7, handlelength=1,
-        columnspacing=0.8, handletextpad=0.6 if more else 0.3, borderpad=0, borderaxespad=0.3,
+        columnspacing=0.8, handletextpad=0.8 if more else 0.3, borderpad=0, borderaxespad=0.3,
     )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.feet import FOOT, WHEEL
-from colloc.pictures.motion_frames import foot_words, frames
+from colloc.pictures.motion_frames import foot_kinds, foot_words, frames
 from colloc.results.solution import Solution
 
 _FRAMES, _PERIODS, _SECONDS = 24, 2, 3.0
@@ -32,7 +32,7 @@ def solution_card(solution: Solution) -> str:
         f"<div><b>{escape(solution.problem.name)}</b> {escape(solution.status)}</div>",
         f"<div>{escape(solution.message)}</div>" if solution.message else "",
         film(solution),
-        f"<div>{foot_words(solution.problem.body.foot_kinds)}</div>",
+        f"<div>{foot_words(foot_kinds(solution.problem.body))}</div>",
         _table(_facts(solution)),
         f"<div>δ = {solution.answer.delta:.0e}; {escape(solution.standing[0])}</div>",
         f"<details{' open' if failed else ''}><summary>{tally}</summary>{listed}</details>" if checks else "",
@@ -65,7 +65,7 @@ def film(solution: Solution) -> str:
         _line(body, clock, f'{line} stroke-width="{width:.1f}"'),
         _disc(body[:, -1], clock, f'r="{0.8 * width + 2:.1f}" fill="currentColor"'),
     ]
-    for number, (kind, holds) in enumerate(zip(solution.problem.body.foot_kinds, shown.holding[:, :-1], strict=True)):
+    for number, (kind, holds) in enumerate(zip(foot_kinds(solution.problem.body), shown.holding[:, :-1], strict=True)):
         foot, colour = pixels(shown.feet[:, :, number]), "#009e73" if kind == WHEEL else "#d55e00"
         slides = ";".join("0" if held else "1" for held in np.tile(holds, _PERIODS))
         hollow = f'<animate attributeName="stroke-opacity" calcMode="discrete" values="{slides}" {clock}/>'

@@ -19,6 +19,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.feet import Foot, Pad, Wheel
 from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import draw_allowed, draw_filmstrip, draw_lab, draw_shape_path, draw_speeds, forbidden, strips
+from colloc.pictures.motion_frames import foot_kinds
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
 from colloc.pictures.style import save
@@ -126,7 +127,7 @@ def test_feet_wheels_and_pads_differ_and_the_key_says_which_is_which(unsolved):
     named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     texts = [text.get_text() for text in axes.get_legend().get_texts()]
     assert texts == [*named, "foot", "wheel", "pad (filled: holds)"]
-    assert list(body.foot_kinds) == KINDS
+    assert list(foot_kinds(body)) == KINDS
     foot, wheels, pad = axes.lines[-7:-1:2]
     assert len({foot.get_color(), wheels.get_color(), pad.get_color()}) == 2
     assert (foot.get_marker(), wheels.get_marker(), pad.get_marker()) == ("s", "None", "None")
