@@ -3,7 +3,7 @@
 Every body spends work at the same rate, counted by the least friction that it meets: with so much work what is dragged
 where it slides best comes `WORK` body lengths far, which is the most that any gait can. Writes
 results/curated/side_by_side.gif; by default three links that lie on the floor (the paper's best gait), the same on feet, a
-snake on wheels and an inchworm. Feet that hold are filled.
+snake on wheels, which are bars, and an inchworm. What holds is filled.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import colloc
-from colloc.pictures.motion_frames import lab_feet, lab_outline
+from colloc.pictures.foot_marks import FootMarks
+from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
 from colloc.results.solution import Solution
@@ -47,8 +48,9 @@ class Crawl:
     ends: np.ndarray
     centre: np.ndarray
     feet: np.ndarray
-    """Places ``(2, n_foot, n_picture)``, and which of them hold ``(n_foot, n_picture)``."""
+    """Both ends ``(2, 2, n_foot, n_picture)``, and which of them hold ``(n_foot, n_picture)``."""
     holds: np.ndarray
+    kinds: tuple[str, ...]
 
 
 def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
@@ -66,7 +68,8 @@ def crawl(solution: Solution) -> Crawl:
     motion = solution.sample(phases(solution, np.linspace(0.0, least * WORK, PICTURES)))
     pose = motion.angles, motion.theta, motion.tail
     label, share = FILES.get(problem.name, problem.gait.describe()), least * solution.efficiency
-    return Crawl(label, share, lab_outline(body, *pose), motion.centre, lab_feet(body, *pose), solution.holding(motion))
+    feet = lab_feet(body, *pose), solution.holding(motion), foot_kinds(body)
+    return Crawl(label, share, lab_outline(body, *pose), motion.centre, *feet)
 
 
 def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
@@ -96,19 +99,16 @@ def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
             (joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
             (head,) = axes.plot([], [], "o", color=INK, ms=9)
             (centre,) = axes.plot([], [], "o", color=colour, ms=7)
-            (feet,) = axes.plot([], [], "o", color="white", mec=colour, ms=6, zorder=3)
-            (held,) = axes.plot([], [], "o", color=colour, ms=6, zorder=3)
-            drawn.append((one, np.array([[0.0], [y]]), (trail, body, joints, head, centre, feet, held)))
+            drawn.append((one, np.array([[0.0], [y]]), (trail, body, joints, head, centre), FootMarks(axes, one.kinds, 6.0)))
         for k in [*range(PICTURES), *[PICTURES - 1] * REST]:
-            for one, lift, (trail, body, joints, head, centre, feet, held) in drawn:
-                ends, places = one.ends[:, :, k] + lift, one.feet[:, :, k] + lift
+            for one, lift, (trail, body, joints, head, centre), marks in drawn:
+                ends = one.ends[:, :, k] + lift
                 trail.set_data(*(one.centre[:, : k + 1] + lift))
                 body.set_data(*ends)
                 joints.set_data(*ends[:, 1:-1])
                 head.set_data(*ends[:, -1:])
                 centre.set_data(*(one.centre[:, [k]] + lift))
-                feet.set_data(*places)
-                held.set_data(*places[:, one.holds[:, k]])
+                marks.place(one.feet[..., k] + lift[:, None], one.holds[:, k])
             canvas.draw()
             yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 

@@ -98,7 +98,7 @@ def main(options: argparse.Namespace) -> int:
             seconds=options.seconds,
             search=options.search,
             fresh=options.fresh,
-            progress=lambda news: line.say(f"{problem.name}: {news}", news.left),
+            progress=lambda news: line.say(f"{problem.name}: {news}"),
         )
     bound, complaints, saved, kept = None, [], [], []
     if options.dry and solution.certificate.replayed:

@@ -278,9 +278,9 @@ class Body(Moved, Shaped, Protocol):
         along = np.diff(now, axis=1)[:, parts]
         return place, along / np.hypot(*along), velocity
 
-    def footprints(self, angles: np.ndarray) -> np.ndarray:
-        """Where the feet of a body are, seen from the tail, ``(2, 2, n_foot, n_time)``: both ends of pads, a point twice;
-        `speeds` are then theirs. None for a body that lies on the floor."""
+    def footprints(self, angles: np.ndarray, wheel: float = 0.0) -> np.ndarray:
+        """Where the feet of a body are, seen from the tail, ``(2, 2, n_foot, n_time)``: both ends of pads, and of wheels that
+        are `wheel` of their link long, a point twice; `speeds` are then theirs. None for a body that lies on the floor."""
         return np.zeros((2, 2, 0, angles.shape[1]))
 
     def imbalance(self, angles: np.ndarray) -> np.ndarray:

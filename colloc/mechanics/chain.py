@@ -23,6 +23,7 @@ from colloc.mechanics.contact import (
     overlap,
     passing_depth,
 )
+from colloc.mechanics.feet import WHEEL
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
@@ -181,12 +182,17 @@ class Chain(Links, Body):
         """Of the midpoints of the links, or of the feet and pads."""
         return self.contact.speeds(self.velocity(self.posture(angles), rates, z))
 
-    def footprints(self, angles: np.ndarray) -> np.ndarray:
-        cos, sin, x, y = (part[[foot.link for foot in self.standing_on]] for part in self.posture(angles))
-        along, length, offset = self.contact.along, self.contact.length, self.contact.offset
-        ends = [along + side * length for side in (-0.5, 0.5)] if self.feet else [np.zeros((0, 1))] * 2
-        beside = offset if self.feet else ends[0]
-        return np.stack([[x + end * cos - beside * sin for end in ends], [y + end * sin + beside * cos for end in ends]])
+    def footprints(self, angles: np.ndarray, wheel: float = 0.0) -> np.ndarray:
+        if not self.feet:
+            return super().footprints(angles)
+        feet, contact = self.standing_on, self.contact
+        links = [foot.link for foot in feet]
+        cos, sin, x, y = (part[links] for part in self.posture(angles))
+        turned = np.exp(1j * np.array([foot.angle for foot in feet])) * [foot.kind == WHEEL for foot in feet]
+        rolling = (wheel * np.array(self.lengths)[links] * turned)[:, None]
+        along, aside = contact.length + rolling.real, rolling.imag
+        ends = [(contact.along + side * along, contact.offset + side * aside) for side in (-0.5, 0.5)]
+        return np.stack([[x + a * cos - b * sin for a, b in ends], [y + a * sin + b * cos for a, b in ends]])
 
     def imbalance(self, angles: np.ndarray) -> np.ndarray:
         if self.feet:

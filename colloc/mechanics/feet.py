@@ -21,6 +21,7 @@ from colloc.system.errors import ProblemError
 
 _SAME = 1e-9
 """Within which numbers of feet are one [body lengths, weights, rad]."""
+FOOT, WHEEL, PAD = "foot", "wheel", "pad"
 _MOST = 20
 """Feet on a link that `feet=` takes as a number: with more a line is meant."""
 
@@ -96,6 +97,13 @@ class Foot:
     def mirrored(self) -> Foot:
         """The foot on the body's mirror image."""
         return replace(self, offset=-self.offset, angle=-self.angle)
+
+    @property
+    def kind(self) -> str:
+        """What it is: "pad" with an extent, "wheel" if friction of its own is lower forwards and backwards, else "foot"."""
+        own = self.friction
+        rolls = isinstance(own, Friction) and own.mu_f == own.mu_b < own.mu_t
+        return PAD if self.extent else WHEEL if rolls else FOOT
 
     @property
     def first(self) -> float:

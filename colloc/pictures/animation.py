@@ -10,7 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from colloc.pictures.figure import draw_shape_path
-from colloc.pictures.motion_frames import Frames, frames, frames_of
+from colloc.pictures.foot_marks import FootMarks
+from colloc.pictures.motion_frames import Frames, foot_kinds, frames, frames_of
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
 from colloc.results.motion import turned
 from colloc.results.solution import Solution
@@ -67,8 +68,9 @@ class _Scene:
         (self.joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
         (self.head,) = axes.plot([], [], "o", color=INK, ms=9)
         (self.centre,) = axes.plot([], [], "o", color=VERMILION, ms=5)
-        feet: dict[str, Any] = {"color": VERMILION, "ms": 8, "lw": 4, "zorder": 3}
-        self.sliding, self.holding = (axes.plot([], [], "s-", mfc=colour, **feet)[0] for colour in ("white", VERMILION))
+        self.feet = FootMarks(axes, foot_kinds(solution.problem.body), 8.0)
+        if key := self.feet.key():
+            axes.legend(key.values(), key.keys(), loc="lower right", ncols=len(key), borderaxespad=0)
         self.quiver: Any = None
         if arrows:
             base = shown.arrow_base[:, :, 0]
@@ -102,17 +104,13 @@ class _Scene:
         for line, path in zip(self.trails, (shown.ends[:, 0], shown.ends[:, -1], shown.centre), strict=True):
             whole = [earlier.of(path) for earlier in shown.before[:period]]
             line.set_data(*np.concatenate([*whole, before.of(path[:, : k + 1])], axis=1))
-        if len(shown.holding):
-            held, feet = shown.holding[:, k], before.of(shown.feet[..., k])
-            apart = np.concatenate([feet, np.full_like(feet[:, :1], np.nan)], axis=1)  # no line from foot to foot
-            for drawn, chosen in ((self.sliding, ~held), (self.holding, held)):
-                drawn.set_data(*apart[..., chosen].transpose(0, 2, 1).reshape(2, -1))
+        self.feet.place(before.of(shown.feet[..., k]), shown.holding[:, k])
         if self.quiver is not None:
             self.quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
             self.quiver.set_UVC(*(shown.arrow_scale * turned(shown.arrow[:, :, k], before.rotation)))
         if self.dot is not None:
             self.dot.set_data(shown.angles[:1, k], shown.angles[1:2, k])
-        self.phase.set_text(f"t = {period + shown.t[k]:.2f}")
+        self.phase.set_text(f"t = {period + shown.t[k]:.2f} of {len(shown.before) * shown.t[-1]:g}")
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[: self.size[0], : self.size[1], :3].copy()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.pictures.motion_frames import lab_feet, lab_outline
-from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours
+from colloc.pictures.foot_marks import FootMarks
+from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
+from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SEQUENTIAL, SERIES, VERMILION, snapshot_colours
 from colloc.results.solution import Solution
 
 _GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08
@@ -23,7 +25,8 @@ _FLAT, _SEEN = 0.12, 0.3
 """A motion that rises by less than the first [body lengths] is drawn higher, by the second."""
 _SMALL = 1.6
 """Extent [rad] below which a path in shape space is shown from closer than the whole plane."""
-_MOST_PERIODS = 3
+_MOST_PERIODS, _NAMED = 3, 5
+"""Drawn in the lab, at most; and lines that a legend names where there are too many for all of them."""
 _CELLS = 180
 _ROUND = 9
 """Vertices of the round end of a link."""
@@ -46,7 +49,8 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     low = float(y.min()) - _MARGIN
     for k, colour in enumerate(snapshot_colours(count)):
         draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body)
-        draw_feet(axes, feet[..., k] * [[[1]], [[higher]]] + [[[shift[k]]], [[0]]], held[:, k])
+        marks = FootMarks(axes, foot_kinds(solution.problem.body), 4.5)
+        marks.place(feet[..., k] * [[[1]], [[higher]]] + [[[shift[k]]], [[0]]], held[:, k])
         axes.plot(motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6)
         below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
         axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, -3), color=GREY, **below)
@@ -86,13 +90,6 @@ def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body
     axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
 
 
-def draw_feet(axes: Axes, places: np.ndarray, held: np.ndarray) -> None:
-    """Feet at places ``(2, 2, n_foot)``, squares, pads a line between two; those that hold filled."""
-    for chosen, colour in ((~held, "white"), (held, VERMILION)):
-        if chosen.any():
-            axes.plot(*places[..., chosen], "s-", color=VERMILION, mfc=colour, ms=3.5, lw=2)
-
-
 def draw_lab(axes: Axes, solution: Solution) -> None:
     """Paths of the body's ends and its centre of mass in the lab, and the body at both ends of them, apart.
 
@@ -112,11 +109,13 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
         draw_body(axes, ends[:, :, k], shade, solution.problem.body)
-        draw_feet(axes, feet[..., k], held[:, k])
+        marks = FootMarks(axes, foot_kinds(solution.problem.body), 6.0)
+        marks.place(feet[..., k], held[:, k])
         axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
     axes.set_aspect("equal", "datalim")
-    axes.set(xlabel="x  [body lengths]", ylabel="y  [body lengths]")
-    _key(axes)
+    counted = f"{periods} period{'s' if periods > 1 else ''}"
+    axes.set(xlabel=f"x  [body lengths],  {counted}", ylabel="y  [body lengths]")
+    draw_key(axes, more=marks.key())
 
 
 def forbidden(body: Body, joint_limit: Limit, first: int = 0, second: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -154,14 +153,13 @@ def draw_allowed(axes: Axes, body: Body, joint_limit: Limit, first: int = 0, sec
 
 def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> None:
     """All joint angles, or amplitudes of modes, over a period."""
-    for j, joint in enumerate(angles):
-        axes.plot(t, joint, lw=1.4, color=SERIES[j % len(SERIES)], label=f"{j + 1}")
+    draw_series(axes, t, angles)
     axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{body.quantity}  [rad]")
-    _key(axes, body.coordinate)
+    draw_key(axes, body.coordinate)
 
 
 def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
-    """The gait in the plane of two joint angles, light to dark, its start a disc, over the shapes that are allowed."""
+    """The gait in the plane of two of all joint angles, light to dark, its start a disc, over the shapes that are allowed."""
     draw_allowed(axes, problem.body, problem.joint_limit, first, second)
     q = angles[[first, second]]
     colours = colormaps[PHASE](np.linspace(0.1, 0.8, 200))  # to be seen on white and on black
@@ -173,7 +171,7 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
     arrow = {"arrowstyle": "-|>", "color": VERMILION, "lw": 1.4}
     axes.annotate("", (q[0, at + 2], q[1, at + 2]), (q[0, at], q[1, at]), arrowprops=arrow)
     middle, half = np.zeros(2), 1.02 * np.pi
-    extent = float(np.ptp(q, axis=1).max())
+    extent = float(np.ptp(angles, axis=1).max())  # of all coordinates: every plane of a gait has one scale
     if extent < _SMALL:
         middle, half = 0.5 * (q.min(axis=1) + q.max(axis=1)), 0.6 * max(extent, 0.05)
         axes.xaxis.set_major_locator(MaxNLocator(5))
@@ -193,13 +191,12 @@ def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
     problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
     part, speed = problem.body.speeds(motion.angles, motion.rates, motion.z)
     speed = np.maximum(speed, 0.1 * delta)
-    for i, along in enumerate(speed):
-        axes.plot(t, along, color=SERIES[i % len(SERIES)], lw=1.4, label=f"{i + 1}")
+    draw_series(axes, t, speed)
     axes.axhline(delta, color=GREY, lw=1, ls=":")
     axes.annotate("δ", (1.0, delta), (3, 0), textcoords="offset points", color=GREY, va="center")
     axes.set(xlim=(0, 1), ylabel=f"{part} speed  [1/period]", xlabel="phase t")
     set_log(axes, "y", (0.5 * float(min(speed.min(), delta)), 2 * float(speed.max())))
-    _key(axes, part)
+    draw_key(axes, part)
 
 
 def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
@@ -225,12 +222,24 @@ def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
     axis.set_major_formatter(lambda value, _: f"10{f'{np.log10(value):.0f}'.translate(_EXPONENT)}")
 
 
-def _key(axes: Axes, of: str = "") -> None:
-    """The names of the lines in a row above the axes, where no line runs."""
+def draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
+    """A line for every joint, or part, that is named by its number; where there are more than colours that differ, from dark to
+    light, and a few are named."""
+    count = len(rows)
+    many = count > len(SERIES)
+    colours = colormaps[SEQUENTIAL](np.linspace(0.0, 0.9, count)) if many else SERIES
+    named = np.linspace(0, count - 1, _NAMED).round() if many else range(count)
+    for j, row in enumerate(rows):
+        axes.plot(t, row, lw=1.4, color=colours[j], label=f"{j + 1}" if j in named else None)
+
+
+def draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) -> None:
+    """The names of the lines, and of more marks, in a row above the axes, where no line runs."""
     handles, labels = axes.get_legend_handles_labels()
+    handles, labels = [*handles, *(more or {}).values()], [*labels, *(more or {})]
     if of:
         labels[0] = f"{of} {labels[0]}"
     axes.legend(
         handles, labels, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(labels), fontsize=7, handlelength=1,
-        columnspacing=0.8, handletextpad=0.3, borderpad=0, borderaxespad=0.3,
+        columnspacing=0.8, handletextpad=0.8 if more else 0.3, borderpad=0, borderaxespad=0.3,
     )  # fmt: skip

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.coupled import Coupled
+from colloc.mechanics.feet import FOOT, PAD, WHEEL
 from colloc.results.motion import RigidMotion, SampledMotion, turned
 from colloc.results.solution import Solution
 
 _ARROW = 0.12
 """Length [body lengths] of the arrow of the largest friction."""
+_WHEEL = 0.25
+"""Length of a wheel over that of its link, as it is drawn."""
+_WORDS = {
+    FOOT: "Squares: feet.",
+    WHEEL: "Green bars: wheels, along their rolling direction.",
+    PAD: "Orange bars: pads.",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +58,28 @@ class Frames:
         return _ARROW / max(float(np.hypot(*self.arrow).max()), 1e-300)
 
 
+def foot_kinds(body: Body) -> tuple[str, ...]:
+    """What the feet of a body are, in the order of `lab_feet` (`colloc.mechanics.feet.Foot.kind`)."""
+    chain = body.chain if isinstance(body, Coupled) else body
+    if isinstance(chain, Chain):
+        return tuple(foot.kind for foot in chain.standing_on)
+    return (FOOT,) * body.footprints(np.zeros((body.n_joint, 1))).shape[2]
+
+
+def foot_words(kinds: Sequence[str]) -> str:
+    """What the marks of such feet mean, in words; empty for a body that lies on the floor."""
+    return " ".join([*(_WORDS[kind] for kind in dict.fromkeys(kinds)), *(["Filled: it holds."] if kinds else [])])
+
+
 def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
     """Lab positions of the outline of a body, ``(2, n_point, n_time)``."""
     return tail[:, None] + turned(np.stack(body.outline(angles)), theta)
 
 
 def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
-    """Lab positions of both ends of the feet of a body, ``(2, 2, n_foot, n_time)``; none where it has none."""
-    return tail[:, None, None] + turned(body.footprints(angles), theta)
+    """Lab positions of both ends of the feet of a body, wheels as they are drawn, ``(2, 2, n_foot, n_time)``; none where it
+    has none."""
+    return tail[:, None, None] + turned(body.footprints(angles, _WHEEL), theta)
 
 
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:

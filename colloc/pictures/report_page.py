@@ -18,7 +18,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.inertia import GRAVITY
-from colloc.pictures.motion_frames import Frames, frames
+from colloc.pictures.motion_frames import Frames, foot_kinds, foot_words, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.robot_figure import robot_panels
 from colloc.pictures.style import INK, styled
@@ -240,7 +240,7 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
         "holding": shown.holding.astype(int).tolist(),
-        "feet": np.round(shown.feet, 4).tolist(),
+        "feet": np.round(shown.feet, 4).tolist(), "footKinds": foot_kinds(body), "footWords": foot_words(foot_kinds(body)),
         "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
         "before": [np.array([np.exp(1j * b.rotation), b.shift]).view(float).round(6).tolist() for b in shown.before],
         "arrowScale": shown.arrow_scale, "grid": grid,

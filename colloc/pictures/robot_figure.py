@@ -7,8 +7,9 @@ from functools import partial
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from colloc.pictures.figure import draw_key, draw_series
 from colloc.pictures.publication import COLUMN, Panel, chosen
-from colloc.pictures.style import SERIES, Picture, styled
+from colloc.pictures.style import Picture, styled
 from colloc.results.robot import Robot
 
 _SHOWN = {"torque": "N·m", "speed": "rad/s", "power": "W"}
@@ -36,7 +37,6 @@ def robot_panels(robot: Robot) -> dict[str, Panel]:
 
 def _draw(axes: Axes, robot: Robot, what: str) -> None:
     t = robot.columns["t"].values
-    for j, row in enumerate(robot.columns[f"joint_{what}s"].values):
-        axes.plot(t, row, color=SERIES[j % len(SERIES)], lw=1.3, label=f"joint {j + 1}")
-    axes.set(xlim=(0, t[-1]), xlabel="time  [s]", ylabel=f"{what}  [{_SHOWN[what]}]")
-    axes.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=4, borderaxespad=0)
+    draw_series(axes, t, robot.columns[f"joint_{what}s"].values)
+    axes.set(xlim=(0, t[-1]), xlabel="time  [s],  one period", ylabel=f"{what}  [{_SHOWN[what]}]")
+    draw_key(axes, "joint")

@@ -8,7 +8,8 @@ from html import escape
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
-from colloc.pictures.motion_frames import frames
+from colloc.mechanics.feet import FOOT, WHEEL
+from colloc.pictures.motion_frames import foot_kinds, foot_words, frames
 from colloc.results.solution import Solution
 
 _FRAMES, _PERIODS, _SECONDS = 24, 2, 3.0
@@ -31,6 +32,7 @@ def solution_card(solution: Solution) -> str:
         f"<div><b>{escape(solution.problem.name)}</b> {escape(solution.status)}</div>",
         f"<div>{escape(solution.message)}</div>" if solution.message else "",
         film(solution),
+        f"<div>{foot_words(foot_kinds(solution.problem.body))}</div>",
         _table(_facts(solution)),
         f"<div>δ = {solution.answer.delta:.0e}; {escape(solution.standing[0])}</div>",
         f"<details{' open' if failed else ''}><summary>{tally}</summary>{listed}</details>" if checks else "",
@@ -55,20 +57,21 @@ def film(solution: Solution) -> str:
 
     clock = f'dur="{_PERIODS * _SECONDS:g}s" repeatCount="indefinite"'
     width = max(scale * solution.problem.body.drawn_width, 4.0)
-    body, centre, feet = pixels(shown.ends[:, chosen]), pixels(shown.centre[:, None]), pixels(shown.feet.mean(axis=1))
-    places = [_points(body[..., k]) for k in range(body.shape[-1])]
+    body, centre = pixels(shown.ends[:, chosen]), pixels(shown.centre[:, None])
     line = 'fill="none" stroke="currentColor" stroke-linecap="round" stroke-linejoin="round"'
     drawn = [
-        f'<polyline points="{places[0]}" {line} stroke-width="{width:.1f}" opacity="0.15"/>',
+        f'<polyline points="{_points(body[..., 0])}" {line} stroke-width="{width:.1f}" opacity="0.15"/>',
         f'<polyline points="{_points(centre[:, 0])}" {line} stroke-width="1" opacity="0.4"/>',
-        f'<polyline points="{places[0]}" {line} stroke-width="{width:.1f}">'
-        f'<animate attributeName="points" values="{";".join(places)}" {clock}/></polyline>',
+        _line(body, clock, f'{line} stroke-width="{width:.1f}"'),
         _disc(body[:, -1], clock, f'r="{0.8 * width + 2:.1f}" fill="currentColor"'),
     ]
-    for foot, holds in zip(feet.transpose(1, 0, 2), np.tile(shown.holding[:, :-1], _PERIODS), strict=True):
-        full = ";".join("1" if held else "0" for held in holds)
-        fill = f'<animate attributeName="fill-opacity" calcMode="discrete" values="{full}" {clock}/>'
-        drawn.append(_disc(foot, clock, 'r="4" fill="#d55e00" stroke="#d55e00" stroke-width="1.5"', fill))
+    for number, (kind, holds) in enumerate(zip(foot_kinds(solution.problem.body), shown.holding[:, :-1], strict=True)):
+        foot, colour = pixels(shown.feet[:, :, number]), "#009e73" if kind == WHEEL else "#d55e00"
+        slides = ";".join("0" if held else "1" for held in np.tile(holds, _PERIODS))
+        hollow = f'<animate attributeName="stroke-opacity" calcMode="discrete" values="{slides}" {clock}/>'
+        drawn.append(_line(foot, clock, f'stroke="{colour}" stroke-width="8" stroke-linecap="square"'))
+        cap = "square" if kind == FOOT else "butt"
+        drawn.append(_line(foot, clock, f'stroke="white" stroke-width="4.4" stroke-linecap="{cap}"', hollow))
     return (
         f'<svg width="{size[0]}" height="{size[1]}" viewBox="0 0 {size[0]} {size[1]}" role="img" style="max-width:100%" '
         f'aria-label="{escape(solution.problem.name)} as it moves, two periods">{"".join(drawn)}</svg>'
@@ -79,13 +82,19 @@ def _points(places: np.ndarray) -> str:
     return " ".join(f"{x:.1f},{y:.1f}" for x, y in places.T)
 
 
-def _disc(places: np.ndarray, clock: str, look: str, inside: str = "") -> str:
+def _line(places: np.ndarray, clock: str, look: str, inside: str = "") -> str:
+    """A line that runs through places, ``(2, n_point, n_time)``."""
+    moves = f'<animate attributeName="points" values="{";".join(map(_points, np.moveaxis(places, -1, 0)))}" {clock}/>'
+    return f'<polyline points="{_points(places[..., 0])}" {look}>{moves}{inside}</polyline>'
+
+
+def _disc(places: np.ndarray, clock: str, look: str) -> str:
     """A circle whose centre runs through places, ``(2, n_time)``."""
     moves = "".join(
         f'<animate attributeName="{name}" values="{";".join(f"{value:.1f}" for value in row)}" {clock}/>'
         for name, row in zip(("cx", "cy"), places, strict=True)
     )
-    return f'<circle cx="{places[0, 0]:.1f}" cy="{places[1, 0]:.1f}" {look}>{moves}{inside}</circle>'
+    return f'<circle cx="{places[0, 0]:.1f}" cy="{places[1, 0]:.1f}" {look}>{moves}</circle>'
 
 
 def _facts(solution: Solution) -> list[tuple[str, str]]:

@@ -61,4 +61,4 @@ def _draw_tracks(axes: Axes, family: Steering) -> None:
         track = point.motion.sample(t).centre  # all arcs set out along +x
         axes.plot(*track, color=colour, lw=1.0)
         axes.plot(*track[:, ::_PHASES], mark, color=colour, ms=3)
-    axes.set(xlabel="x  [body lengths]", ylabel="y  [body lengths]", aspect="equal")
+    axes.set(xlabel=f"x  [body lengths],  {_PERIODS} periods", ylabel="y  [body lengths]", aspect="equal")

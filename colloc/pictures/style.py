@@ -13,6 +13,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib import style
 from matplotlib.figure import Figure
 
 from colloc.system.replaced_file import replaced_file
@@ -48,8 +49,8 @@ _STYLE: Any = {
 
 @contextmanager
 def styled(font_size: float = 9) -> Iterator[None]:
-    """The common style, for figures made inside."""
-    with matplotlib.rc_context({**_STYLE, "font.size": font_size, "axes.labelsize": font_size}):
+    """The common style, for figures made inside, whatever a user's own is."""
+    with style.context(["default", {**_STYLE, "font.size": font_size, "axes.labelsize": font_size}]):
         yield
 
 

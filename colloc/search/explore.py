@@ -181,7 +181,9 @@ def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], b
 def followed_further(problem: Problem, explored: Exploration, goes_on: Callable[[], bool]) -> tuple[Optimum, ...]:
     """What the first of the gaits left over lead to at the final delta, best first, where none of those followed will do."""
     ends: list[Optimum] = []
-    for optimum in itertools.takewhile(lambda _: goes_on(), explored.left[:ENOUGH]):
+    left = explored.left[:ENOUGH]
+    for done, optimum in enumerate(itertools.takewhile(lambda _: goes_on(), left)):
+        this_run().told("follow", done, len(left))
         with suppress(CollocError):
             end = _followed(problem, optimum)
             if _is_member(end) and not any(same_gait(problem, end, other) for other in (*explored.optima, *ends)):
@@ -259,7 +261,8 @@ def candidates(
         before, best = best, min((c.optimum.objective for c in known[-1]), default=0.0)
         if start > 0 and best < before - SAME_VALUE * abs(before):
             better = start
-        run.told("explore", tried, max(tried, count), _best([c.optimum for c in (*known[-1], *loops)]))
+        shown = [*known[-1], *loops] if problem.shrinking else known[-1]  # as a rule loops shrink further on their way down
+        run.told("explore", tried, max(tried, count), _best([c.optimum for c in shown]))
 
     for candidate in (ends := [*known[-1], *loops]):
         candidate.dry, candidate.is_loop = objective_at(dry, candidate.optimum), candidate in loops
@@ -278,7 +281,8 @@ def _met_best(candidates: Sequence[Candidate]) -> int:
 
 
 def _best(optima: Sequence[Optimum]) -> Optimum | None:
-    return min(optima, key=lambda f: f.objective, default=None)
+    """The best that may be the answer while others are known: of finite size, unless the problem asks for any."""
+    return min((f for f in optima if f.problem.shrinking or is_finite(f)), key=lambda f: f.objective, default=None)
 
 
 def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
@@ -370,8 +374,13 @@ def _followed_to_the_end(
             if _is_member(end):
                 new.append(not any(same_gait(problem, end, other) for other, _ in ends))
                 ends.append((end, candidate))
-        run.told("explore", len(known) - len(left), len(known), _best([optimum for optimum, _ in ends]))
+        tell()
 
+    def tell() -> None:
+        best = _best([optimum for optimum, _ in ends]) or _best([c.optimum for c in left])
+        run.told("follow", len(known) - len(left), len(known), best)
+
+    tell()
     queues = [c for c in known if not c.is_loop], [c for c in known if c.is_loop]
     for number, candidate in enumerate(filter(promising, itertools.chain(*(queue[:FOLLOWED] for queue in queues)))):
         if helpers.has(number):

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from colloc.gaits import gait_fields
 from colloc.gaits.problem import Problem
+from colloc.gaits.starts import on_speed_floor
 from colloc.reduced.given import Given
 from colloc.results.answer import Answer, SecondOrder, Step
 from colloc.results.checks import Certificate, Check
@@ -34,6 +35,7 @@ ROWS = "colloc run 1"
 EVERY = 2.0
 """Seconds between writes: as much may have to be computed again after a crash. Short solves write nothing."""
 _PROBLEM = "problem"
+STAGES = ("explore", "follow", "descend", "refine", "confirm", "certify")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +45,17 @@ class Progress:
     Attributes
     ----------
     stage : str
-        "explore", "descend", "refine", "confirm" or "certify".
+        "explore", "follow", "descend", "refine", "confirm" or "certify".
     done, count : int
-        Of starts and gaits followed, of levels of delta, or of meshes; the last ones at most so many.
+        Of starts, of gaits followed to the final delta, of levels of delta, or of meshes. Fewer may be enough: nobody knows
+        how long a stage will take.
     best : Optimum, optional
-        The best gait so far.
+        The best gait so far; one that shrank as far as the problem allows only if none of finite size is known.
     seconds : float
         Since the solve began.
+    round : int
+        Counts from 1 how often the stages were begun: again for a second gait that may be the answer, at a smaller delta, or
+        off a saddle.
     """
 
     stage: str
@@ -57,14 +63,12 @@ class Progress:
     count: int
     best: Optimum | None
     seconds: float
-
-    @property
-    def left(self) -> float:
-        """Seconds that the rest of this stage will probably take; infinite if nobody can know yet."""
-        return self.seconds / self.done * (self.count - self.done) if self.done else float("inf")
+    round: int = 1
 
     def __str__(self) -> str:
         text = f"{self.stage}, {self.done} of {self.count}"
+        if self.round > 1:
+            text = f"round {self.round}, {text}"
         if self.best is None:
             return text
         return f"{text}; best {self.best.problem.objective.short} = {self.best.value:.4f} at delta = {self.best.delta:.0e}"
@@ -97,6 +101,7 @@ class Run:
 
     def __post_init__(self) -> None:
         self._begin = self._last = time.monotonic()
+        self._stage, self._round = STAGES[0], 1
         self._known: dict[str, Any] = {}
         self._pending: dict[str, Any] = {}
         self._problems: dict[str, Problem] = {}
@@ -187,9 +192,14 @@ class Run:
                     self.path.unlink()
 
     def told(self, stage: str, done: int, count: int, best: Optimum | None = None) -> None:
-        """Say how far a stage has come, and which gait is the best so far."""
-        self.best = best or self.best
-        self.progress(Progress(stage, done, count, self.best, time.monotonic() - self._begin))
+        """Say how far a stage has come, and which gait is the best so far: one of finite size is, beside one that shrank."""
+        if (self._stage, stage) == ("follow", "descend"):
+            return  # each gait is followed by a descent of its own
+        if best is not None and (self.best is None or best.delta < self.best.delta or _counts(best) or not _counts(self.best)):
+            self.best = best
+        self._round += STAGES.index(stage) < STAGES.index(self._stage)
+        self._stage = stage
+        self.progress(Progress(stage, done, count, self.best, time.monotonic() - self._begin, self._round))
 
     @contextmanager
     def under_way(self, seconds: float) -> Iterator[None]:
@@ -202,6 +212,12 @@ class Run:
         finally:
             self.write()
             _CURRENT.reset(token)
+
+
+def _counts(optimum: Optimum) -> bool:
+    """Whether a gait may be the answer, though others that are less good are known."""
+    problem = optimum.problem
+    return problem.shrinking or problem.gait.mixes or not on_speed_floor(problem, optimum.gait)
 
 
 _CURRENT: ContextVar[Run] = ContextVar("run")

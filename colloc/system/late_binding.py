@@ -6,7 +6,10 @@ So a lower package can offer what it must not import; the face of the library sa
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from colloc.system.errors import CollocError
@@ -22,7 +25,23 @@ def bind(places: Mapping[str, str]) -> None:
 def bound(name: str) -> Callable[..., Any]:
     """The function of that name. `KeyError` if nobody has said where it is."""
     module, _, function = _WHERE[name].partition(":")
-    return getattr(importlib.import_module(module), function)
+    with _whatever_backend():
+        return getattr(importlib.import_module(module), function)
+
+
+@contextmanager
+def _whatever_backend() -> Iterator[None]:
+    """Matplotlib cannot be imported where the environment names a backend that is not installed, as a notebook's terminal does.
+    In this block it can; nothing is drawn here with that backend, and where there is one others get it."""
+    named = None if "matplotlib" in sys.modules else os.environ.pop("MPLBACKEND", None)
+    try:
+        yield
+    finally:
+        if named is not None:
+            os.environ["MPLBACKEND"] = named
+            if named and "matplotlib" in sys.modules:
+                with suppress(ValueError):
+                    sys.modules["matplotlib"].rcParams["backend"] = named
 
 
 def optional(library: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from typing import TYPE_CHECKING, TextIO
@@ -21,7 +22,7 @@ def duration(seconds: float) -> str:
 
 
 class StatusLine:
-    """A line at the bottom of the terminal: what is being done, for how long, and how long it will take.
+    """A line at the bottom of the terminal: what is being done, for how long, and how long it will take where that is known.
 
     Rich redraws it twice a second, since a solve reports nothing for long, and it vanishes at the end. Where the stream (by
     default standard error) is not a terminal, or the line is not enabled, nothing is written, and Rich is not loaded.
@@ -40,9 +41,9 @@ class StatusLine:
     def __exit__(self, *error: object) -> None:
         self.clear()
 
-    def say(self, text: str, left: float | None = None) -> None:
-        """Show a text from now on; `left` are the seconds it will probably take from now."""
-        self._text, self._left, self._since = text, left or 0.0, time.monotonic()
+    def say(self, text: str, left: float = 0.0) -> None:
+        """Show a text from now on; `left` are the seconds it will probably take from now, 0 if nobody knows."""
+        self._text, self._left, self._since = text, left if math.isfinite(left) else 0.0, time.monotonic()
         if not self._shown:
             return
         if self._live is None:
@@ -54,8 +55,8 @@ class StatusLine:
                 console=Console(file=self._stream, highlight=False, markup=False),
                 refresh_per_second=2,
                 transient=True,
-                redirect_stdout=False,  # what others print goes where they send it, after `clear`
-                redirect_stderr=False,
+                redirect_stdout=False,  # it may go elsewhere; what is for this terminal is printed after `clear`
+                redirect_stderr=True,  # warnings stand above the line
             )
             self._live.start()
         self._live.refresh()

@@ -2,11 +2,13 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from shared.readable import assert_readable
 
@@ -14,8 +16,10 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.feet import Foot, Pad, Wheel
 from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import draw_allowed, draw_filmstrip, draw_lab, draw_shape_path, draw_speeds, forbidden, strips
+from colloc.pictures.motion_frames import foot_kinds
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
 from colloc.pictures.style import save
@@ -93,11 +97,62 @@ def test_a_path_of_shapes_is_drawn_whole_with_its_sense_and_from_close_by_if_it_
     np.testing.assert_allclose([axes.get_xlim(), axes.get_ylim()], np.add.outer(middle, [-half, half]), atol=1e-3 * half)
 
 
-@pytest.mark.parametrize(("n_link", "size"), [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (8, 0.3)])
+@pytest.mark.parametrize(("n_link", "size"), [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (6, 0.5), (9, 0.3), (13, 0.2)])
 def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
     solution = unsolved(crawler(n_link, size))
     texts = assert_readable(solution_figure(solution))
-    assert "joint angle 2  [rad]" in texts if n_link == 3 else {"joint 1", *(f"{j}" for j in range(2, n_link))} <= set(texts)
+    named = range(2, n_link) if n_link <= 9 else (4, 7, 9, 12)
+    assert "joint angle 2  [rad]" in texts if n_link == 3 else {"joint 1", *map(str, named)} <= set(texts)
+
+
+@pytest.mark.parametrize("n_link", [6, 13])
+def test_joints_of_a_robot_are_named_above_the_panels_in_colours_that_differ(n_link, unsolved):
+    solution = unsolved(crawler(n_link, 0.3))
+    figure = solution.robot(length=1.0, mass=1.0, period=4.0).plot()
+    assert_readable(figure)
+    for axes in figure.axes:
+        assert axes.get_legend().get_window_extent().y0 >= axes.bbox.y1
+        assert len({to_hex(line.get_color()) for line in axes.lines}) == n_link - 1
+
+
+STANDS = (Foot(0), *(Wheel(1, 0.3, offset=side * 0.05, angle=side * 0.6) for side in (1, -1)), Pad(2, 0.2, 0.8), Wheel(3))
+KINDS = ["foot", "wheel", "wheel", "pad", "wheel"]
+
+
+def test_feet_wheels_and_pads_differ_and_the_key_says_which_is_which(unsolved):
+    """Bars of wheels lie along their rolling direction, in the colour of none else."""
+    body, axes = Chain((0.25,) * 4, feet=STANDS), Figure().add_subplot()
+    solution = unsolved(replace(crawler(4), body=body))
+    draw_lab(axes, solution)
+    named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    texts = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert texts == [*named, "foot", "wheel", "pad (filled: holds)"]
+    assert list(foot_kinds(body)) == KINDS
+    foot, wheels, pad = axes.lines[-7:-1:2]
+    assert len({foot.get_color(), wheels.get_color(), pad.get_color()}) == 2
+    assert (foot.get_marker(), wheels.get_marker(), pad.get_marker()) == ("s", "None", "None")
+    fine = solution.sample(float(axes.get_xlabel().split()[-2]))
+    links = fine.theta[0] + np.cumsum(np.insert(fine.angles[:, 0], 0, 0.0))
+    for line, wanted in ((wheels, [(1, -0.6), (1, 0.6), (3, 0.0)]), (pad, [(2, 0.0)])):
+        first, last = (np.array(line.get_data())[:, end::3] for end in (0, 1))
+        direction = np.arctan2(*(last - first)[::-1])
+        np.testing.assert_allclose(np.sin(direction - [links[link] + angle for link, angle in wanted]), 0, atol=1e-9)
+
+
+def test_a_figure_in_the_lab_says_of_how_many_periods_it_is(unsolved):
+    for size, counted in ((0.4, "1 period"), (1.2, "3 periods")):
+        draw_lab(axes := Figure().add_subplot(), unsolved(snake(size)))
+        assert axes.get_xlabel().endswith(counted)
+
+
+@pytest.mark.parametrize("size", [0.3, 1.5])
+def test_planes_of_shapes_of_one_gait_share_one_scale(size, unsolved):
+    problem = crawler(4, size)
+    wide = Fourier(problem.guess.mean, problem.guess.cos * [[1.0], [0.2], [0.1]], problem.guess.sin * [[1.0], [0.2], [0.1]])
+    solution = unsolved(problem.with_(guess=wide))
+    axes = [panel.figure().axes[0] for name, panel in panels(solution).items() if name.startswith("shape")]
+    assert len(axes) == 2
+    assert np.ptp([[np.ptp(panel.get_xlim()), np.ptp(panel.get_ylim())] for panel in axes]) < 1e-12
 
 
 def test_the_solved_problem_can_be_read(three_link):
@@ -226,8 +281,7 @@ def test_a_flat_motion_is_drawn_higher_with_its_feet_and_says_so(size, times, un
     drawn = bodies(axes)
     assert np.ptp(np.concatenate(drawn, axis=1)[1]) > 0.2
     assert said == ([] if times == 1 else [f"heights drawn {times} times as large"])
-    feet = np.concatenate(
-        [np.array(line.get_data()).reshape(2, 2, -1)[:, 0] for line in axes.lines if line.get_marker() == "s"], axis=1
-    )
+    squares = [np.array(line.get_data()) for line in axes.lines if line.get_marker() == "s" and line.get_color() != "white"]
+    feet = np.concatenate([square[:, ::3] for square in squares], axis=1)  # each is there twice, and then a gap
     middles = np.concatenate([0.5 * (body[:, 1:] + body[:, :-1]) for body in drawn], axis=1)
     np.testing.assert_allclose(sorted(feet.T.tolist()), sorted(middles.T.tolist()), atol=1e-12)

@@ -14,6 +14,7 @@ import colloc
 from benchmarks.kills import contents, lost, stopped
 from colloc import Chain, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.gaits.problem_file import read_problem_file
+from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load
 from colloc.search.certify import certify
 from colloc.search.choose import Certified, choose
@@ -21,7 +22,7 @@ from colloc.search.confirm import confirm
 from colloc.search.descend import descend
 from colloc.search.explore import begin_at, explore
 from colloc.search.refine import refine
-from colloc.search.run import ROWS, Run
+from colloc.search.run import ROWS, STAGES, Run
 from colloc.search.solve import solve
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.result_names import run_file
@@ -302,7 +303,7 @@ def test_time_that_is_over_gives_the_best_gait_so_far(thread):
     assert solution.sample(0.3).angles.shape == (links - 1, 1)
 
 
-def test_progress_is_told_from_the_first_moment_and_says_how_long():
+def test_progress_is_told_from_the_first_moment_on_stage_by_stage():
     begin, seen = time.monotonic(), []
     solution = solve(QUICK, 4, progress=seen.append)
     told = [news.seconds for news in seen]
@@ -311,11 +312,24 @@ def test_progress_is_told_from_the_first_moment_and_says_how_long():
     assert (seen[0].stage, seen[0].done, seen[0].count) == ("explore", 0, 4)
     assert seen[0].best.value > 0
     tried = [news for news in seen if news.stage == "explore" and news.count == 4]
-    assert tried[-1].left == 0.0 < tried[1].left < np.inf
-    stages = list(dict.fromkeys(news.stage for news in seen))
-    assert [stage for stage in stages if stage != "descend"] == ["explore", "refine", "confirm", "certify"]
+    assert list(dict.fromkeys(news.stage for news in seen)) == ["explore", "follow", "refine", "confirm", "certify"]
     assert str(tried[-1]).startswith("explore, 4 of 4; best d/W = 0.")
     assert solution.certificate.replayed
+
+
+def test_the_best_gait_told_of_is_one_of_finite_size_and_stages_come_in_their_order():
+    """Here small loops are better from the first start on, and one of the gaits that lead the sketches shrinks on its way."""
+    problem = Problem("three", body=Chain((0.4, 0.2, 0.4)), friction=Friction(2, 1, 1.4), gait=Harmonic(1), delta=1e-3)
+    seen = []
+    solution = solve(problem, 2, progress=seen.append)
+    assert solution.shrunk.value > 1.1 * solution.value
+    assert not any(on_speed_floor(problem, news.best.gait) for news in seen)
+    dry = [news.best.value for news in seen if news.best.delta == problem.delta]
+    assert max(dry) == pytest.approx(solution.value, rel=1e-3)
+    assert len(dry) > len(seen) / 3
+    came = [(news.round, STAGES.index(news.stage), news.done) for news in seen]
+    assert came == sorted(came)
+    assert str(seen[-1]).startswith("round 2, certify, 0 of 1; best d/W = 0.25")  # the one that shrank is certified, too
 
 
 def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess():

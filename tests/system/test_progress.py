@@ -8,6 +8,7 @@ import time
 import pytest
 
 from colloc.system.progress import StatusLine, duration
+from tests.shared.terminal import screen
 
 WIPED = "\x1b[1A\x1b[2K"
 """Up to the line, and the line erased."""
@@ -37,6 +38,15 @@ def test_the_line_says_what_and_how_long_and_vanishes():
     assert printed.endswith(WIPED)
 
 
+@pytest.mark.parametrize("left", [float("inf"), float("nan"), 0.0, -3.0])
+def test_a_time_that_nobody_knows_is_not_told(left):
+    stream = Terminal()
+    with StatusLine(stream) as line:
+        line.say("solving", left)
+    assert "solving   0 s" in stream.getvalue()
+    assert "left" not in stream.getvalue()
+
+
 def test_what_is_printed_in_between_stands_on_a_line_of_its_own():
     stream = Terminal()
     with StatusLine(stream) as line:
@@ -49,6 +59,17 @@ def test_what_is_printed_in_between_stands_on_a_line_of_its_own():
     assert "0 of 2 [starts]   0 s" in before
     assert "1 of 2 [starts]   0 s" in after
     assert after.endswith(WIPED)
+
+
+def test_a_warning_while_the_line_is_shown_stands_on_a_line_of_its_own(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", stream := Terminal())
+    with StatusLine() as line:
+        line.say("solving")
+        print("colloc: the disk is full", file=sys.stderr)
+        line.say("drawing")
+    lines, cursor = screen(stream.getvalue().replace("\n", "\r\n"))
+    assert [line for line in lines if line] == ["colloc: the disk is full"]
+    assert cursor
 
 
 def test_the_line_ticks_by_itself_and_the_time_left_falls():

@@ -125,11 +125,16 @@
     line(x, y, colours.ink, data.width * unit || 5);
     for (let k = data.hinges[0]; k < data.hinges[1]; k++) disc(x[k], y[k], 3.2, colours.paper, colours.ink);
     disc(x[last], y[last], 6, colours.ink);
-    // feet, and both ends of pads; those that hold filled
+    // feet are squares, wheels and pads bars between their ends; those that slide hollow
     const [first, end] = [0, 1].map((side) => placed(data.feet[0][side], data.feet[1][side], position));
     at(data.holding, position).forEach((holds, k) => {
-      line([first[0][k], end[0][k]], [first[1][k], end[1][k]], red, 3);
-      for (const [atX, atY] of [first, end]) disc(atX[k], atY[k], 4.5, holds > 0.5 ? red : colours.paper, red);
+      const kind = data.footKinds[k], colour = kind === "wheel" ? "#009e73" : red;
+      for (const [fill, size, cap] of [[colour, 8, "square"], [colours.paper, 4.4, kind === "foot" ? "square" : "butt"]]) {
+        if (holds > 0.5 && fill !== colour) continue;
+        context.lineCap = cap;
+        line([first[0][k], end[0][k] + 1e-6], [first[1][k], end[1][k]], fill, size);
+      }
+      context.lineCap = "round";
     });
     const [[centreX], [centreY]] = placed([data.centre[0]], [data.centre[1]], position);
     disc(centreX, centreY, 3.5, red);
