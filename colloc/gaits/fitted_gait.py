@@ -40,8 +40,9 @@ first length of which that holds is tried as the period."""
 _REPEATED, _SLOW, _SMALL = 2.0, 10.0, 3e-3
 """How much more mean square distance is allowed to periods that repeat than to as many harmonics as one long period may have:
 the first factor, and the second, for noise that is slower than the samples, up to such a share of what the joints move."""
-_DRIFTS = 1.3
-"""The same for a record without a drift: a part of a wave, with noise, looks a little like one."""
+_DRIFTS, _OPEN = 1.3, 4.0
+"""The same for a record without a drift, as a part of a wave, with noise, looks a little like one; and for one that would not
+close else."""
 _TOLD = 0.5
 """A period longer than this share of a record is told without a drift: a part of a wave and a drift are much alike."""
 _ROUGH = 6
@@ -298,8 +299,26 @@ def _fit(name: str, time: np.ndarray, angles: np.ndarray, period: float | None, 
     closed = [fit for fit in found if not fit.drifts]
     if min(fit.score for fit in closed) <= _DRIFTS * min(fit.score for fit in found) + _EXACT:
         found = closed
-    enough = max(_WORTH * min(fit.score for fit in found), _EXACT)
-    return min(fit for fit in found if fit.score <= enough)
+    told = _cheapest(found)
+    left_open = told.drifts and not _closes(*_coefficients(time, angles, told)[1:])
+    return _cheapest(closed) if left_open and min(fit.score for fit in closed) <= _OPEN * told.score else told
+
+
+def _cheapest(fits: list[_Fit]) -> _Fit:
+    """The fit of the fewest numbers whose score is about the best."""
+    enough = max(_WORTH * min(fit.score for fit in fits), _EXACT)
+    return min(fit for fit in fits if fit.score <= enough)
+
+
+def _coefficients(time: np.ndarray, angles: np.ndarray, fit: _Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The numbers of every joint, how much it drifts in a period, and through what angle it moves, ``(n_joint, ...)``."""
+    table = np.linalg.lstsq(_columns(time, fit), angles.T, rcond=None)[0].T
+    moves = np.ptp(_series(table[:, int(fit.drifts) :]).angles(np.arange(_PHASES) / _PHASES), axis=1)
+    return table, np.abs(table[:, 0]) * fit.drifts, moves
+
+
+def _closes(drift: np.ndarray, moves: np.ndarray) -> bool:
+    return bool(drift.max() <= _DRIFT * moves.max())
 
 
 def _repeats(time: np.ndarray, angles: np.ndarray, step: float) -> list[tuple[float, float]]:
@@ -334,12 +353,9 @@ def _repeats(time: np.ndarray, angles: np.ndarray, step: float) -> list[tuple[fl
 
 def _closed(name: str, time: np.ndarray, angles: np.ndarray, fit: _Fit, degrees: bool) -> FittedGait:
     """A gait without the drift of its record. `ProblemError` if that is no small one."""
-    columns = _columns(time, fit)
-    table = np.linalg.lstsq(columns, angles.T, rcond=None)[0].T
-    drift, series = np.abs(table[:, 0]) * fit.drifts, table[:, int(fit.drifts) :]
-    gait = _series(series)
-    moves = np.ptp(gait.angles(np.arange(_PHASES) / _PHASES), axis=1)
-    for joint in np.flatnonzero(drift > _DRIFT * moves.max()):
+    table, drift, moves = _coefficients(time, angles, fit)
+    gait, joint = _series(table[:, int(fit.drifts) :]), int(drift.argmax())
+    if not _closes(drift, moves):
         raise ProblemError(
             f"{name} does not close: after a period joint {joint + 1} is off by {_told(drift[joint], degrees)}, and it moves "
             f"through {_told(moves[joint], degrees)}. Give one whole period, or say how long it is (period=, --period)."
@@ -365,12 +381,14 @@ def _uncertainty(time: np.ndarray, angles: np.ndarray, fit: _Fit, table: np.ndar
     So large harmonics may be that the samples do not show: those up to twice the highest are in the covariance, too. Where they
     hold more of the residuals than their share, noise is slower than the samples, and there is as much of it in the others.
     """
-    residuals, first = angles - table @ _columns(time, fit).T, int(fit.drifts)
-    left, samples = (residuals**2).sum(axis=1), round(fit.period / float(np.median(np.diff(time))))
-    freedom = time.size - table.shape[1]
+    first, samples = int(fit.drifts), round(fit.period / float(np.median(np.diff(time))))
     most = min(max((min(time.size - first, samples) - 1) // 2, fit.harmonics), _HIGHEST)
     near, far = (fit._replace(harmonics=min(most, many * fit.harmonics + 1)) for many in (2, 4))
-    columns = _columns(time, near)
+    residuals, size, richer = angles - table @ _columns(time, fit).T, table.shape[1], _richer(time, angles, table, fit, far)
+    if richer is not None:  # what is left of the residuals is noise
+        size = richer.shape[1]
+        residuals = angles - richer @ _columns(time, far).T
+    columns, left, freedom = _columns(time, near), (residuals**2).sum(axis=1), max(time.size - size, 1)
     u, s, v = np.linalg.svd(columns, full_matrices=False)
     share = ((residuals @ u) ** 2).sum() / (left.sum() + 1e-300) * freedom / max(columns.shape[1] - table.shape[1], 1)
     deviation = np.sqrt(left / freedom * max(share, _correlation_time(residuals))) + 1e-300
@@ -382,19 +400,20 @@ def _uncertainty(time: np.ndarray, angles: np.ndarray, fit: _Fit, table: np.ndar
         along = by_period @ u
         beside = ((by_period - along @ u.T) / deviation[:, None]) ** 2
         directions = np.concatenate([directions, -((along / s) @ v)[None, :, first:] / np.sqrt(beside.sum() + 1e-300)])
-    return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), _richer(time, angles, residuals, fit, far))
+    more = None if richer is None else _series(richer[:, first:])
+    return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), more)
 
 
-def _richer(time: np.ndarray, angles: np.ndarray, residuals: np.ndarray, fit: _Fit, far: _Fit) -> Fourier | None:
-    """A series of more harmonics through samples, if these are worth more than noise would be (F test)."""
+def _richer(time: np.ndarray, angles: np.ndarray, table: np.ndarray, fit: _Fit, far: _Fit) -> np.ndarray | None:
+    """The numbers of a fit of more harmonics, if these are worth more than noise would be (F test)."""
     columns = _columns(time, far)
-    more, left = columns.shape[1] - 2 * fit.harmonics - 1 - fit.drifts, time.size - columns.shape[1]
-    table = np.linalg.lstsq(columns, angles.T, rcond=None)[0].T
-    missed, still = (residuals**2).sum(), ((angles - table @ columns.T) ** 2).sum()
+    more, left = columns.shape[1] - table.shape[1], time.size - columns.shape[1]
+    richer = np.linalg.lstsq(columns, angles.T, rcond=None)[0].T
+    missed, still = (((angles - x @ y.T) ** 2).sum() for x, y in ((table, _columns(time, fit)), (richer, columns)))
     worth = (missed / (still + 1e-300) - 1) * left / max(more, 1)
     if more < 1 or (left > 0 and fdtrc(len(angles) * more, len(angles) * left, worth) > _CHANCE):
         return None
-    return _series(table[:, int(fit.drifts) :])
+    return np.asarray(richer)
 
 
 def _correlation_time(residuals: np.ndarray) -> float:

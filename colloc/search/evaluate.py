@@ -25,6 +25,8 @@ from colloc.system.errors import NotConvergedError, ProblemError
 
 _PHASES = 256
 """At which a record is looked at, before it is replayed."""
+_ROUGHLY = 1.25
+"""Times as much may be left out by smoothing as the mesh of the smoothed gait says."""
 _DRAWN = 4
 """Typical changes of a series that are tried, each both ways."""
 
@@ -165,7 +167,8 @@ def _errors_of_samples(answer: Answer, gait: Fourier, samples: Uncertainty) -> t
     if richer is not None:
         lack = np.abs(values(coefficients(richer.resized(highest)).ravel()) - known)
         missed = f", and lack of fit: {richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
-    return tuple(np.nan_to_num(noise + lack, nan=np.inf).tolist()), missed
+    # the mesh was made for a smoother gait
+    return tuple(np.nan_to_num(noise + _ROUGHLY * lack, nan=np.inf).tolist()), missed
 
 
 class _Series(NamedTuple):
