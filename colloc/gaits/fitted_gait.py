@@ -2,8 +2,8 @@
 
 The angles are fitted by a Fourier series of the phase, by least squares: so steps of time need not be equal, and noise is
 smoothed. How many harmonics that takes is told by generalised cross-validation: what a further harmonic gains has to be worth
-its coefficients. By the same measure the record gets a drift, which is taken out so that the gait closes, and a time from its
-last sample to the first one of the next period.
+its coefficients. By the same measure the record gets a drift, which is taken out so that the gait closes, and a period: a time
+from its last sample to the first one of the next period, or that after which it repeats itself.
 """
 
 from __future__ import annotations
@@ -143,22 +143,20 @@ def fitted_gait(
     Parameters
     ----------
     given : gait, array, path of a CSV file, or callable
-        See `Given`. A file has a column of times, then one for each joint; names and ``#`` lines are optional, and columns
-        whose names end in ``_per_s``, ``_N_m`` or ``_W`` are left out.
+        See `Given`. A file has a column of times and one for each joint (`colloc.gaits.record.read_record`).
     n_joint : int
         That the body has.
     period : float, optional
-        Of a file, in its unit of time; more than one may be recorded. By default the file holds one.
+        Of a file, in its unit of time; more than one may be recorded. By default it is told from the samples.
     harmonics : int, optional
         By default as many as the samples are worth.
     degrees : bool
-        Whether angles are degrees; also of those columns of a file whose names end in ``_deg``.
+        Whether angles are degrees; of a file, where it does not say what they are.
 
     Raises
     ------
     ProblemError
-        If there are no such angles, they are not finite, times do not rise, the path is far from closed, or angles look like
-        degrees.
+        If there are no such angles, they are not finite, times fall, the path is far from closed, or angles look like degrees.
 
     Examples
     --------

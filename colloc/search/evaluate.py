@@ -52,7 +52,8 @@ def evaluate(
     Returns
     -------
     Solution
-        Of a class of as many harmonics as the gait has; its message tells how far the angles were smoothed.
+        Of a class of as many harmonics as the gait has; its message tells what was read and how far the angles were smoothed.
+        Its errors hold what the samples are off by, with two standard deviations (`Certificate.of_samples`).
 
     Raises
     ------
