@@ -37,7 +37,7 @@ _LARGEST = 2 * np.pi
 _ALIKE = 1e-3, 0.03, 0.2
 """How much more a record may differ from itself a period later than several periods later, of what it does on average: the
 first length of which that holds is tried as the period."""
-_REPEATED, _SLOW, _SMALL = 2.0, 10.0, 3e-3
+_REPEATED, _SLOW, _SMALL = 2.0, 10.0, 1e-2
 """How much more mean square distance is allowed to periods that repeat than to as many harmonics as one long period may have:
 the first factor, and the second, for noise that is slower than the samples, up to such a share of what the joints move."""
 _DRIFTS, _OPEN = 1.3, 4.0
@@ -253,7 +253,7 @@ def _tried(time: np.ndarray, angles: np.ndarray, fit: _Fit, chosen: int = 0) -> 
 
 
 def _fit(name: str, time: np.ndarray, angles: np.ndarray, period: float | None, harmonics: int | None) -> _Fit:
-    count, step = time.size, float(np.median(np.diff(time)))
+    count, step = time.size, _typical_step(time)
     if period is not None:
         if not np.isfinite(period) or period <= 0:
             raise ProblemError(f"the period must be positive, not {period:g}.")
@@ -319,6 +319,11 @@ def _closes(drift: np.ndarray, moves: np.ndarray) -> bool:
     return bool(drift.max() <= _DRIFT * moves.max())
 
 
+def _typical_step(time: np.ndarray) -> float:
+    """Between samples; of many at one instant, as where stamps are rounded, the mean."""
+    return float(np.median(np.diff(time))) or float(time[-1] - time[0]) / (time.size - 1)
+
+
 def _repeats(time: np.ndarray, angles: np.ndarray, step: float) -> list[tuple[float, float]]:
     """Between what lengths of time a record may repeat itself, the likeliest ones: where it differs least from itself that much
     later. Of many periods a length is told by as many as there are."""
@@ -345,7 +350,9 @@ def _repeats(time: np.ndarray, angles: np.ndarray, step: float) -> list[tuple[fl
             times *= 2
             window = np.arange(round(times * length - around), round(times * length + around) + 1)
             length = float(window[np.argmin(differs[window])]) / times
-        found.add(((length - 2.0 / times) * step, (length + 2.0 / times) * step))
+        for part in (1, 2, 3):  # what a gap in the record may hide
+            if length - 2.0 / times > part * FEWEST:
+                found.add(((length - 2.0 / times) * step / part, (length + 2.0 / times) * step / part))
     return sorted(found)
 
 
@@ -379,7 +386,7 @@ def _uncertainty(time: np.ndarray, angles: np.ndarray, fit: _Fit, table: np.ndar
     So large harmonics may be that the samples do not show: those up to twice the highest are in the covariance, too. Where they
     hold more of the residuals than their share, noise is slower than the samples, and there is as much of it in the others.
     """
-    first, samples = int(fit.drifts), round(fit.period / float(np.median(np.diff(time))))
+    first, samples = int(fit.drifts), round(fit.period / _typical_step(time))
     most = min(max((min(time.size - first, samples) - 1) // 2, fit.harmonics), _HIGHEST)
     near, far = (fit._replace(harmonics=min(most, many * fit.harmonics + 1)) for many in (2, 4))
     residuals, size, richer = angles - table @ _columns(time, fit).T, table.shape[1], _richer(time, angles, table, fit, far)

@@ -195,6 +195,16 @@ def test_the_period_of_a_record_that_holds_several_is_found(periods, noise, tmp_
     assert f"of {found.periods:.3g} periods of" in found.describe()
 
 
+def test_bursts_of_samples_with_one_stamp_are_read_as_well_as_the_stamps_are(tmp_path):
+    t = np.sort(np.random.default_rng(0).uniform(0, 3, 600))
+    t[200:] += 0.6
+    stamps = np.floor(50 * t) / 50
+    found = read(tmp_path, "t,q1,q2,q3\n" + table(stamps, *GAIT.angles(t)))
+    assert found.period == pytest.approx(1, rel=5e-3)
+    assert found.largest < 0.3  # a stamp is 0.02 of a period wide
+    np.testing.assert_allclose(found.gait.angles(T - 0.01 - stamps[0]), ANGLES, atol=0.02)
+
+
 def test_slow_noise_does_not_hide_a_period(tmp_path):
     rng, t = np.random.default_rng(6), np.arange(0, 3.3, 1 / 40)
     noise = 0.005 * rng.normal(size=(3, t.size))
