@@ -19,8 +19,10 @@ from colloc.results.kept import save_result
 from colloc.results.store import load
 
 _EPILOG = """\
-The file has a line for each instant: its time, then the angle of each joint, from tail to head. Names and '#' lines are
-optional; what colloc export writes can be read. Angles are radians, or degrees with --degrees or names that end in _deg.
+The file has a line for each instant: its time, then the angle of each joint. Columns are known by their names (joint_1 at the
+tail, joint_2, ...; units as _deg, [deg], time_ms), in any order; without names they go from tail to head. Delimiters, decimal
+commas, comments and other columns are seen to, and one line says what was taken. Angles are radians unless names or --degrees
+say otherwise. What colloc export writes can be read. Errors hold what the samples are off by, with two standard deviations.
 
   colloc evaluate problems/three_link.py mine.csv                                    results/mine-evaluated.h5
   colloc evaluate problems/three_link.py mine.csv --best results/three_link.h5       and by what it differs from that
@@ -32,11 +34,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("problem", help="a Python file that states PROBLEM: body, friction and limits are meant")
     parser.add_argument("gait", metavar="GAIT.csv", help="times and joint angles")
     parser.add_argument("--best", metavar="FILE.h5", help="a result to hold the gait against")
-    parser.add_argument(
-        "--period", type=float, metavar="T", help="in the file's unit of time (default: the file is one period)"
-    )
+    parser.add_argument("--period", type=float, metavar="T", help="in the file's unit of time (default: as it repeats itself)")
     parser.add_argument("--harmonics", type=int, metavar="N", help="of the fit (default: as many as the samples are worth)")
-    parser.add_argument("--degrees", action="store_true", help="angles are degrees")
+    parser.add_argument("--degrees", action="store_true", help="angles are degrees where names do not say what they are")
     parser.add_argument("--output", metavar="PATH", help="folder or .h5 file (default: results/GAIT-evaluated.h5)")
     add_printing(parser)
     add_verbose(parser)

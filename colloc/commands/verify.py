@@ -61,6 +61,7 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
     """A sentence if the certificate in a file is not what a new one says, in any of its numbers; empty if they agree."""
     if not recorded.replayed:
         return "the file holds no certificate."
+    recorded, now = recorded.by_replay, now.by_replay  # what samples are off by is not found anew
     besides = [
         (name, "", f"a {name.replace('_', ' ')}")
         for name in recorded.values
@@ -109,7 +110,8 @@ def rechecked(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
     answer states."""
     before = min(solution.certificate.instants or 1600, _MOST_INSTANTS)
     instants = 2 * (3 * before // 8) + 2
-    return replace(solution, certificate=certify(solution.answer, tolerance=tolerance, instants=instants))
+    certificate = certify(solution.answer, tolerance=tolerance, instants=instants)
+    return replace(solution, certificate=certificate.with_samples(solution.certificate.of_samples))
 
 
 @command(_parser)

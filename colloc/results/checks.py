@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,8 @@ class Certificate(Period):
     dry : (float, float), optional
         Between what the efficiency lies under dry friction, with no delta (`colloc.verification.dry_friction`), if that was
         asked for.
+    of_samples : tuple of float, optional
+        What the errors of value, efficiency, distance and work hold for what the samples of a gait are off by.
     """
 
     checks: tuple[Check, ...]
@@ -66,6 +68,7 @@ class Certificate(Period):
     value_at_zero_delta: float
     value_error_at_zero_delta: float
     dry: tuple[float, float] | None = None
+    of_samples: tuple[float, ...] | None = None
 
     def __repr__(self) -> str:
         if not self.replayed:
@@ -92,11 +95,34 @@ class Certificate(Period):
         errors = {f"{name}_error": error for name, error in self.errors.items()}
         return {**self.values, **errors, "efficiency": self.efficiency, **{name: getattr(self, name) for name in NUMBERS}}
 
+    def with_samples(self, errors: tuple[float, ...] | None) -> Certificate:
+        """The same for a gait through samples, which put (value, efficiency, distance, work) off by `errors`."""
+        if errors is None or not self.replayed:
+            return self
+        value, efficiency, distance, work = errors
+        return replace(
+            self,
+            errors={**self.errors, "distance": self.errors["distance"] + distance, "work": self.errors["work"] + work},
+            value_error=self.value_error + value,
+            value_error_at_zero_delta=self.value_error_at_zero_delta + value,
+            efficiency_error=self.efficiency_error + efficiency,
+            error_at_zero_delta=self.error_at_zero_delta + efficiency,
+            of_samples=errors,
+        )
+
+    @property
+    def by_replay(self) -> Certificate:
+        """The same with the errors of the replay alone, whatever samples a gait goes through."""
+        if self.of_samples is None:
+            return self
+        return replace(self.with_samples(tuple(-error for error in self.of_samples)), of_samples=None)
+
     def facts(self) -> dict[str, Any]:
         """All of it as plain numbers (JSON)."""
         listed = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in self.checks}
         dry = {} if self.dry is None else {"dry_efficiency": list(self.dry)}
-        return self.numbers | dry | {"passed": self.passed, "checks": listed}
+        samples = {} if self.of_samples is None else {"errors_of_samples": list(self.of_samples)}
+        return self.numbers | dry | samples | {"passed": self.passed, "checks": listed}
 
     @property
     def failures(self) -> list[Check]:

@@ -70,7 +70,7 @@ _GAIT_ARRAYS = {
     "corners": ("rad", "joint, vertex"),
     "schedule": ("period", "stage"),
 }
-_DRY = "dry_efficiency"
+_DRY, _OF_SAMPLES = "dry_efficiency", "errors_of_samples"
 
 
 def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
@@ -215,6 +215,8 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
             put_attribute(group, name, number)
     if certificate.dry is not None:
         put_attribute(group, _DRY, list(certificate.dry))
+    if certificate.of_samples is not None:
+        put_attribute(group, _OF_SAMPLES, list(certificate.of_samples))
     for name in ("name", "value", "threshold", "passed", "meaning"):
         put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
@@ -223,13 +225,17 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     """The certificate that `_write_certificate` wrote."""
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
     checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-    besides = {*NUMBERS, _DRY, *(f"{name}_error" for name in ("distance", "work"))}
+    besides = {*NUMBERS, _DRY, _OF_SAMPLES, *(f"{name}_error" for name in ("distance", "work"))}
     integrals = [name for name in group.attrs if name not in besides]  # those that were asked for
     values = {name: float(attribute(group, name)) for name in ("distance", "work", "rotation", *integrals)}
     errors = {name: float(attribute(group, f"{name}_error")) for name in ("distance", "work")}
     dry = tuple(attribute(group, _DRY)) if _DRY in group.attrs else None
+    samples = None
+    if _OF_SAMPLES in group.attrs:
+        value, efficiency, distance, work = map(float, attribute(group, _OF_SAMPLES))
+        samples = value, efficiency, distance, work
     others = {name: type(getattr(UNCERTIFIED, name))(attribute(group, name)) for name in NUMBERS}  # numbers, not arrays of them
-    return Certificate(values, errors, {}, checks, **others, dry=dry)
+    return Certificate(values, errors, {}, checks, **others, dry=dry, of_samples=samples)
 
 
 def _read(file: h5py.File) -> Solution:

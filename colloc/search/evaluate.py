@@ -5,15 +5,30 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
+from typing import NamedTuple
 
-from colloc.gaits.fitted_gait import FittedGait, Given, fitted_gait
-from colloc.gaits.harmonic import Harmonic
+import numpy as np
+
+from colloc.gaits.control_problem import control_problem
+from colloc.gaits.fitted_gait import FittedGait, Given, Uncertainty, coefficients, fitted_gait
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.motion.kinds import kind_of_motion
+from colloc.reduced.motion import ReducedMotion
+from colloc.results.answer import Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
-from colloc.search.certify import GAP, certify, goes_nowhere
+from colloc.search.certify import EXACT, GAP, certify, goes_nowhere
 from colloc.search.prescribed import evaluated_answer
 from colloc.system.errors import NotConvergedError, ProblemError
+
+_PHASES = 256
+"""At which a record is looked at, before it is replayed."""
+_ROUGHLY = 1.25
+"""Times as much may be left out by smoothing as the mesh of the smoothed gait says."""
+_DRAWN = 4
+"""Typical changes of a series that are tried, each both ways."""
 
 
 def evaluate(
@@ -37,7 +52,8 @@ def evaluate(
     Returns
     -------
     Solution
-        Of a class of as many harmonics as the gait has; its message tells how far the angles were smoothed.
+        Of a class of as many harmonics as the gait has; its message tells what was read and how far the angles were smoothed.
+        Its errors hold what the samples are off by, with two standard deviations (`Certificate.of_samples`).
 
     Raises
     ------
@@ -57,10 +73,22 @@ def evaluate(
     if problem.body.schedule:
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")
     fitted = fitted_gait(gait, problem.body.n_joint, period=period, harmonics=harmonics, degrees=degrees)
+    if fitted.centre:
+        _check_centre(problem, fitted, gait)
     problem.regime.at(fitted.gait)  # refuses one that does not say a pace which the problem leaves open
     solution = _evaluated(problem, fitted)
     solution.seconds = time.monotonic() - begin
     return solution
+
+
+def _check_centre(problem: Problem, fitted: FittedGait, given: Given) -> None:
+    """A `ProblemError` if all joints are bent about one right angle and links cross: so look servos without negative angles."""
+    phases = np.arange(_PHASES) / _PHASES
+    if float(problem.body.crossing_depth(fitted.gait.angles(phases)).max()) > EXACT:
+        raise ProblemError(
+            f"{given}: all joints move about {fitted.centre}°, where links cross: if servos stand so when the body is "
+            "straight, subtract it from every column of angles."
+        )
 
 
 def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
@@ -95,4 +123,65 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
         said = f" It fails: {failures}." if failures else ""
     except NotConvergedError as error:
         said = f" The replay failed: {error}"
+    if fitted.uncertainty is not None and certificate.replayed:
+        errors, missed = _errors_of_samples(answer, fitted.gait, fitted.uncertainty)
+        if errors[0] > certificate.value_error:
+            what = f"{problem.objective.short} uncertain by {errors[0]:.1e} (two standard deviations{missed})"
+            said = f" Samples that far off leave {what}.{said}"
+        certificate = certificate.with_samples(errors)
     return Solution(stated, answer, certificate, message=f"{fitted.describe()}.{said}")
+
+
+def _errors_of_samples(answer: Answer, gait: Fourier, samples: Uncertainty) -> tuple[tuple[float, ...], str]:
+    """By how much value, efficiency, distance and work may be wrong for what the samples of a gait are off by, two standard
+    deviations; and what of it is lack of fit, in words.
+
+    The covariance of the fit goes through the gradients of the collocated motion on the mesh of the answer. Near an optimum
+    they vanish, and what counts is of second order: typical changes of the series are tried, both ways. What smoothing leaves
+    out, if it is more than noise, is what a series of more harmonics changes.
+    """
+    control, richer = control_problem(answer.problem), samples.richer
+    highest = max(gait.n_harmonic, samples.directions.shape[2] // 2, richer.n_harmonic if richer else 0)
+    later = math.atan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * math.pi)  # where the gait of the answer begins
+    phases, wide = answer.mesh.times + later, Harmonic(highest)
+    series = _Series(np.stack([wide.functions(phases), wide.functions(phases, 1)]))
+    aims, delta = control.aims, answer.problem.delta * answer.gait.delta_unit
+    motion = ReducedMotion(kind_of_motion(control.dynamics), answer.mesh, series, aims.integrals)
+    scale = np.array([control.stated(1.0), 1 / control.unit, 1.0, control.unit])
+
+    def values(v: np.ndarray) -> np.ndarray:
+        period = motion.values(v, delta)
+        return scale * [aims.objective(period), EFFICIENCY(period), period["distance"], period["work"]]
+
+    v = coefficients(gait.resized(highest)).ravel()
+    known, period, slopes = values(v), motion.values(v, delta), motion.gradients(v, delta)
+    by_aim = [aim.gradient(period, slopes) + np.zeros_like(v) for aim in (aims.objective, EFFICIENCY)]
+    gradients = scale[:, None] * [*by_aim, slopes["distance"], slopes["work"]]
+    changes = np.zeros((len(samples.directions), gait.n_joint, 2 * highest + 1))
+    changes[:, :, : samples.directions.shape[2]] = samples.directions
+    changes = changes.reshape(len(changes), -1)
+    noise = np.linalg.norm(gradients @ changes.T, axis=1)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (_DRAWN, len(changes)))
+    bent = [0.5 * (values(v + change) + values(v - change)) - known for change in signs @ changes]
+    noise = samples.factor * (noise + np.abs(bent).max(axis=0))
+    lack, missed = np.zeros(4), ""
+    if richer is not None:
+        lack = np.abs(values(coefficients(richer.resized(highest)).ravel()) - known)
+        missed = f", and lack of fit: {richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
+    # the mesh was made for a smoother gait
+    return tuple(np.nan_to_num(noise + _ROUGHLY * lack, nan=np.inf).tolist()), missed
+
+
+class _Series(NamedTuple):
+    """Fourier series by their coefficients, joint by joint, on the points of a mesh."""
+
+    functions: np.ndarray
+    """``(2, 2 K + 1, n_point)``: with their derivatives."""
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        angles, rates = v.reshape(-1, self.functions.shape[1]) @ self.functions
+        return angles, rates, np.ones(self.functions.shape[2])
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        both = on_shape.reshape(*on_shape.shape[:2], 2, -1)
+        return np.einsum("ktdj,dwt->kjw", both, self.functions).reshape(len(both), -1)

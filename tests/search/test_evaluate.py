@@ -195,11 +195,11 @@ def test_a_gait_that_does_not_turn_is_refused_by_no_objective_of_its_turn():
 
 REST = "5,0,0\n6,0,0\n7,0,0\n8,0,0\n"
 BAD = {
-    "t,a,b\n0,1,nan\n1,2,3\n" + REST: "sample 1: '0,1,nan' is not 3 finite numbers",
+    "t,a,b\n0,1,nan\n1,2,3\n" + REST: r"only 5 of 6 lines have a number in each .* \(line 2 has not\)",
     "t,a\n0,1\n1,2\n2,1\n3,1\n4,2\n5,1\n": "1 column of angles, and the body has 2 joints",
-    "t,a,b\n0,0,0\n1,1,0\n1,0,1\n" + REST: "do not rise after sample 2",
+    "t,a,b\n0,0,0\n1,1,0\n0,0,1\n" + REST: "times fall after line 3",
     "t,a,b\n0,0,0\n1,1,0\n": "holds 2 samples",
-    "t,a,b\n0,0,0\n1,90,0\n2,0,90\n" + REST: "an angle of 90 rad: if angles are degrees, say so",
+    "t,a,b\n0,0,0\n1,90,0\n2,0,90\n" + REST: "an angle of 90 rad .*: if angles are degrees, say so",
     "": "holds 0 samples",
 }
 
@@ -242,3 +242,93 @@ def test_a_file_may_be_called_as_it_likes(tmp_path, monkeypatch, capsys):
     assert main(["evaluate", "p.py", "my gait (3).csv", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["name"] == "my_gait__3_-evaluated"
     assert (tmp_path / "results/my_gait__3_-evaluated.h5").exists()
+
+
+QUICK = PROBLEM.with_(delta=3e-3, mesh_tolerance=1e-3)
+N = 40
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return colloc.evaluate(QUICK, GAIT)
+
+
+@pytest.mark.parametrize("degrees", [0.1, 1.0])
+def test_stated_errors_hold_for_gaits_through_noisy_samples_and_grow_with_the_noise(exact, degrees):
+    rng, inside = np.random.default_rng(3), []
+    for _ in range(5):
+        noisy = colloc.evaluate(QUICK, GAIT.angles(np.arange(N) / N) + np.radians(degrees) * rng.normal(size=(2, N)))
+        stated = noisy.certificate
+        assert 1e-4 * degrees < stated.value_error < 2e-2 * degrees
+        assert stated.value_error == stated.efficiency_error
+        assert f"leave d/W uncertain by {stated.of_samples[0]:.1e} (two standard deviations" in noisy.message
+        inside += [
+            abs(noisy.efficiency - exact.efficiency) <= stated.efficiency_error,
+            abs(noisy.distance - exact.distance) <= stated.errors["distance"],
+            abs(noisy.work - exact.work) <= stated.errors["work"],
+        ]
+    assert sum(inside) >= 13  # of 15, 95 % each
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("degrees", "slow"), [(0.1, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.7)])
+def test_two_standard_deviations_cover_the_true_gait_in_95_of_100_records(exact, degrees, slow):
+    rng, inside = np.random.default_rng(1), []
+    for _ in range(40):
+        noise = np.radians(degrees) * rng.normal(size=(2, N))
+        for k in range(1, N):
+            noise[:, k] += slow * noise[:, k - 1]
+        noisy = colloc.evaluate(QUICK, GAIT.angles(np.arange(N) / N) + noise)
+        errors = noisy.certificate.errors
+        inside.append(abs(noisy.efficiency - exact.efficiency) <= noisy.certificate.efficiency_error)
+        inside.append(abs(noisy.distance - exact.distance) <= errors["distance"])
+        inside.append(abs(noisy.work - exact.work) <= errors["work"])
+    assert np.mean(inside) >= (0.75 if slow else 0.92)
+
+
+def test_noise_about_an_optimum_is_stated_though_its_gradient_vanishes():
+    best = colloc.solve(colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2), starts=1)
+    noise = np.radians(3) * np.random.default_rng(0).normal(size=(2, N))
+    noisy = colloc.evaluate(QUICK.with_(delta=1e-2), best.gait.angles(np.arange(N) / N) + noise)
+    assert 0 < best.value - noisy.value <= noisy.certificate.value_error
+
+
+def test_a_series_that_misses_its_samples_states_its_lack_of_fit():
+    corners = colloc.Fourier([0, 0], [[1.2, 0.0, 0.4], [0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0], [1.2, 0.0, -0.4]])
+    true, t = colloc.evaluate(QUICK, corners), np.arange(8) / 8
+    found = colloc.evaluate(QUICK, corners.angles(t), harmonics=1)
+    assert "4.0e-01 rad at most" in found.message
+    assert abs(found.efficiency - true.efficiency) > 1e-2
+    assert abs(found.efficiency - true.efficiency) <= found.certificate.efficiency_error
+    assert "lack of fit: 3 harmonics would change it by" in found.message
+    enough = colloc.evaluate(QUICK, corners.angles(np.arange(60) / 60))
+    assert enough.certificate.efficiency_error < 1e-6 < 1e3 * enough.certificate.efficiency_error
+
+
+def test_errors_of_samples_are_kept_and_are_no_disagreement(tmp_path):
+    noisy = GAIT.angles(np.arange(N) / N) + 0.01 * np.random.default_rng(0).normal(size=(2, N))
+    path = colloc.save(colloc.evaluate(QUICK, noisy), tmp_path / "x.h5")
+    loaded = colloc.load(path)
+    assert loaded.certificate.value_error > loaded.certificate.of_samples[0] > 1e-4
+    assert loaded.certificate.facts()["errors_of_samples"] == list(loaded.certificate.of_samples)
+    assert main(["verify", str(path), "--quiet"]) == 0
+
+
+def test_an_exported_gait_states_no_error_of_its_samples_whatever_its_columns(tmp_path, capsys):
+    gait = colloc.evaluate(QUICK, colloc.Fourier([0.2, -0.1], [[0.9, 0.1], [0.3, 0.0]], [[0.0, 0.1], [0.8, -0.1]]))
+    for periods in (1, 3):
+        gait.export(tmp_path / "x.csv", period=4, length=1, mass=2, periods=periods)
+        fitted = fitted_gait(tmp_path / "x.csv", 2)
+        np.testing.assert_allclose(fitted.gait.angles(T), gait.gait.angles(T), atol=1e-8)
+        assert "left out: joint_1_rad_per_s" in fitted.describe()
+    again = colloc.evaluate(QUICK, tmp_path / "x.csv")
+    assert again.certificate.of_samples[0] < 1e-8
+    assert "uncertain" not in again.message
+
+
+def test_servos_that_stand_about_90_degrees_are_refused_before_the_replay_where_links_cross(tmp_path):
+    five = colloc.Problem("five", body=colloc.Chain((0.2,) * 5))
+    wave = np.degrees(0.7 * np.sin(2 * np.pi * T - np.arange(4)[:, None]))
+    path = written(tmp_path / "servo.csv", T, 90 + wave, "t_s,s1_deg,s2_deg,s3_deg,s4_deg")
+    with pytest.raises(colloc.ProblemError, match=r"all joints move about 90°, where links cross: .* subtract it"):
+        colloc.evaluate(five, path)

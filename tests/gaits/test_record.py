@@ -1,0 +1,230 @@
+"""A record of joint angles is read as robots, loggers and spreadsheets write it, or refused in a sentence with a cure."""
+
+import time
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc.gaits.fitted_gait import fitted_gait
+
+GAIT = colloc.Fourier([0.2, -0.1, 0.1], [[0.6, 0.05], [0.3, 0.0], [-0.3, 0.0]], [[0.0, 0.1], [0.5, -0.05], [0.4, 0.0]])
+T = np.arange(60) / 60
+SECONDS, ANGLES = 4 * T, GAIT.angles(T)
+DEGREES = np.degrees(ANGLES)
+A, B, C = ANGLES
+D, E, F = DEGREES
+STAMPS = [f"2026-01-31T12:00:{s:09.6f}Z" for s in SECONDS]
+NANOSECONDS = [f"{1_700_000_000_000_000_000 + round(s * 1e9)}" for s in SECONDS]
+
+
+def table(*columns, between=",", comma=False, end="\n", digits=9):
+    """Lines of a file, a column for each argument."""
+    lines = []
+    for row in zip(*columns, strict=True):
+        cells = [cell if isinstance(cell, str) else f"{cell:.{digits}g}" for cell in row]
+        lines.append(between.join(cell.replace(".", ",") if comma else cell for cell in cells))
+    return end.join([*lines, ""])
+
+
+def read(tmp_path, content, **settings):
+    path = tmp_path / "record.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return fitted_gait(path, 3, **settings)
+
+
+ROS = (
+    "%time,field.header.seq,field.header.frame_id,field.name0,field.position0,field.position1,field.position2,field.velocity0\n"
+)
+TOPIC = "/joint_states/joint_"
+READ = {
+    "tail last": ("time_s,joint_3_rad,joint_2_rad,joint_1_rad\n" + table(SECONDS, C, B, A), "by name from joint_1_rad"),
+    "from zero": ("t,q2,q0,q1\n" + table(SECONDS, C, A, B), "from q0 ... q2, radians; time from t"),
+    "letters": ("ElapsedTime, Axis_B, Axis_A, Axis_C\n" + table(SECONDS, B, A, C), "from Axis_A ... Axis_C"),
+    "units in brackets": (
+        "Time [ms],Joint 3 [deg],Joint 1 [deg],Joint 2 [deg]\n" + table(1000 * SECONDS, F, D, E),
+        "degrees; time in ms",
+    ),
+    "one column of degrees": (
+        "t,joint_1_rad,joint_2_deg,joint_3_rad\n" + table(SECONDS, A, E, C),
+        r"radians \(but joint_2_deg degrees\)",
+    ),
+    "units in a row": (
+        "time,joint_1,joint_2,joint_3,current_1\ns,deg,deg,deg,mA\n" + table(SECONDS, D, E, F, T),
+        "degrees; time in s; left out: current_1 mA",
+    ),
+    "rostopic echo": (ROS + table(NANOSECONDS, range(60), ["base"] * 60, ["j"] * 60, A, B, C, A), "from field.position0"),
+    "PlotJuggler": (
+        "__time,"
+        + ",".join(f"{TOPIC}{j}/{what}" for j in (1, 2, 3) for what in ("position", "velocity"))
+        + "\n"
+        + table(1.7e9 + SECONDS, A, A, B, B, C, C, digits=16),
+        "left out: /joint_states/joint_1/velocity",
+    ),
+    "driver of an arm": (
+        "time_ms,read_attempt,joint_0_pos,joint_1_pos,joint_2_pos,joint_0_vel,joint_1_vel,joint_2_vel\n"
+        + table(1000 * SECONDS, range(60), A, B, C, A, B, C),
+        "from joint_0_pos ... joint_2_pos",
+    ),
+    "commanded and measured": (
+        "t,cmd_1,cmd_2,cmd_3,meas_1,meas_2,meas_3\n" + table(SECONDS, B, C, A, A, B, C),
+        "from meas_1 ... meas_3",
+    ),
+    "seconds and nanoseconds": (
+        "stamp.sec,stamp.nanosec,q1,q2,q3\n"
+        + table([f"{int(s) + 1000}" for s in SECONDS], [f"{round(s % 1 * 1e9)}" for s in SECONDS], A, B, C),
+        "time in s",
+    ),
+    "date and time": ("timestamp,joint_1,joint_2,joint_3\n" + table(STAMPS, A, B, C), "time of day, in s"),
+    "no times": ("Servo1 Position,Servo2 Position,Servo3 Position\n" + table(A, B, C), "time in equal steps"),
+    "counted samples, two dropped": (
+        "seq,q1,q2,q3\n" + table(*(np.delete(each, [7, 30]) for each in (np.arange(60), A, B, C))),
+        r"time in samples \(seq\)",
+    ),
+    "no names": (table(1.7e9 + SECONDS, A, B, C, digits=16), "as it has no names"),
+    "names in a comment": ("# t q1 q2 q3\n" + table(SECONDS, A, B, C, between=" "), "spaces between"),
+    "an index of pandas": (",t,q1,q2,q3\n" + table(range(60), SECONDS, A, B, C), "time from t"),
+    "OpenSim": (
+        "Coordinates\nversion=1\nnRows=60\ninDegrees=yes\nendheader\n"
+        + "time\tjoint_1\tjoint_2\tjoint_3\n"
+        + table(SECONDS, D, E, F, between="\t"),
+        "degrees; time from time; tabs between",
+    ),
+    "a spreadsheet, decimal commas": (
+        "\ufeffZeit (s);Winkel 1 (°);Winkel 2 (°);Winkel 3 (°);\r\n"
+        + table(SECONDS, D, E, F, between=";", comma=True, end=";\r\n"),
+        "degrees; time in s; semicolons between; decimal commas",
+    ),
+    "decimal commas and tabs": (table(SECONDS, A, B, C, between="\t", comma=True), "tabs between; decimal commas"),
+    "UTF-16": (("t\tq1\tq2\tq3\r\n" + table(SECONDS, A, B, C, between="\t")).encode("utf-16"), "tabs between"),
+    "Latin-1": (("t;q1 [°];q2 [°];q3 [°]\n" + table(SECONDS, D, E, F, between=";")).encode("cp1252"), "degrees"),
+    "quoted": ('"t","q1","q2","q3"\n' + table(*([f'"{x:.6f}"' for x in each] for each in (SECONDS, A, B, C))), "from q1"),
+    "thousands": (
+        "t_ms;q1;q2;q3\n" + table([f"{1e4 * s:,.1f}" for s in SECONDS], A, B, C, between=";"),
+        "commas in numbers",
+    ),
+    "equal rows": (
+        "t,q1,q2,q3\n" + "".join(line + "\n" + line + "\n" for line in table(SECONDS, A, B, C).splitlines()),
+        "60 rows like the one before left out",
+    ),
+    "blank cells": (
+        "t,q1,q2,q3\n0,,,\n" + table(SECONDS[1:], A[1:], B[1:], C[1:]) + "4,nan,0.2,-\n",
+        "2 rows with blank cells left out",
+    ),
+    "a last line cut short": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C) + "4.0,0.8", "line 62, the last one, cut short"),
+    "rounded stamps": ("t,q1,q2,q3\n" + table(np.round(SECONDS, 1), A, B, C), "rounded to 0.1 taken as equal steps"),
+    "equal stamps": ("t,q1,q2,q3\n" + table(np.floor(SECONDS), A, B, C), "rounded to 1 taken as equal steps"),
+    "angles without a sign": ("t,q1_deg,q2_deg,q3_deg\n" + table(SECONDS, D % 360, E % 360, F % 360), "whole turns taken out"),
+    "times called otherwise": ("Uhr,Gelenk1,Gelenk2,Gelenk3\n" + table(SECONDS, A, B, C), "time from Uhr"),
+}
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_a_record_is_read_right_and_what_was_taken_is_said(kind, tmp_path):
+    content, said = READ[kind]
+    found = read(tmp_path, content)
+    start = 1 / 60 if kind == "blank cells" else 0.0  # its first sample is blank
+    np.testing.assert_allclose(found.gait.angles(T - start), ANGLES, atol=1e-5)
+    assert found.describe().startswith("read 3 joints ")
+    with pytest.raises(AssertionError, match=said):
+        raise AssertionError(found.describe())
+
+
+REFUSED = {
+    "ticks": (
+        "t,m1,m2,m3\n" + table(SECONDS, *np.round(512 + DEGREES * 1023 / 300)),
+        "m1 goes up to .* like ticks .* of a servo",
+    ),
+    "pulses": ("millis,s1,s2,s3\n" + table(1000 * SECONDS, *np.round(1500 + DEGREES / 0.09)), r"\(microseconds - 1500\)"),
+    "directions of links": ("t,theta1,theta2,theta3,theta4\n" + table(SECONDS, T, A, B, C), "if they are directions of links"),
+    "positions": ("t,x0,y0,x1,y1,x2,y2\n" + table(SECONDS, A, B, C, A, B, C), "look like positions of points"),
+    "leader and follower": ("t,j1,j2,j3,l_j1,l_j2,l_j3\n" + table(SECONDS, A, B, C, A, B, C), "j1 ... j3, and l_j1 ... l_j3"),
+    "one name twice": ("t,q1,q1,q2\n" + table(SECONDS, A, B, C), "two columns are called q1"),
+    "head first, or not": ("t,head,middle,tail\n" + table(SECONDS, A, B, C), "head, middle, tail is not clear"),
+    "a unit of some": ("t,q1_deg,q2,q3_deg\n" + table(SECONDS, D, E, F), "q2 does not: call it q2_deg or q2_rad"),
+    "no number": (
+        "t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n2,", "\n2,E!", 1),
+        r"line 32, column q1: .* is no number: mend it",
+    ),
+    "a longer line": (
+        "t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n", ",1\n", 1) + "4,0,0,0\n",
+        "line 2, has 5 cells, and the lines below have 4",
+    ),
+    "two records": ("t,q1,q2,q3\n" + 2 * table(SECONDS, A, B, C), "the times fall after line 61"),
+    "names twice": (2 * ("t,q1,q2,q3\n" + table(SECONDS, A, B, C)), "line 62, names the columns again"),
+    "commas for both": (
+        "t,q1,q2,q3\n" + table(*(np.round(each + 0.1234, 6) for each in (SECONDS, A, B, C)), comma=True),
+        "line 1, has 4 cells, and the lines below have .* decimal commas",
+    ),
+    "joints by turns": (
+        "t,q1,q2,q3\n" + "".join(f"{s},{x:.4f},,\n{s},,{x:.4f},\n{s},,,{x:.4f}\n" for s, x in zip(SECONDS, A, strict=True)),
+        "only 0 of 180 lines .* write all joints in every line",
+    ),
+    "lists in cells": (
+        "t,positions\n" + "".join(f'{s},"[{a}, {a}]"\n' for s, a in zip(SECONDS, A, strict=True)),
+        "0 columns of angles",
+    ),
+    "another time": ("t,q1,q2,q3\n" + table([f"31.01. {k}h" for k in range(60)], A, B, C), "line 2: the time .* write seconds"),
+    "one instant": (table(np.ones(60), A, B, C), "all times are 1"),
+    "JSON": (b'{"time_s": [0, 1]}', "is no text of numbers"),
+    "a workbook": (b"PK\x03\x04\x14\x00\x06", "save as CSV"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_is_no_record_or_several_is_refused_with_a_cure(kind, tmp_path):
+    content, said = REFUSED[kind]
+    with pytest.raises(colloc.ProblemError, match=said) as refused:
+        read(tmp_path, content)
+    assert "record.csv" in str(refused.value)
+
+
+def test_radians_are_no_degrees_whatever_is_asked_for(tmp_path):
+    with pytest.raises(colloc.ProblemError, match="joint_1_rad holds radians"):
+        read(tmp_path, "t,joint_1_rad,joint_2_rad,joint_3_rad\n" + table(SECONDS, A, B, C), degrees=True)
+
+
+@pytest.mark.parametrize(("periods", "noise"), [(3.0, 0.0), (3.32, 0.02), (1.2, 0.01), (17.3, 0.02)])
+def test_the_period_of_a_record_that_holds_several_is_found(periods, noise, tmp_path):
+    rng = np.random.default_rng(0)
+    t = np.arange(0, periods, 1 / 60) + (rng.uniform(-0.004, 0.004, int(np.ceil(periods * 60))) if periods > 4 else 0.0)
+    angles = GAIT.angles(t) + noise * rng.normal(size=(3, t.size))
+    found = read(tmp_path, "t,q1,q2,q3\n" + table(4 * t, *angles))
+    assert found.period == pytest.approx(4, rel=1e-7 if noise == 0 else 5e-3)
+    np.testing.assert_allclose(found.gait.angles(T - t[0]), ANGLES, atol=1e-6 + 0.8 * noise)
+    assert f"of {found.periods:.3g} periods of" in found.describe()
+
+
+def test_bursts_of_samples_with_one_stamp_are_read_as_well_as_the_stamps_are(tmp_path):
+    t = np.sort(np.random.default_rng(0).uniform(0, 3, 600))
+    t[200:] += 0.6
+    stamps = np.floor(50 * t) / 50
+    found = read(tmp_path, "t,q1,q2,q3\n" + table(stamps, *GAIT.angles(t)))
+    assert found.period == pytest.approx(1, rel=5e-3)
+    assert found.largest < 0.3  # a stamp is 0.02 of a period wide
+    np.testing.assert_allclose(found.gait.angles(T - 0.01 - stamps[0]), ANGLES, atol=0.02)
+
+
+def test_slow_noise_does_not_hide_a_period(tmp_path):
+    rng, t = np.random.default_rng(6), np.arange(0, 3.3, 1 / 40)
+    noise = 0.005 * rng.normal(size=(3, t.size))
+    for k in range(1, t.size):
+        noise[:, k] += 0.7 * noise[:, k - 1]
+    found = read(tmp_path, "t,q1,q2,q3\n" + table(t, *(GAIT.angles(t) + noise)))
+    assert found.period == pytest.approx(1, rel=0.01)
+
+
+def test_a_long_log_is_read_in_seconds(tmp_path):
+    t = np.arange(20_000) / 400
+    begin = time.process_time()
+    found = read(tmp_path, "t,q1,q2,q3\n" + table(4 * t, *GAIT.angles(t)))
+    assert time.process_time() - begin < 10
+    np.testing.assert_allclose(found.gait.angles(T), ANGLES, atol=1e-5)
+    assert "of 20000 rows, one in 4 taken" in found.describe()
+
+
+def test_joints_that_all_move_about_a_right_angle_are_hinted_at(tmp_path):
+    found = read(tmp_path, "t,s1_deg,s2_deg,s3_deg\n" + table(SECONDS, *(DEGREES + 90)))
+    assert found.centre == 90
+    assert "all joints move about 90°, which servos may count from" in found.describe()
+    assert read(tmp_path, "t,s1_deg,s2_deg,s3_deg\n" + table(SECONDS, *DEGREES)).centre == 0
