@@ -130,12 +130,12 @@ def gait(row: Row, starts: int) -> dict[str, Any]:
     backwards where mu_b exceeds mu_f."""
     begin = time.process_time()
     near = [relaxation(other.file("gait")).gait.mean.realised() for other in nearest(row)[:2]]
-    senses = (1,) if Friction(*row.mu).reversible else (1, -1)
+    senses = (1,) if row.friction.reversible else (1, -1)
     first = [replace(one, corners=one.corners[:, ::sense]) for one in near for sense in senses]
     ends = []
     for symmetry in SYMMETRIES:
         problem = Problem(
-            f"frontier-{row.name}", body=row.body, friction=Friction(*row.mu), gait=Relaxed(row.links, symmetry), delta=DELTA,
+            f"frontier-{row.name}", body=row.body, friction=row.friction, gait=Relaxed(row.links, symmetry), delta=DELTA,
             joint_limit=row.limit,
         )  # fmt: skip
         with suppress(NotConvergedError):
@@ -159,13 +159,13 @@ def few(row: Row, starts: int) -> dict[str, Any]:
 def small(row: Row, starts: int) -> dict[str, Any]:
     """The best gait of no size."""
     begin = time.process_time()
-    best, shape = best_small_gait(row.body, Friction(*row.mu), row.limit)
+    best, shape = best_small_gait(row.body, row.friction, row.limit)
     return {"efficiency": best.efficiency, "shape": shape.tolist(), "seconds": time.process_time() - begin}
 
 
 def loop(row: Row, starts: int) -> dict[str, Any]:
     """The best polygon of a short path, begun about the shape of the best gait of no size, where links keep their width."""
-    begin, friction = time.process_time(), Friction(*row.mu)
+    begin, friction = time.process_time(), row.friction
     shape = np.array(read()[f"{row.name} small"]["shape"])
     path = small_gait(row.body, friction, shape).path(shape, 1.2 * 2 * np.pi * SPEED)
     inside = min(1.0, largest_factor(row.body, row.limit, Corners(path).angles(np.linspace(0.0, 1.0, 401))))
@@ -187,11 +187,11 @@ def bound(row: Row, starts: int) -> dict[str, Any]:
     """The sampled bound: that of a kept potential, looked for anew, or a new one."""
     begin = time.process_time()
     for domain, space, free, program in potentials():
-        if (domain.body, domain.friction) == (row.body, Friction(*row.mu)) and abs(domain.joint_limit - row.limit) < 1e-9:
+        if (domain.body, domain.friction) == (row.body, row.friction) and abs(domain.joint_limit - row.limit) < 1e-9:
             top = largest_ratio(domain, space, free)[0]
             seconds = time.process_time() - begin
             return {"sampled": top, "floor": program, "converged": True, "unknowns": space.size, "seconds": seconds}
-    friction = Friction(*row.mu)
+    friction = row.friction
     budget = BUDGET if row.links <= 3 else usual_budget(row.body)
     if friction.reversible and row.links > 3:
         budget = replace(budget, harmonics=MORE)

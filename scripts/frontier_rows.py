@@ -10,6 +10,7 @@ import numpy as np
 
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import gap
+from colloc.mechanics.friction import Friction
 from colloc.system.replaced_file import replaced_file
 
 STORE, GAITS = Path("results/curated/frontier.json"), Path("results/frontier")
@@ -32,6 +33,11 @@ class Row(NamedTuple):
     @property
     def body(self) -> Chain:
         return Chain((1 / self.links,) * self.links, width=self.width)
+
+    @property
+    def friction(self) -> Friction:
+        mu_t, mu_f, mu_b = self.mu
+        return Friction(mu_t=mu_t, mu_f=mu_f, mu_b=mu_b)
 
     def file(self, part: str) -> Path:
         return GAITS / f"{self.name}-{part}.h5"

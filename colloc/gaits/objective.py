@@ -15,7 +15,7 @@ import numpy as np
 
 from colloc.mechanics.densities import INTEGRALS, Quantity, quantities_of
 from colloc.numerics.expression import Dual, Formula, formula
-from colloc.system.arguments import is_number
+from colloc.system.arguments import is_number, named_arguments
 from colloc.system.errors import ProblemError
 
 QUANTITIES = {
@@ -34,6 +34,7 @@ _OTHERS = 1.9, 3.3
 """Periods at which an expression is tried when it is stated, and all other quantities there."""
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Objective:
     """A value of what a period comes to.

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from colloc.gaits.problem import Problem
-from colloc.system.arguments import is_whole
+from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.sealed_file import LONGEST_TEXT
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Reference:
     """A value to hold the result against.

@@ -17,7 +17,7 @@ from colloc.gaits.gait import DELTA_START, ClassOfGaits
 from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, SYMMETRIES
-from colloc.system.arguments import is_whole
+from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _IDLE = 1e-9
@@ -26,6 +26,7 @@ _PIECES, _PARAMETERS = 240, 400
 """Pieces over a period, and at most so many parameters of the part that is solved: as many as a dense search can take."""
 
 
+@named_arguments
 @dataclass(frozen=True, eq=False)
 class Mixture:
     """A relaxed gait, piece by piece: on each the mixture is constant, so that the mean shape moves on a straight line.
@@ -210,6 +211,7 @@ class Mixture:
         return Corners.through(vertices, BILATERAL if self.symmetry == BOTH else self.symmetry)
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Relaxed(ClassOfGaits):
     """Relaxed gaits: at each instant a mixture of a few directions of joint rates, constant on every piece of the period.

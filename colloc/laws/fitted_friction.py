@@ -132,7 +132,7 @@ def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
     """Coulomb's, where no coefficient knows the speed; else one of formulas."""
     forwards, sideways, backwards = fits[0], fits[1], fits[-1] if len(fits) > 2 else fits[0]
     if not any(fit[1:].any() for fit in fits):
-        return Friction(*(float(fit[0]) for fit in (sideways, forwards, backwards)))
+        return Friction(mu_t=sideways[0], mu_f=forwards[0], mu_b=backwards[0])
     along, across, back = (_formula(fit, v_s) for fit in (forwards, sideways, backwards))
     if back != along:
         along = f"where(vs > 0, {along}, {back})"

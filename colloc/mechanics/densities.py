@@ -18,7 +18,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.expression import FUNCTIONS, Formula, formula
-from colloc.system.arguments import is_number
+from colloc.system.arguments import is_number, named_arguments
 from colloc.system.errors import ProblemError
 
 VARIABLES = {
@@ -161,6 +161,7 @@ class OfInstants:
             raise ProblemError(f"{what}: '{self.text}' has no finite value at a usual instant.")
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Quantity(OfInstants):
     """An integral over a period of a function of an instant, for objectives to speak of.
@@ -238,6 +239,7 @@ def quantities_of(asked: Any) -> tuple[Quantity, ...]:
     return tuple(each if isinstance(each, Quantity) else INTEGRALS[each] for each in asked)
 
 
+@named_arguments
 @dataclass(frozen=True)
 class PathLimit(OfInstants):
     """The most that a function of an instant may be, at every instant of a period.

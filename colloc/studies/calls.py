@@ -263,7 +263,7 @@ def sweep(
     >>> def problem(mu_t):
     ...     return colloc.Problem(
     ...         "grid",
-    ...         friction=colloc.Friction(mu_t),
+    ...         friction=colloc.Friction(mu_t=mu_t),
     ...         gait=colloc.Harmonic(1, "bilateral"),
     ...         delta=1e-2,
     ...     )

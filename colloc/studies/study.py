@@ -17,7 +17,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import place_of, stated_names, words_of
-from colloc.system.arguments import is_whole
+from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.result_names import check_name
 
@@ -25,6 +25,7 @@ Index = tuple[int, ...]
 MOST_CELLS = 1_000_000
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Axis:
     """One direction of a grid.
@@ -71,6 +72,7 @@ class Axis:
         return isinstance(self.values[0], str)
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Study:
     """A grid of problems, and how hard to search each cell.
@@ -98,7 +100,7 @@ class Study:
     --------
     >>> import colloc
     >>> def problem(mu_b):
-    ...     return colloc.Problem("grid", friction=colloc.Friction(1, 1, mu_b), gait=colloc.Harmonic(1, "bilateral"))
+    ...     return colloc.Problem("grid", friction=colloc.Friction(mu_t=1, mu_f=1, mu_b=mu_b), gait=colloc.Harmonic(1, "bilateral"))
     >>> study = colloc.Study("grid", (colloc.Axis("mu_b", (1, 2)),), problem)
     >>> study.shape
     (2,)

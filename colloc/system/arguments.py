@@ -1,17 +1,21 @@
-"""Arguments of the classes that people write by hand: misspelt or unusable ones meet a sentence that says so."""
+"""Arguments of what people call by hand: misspelt or unusable ones meet a sentence that says so."""
 
 from __future__ import annotations
 
 import functools
 import inspect
 import math
-from typing import Any, TypeGuard, TypeVar
+import reprlib
+from collections.abc import Callable, Iterable, Mapping
+from types import NoneType, UnionType
+from typing import Any, ParamSpec, TypeGuard, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 
 from colloc.system.errors import ProblemError
 
 T = TypeVar("T")
+P = ParamSpec("P")
 STATED_IF_SET = {"stated if set": True}
 """Metadata of a field that statements name only where it is not its default: what was stated before there was one, stays."""
 
@@ -19,12 +23,17 @@ STATED_IF_SET = {"stated if set": True}
 def named_arguments(cls: type[T]) -> type[T]:
     """Make a dataclass refuse arguments it does not have, or lacks, by a `ProblemError` that says which one is meant.
 
+    Numbers become Python's own, of the kind that the field has: equal values have equal hashes. Fields that the class names in
+    `by_name` must be given so where they differ.
+
     Examples
     --------
     >>> from colloc import Friction
     >>> Friction(mu_x=1)
     Traceback (most recent call last):
     colloc.system.errors.ProblemError: Friction has no argument 'mu_x'; did you mean mu_t, mu_f or mu_b?
+    >>> Friction(1) == Friction(1.0)
+    True
     """
     made = cls.__init__
     _, *taken = inspect.signature(made).parameters.values()  # without self
@@ -43,10 +52,127 @@ def named_arguments(cls: type[T]) -> type[T]:
             raise ProblemError(f"{cls.__name__} has {len(known)} arguments, {', '.join(known)}, and {len(given)} were given.")
         if missing := [name for name in needed if name in known[len(given) :] and name not in named]:
             raise ProblemError(f"{cls.__name__} needs {' and '.join(missing)}.")
-        made(self, *given, **named)
+        stated = {**dict(zip(known, given, strict=False)), **named}
+        if len(stated) < len(given) + len(named):
+            raise ProblemError(f"{cls.__name__} was given {known[len(given) - 1]} twice, by its place and by its name.")
+        scalars = _scalars(made)
+        try:
+            made(self, **{name: _plain(value, scalars.get(name)) for name, value in stated.items()})
+        except (TypeError, ValueError, ArithmeticError, AttributeError) as error:
+            if not isinstance(error, ProblemError):
+                _check_kinds(scalars, stated)
+            raise
+        _check_kinds(scalars, stated)  # last, as its own checks know better what is wrong
+        order = getattr(cls, "by_name", ())
+        placed = [f"{getattr(self, name):g}" for name in known[: len(given)] if name in order]
+        if placed and len({getattr(self, name) for name in order}) > 1:
+            one = len(placed) == 1
+            readings = (order, placed), (order, placed * len(order)) if one else ((*order[1:], order[0]), placed)
+            texts = (", ".join(map("=".join, zip(*each, strict=False))) for each in readings)
+            raise ProblemError(
+                f"{cls.__name__} takes coefficients that differ by name, as texts and programs order them differently: "
+                f"{', or '.join(texts)}?"
+            )
 
     cls.__init__ = checked  # type: ignore[assignment]
     return cls
+
+
+def checked_arguments(function: Callable[P, T]) -> Callable[P, T]:
+    """The same function, which refuses arguments that are of no kind its annotations name, by a `ProblemError`."""
+
+    @functools.wraps(function)
+    def checked(*given: P.args, **named: P.kwargs) -> T:
+        try:
+            stated = inspect.signature(function).bind(*given, **named).arguments
+        except TypeError as error:
+            raise ProblemError(f"{function.__name__}: {error}.") from None
+        _check_kinds(_kinds(function), stated)
+        return function(*given, **named)
+
+    return checked
+
+
+@functools.cache
+def _kinds(function: Callable[..., Any]) -> dict[str, Any]:
+    """What the annotations of a function stand for; not those that only type checkers can resolve."""
+    found = {}
+    for name, each in inspect.signature(function).parameters.items():
+        try:
+            found[name] = eval(each.annotation, function.__globals__)  # type: ignore[attr-defined]
+        except (NameError, TypeError):
+            continue
+    return found
+
+
+@functools.cache
+def _scalars(function: Callable[..., Any]) -> dict[str, Any]:
+    return {name: kind for name, kind in _kinds(function).items() if set(_alternatives(kind)) <= _SCALARS}
+
+
+def _alternatives(kind: Any) -> tuple[Any, ...]:
+    return get_args(kind) if get_origin(kind) in (Union, UnionType) else (NoneType if kind is None else kind,)
+
+
+def _check_kinds(kinds: Mapping[str, Any], stated: Mapping[str, Any]) -> None:
+    for name, value in stated.items():
+        allowed = _alternatives(kinds.get(name, Any))
+        if not any(_fits(value, kind) for kind in allowed):
+            words = _either(list(dict.fromkeys(map(_words, allowed))))
+            raise ProblemError(f"{name} must be {words}, not {shown(value)}.")
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    if kind is float:  # whether infinite ones will do is for others to say
+        return is_number(value) or (isinstance(value, (float, np.floating)) and not np.isnan(value))
+    if kind is int:
+        return is_whole(value, -(2**63), 2**63)
+    if kind is bool:
+        return isinstance(value, (bool, np.bool_))
+    if kind is np.ndarray:
+        return _are_numbers(value)
+    kind = get_origin(kind) or kind
+    if kind is Callable:
+        return callable(value)
+    if isinstance(kind, type) and issubclass(kind, Iterable) and not issubclass(kind, str):
+        return isinstance(value, Iterable) and hasattr(value, "__len__") and not isinstance(value, (str, bytes))
+    return kind is Any or not isinstance(kind, type) or (not isinstance(value, type) and isinstance(value, kind))
+
+
+def _are_numbers(value: Any) -> bool:
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        return False
+    return array.ndim > 0 and (array.dtype.kind in "iuf" or not array.size) and bool(np.isfinite(array).all())
+
+
+_SCALARS = {float, int, bool, str, NoneType}
+_WORDS = {
+    float: "a number", int: "a whole number", bool: "True or False", str: "text", NoneType: "None", np.ndarray: "finite numbers",
+    Callable: "a function", Iterable: "a sequence",
+}  # fmt: skip
+
+
+def _words(kind: Any) -> str:
+    kind = get_origin(kind) or kind
+    if isinstance(kind, type) and issubclass(kind, Iterable) and kind not in _WORDS:
+        kind = Iterable
+    return _WORDS.get(kind) or f"a {kind.__name__.removeprefix('PathLike') or 'path'}"
+
+
+def _plain(value: Any, kind: Any) -> Any:
+    """A number as a field of its kind stores it; all else as it is."""
+    found = (each(value) for each in _alternatives(kind) if each in (float, int, bool) and _fits(value, each))
+    return next(found, value)
+
+
+def shown(value: object) -> str:
+    """A value as a message shows it, in one short line."""
+    try:
+        return reprlib.repr(value)
+    except Exception:  # of a `__repr__` of somebody's own
+        return f"<{type(value).__name__}>"
 
 
 def _either(names: list[str]) -> str:
@@ -56,7 +182,7 @@ def _either(names: list[str]) -> str:
 def is_number(value: object) -> TypeGuard[float]:
     """Whether it is a finite real number, and no truth value; a whole one that NumPy takes."""
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    return real and bool(abs(value) < (2**63 if isinstance(value, int) else math.inf))  # type: ignore[arg-type]
+    return real and (abs(value) < 2**63 if isinstance(value, int) else math.isfinite(float(value)))  # type: ignore[arg-type]
 
 
 def is_whole(value: object, least: float = -math.inf, most: float = math.inf) -> TypeGuard[int]:
@@ -69,7 +195,7 @@ def check_finite(positive: bool = False, **numbers: object) -> None:
     """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is asked)."""
     for name, value in numbers.items():
         if not is_number(value) or (positive and not value > 0):
-            raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {value!r}.")
+            raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {shown(value)}.")
 
 
 def check_positive(owner: object, *names: str, of: str = "") -> None:

@@ -70,7 +70,7 @@ def heading_map(
     --------
     >>> import colloc
     >>> gait = colloc.Fourier([0, 0], [[1.5], [0]], [[0], [1]])
-    >>> at = colloc.Chain(), colloc.Friction(2, 1, 1), gait
+    >>> at = colloc.Chain(), colloc.Friction(mu_t=2, mu_f=1, mu_b=1), gait
     >>> found = colloc.heading_map(*at, delta=1e-2, grade=0.1, count=4, tolerance=1e-4)
     >>> [(round(float(ran.headings[0]), 2), ran.stable) for ran in found.lasting]
     [(-3.13, True), (-0.01, False)]

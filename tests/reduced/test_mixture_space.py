@@ -19,7 +19,7 @@ def begun(symmetry, links=3, directions=3, pieces=5, far=()):
     problem = Problem(
         "relaxed",
         body=Chain((1 / links,) * links),
-        friction=Friction(1.5, 1, 1.2),
+        friction=Friction(mu_t=1.5, mu_f=1, mu_b=1.2),
         gait=Relaxed(directions, symmetry),
         joint_limit=2.0,
     )
