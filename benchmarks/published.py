@@ -253,7 +253,9 @@ def amplitude_exponent() -> Row:
     frictions, best = (1e3, 1e4, 1e5), []
     for mu in frictions:
         search = {"bounds": (0.05, 1.0), "method": "bounded", "options": {"xatol": 1e-4}}
-        best.append(minimize_scalar(lambda a, mu=mu: -_efficiency(sine_wave(a, 2.0), Friction(mu_t=mu, mu_f=1, mu_b=1)), **search).x)
+        best.append(
+            minimize_scalar(lambda a, mu=mu: -_efficiency(sine_wave(a, 2.0), Friction(mu_t=mu, mu_f=1, mu_b=1)), **search).x
+        )
     slopes = np.diff(np.log(best)) / np.diff(np.log(frictions))
     ours = f"{slopes[0]:.4f} from mu_t = 1e3 to 1e4, {slopes[1]:.4f} to 1e5"
     holds = abs(slopes[1] + 0.25) < 5e-3 and abs(slopes[1] + 0.25) < abs(slopes[0] + 0.25)

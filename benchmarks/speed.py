@@ -104,7 +104,9 @@ def grown(links: int = 3, harmonics: int = 1, intervals: int = 24, feet: int = 0
 def swept(cells: int) -> object:
     """A study of so many coefficients of friction."""
     axis = colloc.Axis("mu_t", tuple(np.geomspace(0.5, 8.0, cells)))
-    return colloc.sweep(colloc.Study("grown", (axis,), lambda mu_t: grown().with_(friction=colloc.Friction(mu_t=mu_t, mu_f=1, mu_b=1))))
+    return colloc.sweep(
+        colloc.Study("grown", (axis,), lambda mu_t: grown().with_(friction=colloc.Friction(mu_t=mu_t, mu_f=1, mu_b=1)))
+    )
 
 
 def growth(quick: bool) -> str:

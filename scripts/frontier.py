@@ -36,7 +36,6 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import gap
-from colloc.mechanics.friction import Friction
 from colloc.results.relaxation import Relaxation
 from colloc.results.solution import SOLVED, Solution
 from colloc.results.store import load, save

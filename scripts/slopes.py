@@ -88,7 +88,14 @@ def figure(curves: list[Curve], path: Path) -> None:
         left.legend()
         for colour, heading in zip(SERIES, _HEADINGS, strict=False):
             ran = slope_motion(
-                Chain(), Friction(mu_t=2, mu_f=1, mu_b=1), TURNING, 1e-3, _GRADE, heading=heading, periods=_PERIODS, tolerance=1e-4
+                Chain(),
+                Friction(mu_t=2, mu_f=1, mu_b=1),
+                TURNING,
+                1e-3,
+                _GRADE,
+                heading=heading,
+                periods=_PERIODS,
+                tolerance=1e-4,
             )
             right.plot(
                 np.append(0, -np.cumsum(ran.aside)), np.append(0, np.cumsum(ran.climb)), ".-", color=colour, markersize=3

@@ -139,7 +139,7 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
     if size > LONGEST_TEXT:
         raise ProblemError(_too_long(str(path), size))
     try:
-        source = content.decode("utf-8")
+        source = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ProblemError(f"{path} is no text in UTF-8 (byte {error.start}), so no {kind} file.") from None
     names: dict[str, object] = {"__name__": f"colloc_{kind}", "__file__": str(path)}

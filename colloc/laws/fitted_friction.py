@@ -12,6 +12,7 @@ information criterion, with more samples left than numbers by two at least; v_S 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,10 @@ class FittedFriction:
 
 
 def fitted_friction(
-    table: str | os.PathLike[str] | np.ndarray, *, length: float | None = None, period: float | None = None
+    table: str | os.PathLike[str] | np.ndarray | Sequence[Sequence[Any]],
+    *,
+    length: float | None = None,
+    period: float | None = None,
 ) -> FittedFriction:
     """The law of friction that measured coefficients are samples of.
 

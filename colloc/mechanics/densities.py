@@ -233,7 +233,7 @@ INTEGRALS = {each.name: each for each in (LENGTH, DRIVEN_WORK)}
 
 def quantities_of(asked: Any) -> tuple[Quantity, ...]:
     """Quantities by their names, or as they are. `ProblemError` for a name that is none."""
-    for each in asked:
+    for each in asked if isinstance(asked, Iterable) else (asked,):
         if not isinstance(each, Quantity) and each not in INTEGRALS:
             raise ProblemError(f"{each!r} is no quantity: name one of {', '.join(INTEGRALS)}, or state a Quantity.")
     return tuple(each if isinstance(each, Quantity) else INTEGRALS[each] for each in asked)

@@ -18,6 +18,7 @@ from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
 from colloc.search.solve import solve
+from colloc.system.arguments import check_count
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.verification.replayer import replayer
@@ -110,6 +111,7 @@ def pareto_front(
     aims = objective_from(first), objective_from(second)
     if aims[0].expression == aims[1].expression:
         raise ProblemError(f"a front needs two objectives, not {aims[0].name} twice.")
+    check_count(starts=starts)
     if points < 2:
         raise ProblemError(f"a front has at least 2 points, not {points}.")
     found: dict[int, Solution] = {}

@@ -6,16 +6,19 @@ import functools
 import inspect
 import math
 import reprlib
-from collections.abc import Callable, Iterable, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import NoneType, UnionType
 from typing import Any, ParamSpec, TypeGuard, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 
-from colloc.system.errors import ProblemError
+from colloc.system.errors import OrderWarning, ProblemError
 
 T = TypeVar("T")
 P = ParamSpec("P")
+MOST_PERIODS = 10_000
+"""That are followed one by one."""
 STATED_IF_SET = {"stated if set": True}
 """Metadata of a field that statements name only where it is not its default: what was stated before there was one, stays."""
 
@@ -23,8 +26,8 @@ STATED_IF_SET = {"stated if set": True}
 def named_arguments(cls: type[T]) -> type[T]:
     """Make a dataclass refuse arguments it does not have, or lacks, by a `ProblemError` that says which one is meant.
 
-    Numbers become Python's own, of the kind that the field has: equal values have equal hashes. Fields that the class names in
-    `by_name` must be given so where they differ.
+    Numbers become Python's own, of the kind that the field has: equal values have equal hashes. Those of `by_name`,
+    if the class has it, are to be given so where they differ: else an `OrderWarning` says how they are read.
 
     Examples
     --------
@@ -57,21 +60,20 @@ def named_arguments(cls: type[T]) -> type[T]:
             raise ProblemError(f"{cls.__name__} was given {known[len(given) - 1]} twice, by its place and by its name.")
         scalars = _scalars(made)
         try:
-            made(self, **{name: _plain(value, scalars.get(name)) for name, value in stated.items()})
+            made(self, **{name: _plain(value, scalars.get(name, ())) for name, value in stated.items()})
         except (TypeError, ValueError, ArithmeticError, AttributeError) as error:
             if not isinstance(error, ProblemError):
                 _check_kinds(scalars, stated)
             raise
         _check_kinds(scalars, stated)  # last, as its own checks know better what is wrong
-        order = getattr(cls, "by_name", ())
-        placed = [f"{getattr(self, name):g}" for name in known[: len(given)] if name in order]
-        if placed and len({getattr(self, name) for name in order}) > 1:
-            one = len(placed) == 1
-            readings = (order, placed), (order, placed * len(order)) if one else ((*order[1:], order[0]), placed)
-            texts = (", ".join(map("=".join, zip(*each, strict=False))) for each in readings)
-            raise ProblemError(
-                f"{cls.__name__} takes coefficients that differ by name, as texts and programs order them differently: "
-                f"{', or '.join(texts)}?"
+        order = {name: getattr(self, name) for name in getattr(cls, "by_name", ())}
+        if len(set(order.values())) > 1 and order.keys() & known[: len(given)]:
+            read = ", ".join(f"{name}={value:g}" for name, value in order.items())
+            warnings.warn(
+                f"coefficients by their place, which others write in another order, are read as {cls.__name__}({read}): name "
+                "them, as here.",
+                OrderWarning,
+                stacklevel=2,
             )
 
     cls.__init__ = checked  # type: ignore[assignment]
@@ -94,29 +96,31 @@ def checked_arguments(function: Callable[P, T]) -> Callable[P, T]:
 
 
 @functools.cache
-def _kinds(function: Callable[..., Any]) -> dict[str, Any]:
-    """What the annotations of a function stand for; not those that only type checkers can resolve."""
+def _kinds(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
+    """What the annotations of a function allow; not those that only type checkers can resolve."""
     found = {}
     for name, each in inspect.signature(function).parameters.items():
         try:
-            found[name] = eval(each.annotation, function.__globals__)  # type: ignore[attr-defined]
+            found[name] = _alternatives(eval(each.annotation, function.__globals__))
         except (NameError, TypeError):
             continue
+        if each.default is None:
+            found[name] = *found[name], NoneType
     return found
 
 
 @functools.cache
-def _scalars(function: Callable[..., Any]) -> dict[str, Any]:
-    return {name: kind for name, kind in _kinds(function).items() if set(_alternatives(kind)) <= _SCALARS}
+def _scalars(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
+    return {name: kinds for name, kinds in _kinds(function).items() if set(kinds) <= _SCALARS}
 
 
 def _alternatives(kind: Any) -> tuple[Any, ...]:
     return get_args(kind) if get_origin(kind) in (Union, UnionType) else (NoneType if kind is None else kind,)
 
 
-def _check_kinds(kinds: Mapping[str, Any], stated: Mapping[str, Any]) -> None:
+def _check_kinds(kinds: Mapping[str, tuple[Any, ...]], stated: Mapping[str, Any]) -> None:
     for name, value in stated.items():
-        allowed = _alternatives(kinds.get(name, Any))
+        allowed = kinds.get(name, (Any,))
         if not any(_fits(value, kind) for kind in allowed):
             words = _either(list(dict.fromkeys(map(_words, allowed))))
             raise ProblemError(f"{name} must be {words}, not {shown(value)}.")
@@ -131,11 +135,12 @@ def _fits(value: Any, kind: Any) -> bool:
         return isinstance(value, (bool, np.bool_))
     if kind is np.ndarray:
         return _are_numbers(value)
-    kind = get_origin(kind) or kind
+    kind, (item, *_) = get_origin(kind) or kind, (*get_args(kind), Any)
     if kind is Callable:
         return callable(value)
-    if isinstance(kind, type) and issubclass(kind, Iterable) and not issubclass(kind, str):
-        return isinstance(value, Iterable) and hasattr(value, "__len__") and not isinstance(value, (str, bytes))
+    if kind in _SEQUENCES:
+        many = isinstance(value, Iterable) and hasattr(value, "__len__") and not isinstance(value, (str, bytes, Mapping))
+        return many and all(any(_fits(part, each) for each in _alternatives(item)) for part in value)
     return kind is Any or not isinstance(kind, type) or (not isinstance(value, type) and isinstance(value, kind))
 
 
@@ -144,26 +149,27 @@ def _are_numbers(value: Any) -> bool:
         array = np.asarray(value)
     except ValueError:  # rows of different lengths
         return False
-    return array.ndim > 0 and (array.dtype.kind in "iuf" or not array.size) and bool(np.isfinite(array).all())
+    return array.ndim > 0 and (array.dtype.kind in "iuf" or not array.size)
 
 
+_SEQUENCES = tuple, list, Sequence, Iterable
 _SCALARS = {float, int, bool, str, NoneType}
 _WORDS = {
-    float: "a number", int: "a whole number", bool: "True or False", str: "text", NoneType: "None", np.ndarray: "finite numbers",
-    Callable: "a function", Iterable: "a sequence",
+    float: "a number", int: "a whole number", bool: "True or False", str: "text", NoneType: "None", np.ndarray: "numbers",
+    Callable: "a function",
 }  # fmt: skip
 
 
 def _words(kind: Any) -> str:
     kind = get_origin(kind) or kind
-    if isinstance(kind, type) and issubclass(kind, Iterable) and kind not in _WORDS:
-        kind = Iterable
+    if kind in _SEQUENCES:
+        return "a sequence"
     return _WORDS.get(kind) or f"a {kind.__name__.removeprefix('PathLike') or 'path'}"
 
 
-def _plain(value: Any, kind: Any) -> Any:
+def _plain(value: Any, kinds: tuple[Any, ...]) -> Any:
     """A number as a field of its kind stores it; all else as it is."""
-    found = (each(value) for each in _alternatives(kind) if each in (float, int, bool) and _fits(value, each))
+    found = (each(value) for each in kinds if each in (float, int, bool) and _fits(value, each))
     return next(found, value)
 
 
@@ -196,6 +202,14 @@ def check_finite(positive: bool = False, **numbers: object) -> None:
     for name, value in numbers.items():
         if not is_number(value) or (positive and not value > 0):
             raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {shown(value)}.")
+
+
+def check_count(most: float = math.inf, **numbers: object) -> None:
+    """A `ProblemError` for the first of some numbers that is not whole, at least 1 and at most another."""
+    for name, value in numbers.items():
+        if not is_whole(value, 1, most):
+            ends = "of at least 1" if most == math.inf else f"from 1 to {most}"
+            raise ProblemError(f"{name} must be a whole number {ends}, not {shown(value)}.")
 
 
 def check_positive(owner: object, *names: str, of: str = "") -> None:

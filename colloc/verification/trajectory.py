@@ -21,7 +21,7 @@ from colloc.system.errors import ProblemError
 from colloc.verification.played import Path
 
 _PHASES = np.linspace(0.0, 1.0, 20001)
-_MOST_SAMPLES = 2_000_000
+MOST_SAMPLES = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def timed(
             f"a period of {wanted:g} s is too short for the joint speed limits{kept}; use at least {shortest:.6g} s."
         )
     count = int(np.ceil(wanted * rate - 1e-9))
-    if not 4 <= count <= _MOST_SAMPLES:
+    if not 4 <= count <= MOST_SAMPLES:
         raise ProblemError(f"{count} samples a period are too {'few' if count < 4 else 'many'}; change the rate or the period.")
     period = count / rate
     pace = np.maximum(_level(slowest, period), slowest)

@@ -439,7 +439,9 @@ def test_the_exchange_does_not_drop_what_it_will_miss():
     assert program.settle(0.01) < program.best.value + 0.01
 
 
-@pytest.mark.parametrize("changes", [{"friction": Viscous(normal=2.0, tangential=1.0)}, {"body": ModalBody(2)}], ids=["drag", "smooth"])
+@pytest.mark.parametrize(
+    "changes", [{"friction": Viscous(normal=2.0, tangential=1.0)}, {"body": ModalBody(2)}], ids=["drag", "smooth"]
+)
 def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_path):
     usual = {"guess": None, "body": Chain(), "friction": Friction(), "gait": Harmonic(1, "antipodal")}
     problem = Problem("other", **(usual | changes))

@@ -71,7 +71,9 @@ def test_every_hard_instant_against_the_reference(coefficients, delta):
 
 
 def test_coefficients_equal_up_to_rounding_give_the_isotropic_answer():
-    one, other = (solve_balance(BODY, Friction(mu_t=1, mu_f=mu_f, mu_b=1), ANGLES, RATES, 1e-8).z for mu_f in (1.0, 1.0 + 1e-15))
+    one, other = (
+        solve_balance(BODY, Friction(mu_t=1, mu_f=mu_f, mu_b=1), ANGLES, RATES, 1e-8).z for mu_f in (1.0, 1.0 + 1e-15)
+    )
     np.testing.assert_allclose(one / SPEED, other / SPEED, atol=1e-10)
 
 

@@ -22,7 +22,13 @@ from colloc.smooth.modal_body import ModalBody
 
 LENGTHS = Chain().length_column()
 OWN = OwnLaw("-where(vs > 0, 1, 1.5)*vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))")
-EVERY = [Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5), Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.5), Viscous(normal=1.8, tangential=1.0), PowerLaw(0.4, mu_t=2.0, mu_f=1.0, mu_b=1.5), OWN]
+EVERY = [
+    Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5),
+    Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.5),
+    Viscous(normal=1.8, tangential=1.0),
+    PowerLaw(0.4, mu_t=2.0, mu_f=1.0, mu_b=1.5),
+    OWN,
+]
 ASSOCIATED = [Elliptic(mu_t=0.3, mu_f=1.0, mu_b=4.0), Viscous(normal=1.8, tangential=1.0), PowerLaw(0.4, 1.5, 1.5, 1.5)]
 each = pytest.mark.parametrize("law", EVERY, ids=lambda law: type(law).__name__)
 each_associated = pytest.mark.parametrize("law", ASSOCIATED, ids=lambda law: type(law).__name__)
@@ -192,14 +198,19 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
 
 
 def test_bounds_of_the_two_laws_are_kept_apart():
-    keys = {bound_key(Domain(Chain(), law, 3.0), QUICK) for law in (Friction(mu_t=2, mu_f=1, mu_b=1), Elliptic(mu_t=2, mu_f=1, mu_b=1))}
+    keys = {
+        bound_key(Domain(Chain(), law, 3.0), QUICK)
+        for law in (Friction(mu_t=2, mu_f=1, mu_b=1), Elliptic(mu_t=2, mu_f=1, mu_b=1))
+    }
     assert len(keys) == 2
 
 
 def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
     for vs, vn in ((2.0, 0.0), (-2.0, 0.0), (0.0, 3.0)):
         at = np.array([[vs]]), np.array([[vn]]), 1e-12
-        np.testing.assert_allclose(Elliptic(mu_t=2, mu_f=1, mu_b=5).density(*at), Friction(mu_t=2, mu_f=1, mu_b=5).density(*at), rtol=1e-14)
+        np.testing.assert_allclose(
+            Elliptic(mu_t=2, mu_f=1, mu_b=5).density(*at), Friction(mu_t=2, mu_f=1, mu_b=5).density(*at), rtol=1e-14
+        )
 
 
 @pytest.mark.skipif(native_kernel() is None, reason="no C compiler")

@@ -19,7 +19,14 @@ PADDED = {
     "pads": tuple(Pad(link, 0.25, 0.75) for link in range(3)),
     "pads and a wheel": (Pad(0, 0.2, 0.8), Pad(1, 0, 1), Wheel(2, 0.5)),
 }
-LAWS = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), Elliptic(mu_t=2, mu_f=1, mu_b=1.5), Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")]
+LAWS = [
+    Friction(),
+    Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    Elliptic(mu_t=2, mu_f=1, mu_b=1.5),
+    Viscous(),
+    PowerLaw(0.5),
+    OwnLaw("-vs/speed", "-2*vn/speed"),
+]
 
 
 def feet_in_the_lab(body, angles, rates, z):

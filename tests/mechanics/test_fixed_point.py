@@ -12,7 +12,14 @@ from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError, ProblemError
 
 ISOTROPIC = Friction()
-FRICTIONS = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), Friction(mu_t=10, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=1, mu_b=5), Friction(mu_t=1, mu_f=1, mu_b=3), Friction(mu_t=3, mu_f=1, mu_b=1)]
+FRICTIONS = [
+    Friction(),
+    Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    Friction(mu_t=10, mu_f=1, mu_b=1),
+    Friction(mu_t=0.5, mu_f=1, mu_b=5),
+    Friction(mu_t=1, mu_f=1, mu_b=3),
+    Friction(mu_t=3, mu_f=1, mu_b=1),
+]
 
 
 def random_instants(seed, count, n_joint=2):

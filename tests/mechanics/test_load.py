@@ -20,7 +20,13 @@ ON_FEET = Chain(
 )  # fmt: skip
 HELD = {BODY: 1.0, ON_FEET: 0.4}
 """What friction of coefficient 1 holds in every shape, about."""
-LAWS = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), Friction(mu_t=10, mu_f=1, mu_b=3), Elliptic(mu_t=2, mu_f=1, mu_b=1.5), OwnLaw("-vs/speed", "-2*vn/speed")]
+LAWS = [
+    Friction(),
+    Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    Friction(mu_t=10, mu_f=1, mu_b=3),
+    Elliptic(mu_t=2, mu_f=1, mu_b=1.5),
+    OwnLaw("-vs/speed", "-2*vn/speed"),
+]
 
 
 def random_loads(count, size, seed=3):

@@ -12,10 +12,21 @@ from colloc.mechanics.native_kernel import native_kernel
 LENGTHS = (0.3, 0.45, 0.25)
 WEIGHTS = (0.2, 0.5, 0.3)
 PADS = (Pad(0, 0.1, 0.6), Pad(1, 0.2, 0.5, offset=0.05), Pad(1, 0.2, 0.5, offset=-0.05), Pad(2, 0.0, 1.0))
-OWN = (Pad(0, 0.1, 0.6, friction=Elliptic(mu_t=2, mu_f=1, mu_b=1.5)), Pad(1), Pad(2, 0.4, 0.5, friction=Friction(mu_t=0.5, mu_f=1, mu_b=2)))
+OWN = (
+    Pad(0, 0.1, 0.6, friction=Elliptic(mu_t=2, mu_f=1, mu_b=1.5)),
+    Pad(1),
+    Pad(2, 0.4, 0.5, friction=Friction(mu_t=0.5, mu_f=1, mu_b=2)),
+)
 MIXED = (Foot(0), Pad(1, 0.3, 0.9), Wheel(1, 0.1, rolling=0.2), Pad(2, 0.0, 0.2, friction=Friction(mu_t=0.5, mu_f=1, mu_b=2)))
 STANDS = {"pads": PADS, "own": OWN, "mixed": MIXED}
-LAWS = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), Elliptic(mu_t=2, mu_f=1, mu_b=1.5), Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")]
+LAWS = [
+    Friction(),
+    Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    Elliptic(mu_t=2, mu_f=1, mu_b=1.5),
+    Viscous(),
+    PowerLaw(0.5),
+    OwnLaw("-vs/speed", "-2*vn/speed"),
+]
 names = {"ids": lambda law: type(law).__name__ + str(law.associated)}
 
 

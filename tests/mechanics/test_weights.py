@@ -24,7 +24,8 @@ LAWS = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), Elliptic(mu_t=2, mu_f=
 def test_weights_in_proportion_to_the_lengths_are_no_weights_to_the_last_bit():
     angles, rates = random_instants(50)
     said, unsaid = (
-        solve_balance(body, Friction(mu_t=2, mu_f=1, mu_b=3), angles, rates, 1e-4) for body in (Chain(weights=(1 / 3,) * 3), Chain())
+        solve_balance(body, Friction(mu_t=2, mu_f=1, mu_b=3), angles, rates, 1e-4)
+        for body in (Chain(weights=(1 / 3,) * 3), Chain())
     )
     np.testing.assert_array_equal(said.z, unsaid.z)
 

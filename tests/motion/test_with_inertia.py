@@ -33,7 +33,12 @@ STANDING = colloc.Chain((0.3, 0.45, 0.25), feet=1)
 
 
 def problem(**fields):
-    usual = {"gait": colloc.Harmonic(1), "guess": LEANING, "friction": colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), "rotation": None}
+    usual = {
+        "gait": colloc.Harmonic(1),
+        "guess": LEANING,
+        "friction": colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3),
+        "rotation": None,
+    }
     return colloc.Problem("paced", **({"body": colloc.Chain((0.3, 0.45, 0.25)), "froude": 0.1, "delta": 1e-2} | usual | fields))
 
 

@@ -49,7 +49,15 @@ def replay_of_unequal_coefficients_with_limits():
 
 
 def replay_with_corners():
-    return replay(LOPSIDED, Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0), SQUARE, 1e-3, instants=120, tolerance=1e-4, breaks=SQUARE.corner_phases)
+    return replay(
+        LOPSIDED,
+        Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0),
+        SQUARE,
+        1e-3,
+        instants=120,
+        tolerance=1e-4,
+        breaks=SQUARE.corner_phases,
+    )
 
 
 def replays_of_other_objectives():

@@ -21,7 +21,11 @@ WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0
 CASES = {
     "harmonics": {"gait": Harmonic(2, "none"), "friction": Friction(mu_t=0.5, mu_f=1, mu_b=5)},
     "bilateral harmonics": {"gait": Harmonic(2, "bilateral")},
-    "antipodal harmonics": {"gait": Harmonic(1, "antipodal"), "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3), "guess": ellipse(0, 1.3, 0.8)},
+    "antipodal harmonics": {
+        "gait": Harmonic(1, "antipodal"),
+        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+        "guess": ellipse(0, 1.3, 0.8),
+    },
     "shared nodes": {"gait": Harmonic(1, "none"), "scheme": "hermite-simpson"},
     "free path": {"gait": FreePath(4.0, "none")},
     "bilateral path": {"gait": FreePath(4.0, "bilateral"), "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)},
@@ -127,7 +131,9 @@ def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
 )
 def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
     """Tail velocities and link forces among the variables, the balance among the constraints; two programs, one solution."""
-    problem = Problem("p", ellipse(1.0, 0.7, 1.1), friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait=gait, intervals=24, delta=3e-3)
+    problem = Problem(
+        "p", ellipse(1.0, 0.7, 1.1), friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait=gait, intervals=24, delta=3e-3
+    )
     answer = answer_near(problem.with_(mesh_tolerance=0.0))
     found = answer.history[-2]
     assert (found.program, answer.program) == ("reduced", "full")

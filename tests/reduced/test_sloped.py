@@ -20,7 +20,8 @@ def bump(t):
 
 LEVEL = Problem("bilateral", gait=Harmonic(1, "bilateral"), grade=0.4, intervals=60)
 SKEW = Problem(
-    "skew", body=Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)), friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait=Harmonic(2), grade=0.4,
+    "skew", body=Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)),
+    friction=Friction(mu_t=1.7, mu_b=1.3), gait=Harmonic(2), grade=0.4,
     intervals=60,
 )  # fmt: skip
 FEET = SKEW.with_(

@@ -25,7 +25,9 @@ def uneven():
     )
     body = Chain((0.2, 0.5, 0.3), weights=(0.2, 0.5, 0.3), feet=feet, masses=MASSES, inertias=INERTIAS)
     limits = ((-1.0, 2.0), 1.5)
-    problem = Problem("uneven", body=body, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), joint_limit=limits, delta=1e-2)
+    problem = Problem(
+        "uneven", body=body, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), joint_limit=limits, delta=1e-2
+    )
     return colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
 
 

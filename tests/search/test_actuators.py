@@ -86,7 +86,11 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
     np.testing.assert_allclose(powers, slow * rates, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("law", "degree"), [(LAW, 0), (PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.5), (Viscous(normal=2, tangential=1), 1)], ids=str)
+@pytest.mark.parametrize(
+    ("law", "degree"),
+    [(LAW, 0), (PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.5), (Viscous(normal=2, tangential=1), 1)],
+    ids=str,
+)
 def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
     angles, rates = random_instants(50)
     z = Chain().solve(law, angles, rates, 0.1).z
@@ -241,7 +245,11 @@ def test_joints_too_weak_for_any_gait_are_told_before_the_search(case):
 
 
 def test_what_may_be_kept_is_not_refused():
-    for changes in ({"torque_limit": 0.05}, {"torque_limit": 0.03, "friction": Friction(mu_t=1, mu_f=1, mu_b=3)}, {"power_limit": 0.05}):
+    for changes in (
+        {"torque_limit": 0.05},
+        {"torque_limit": 0.03, "friction": Friction(mu_t=1, mu_f=1, mu_b=3)},
+        {"power_limit": 0.05},
+    ):
         check_actuators_suffice(USUAL.with_(guess=None, **changes))
 
 

@@ -54,7 +54,11 @@ def test_refinement_ends_where_an_optimum_is_flat(start):
 def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     """Nearest to it, no gradient is below 1e-3; those of both sides cancel."""
     problem = Problem(
-        "kink", body=Chain((0.2, 0.5, 0.3)), friction=Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0), gait=Harmonic(3, "none"), delta=1e-4
+        "kink",
+        body=Chain((0.2, 0.5, 0.3)),
+        friction=Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0),
+        gait=Harmonic(3, "none"),
+        delta=1e-4,
     )
     solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 3)), 1)
     assert solution.status == "solved", solution.message

@@ -21,7 +21,9 @@ from colloc.search.solve import solve
 from colloc.system.errors import NotConvergedError
 
 ALONE = Helpers(Problem("alone"))
-UNEQUAL = Problem("unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(mu_t=2, mu_f=1, mu_b=1.4), gait=Harmonic(2, "none"))
+UNEQUAL = Problem(
+    "unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(mu_t=2, mu_f=1, mu_b=1.4), gait=Harmonic(2, "none")
+)
 
 
 @pytest.mark.slow

@@ -118,7 +118,9 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     assert 0.1 < law.smallest < 10
     assert Problem.from_dict(other.with_(friction=law).to_dict()).law == law
     angles, rates = random_instants(20)
-    z, same, again = (solve_balance(wheels, own, angles, rates, 1e-3).z for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9), law))
+    z, same, again = (
+        solve_balance(wheels, own, angles, rates, 1e-3).z for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9), law)
+    )
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
     stated, resolved = (replay(wheels, law, KNOWN, 1e-2, tolerance=1e-4, instants=200) for law in (Friction(), one.law))

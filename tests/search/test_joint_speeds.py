@@ -68,7 +68,9 @@ def test_a_flat_top_that_the_second_round_comes_back_to_is_no_end():
 
 
 def test_derivatives_of_the_rows_are_those_of_differences():
-    problem = Problem("rows", gait=Serpenoid(2), body=Chain((0.25,) * 4), friction=Friction(mu_t=2, mu_f=1, mu_b=1.5), speed_limit=(5, 6, 7))
+    problem = Problem(
+        "rows", gait=Serpenoid(2), body=Chain((0.25,) * 4), friction=Friction(mu_t=2, mu_f=1, mu_b=1.5), speed_limit=(5, 6, 7)
+    )
     space, v = space_near(problem, problem.guess)
     program, h = ReducedProgram(space, 1e-2), 1e-6
     program.place_rows(v)

@@ -214,7 +214,10 @@ def test_the_level_is_stated_as_before():
 @pytest.mark.slow
 def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     free = PROBLEM.with_(
-        gait=Harmonic(1), guess=Fourier([0.2, 0.3], [[1.3], [0.1]], [[0.1], [1.2]]), friction=Friction(mu_t=3, mu_f=1, mu_b=2), delta=1e-3
+        gait=Harmonic(1),
+        guess=Fourier([0.2, 0.3], [[1.3], [0.1]], [[0.1], [1.2]]),
+        friction=Friction(mu_t=3, mu_f=1, mu_b=2),
+        delta=1e-3,
     )
     found = solve(free, 1)
     assert found.status == "solved", found.message

@@ -53,7 +53,9 @@ def test_mirror_images_are_one():
 
 def test_viscous_drag_has_none():
     """In first order what a small loop goes forth it goes back."""
-    assert small_loops(Problem("drag", friction=Viscous(normal=2.0, tangential=1.0), gait=Harmonic(1), objective="towing")) == []
+    assert (
+        small_loops(Problem("drag", friction=Viscous(normal=2.0, tangential=1.0), gait=Harmonic(1), objective="towing")) == []
+    )
 
 
 def test_a_small_gait_at_the_fold_is_found_where_it_is_the_best():

@@ -10,7 +10,9 @@ from colloc.smooth.concertina import Concertina
 from colloc.system.errors import ProblemError
 from scripts.models.epsilon_study import Crawler, EpsilonPoint, delta_for, epsilon_point, fitted_order, fitted_orders, table
 
-SIDEWAYS = Crawler(Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2), Friction(mu_t=1.0, mu_f=3.0, mu_b=3.0), delta=1e-6)
+SIDEWAYS = Crawler(
+    Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2), Friction(mu_t=1.0, mu_f=3.0, mu_b=3.0), delta=1e-6
+)
 ONE = Crawler(Concertina(epsilon=0.05, amplitude=1.3), delta=1e-6)
 
 

@@ -58,7 +58,9 @@ def test_the_half_period_and_the_whole_agree():
     """The mirror-image second half, computed instead of inferred."""
     wave = sine_wave()
     whole = Motion(wave.angle, wave.rate, stages=(0.0, 0.5, 1.0))
-    a, b = (period(m, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), 1e-3, intervals=3, quadrature_tolerance=1e-8) for m in (wave, whole))
+    a, b = (
+        period(m, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), 1e-3, intervals=3, quadrature_tolerance=1e-8) for m in (wave, whole)
+    )
     assert a.d == pytest.approx(b.d, abs=1e-8)
     assert pytest.approx(b.W, abs=1e-8) == a.W
     assert abs(b.rotation) < 1e-10

@@ -36,8 +36,8 @@ from colloc.studies import calls, campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
 from scripts.continue_delta import resolution_warning, value_at_zero_delta
-from tests.shared.stages import answer_near
 from tests.shared.laws import coulomb
+from tests.shared.stages import answer_near
 
 REVERSIBLE, IRREVERSIBLE = Friction(mu_t=3, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=1, mu_b=5)
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])

@@ -40,7 +40,7 @@ from colloc import *
 from colloc.studies.study import Axis, Study
 
 def problem(mu_t, mu_b):
-    return Problem("tiny", ellipse(0.0, 2.85, 1.3), friction=Friction(mu_t=mu_t, mu_f=1, mu_b=mu_b), gait=Harmonic(1, "bilateral"),
+    return Problem("tiny", ellipse(0.0, 2.85, 1.3), friction=Friction(mu_t=mu_t, mu_b=mu_b), gait=Harmonic(1, "bilateral"),
                    delta=1e-2, delta_start=1e-2, intervals=12, mesh_tolerance=1e-4)
 
 STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1)), Axis("mu_b", (1.0,))), problem, cold_starts=0)
@@ -138,8 +138,11 @@ def test_a_study_file_is_code_and_its_mistakes_are_named_with_their_line(tmp_pat
     study, source = read_study_file(path)
     assert study.shape == (2, 1)
     assert source == FILE
-    for stated, line, what in (("Frction(mu_t=mu_t, mu_f=1", 6, "NameError: .*"), ("Friction(mu_t=-mu_t, mu_f=1", 6, "friction.mu_t must be .*")):
-        path.write_text(FILE.replace("Friction(mu_t=mu_t, mu_f=1", stated))
+    for stated, line, what in (
+        ("Frction(mu_t=mu_t, mu_b=mu_b", 6, "NameError: .*"),
+        ("Friction(mu_t=-mu_t, mu_b=mu_b", 6, "friction.mu_t must be .*"),
+    ):
+        path.write_text(FILE.replace("Friction(mu_t=mu_t, mu_b=mu_b", stated))
         with pytest.raises(ProblemError, match=rf"no problem at mu_t = 1.0, mu_b = 1.0: .*s\.py, line {line}: {what}"):
             read_study_file(path)[0].problem_at((0, 0))
 

@@ -12,7 +12,9 @@ from colloc.gaits.harmonic import Fourier
 from colloc.pictures.steering_figure import steering_figure
 from colloc.studies.steering import Steering
 
-PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-4)
+PROBLEM = Problem(
+    "p", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-4
+)
 TURNS = np.radians([-10, 0, 10])
 
 
@@ -77,7 +79,13 @@ def test_gaits_begin_where_they_are_nearest_to_their_neighbours():
 
 
 def test_an_offset_turns_a_serpenoid_snake():
-    snake = Problem("s", body=Chain((0.2,) * 5), friction=Friction(mu_t=10, mu_f=1, mu_b=1), gait=Serpenoid(symmetry="antipodal"), delta=1e-2)
+    snake = Problem(
+        "s",
+        body=Chain((0.2,) * 5),
+        friction=Friction(mu_t=10, mu_f=1, mu_b=1),
+        gait=Serpenoid(symmetry="antipodal"),
+        delta=1e-2,
+    )
     family = steer(snake, [-0.2, 0.2], starts=1)
     assert family.certified
     right, left = (point.gait.mean[0] for point in family.points)
