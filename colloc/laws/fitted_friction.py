@@ -143,7 +143,7 @@ def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
     return OwnLaw(f"-({along})*vs/speed", f"-({across})*vn/speed", speed_unit=scale)
 
 
-def _read(table: str | os.PathLike[str] | np.ndarray) -> tuple[str, np.ndarray]:
+def _read(table: Any) -> tuple[str, np.ndarray]:
     """Where the samples are from, and speed, along, across and, where it differs, back ``(n, 3 or 4)``."""
     if not isinstance(table, (str, os.PathLike)):
         cells = np.array(table, dtype=object)
