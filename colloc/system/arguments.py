@@ -61,9 +61,10 @@ def named_arguments(cls: type[T]) -> type[T]:
         scalars = _scalars(made)
         try:
             made(self, **{name: _plain(value, scalars.get(name, ())) for name, value in stated.items()})
-        except (TypeError, ValueError, ArithmeticError, AttributeError) as error:
-            if not isinstance(error, ProblemError):
-                _check_kinds(scalars, stated)
+        except ProblemError:
+            raise
+        except Exception:
+            _check_kinds(scalars, stated)
             raise
         _check_kinds(scalars, stated)  # last, as its own checks know better what is wrong
         order = {name: getattr(self, name) for name in getattr(cls, "by_name", ())}
