@@ -202,6 +202,19 @@ SENTENCES = {
     "a fraction of a start": (lambda: colloc.solve(PROBLEM, starts=1.5), "starts must be a whole number or None, not 1.5"),
     "starts that are true": (lambda: colloc.solve(PROBLEM, starts=True), "starts must be a whole number or None, not True"),
     "a reference of words": (lambda: colloc.Reference("high", 0.1, "me"), "efficiency must be a number"),
+    "an axis that is a number": (lambda: Axis("x", 3), "values of an axis must be"),
+    "an axis beyond all bounds": (lambda: Axis("x", (10**400,)), "values of an axis must be"),
+    "a sampler that is none": (lambda: colloc.multistart(PROBLEM, 1, sampler="x"), "sampler must be one of latin-hypercube"),
+    "an output that is a folder": (lambda: colloc.solve(PROBLEM, 1, output="."), "output must name a file"),
+    "breaks that are no phases": (
+        lambda: colloc.replay(Chain(), Friction(), GAIT, 1e-2, breaks=(float("nan"), 5.0)), "breaks must be numbers",
+    ),
+    "a billion instants": (lambda: colloc.replay(Chain(), Friction(), GAIT, 1e-2, instants=10**9), "at most 10000000"),
+    "a billion headings": (lambda: colloc.heading_map(**ON, grade=0.1, count=10**9), "count must be .* from 1 to 10000"),
+    "a billion points": (lambda: colloc.pareto_front(PROBLEM, points=10**9), "2 to 1000 points"),
+    "a word that Python keeps": (lambda: Quantity("lambda", "sum(rate**2)"), "a name of its own that is a word"),
+    "a motion that is nothing": (lambda: Problem("x", motion=[]), "motion must be"),
+    "a link that is nothing": (lambda: Chain((1e-12, 0.5 - 1e-12, 0.5)), "no link may be shorter than 1e-06"),
     "a joint limit of no dimension": (lambda: Problem("x", joint_limit=np.array(9.0)), "joint_limit must lie"),
 }  # fmt: skip
 
@@ -211,6 +224,29 @@ def test_what_cannot_be_meant_is_refused_in_a_sentence(case):
     made, words = SENTENCES[case]
     with pytest.raises(ProblemError, match=words):
         made()
+
+
+@pytest.mark.parametrize("value", [None, -1, float("nan"), {}, object()])
+def test_a_solution_refuses_what_cannot_be_meant(value, three_link, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    wrong = [
+        lambda: three_link.sample("a"), lambda: three_link.export(value, period=4), lambda: three_link.animate(value),
+        lambda: three_link.export("x.csv", period=4, rate=value), lambda: three_link.robot(1, 1, 1, max_speed="fast"),
+        lambda: three_link.robot(1e300, 1, 1), lambda: three_link.robot(1, 1, value), lambda: colloc.save(three_link, "."),
+        lambda: three_link.export("x.csv", period=4, periods=10**9), lambda: three_link.sample([float("nan")]),
+    ]  # fmt: skip
+    for each in wrong:
+        with pytest.raises(ProblemError):
+            each()
+
+
+def test_what_a_problem_file_raises_is_told_even_if_it_cannot_say_itself(tmp_path):
+    (tmp_path / "x.py").write_text("class Mute(Exception):\n    def __str__(self):\n        raise KeyError\nraise Mute\n")
+    with pytest.raises(ProblemError, match="line 4: Mute"):
+        colloc.load_problem(tmp_path / "x.py")
+    (tmp_path / "y.py").write_bytes(b"\x00")
+    with pytest.raises(ProblemError, match=r"y.py: .*null bytes"):
+        colloc.load_problem(tmp_path / "y.py")
 
 
 def test_an_array_of_no_dimension_is_a_number():

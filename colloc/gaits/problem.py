@@ -197,7 +197,7 @@ class Problem:
         check_name(self.name)
         check_kind("friction", self.friction, gait_fields.LAWS, Law)
         check_kind("gait", self.gait, gait_fields.CLASSES)
-        check_kind("motion", self.motion or LEVEL, [Regime, *gait_fields.MOTIONS])
+        check_kind("motion", LEVEL if self.motion is None else self.motion, [Regime, *gait_fields.MOTIONS])
         if self.gait.free == bool(self.body.schedule):
             what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
             raise ProblemError(f"{what}; leave gait out, or take another body.")

@@ -147,7 +147,8 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
         with contextlib.redirect_stdout(sys.stderr):  # standard output is for results
             exec(compile(source, str(path), "exec"), names)
     except SyntaxError as error:
-        raise ProblemError(f"{path}, line {error.lineno}: {error.msg}.") from None
+        where = "" if error.lineno is None else f", line {error.lineno}"
+        raise ProblemError(f"{path}{where}: {error.msg}.") from None
     except KeyboardInterrupt:
         raise
     except BaseException as error:
@@ -167,4 +168,9 @@ def place_of(error: BaseException) -> str:
 
 def words_of(error: BaseException) -> str:
     """What an exception says; with its kind, unless it was made for people."""
-    return str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"
+    if isinstance(error, ProblemError):
+        return str(error)
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:  # of somebody's own, which cannot say what it is
+        return type(error).__name__

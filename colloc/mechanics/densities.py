@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from keyword import iskeyword
 from typing import Any
 
 import numpy as np
@@ -194,7 +195,9 @@ class Quantity(OfInstants):
 
     def __post_init__(self) -> None:
         name = self.name
-        known = isinstance(name, str) and name.isidentifier() and not name.endswith(("_error", "_delta"))
+        known = (
+            isinstance(name, str) and name.isidentifier() and not iskeyword(name) and not name.endswith(("_error", "_delta"))
+        )
         if not known or name in (*_TAKEN, *SUMMED):
             raise ProblemError(f"a quantity needs a name of its own that is a word, not {name!r}.")
         object.__setattr__(self, "density", read(self.density).text)

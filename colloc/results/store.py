@@ -37,7 +37,7 @@ from colloc.results.answer import REALISED, Alternative, Answer, SecondOrder, St
 from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
-from colloc.system.errors import ChangedFileWarning, StoreError
+from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 from colloc.system.store_file import (
     BETWEEN_DIMS,
     array,
@@ -102,6 +102,8 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
     True
     """
     path = Path(path)
+    if not path.name:
+        raise ProblemError(f"a result is saved in a file, which {path} does not name.")
     with new_file(path) as file:
         _write(file, solution)
     return path

@@ -13,7 +13,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.gaits.starts import LARGEST_SEED, LATIN_HYPERCUBE
+from colloc.gaits.starts import LARGEST_SEED, LATIN_HYPERCUBE, SAMPLERS
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import Outcome, counts
@@ -96,6 +96,8 @@ def solve(
         solution = search_solve(stated.problem, starts or stated.starts, **how)  # type: ignore[arg-type]
         solution.source = stated.source
         return solution
+    if not Path(output).name:
+        raise ProblemError(f"output must name a file, not {shown(str(output))}.")
     solution = resumed(stated, Path(output), starts=starts or stated.starts, **how)  # type: ignore[arg-type]
     save_end(solution, Path(output))
     return solution
@@ -214,6 +216,8 @@ def multistart(
     check_count(starts=starts, workers=workers)
     if not is_whole(seed, 0, LARGEST_SEED):
         raise ProblemError(f"seed must be a whole number from 0 to {LARGEST_SEED}, not {shown(seed)}.")
+    if sampler not in SAMPLERS:
+        raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {shown(sampler)}.")
     if not time_limit > 0:
         raise ProblemError(f"time_limit must be positive, not {time_limit:g}.")
     problem = _stated(problem).problem

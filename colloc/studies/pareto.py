@@ -24,6 +24,7 @@ from colloc.system.late_binding import bound
 from colloc.verification.replayer import replayer
 
 POINTS = 9
+_MOST_POINTS = 1000
 _SAME = 1e-6
 """Relative difference below which two values are the same: what the search leaves of it."""
 _BETTER = 1e-6
@@ -112,8 +113,8 @@ def pareto_front(
     if aims[0].expression == aims[1].expression:
         raise ProblemError(f"a front needs two objectives, not {aims[0].name} twice.")
     check_count(starts=starts)
-    if points < 2:
-        raise ProblemError(f"a front has at least 2 points, not {points}.")
+    if not 2 <= points <= _MOST_POINTS:
+        raise ProblemError(f"a front has 2 to {_MOST_POINTS} points, not {points}.")
     found: dict[int, Solution] = {}
 
     def put(k: int, solution: Solution) -> None:

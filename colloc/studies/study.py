@@ -64,8 +64,9 @@ class Axis:
 
     def __post_init__(self) -> None:
         try:
-            values = tuple(v if isinstance(v, str) else float(v) for v in self.values)
-        except (TypeError, ValueError):
+            given = (self.values,) if isinstance(self.values, str) else self.values
+            values = tuple(v if isinstance(v, str) else float(v) for v in given)
+        except (TypeError, ValueError, OverflowError):
             raise ProblemError(f"values of an axis must be numbers or names, not {self.values!r}.") from None
         object.__setattr__(self, "values", values)
         if not isinstance(self.name, str) or not self.name.isidentifier():

@@ -150,7 +150,8 @@ def _are_numbers(value: Any) -> bool:
         array = np.asarray(value)
     except ValueError:  # rows of different lengths
         return False
-    return array.ndim > 0 and (array.dtype.kind in "iuf" or not array.size)
+    numbers = array.dtype.kind in "iuf" or not array.size
+    return numbers and (bool(np.isfinite(array).all()) if array.ndim == 1 else array.ndim > 1)  # of tables others know more
 
 
 _SEQUENCES = tuple, list, Sequence, Iterable

@@ -14,7 +14,7 @@ import numpy as np
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.system.arguments import check_finite
+from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.verification.played import Path
 from colloc.verification.slope import SlopeMotion, gait_on_slope
 
@@ -78,7 +78,8 @@ def heading_map(
     from scipy.optimize import brentq
 
     on = gait_on_slope(body, friction, gait, delta, grade, breaks)
-    check_finite(positive=True, tolerance=tolerance, count=count)
+    check_finite(positive=True, tolerance=tolerance)
+    check_count(MOST_PERIODS, count=count)
     course = on.course(tolerance)
 
     def turn(heading: float) -> float:

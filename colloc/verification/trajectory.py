@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
 from colloc.verification.played import Path
 
@@ -86,7 +87,9 @@ def timed(
         )
     count = int(np.ceil(wanted * rate - 1e-9))
     if not 4 <= count <= MOST_SAMPLES:
-        raise ProblemError(f"{count} samples a period are too {'few' if count < 4 else 'many'}; change the rate or the period.")
+        raise ProblemError(
+            f"{count:g} samples a period are too {'few' if count < 4 else 'many'}; change the rate or the period."
+        )
     period = count / rate
     pace = np.maximum(_level(slowest, period), slowest)
     clock = np.concatenate([[0.0], np.cumsum(pace) / pace.size])
@@ -120,7 +123,10 @@ def _slowest(vertices: np.ndarray, limits: np.ndarray, keep_pace: bool) -> np.nd
 
 def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: str) -> np.ndarray:
     """Limits that are positive numbers, ``(n_joint,)``, from one for all or one each; `what` one of them is."""
-    given = np.asarray(limits, dtype=float).ravel()
+    try:
+        given = np.asarray(limits, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise ProblemError(f"{what}s must be numbers, not {shown(limits)}.") from None
     if given.size not in (1, n_joint):
         raise ProblemError(f"{given.size} {what}s for {n_joint} joints; give one for all, or one each.")
     if not np.isfinite(given).all() or given.min() <= 0:
