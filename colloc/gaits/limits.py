@@ -16,8 +16,10 @@ Limit = float | tuple[Any, ...]
 
 def checked_limit(body: Body, limit: Any) -> Limit:
     """A limit as it is, or as a tuple of one for each joint. `ProblemError` if it cannot be used for the body."""
-    if np.ndim(limit) == 0:
-        return _checked_number(body, limit.item() if isinstance(limit, np.ndarray) else limit)
+    if isinstance(limit, np.ndarray) and limit.ndim == 0:
+        limit = limit.item()
+    if not isinstance(limit, (tuple, list, np.ndarray)):
+        return _checked_number(body, limit)
     each = tuple(_range_or_number(own) for own in limit)
     for own in each:
         if isinstance(own, tuple):

@@ -125,6 +125,7 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
     body, n = Chain(lengths), len(lengths) - 1
     at = rng.uniform(-3, 3, (n, 20)), rng.normal(size=(n, 20))
     laws = Friction(), Friction(mu_t=10, mu_b=3), OwnLaw("-where(vs > 0, 1, 2) * vs/speed", "-vn/speed * tanh(2 + speed)")
+    for law in laws:
         assert native_kernel.native_kernel(body, law) is not None
         chain_slopes(body, law, *at, 1e-4, solve_balance(body, law, *at, 1e-4))
         for method in ("newton", "fixed_point"):

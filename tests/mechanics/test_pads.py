@@ -156,7 +156,7 @@ def test_laws_that_are_stated_as_formulas_are_compiled_for_pads_and_feet(law):
     [
         (lambda: Pad(0, 0.2, 1.2), "must lie on its link"),
         (lambda: Pad(0, 0.6, 0.4), "must end behind where it begins"),
-        (lambda: Pad(0, "tail", 0.4), "must lie on its link"),
+        (lambda: Pad(0, "tail", 0.4), "first must be a number, not 'tail'"),
         (lambda: Pad(0, angle=0.3), "may be turned"),
         (lambda: Foot(0, 0.9, extent=0.4), "must lie on its link"),
         (lambda: Foot(0, extent=-0.4), "from 0 \\(a point\\) to 1"),
