@@ -52,7 +52,7 @@ def random_problem(number: int) -> tuple[Problem, tuple[float, ...], tuple[float
     mu_t = 1.0 if rng.random() < 0.3 else float(np.exp(rng.uniform(np.log(0.1), np.log(30))))
     mu_b = 1.0 if rng.random() < 0.6 else float(rng.uniform(1, 5))
     limit = float(rng.choice([np.pi, 2.5, 2.0]))
-    law, kind = Friction(mu_t, 1.0, mu_b), Harmonic(1, symmetry)
+    law, kind = Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), Harmonic(1, symmetry)
     problem = Problem(f"audit-{number}", body=Chain(links), friction=law, gait=kind, joint_limit=limit)
     return problem.with_(guess=start_gait(problem, LATIN_HYPERCUBE, SEED, number)), links, (mu_t, 1.0, mu_b)
 

@@ -88,7 +88,7 @@ def case_problem(index: int) -> Problem:
         f"error-{index}",
         guess,
         body,
-        Friction(*friction),
+        Friction(mu_t=friction[0], mu_f=friction[1], mu_b=friction[2]),
         gait,
         delta,
         intervals=intervals,

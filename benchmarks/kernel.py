@@ -31,7 +31,7 @@ from scripts.models.ellipses import admissible
 from scripts.models.sweep import Route, performance
 
 BODY, ISOTROPIC = Chain(), Friction()
-LAWS = (ISOTROPIC, Friction(2.5, 1, 1.6))
+LAWS = (ISOTROPIC, Friction(mu_t=2.5, mu_f=1, mu_b=1.6))
 START_FLOOR = 0.1
 """Processor time of a certified start below which what is not the balance would have to be rewritten as well [s]."""
 WAYS: dict[str, Callable[[], contextlib.AbstractContextManager]] = {"kernel": contextlib.nullcontext, "NumPy": numpy_instead}

@@ -194,7 +194,7 @@ def resistance_laws() -> Row:
     for mu in (2.0, 100.0):
         gaits = [Harmonic(1, symmetry) for symmetry in ("antipodal", "bilateral")]
         dry = max(solved(Friction(mu_t=mu), gait).measured.value for gait in gaits)
-        linear = max(solved(Viscous(mu, 1.0), gait, objective="towing").measured.value for gait in gaits)
+        linear = max(solved(Viscous(normal=mu, tangential=1.0), gait, objective="towing").measured.value for gait in gaits)
         lines.append(f"{linear:.4f} against {dry:.4f} at {mu:g}")
         parts.append(linear / dry)
     said = "linear resistance: relative efficiencies much lower except at very large normal friction"
@@ -237,8 +237,8 @@ def third_ellipse() -> Row:
 def waves() -> list[Row]:
     rows = []
     for what, printed, motion, friction in (
-        ("sine wave, (100, 1, 1)", 0.76, sine_wave(), Friction(100, 1, 1)),
-        ("tanh wave of amplitude 1.3, (1, 100, 100)", 0.93, tanh_wave(1.3, 20.0, 2.0), Friction(1, 100, 100)),
+        ("sine wave, (100, 1, 1)", 0.76, sine_wave(), Friction(mu_t=100, mu_f=1, mu_b=1)),
+        ("tanh wave of amplitude 1.3, (1, 100, 100)", 0.93, tanh_wave(1.3, 20.0, 2.0), Friction(mu_t=1, mu_f=100, mu_b=100)),
     ):
         ours = _efficiency(motion, friction)
         rows.append(number(what, f"{PAPER}, section III", printed, ours, 5e-3))
@@ -253,7 +253,9 @@ def amplitude_exponent() -> Row:
     frictions, best = (1e3, 1e4, 1e5), []
     for mu in frictions:
         search = {"bounds": (0.05, 1.0), "method": "bounded", "options": {"xatol": 1e-4}}
-        best.append(minimize_scalar(lambda a, mu=mu: -_efficiency(sine_wave(a, 2.0), Friction(mu, 1, 1)), **search).x)
+        best.append(
+            minimize_scalar(lambda a, mu=mu: -_efficiency(sine_wave(a, 2.0), Friction(mu_t=mu, mu_f=1, mu_b=1)), **search).x
+        )
     slopes = np.diff(np.log(best)) / np.diff(np.log(frictions))
     ours = f"{slopes[0]:.4f} from mu_t = 1e3 to 1e4, {slopes[1]:.4f} to 1e5"
     holds = abs(slopes[1] + 0.25) < 5e-3 and abs(slopes[1] + 0.25) < abs(slopes[0] + 0.25)

@@ -89,7 +89,7 @@ def case_problem(
     stated = Problem(
         name="robustness-" + "-".join(f"{mu:g}" for mu in law) + f"-{symmetry}-{delta:g}{table.suffix}",
         body=table.body,
-        friction=Friction(*law),
+        friction=Friction(mu_t=law[0], mu_f=law[1], mu_b=law[2]),
         gait=table.gait_class(symmetry),
         delta=delta,
         delta_start=delta_start,

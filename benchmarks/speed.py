@@ -97,14 +97,16 @@ def works(rounds: int, zoo: int) -> str:
 def grown(links: int = 3, harmonics: int = 1, intervals: int = 24, feet: int = 0) -> colloc.Problem:
     """A problem of some size. Two links get nowhere where friction forward and backward is alike."""
     body = colloc.Chain((1 / links,) * links, feet=feet) if feet else colloc.Chain((1 / links,) * links)
-    friction, kind = colloc.Friction(2, 1, 2 if links == 2 else 1), colloc.Harmonic(harmonics, "bilateral")
+    friction, kind = colloc.Friction(mu_t=2, mu_f=1, mu_b=2 if links == 2 else 1), colloc.Harmonic(harmonics, "bilateral")
     return colloc.Problem("grown", body=body, friction=friction, gait=kind, intervals=intervals, delta=1e-3)
 
 
 def swept(cells: int) -> object:
     """A study of so many coefficients of friction."""
     axis = colloc.Axis("mu_t", tuple(np.geomspace(0.5, 8.0, cells)))
-    return colloc.sweep(colloc.Study("grown", (axis,), lambda mu_t: grown().with_(friction=colloc.Friction(mu_t, 1, 1))))
+    return colloc.sweep(
+        colloc.Study("grown", (axis,), lambda mu_t: grown().with_(friction=colloc.Friction(mu_t=mu_t, mu_f=1, mu_b=1)))
+    )
 
 
 def growth(quick: bool) -> str:

@@ -66,7 +66,7 @@ def zoo_problem(number: int) -> Problem:
         gait = FreePath(float(rng.choice([1.0, 2.0, 4.0])), symmetry)
     else:
         gait = Polygon(2 * int(rng.integers(2, 5)), symmetry)
-    return Problem(f"zoo-{number}", body=body, friction=Friction(mu_t, 1.0, mu_b), gait=gait, joint_limit=limit)
+    return Problem(f"zoo-{number}", body=body, friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), gait=gait, joint_limit=limit)
 
 
 def _drawn_body(rng: np.random.Generator, most: int = 6) -> Chain:
@@ -117,7 +117,10 @@ def modal_problem(number: int) -> Problem:
     gait = harmonics_within(int(rng.integers(1, 3)), str(rng.choice(["none", "antipodal"])))
     mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))), float(rng.choice([1.0, rng.uniform(1.0, 5.0)]))
     return Problem(
-        f"zoo-modes-{number}", body=ModalBody(int(rng.integers(2, 7))), friction=Friction(mu_t, 1.0, mu_b), gait=gait
+        f"zoo-modes-{number}",
+        body=ModalBody(int(rng.integers(2, 7))),
+        friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b),
+        gait=gait,
     )
 
 
@@ -133,7 +136,9 @@ def paced_problem(number: int) -> Problem:
     stays = body.n_link == 2 and mu_b == 1.0  # whatever its antipodal gait
     gait = harmonics_within(count, "none" if stays else symmetry)
     froude = float(f"{np.exp(rng.uniform(np.log(1e-3), 0.0)):.3g}")
-    return Problem(f"zoo-paced-{number}", body=body, friction=Friction(mu_t, 1.0, mu_b), gait=gait, froude=froude)
+    return Problem(
+        f"zoo-paced-{number}", body=body, friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), gait=gait, froude=froude
+    )
 
 
 def feet_problem(number: int) -> Problem:
@@ -151,7 +156,9 @@ def feet_problem(number: int) -> Problem:
     if body.n_link > 2 and rng.random() < 0.15:
         gait = FreePath(float(rng.choice([1.0, 2.0, 4.0])), symmetry)
     limit = float(rng.choice([np.pi, 2.5, 2.0]))
-    return Problem(f"zoo-feet-{number}", body=body, friction=Friction(mu_t, 1.0, mu_b), gait=gait, joint_limit=limit)
+    return Problem(
+        f"zoo-feet-{number}", body=body, friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), gait=gait, joint_limit=limit
+    )
 
 
 def _drawn_feet(rng: np.random.Generator, body: Chain) -> tuple[Foot, ...]:

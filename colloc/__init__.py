@@ -21,7 +21,10 @@ The paper: S. Alben, "Efficient sliding locomotion with isotropic friction" (201
 from __future__ import annotations
 
 import ast
+import functools
 import importlib
+import inspect
+from collections.abc import Callable
 from pathlib import Path
 
 from colloc.system.late_binding import bind
@@ -62,6 +65,16 @@ bind(
 )
 
 
+@functools.cache
+def _checked(function: Callable[..., object]) -> Callable[..., object]:
+    """A public function that checks its arguments, and is found here where other processes ask for it."""
+    from colloc.system.arguments import checked_arguments
+
+    checked = checked_arguments(function)
+    checked.__module__ = __name__
+    return checked
+
+
 def __dir__() -> list[str]:
     """The public names, also those that nobody has used yet, and no others but those with two underscores."""
     return sorted({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})
@@ -70,7 +83,8 @@ def __dir__() -> list[str]:
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used, so that the NumPy part never loads CasADi."""
     if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
+        found = getattr(importlib.import_module(_HOME[name]), name)
+        return _checked(found) if inspect.isfunction(found) else found
     if name == "__version__":
         return version_of("colloc")
     if name in _GONE:

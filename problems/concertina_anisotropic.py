@@ -11,10 +11,10 @@ from colloc import Concertina, Friction, Problem
 PROBLEMS = tuple(
     Problem(name, body=body, friction=friction, delta=1e-4)
     for name, body, friction in (
-        ("forwards-1.7-1-1.3", Concertina(amplitude=1.3), Friction(1.7, 1.0, 1.3)),
-        ("backwards-1.7-1.3-1", Concertina(amplitude=1.3, backwards=True), Friction(1.7, 1.3, 1.0)),
-        ("forwards-10-1-1", Concertina(amplitude=1.3, share=0.15), Friction(10.0, 1.0, 1.0)),
-        ("concertina_anisotropic", Concertina(amplitude=1.2, share=0.3, bumps=2), Friction(1.0, 3.0, 3.0)),
+        ("forwards-1.7-1-1.3", Concertina(amplitude=1.3), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)),
+        ("backwards-1.7-1.3-1", Concertina(amplitude=1.3, backwards=True), Friction(mu_t=1.7, mu_f=1.3, mu_b=1.0)),
+        ("forwards-10-1-1", Concertina(amplitude=1.3, share=0.15), Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)),
+        ("concertina_anisotropic", Concertina(amplitude=1.2, share=0.3, bumps=2), Friction(mu_t=1.0, mu_f=3.0, mu_b=3.0)),
     )
 )
 PROBLEM = PROBLEMS[-1]

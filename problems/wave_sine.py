@@ -6,5 +6,7 @@ computation converges to 0.737066 (and to 0.7623 for mu_t = 1000).
 
 from colloc import Friction, Problem, Reference, Wave
 
-PROBLEM = Problem(name="wave_sine", body=Wave("sine", amplitude=1.0, waves=1.0), friction=Friction(100.0, 1.0, 1.0), delta=1e-4)
+PROBLEM = Problem(
+    name="wave_sine", body=Wave("sine", amplitude=1.0, waves=1.0), friction=Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), delta=1e-4
+)
 REFERENCE = Reference(0.737066, 1e-6, "design notes, section 8; composite Gauss panels")

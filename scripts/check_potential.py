@@ -75,7 +75,8 @@ def add_domain(parser: argparse.ArgumentParser, limit: float) -> None:
 
 def domain_of(options: argparse.Namespace) -> Domain:
     """What was asked for."""
-    return Domain(Chain(tuple(options.lengths)), LAWS[options.law](*options.friction), options.limit)
+    mu_t, mu_f, mu_b = options.friction
+    return Domain(Chain(tuple(options.lengths)), LAWS[options.law](mu_t=mu_t, mu_f=mu_f, mu_b=mu_b), options.limit)
 
 
 def largest_random_ratio(kept: Kept, count: int, seed: int) -> float:

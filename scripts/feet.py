@@ -25,7 +25,7 @@ from colloc.system.errors import CollocError, ProblemError
 
 STANDS = {"line": 0, "1 foot a link": 1, "2 feet": 2, "3 feet": 3}
 CLASSES: tuple[Harmonic | FreePath, ...] = (Harmonic(1), Harmonic(2), Harmonic(3), FreePath())
-LEVEL = Friction(), Friction(2, 1, 1)
+LEVEL = Friction(), Friction(mu_t=2, mu_f=1, mu_b=1)
 
 
 def column(body: Chain, friction: Friction, starts: int) -> list[str]:
@@ -63,7 +63,7 @@ def main() -> None:
     head = ("links", "friction", "class", *STANDS)
     lines += [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for links in (2, 3, 4, 5):
-        for friction in LEVEL if links > 2 else (Friction(1, 1, 3),):
+        for friction in LEVEL if links > 2 else (Friction(mu_t=1, mu_f=1, mu_b=3),):
             chains = {stand: Chain((1 / links,) * links, feet=feet) for stand, feet in STANDS.items()}
             columns = {stand: column(chain, friction, options.starts) for stand, chain in chains.items()}
             lines += table(columns, links, friction.label)

@@ -27,7 +27,7 @@ SCENES = (
     ("equal friction", Friction(), 1, (0.0, 0.05, 0.1, 0.15, 0.2)),
     ("equal friction", Friction(), 2, (0.0, 0.05, 0.1, 0.2, 0.3, 0.4)),
     ("equal friction", Friction(), 3, (0.0, 0.05, 0.1, 0.2, 0.3, 0.4)),
-    ("friction (10, 1, 1)", Friction(10, 1, 1), 2, (0.0, 0.3, 1.0, 2.0)),
+    ("friction (10, 1, 1)", Friction(mu_t=10, mu_f=1, mu_b=1), 2, (0.0, 0.3, 1.0, 2.0)),
 )
 TURNING = Fourier(np.zeros(2), np.array([[1.5], [0.0]]), np.array([[0.0], [1.0]]))
 HEAD = (
@@ -88,7 +88,14 @@ def figure(curves: list[Curve], path: Path) -> None:
         left.legend()
         for colour, heading in zip(SERIES, _HEADINGS, strict=False):
             ran = slope_motion(
-                Chain(), Friction(2, 1, 1), TURNING, 1e-3, _GRADE, heading=heading, periods=_PERIODS, tolerance=1e-4
+                Chain(),
+                Friction(mu_t=2, mu_f=1, mu_b=1),
+                TURNING,
+                1e-3,
+                _GRADE,
+                heading=heading,
+                periods=_PERIODS,
+                tolerance=1e-4,
             )
             right.plot(
                 np.append(0, -np.cumsum(ran.aside)), np.append(0, np.cumsum(ran.climb)), ".-", color=colour, markersize=3

@@ -7,7 +7,11 @@ import numpy as np
 
 from colloc import Axis, Chain, Friction, Harmonic, Problem, Study, ellipse
 
-LAWS = {"isotropic": Friction(1, 1, 1), "backward 3": Friction(1, 1, 3), "transverse 10": Friction(10, 1, 1)}
+LAWS = {
+    "isotropic": Friction(1, 1, 1),
+    "backward 3": Friction(mu_t=1, mu_f=1, mu_b=3),
+    "transverse 10": Friction(mu_t=10, mu_f=1, mu_b=1),
+}
 
 
 def problem(law, outer):

@@ -80,7 +80,7 @@ def test_the_module_behind_python_m_is_also_the_function():
         (lambda: colloc.Problem("x").with_(intervalls=3), "did you mean intervals"),
         (lambda: colloc.FreePath(colour=1), "it takes curvature, symmetry, winding"),
         (lambda: colloc.solve(5), "problem must be a Problem or the path of a problem file, not int"),
-        (lambda: colloc.solve(colloc.Problem("x"), starts=0), "starts must be at least 1"),
+        (lambda: colloc.solve(colloc.Problem("x"), starts=0), "starts must be a whole number of at least 1"),
         (lambda: colloc.solve(colloc.Problem("x"), seconds=np.nan), "seconds must be positive, not nan"),
     ],
 )
@@ -152,7 +152,7 @@ def test_a_gait_is_exported_from_python_as_by_the_command(three_link, tmp_path, 
     (tmp_path / "x.csv").unlink()
     for name, settings, words in (
         ("x.txt", {}, r"should end in \.csv or \.json"),
-        ("x.csv", {"periods": 0}, "periods must be at least 1"),
+        ("x.csv", {"periods": 0}, "periods must be a whole number of at least 1"),
         ("x.csv", {"length": 1.0}, "both the length and the mass"),
         ("x.csv", {"mass": 2.0}, "both the length and the mass"),
     ):

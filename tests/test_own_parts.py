@@ -127,7 +127,7 @@ def test_a_class_that_is_no_fourier_series_is_one_file_too(monkeypatch, tmp_path
 @pytest.mark.slow
 def test_a_class_of_your_own_can_be_put_on_a_slope_and_taken_off_it(monkeypatch, capsys):
     own = run("own_gait_class.md", monkeypatch)
-    level, uphill = own.problem, own.problem.with_(grade=0.02, friction=Friction(10, 1, 1.5), delta=1e-2)
+    level, uphill = own.problem, own.problem.with_(grade=0.02, friction=Friction(mu_t=10, mu_f=1, mu_b=1.5), delta=1e-2)
     assert isinstance(uphill.gait, own.OwnHarmonics)
     assert uphill.gait.describe() == level.gait.describe()
     assert uphill.gait.size(2) == level.gait.size(2) + 1  # where it points

@@ -32,7 +32,7 @@ def on_feet(body: Any, friction: Law) -> Chain:
     """The chain on points: its own feet, or Gauss points of its links; unequal coefficients as engines have them, elliptic."""
 
     def law(own: Any) -> Friction:
-        return own if own.smallest == own.largest else Elliptic(own.mu_t, own.mu_f, own.mu_b)
+        return own if own.smallest == own.largest else Elliptic(mu_t=own.mu_t, mu_f=own.mu_f, mu_b=own.mu_b)
 
     nodes, shares = np.polynomial.legendre.leggauss(POINTS)
     weights = enumerate(body.weight_column()[:, 0])

@@ -70,7 +70,7 @@ def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bo
     """
     links, whole = len(lengths), math.fsum(lengths)
     if not _FEWEST <= links <= _MOST:
-        raise ProblemError(f"a chain must have {_FEWEST} to {_MOST} links here, not {links}.")
+        raise ProblemError(f"a chain must have {_FEWEST} to {_MOST} links here, not {links}{' or more' * (links > _MOST)}.")
     if not (all(length > 0 for length in lengths) and math.isfinite(whole)):
         raise ProblemError(f"--lengths must be positive numbers, not {', '.join(f'{length:g}' for length in lengths)}.")
     if max(lengths) > _LONGER * min(lengths):
@@ -95,7 +95,7 @@ def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bo
 @command(_parser)
 def main(options: argparse.Namespace) -> int:
     path: Path = options.problem
-    lengths = options.lengths or [1.0] * options.links
+    lengths = options.lengths or [1.0] * min(options.links, _MOST + 1)
     text = problem_text(path, lengths, options.feet, options.wheels)
     try:
         with path.open("x", encoding="utf-8") as file:

@@ -16,10 +16,11 @@ from colloc.commands.summary import bound_facts
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
+from colloc.gaits.starts import LARGEST_SEED, LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import RETRIED, STATUSES, Outcome, counts
 from colloc.results.solution import SOLVED
+from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
 
@@ -57,8 +58,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def _checked(options: argparse.Namespace) -> None:
     for name, least in (("starts", 1), ("workers", 1), ("seed", 0)):
-        if getattr(options, name) < least:
-            raise ProblemError(f"--{name} must be at least {least}, not {getattr(options, name)}.")
+        if not is_whole(getattr(options, name), least, LARGEST_SEED):
+            raise ProblemError(f"--{name} must be at least {least}, and at most {LARGEST_SEED}, not {getattr(options, name)}.")
     if not options.time_limit > 0:
         raise ProblemError(f"--time-limit must be positive, not {options.time_limit:g}.")
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
+from colloc.results import limit_use
 from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
@@ -89,6 +90,7 @@ def _besides(solution: Solution) -> list[str]:
         lines.append(f"  feet hold       {shares} % of the period, from the tail")
     if (travels := solution.travels) != "head first":
         lines.append(f"  travels         {travels}")
+    lines += [f"  limits          {text}" for text in limit_use.lines(solution)]
     if problem.rotation != 0:
         lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
     return lines
@@ -132,6 +134,7 @@ def summary_dict(solution: Solution, path: Path | None, reference: Reference | N
         "kkt_error": solution.answer.kkt_error,
         "starts": solution.starts,
         "shrunk": None if solution.shrunk is None else solution.shrunk.value,
+        "limits": limit_use.shares(solution) if certificate.replayed else {},
         "feet_hold": solution.share_held.tolist() if certificate.replayed else [],
         "others": [
             {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}

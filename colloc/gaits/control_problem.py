@@ -146,7 +146,7 @@ def control_problem(problem: Problem) -> ControlProblem:
     body, gait, law, aims = problem.body, problem.gait, problem.law, (problem.objective, *(aim for aim, _ in problem.at_least))
     limits, regime = problem.path_limits, problem.regime
     degrees = [part.degree for part in aims] + [limit.friction_degree for limit in limits.each]
-    unit = 1.0 if None in degrees else friction_unit(law)
+    unit = 1.0 if None in degrees or regime.free_pace else friction_unit(law)  # what a gait says of its pace has no unit
     return ControlProblem(
         problem,
         Dynamics(

@@ -14,6 +14,7 @@ import numpy as np
 
 from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced, symmetric_samples
 from colloc.mechanics.inertia import GRAVITY
+from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
 
 _SEED_HARMONICS = 2
@@ -305,8 +306,8 @@ def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
     """Numbers of a gait as an array of so many dimensions. `ProblemError` if they, or their squares, are none or not finite."""
     try:
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ProblemError(f"{name} must be numbers, not {value!r}.") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ProblemError(f"{name} must be numbers, not {shown(value)}.") from None
     if array.ndim != ndim or not (np.abs(array) < np.sqrt(np.finfo(float).max) / (array.size + 1)).all():
         raise ProblemError(f"{name} must be a finite {ndim}-D array.")
     return array

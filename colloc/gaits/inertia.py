@@ -17,6 +17,9 @@ from colloc.numerics.schemes import scheme
 from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
+_PACED = {"distance", "work", "rotation", "period"}
+"""What inertia makes depend on how fast a gait is played."""
+
 
 class Free(NamedTuple):
     """A range of Froude numbers L/(g T^2) in which the pace of a gait is sought with it.
@@ -24,7 +27,8 @@ class Free(NamedTuple):
     Parameters
     ----------
     low, high : float
-        Above 0; where they are one the pace is given.
+        Above 0; where they are one the pace is given. The best pace of the plain efficiency is the slowest, unless inertia
+        helps: a term in the "period" says what time is worth.
 
     Examples
     --------
@@ -104,10 +108,9 @@ class Paced(Regime):
         return replace(super().in_units_of(unit), froude=self.froude / unit)  # where time counts the unit is 1
 
     def check(self, problem: Any) -> None:
-        if self.free and not problem.uses("period"):
+        if self.free and not set(problem.objective.uses) & _PACED:
             raise ProblemError(
-                f"a free pace needs an objective that says what time is worth, not {problem.objective.name!r}: "
-                "'distance / (work + 0.1 * period)' counts a standing power of 0.1 weight x sqrt(length x gravity)."
+                f"a free pace needs an objective that depends on it, as distance and work do, not {problem.objective.name!r}."
             )
         checked_mass(problem.body)
         if not problem.gait.free:

@@ -16,14 +16,15 @@ Limit = float | tuple[Any, ...]
 
 def checked_limit(body: Body, limit: Any) -> Limit:
     """A limit as it is, or as a tuple of one for each joint. `ProblemError` if it cannot be used for the body."""
+    if isinstance(limit, np.ndarray) and limit.ndim == 0:
+        limit = limit.item()
     if not isinstance(limit, (tuple, list, np.ndarray)):
         return _checked_number(body, limit)
     each = tuple(_range_or_number(own) for own in limit)
     for own in each:
         if isinstance(own, tuple):
             _check_range(own, body.usual.largest_limit)
-        else:
-            _checked_number(body, own)
+    each = tuple(own if isinstance(own, tuple) else _checked_number(body, own) for own in each)
     if len(each) != body.n_joint or len(body.limit_names) != body.n_joint:
         raise ProblemError(f"joint_limit has {len(each)} values; give one for all joints, or one for each joint of a chain.")
     return each
@@ -52,7 +53,7 @@ def _checked_number(body: Body, limit: Any) -> Any:
         most = f"pi/{np.pi / largest:g}".removesuffix("/1")
         shown = f"{limit:g}" if is_number(limit) else repr(limit)
         raise ProblemError(f"joint_limit must lie in (0, {most}], not {shown}.")
-    return limit
+    return float(limit)
 
 
 def range_of(own: Any) -> tuple[float, float]:

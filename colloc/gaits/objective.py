@@ -6,7 +6,7 @@ that carry their gradient for the search in the reduced space and for error bars
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 
 from colloc.mechanics.densities import INTEGRALS, Quantity, quantities_of
 from colloc.numerics.expression import Dual, Formula, formula
-from colloc.system.arguments import is_number
+from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
 QUANTITIES = {
@@ -30,10 +30,13 @@ _SAMPLES = (
     {"distance": 0.4, "work": 1.7, "rotation": 0.3, "length": 7.0},
     {"distance": 0.7, "work": 2.9, "rotation": 0.8, "length": 11.0},
 )
+_FLATTEST = 1e-30
+"""Slope of an objective, over which there is something to climb; one over it is too steep."""
 _OTHERS = 1.9, 3.3
 """Periods at which an expression is tried when it is stated, and all other quantities there."""
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Objective:
     """A value of what a period comes to.
@@ -78,18 +81,25 @@ class Objective:
         except (ProblemError, TypeError) as error:
             known = f"It may be one of {', '.join(NAMED)}, or a formula like 'distance / work'."
             raise ProblemError(f"objective: {error} {known}") from None
+        if not stated.names & {*self._names}:
+            known = ", ".join(self._names)
+            raise ProblemError(f"the objective {stated.text!r} speaks of nothing that a gait does; it may of {known}.")
         object.__setattr__(self, "expression", stated.text)
         names = {expression: name for name, expression in NAMED.items()}
         object.__setattr__(self, "name", self.name or names.get(self.expression, self.expression))
         try:
             with np.errstate(all="ignore"):
                 values = [self(sample) for sample in self._samples]
-                rises = [self.partials(sample).get("distance", 0.0) for sample in self._samples]
+                partials = [self.partials(sample) for sample in self._samples]
         except (ArithmeticError, TypeError, ValueError):
-            values, rises = [np.nan], []
+            values, partials = [np.nan], [{}]
         if not all(isinstance(value, float) and np.isfinite(value) for value in values):
             raise ProblemError(f"the objective {self.expression!r} has no value for a usual gait: {self._samples[0]}.")
-        if min(rises, default=0.0) < 0:
+        if not all(_FLATTEST < max(map(abs, each.values())) < 1 / _FLATTEST for each in partials):
+            raise ProblemError(
+                f"the objective {self.expression!r} does not tell usual gaits apart: it is too flat or too steep."
+            )
+        if min(each.get("distance", 0.0) for each in partials) < 0:
             raise ProblemError(
                 f"the objective {self.expression!r} falls with the distance; a body counts its distance in the direction in "
                 "which it moves, so it can only be asked to go far."
@@ -215,7 +225,9 @@ def objective_from(stated: object) -> Objective:
 
 def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
     """Objectives and the values that they must reach at least, from a mapping or pairs."""
-    pairs: Sequence = list(stated.items()) if isinstance(stated, Mapping) else list(stated or ())  # type: ignore[call-overload]
+    pairs = stated.items() if isinstance(stated, Mapping) else () if stated is None else stated
+    if not isinstance(pairs, Iterable) or not all(isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in pairs):
+        raise ProblemError(f"at_least names what must be reached with its value, as {{'distance': 0.3}}, not {shown(stated)}.")
     found = []
     for what, least in pairs:
         if not is_number(least):

@@ -32,6 +32,9 @@ from colloc.system.result_names import check_name
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 
+LARGEST_DELTA = 1e3
+"""Body lengths per period, far above the speeds of any gait, and far from where numbers overflow."""
+
 MOST_COORDINATES = 100
 """Of a shape: contact is looked for in every pair of links at thousands of phases, which takes 10 s at so many, and no search
 ends with more."""
@@ -166,9 +169,8 @@ class Problem:
         object.__setattr__(self, "at_least", least_values(self.at_least))
         regime = self.regime
         object.__setattr__(self, "gait", regime.class_of(self.gait))
-        object.__setattr__(self, "grade", float(self.grade))
-        if isinstance(self.froude, (list, tuple)):
-            object.__setattr__(self, "froude", Free(*self.froude))
+        stated = self.froude
+        object.__setattr__(self, "froude", Free(*map(float, stated)) if isinstance(stated, (list, tuple)) else float(stated))
         usual = self.body.usual
         start = (self.gait.delta_start or usual.delta_start) if self.law.regularised else usual.delta
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=formulations(self.body)[0])
@@ -195,7 +197,7 @@ class Problem:
         check_name(self.name)
         check_kind("friction", self.friction, gait_fields.LAWS, Law)
         check_kind("gait", self.gait, gait_fields.CLASSES)
-        check_kind("motion", self.motion or LEVEL, [Regime, *gait_fields.MOTIONS])
+        check_kind("motion", LEVEL if self.motion is None else self.motion, [Regime, *gait_fields.MOTIONS])
         if self.gait.free == bool(self.body.schedule):
             what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
             raise ProblemError(f"{what}; leave gait out, or take another body.")
@@ -209,6 +211,10 @@ class Problem:
             raise ProblemError(
                 f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that order are lost in rounding. "
                 "The paper uses 1e-4, and a certificate states the efficiency for delta -> 0."
+            )
+        if max(self.delta, self.delta_start) > LARGEST_DELTA:
+            raise ProblemError(
+                f"delta and delta_start must be at most {LARGEST_DELTA:g}: at such speeds friction would be viscous."
             )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)

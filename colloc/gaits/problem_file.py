@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from colloc.gaits.problem import Problem
-from colloc.system.arguments import is_whole
+from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.sealed_file import LONGEST_TEXT
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Reference:
     """A value to hold the result against.
@@ -138,7 +139,7 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
     if size > LONGEST_TEXT:
         raise ProblemError(_too_long(str(path), size))
     try:
-        source = content.decode("utf-8")
+        source = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ProblemError(f"{path} is no text in UTF-8 (byte {error.start}), so no {kind} file.") from None
     names: dict[str, object] = {"__name__": f"colloc_{kind}", "__file__": str(path)}
@@ -146,7 +147,8 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
         with contextlib.redirect_stdout(sys.stderr):  # standard output is for results
             exec(compile(source, str(path), "exec"), names)
     except SyntaxError as error:
-        raise ProblemError(f"{path}, line {error.lineno}: {error.msg}.") from None
+        where = "" if error.lineno is None else f", line {error.lineno}"
+        raise ProblemError(f"{path}{where}: {error.msg}.") from None
     except KeyboardInterrupt:
         raise
     except BaseException as error:
@@ -166,4 +168,9 @@ def place_of(error: BaseException) -> str:
 
 def words_of(error: BaseException) -> str:
     """What an exception says; with its kind, unless it was made for people."""
-    return str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"
+    if isinstance(error, ProblemError):
+        return str(error)
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:  # of somebody's own, which cannot say what it is
+        return type(error).__name__

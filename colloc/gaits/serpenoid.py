@@ -72,7 +72,7 @@ class Serpenoid(Harmonic):
     Examples
     --------
     >>> from colloc import Chain, Friction, Problem, Serpenoid
-    >>> snake = Problem("snake", body=Chain((1 / 8,) * 8), friction=Friction(10, 1, 1), gait=Serpenoid(symmetry="antipodal"))
+    >>> snake = Problem("snake", body=Chain((1 / 8,) * 8), friction=Friction(mu_t=10), gait=Serpenoid(symmetry="antipodal"))
     >>> snake.gait.describe()
     'serpenoid, 1 harmonic, symmetry antipodal'
     """

@@ -23,6 +23,8 @@ LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
 SAMPLERS = (LATIN_HYPERCUBE, PERTURBED)
 BLOCK = 25
 """Starts per Latin hypercube: start k belongs to hypercube k // BLOCK, seeded by that number and the run's seed."""
+LARGEST_SEED = 2**63 - 1
+"""Files keep seeds and numbers of starts in so many bits."""
 _FRACTIONS = (0.2, 0.95)
 _PHASES = 200
 _ATTEMPTS = 200

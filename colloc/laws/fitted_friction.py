@@ -12,6 +12,7 @@ information criterion, with more samples left than numbers by two at least; v_S 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,10 @@ class FittedFriction:
 
 
 def fitted_friction(
-    table: str | os.PathLike[str] | np.ndarray, *, length: float | None = None, period: float | None = None
+    table: str | os.PathLike[str] | np.ndarray | Sequence[Sequence[Any]],
+    *,
+    length: float | None = None,
+    period: float | None = None,
 ) -> FittedFriction:
     """The law of friction that measured coefficients are samples of.
 
@@ -132,14 +136,14 @@ def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
     """Coulomb's, where no coefficient knows the speed; else one of formulas."""
     forwards, sideways, backwards = fits[0], fits[1], fits[-1] if len(fits) > 2 else fits[0]
     if not any(fit[1:].any() for fit in fits):
-        return Friction(*(float(fit[0]) for fit in (sideways, forwards, backwards)))
+        return Friction(mu_t=sideways[0], mu_f=forwards[0], mu_b=backwards[0])
     along, across, back = (_formula(fit, v_s) for fit in (forwards, sideways, backwards))
     if back != along:
         along = f"where(vs > 0, {along}, {back})"
     return OwnLaw(f"-({along})*vs/speed", f"-({across})*vn/speed", speed_unit=scale)
 
 
-def _read(table: str | os.PathLike[str] | np.ndarray) -> tuple[str, np.ndarray]:
+def _read(table: Any) -> tuple[str, np.ndarray]:
     """Where the samples are from, and speed, along, across and, where it differs, back ``(n, 3 or 4)``."""
     if not isinstance(table, (str, os.PathLike)):
         cells = np.array(table, dtype=object)

@@ -65,7 +65,11 @@ class OwnLaw(FormulaLaw):
                 "not oppose the motion, so friction would give energy to the body; look at the signs."
             )
         zero = np.zeros((1, 1))
-        if np.abs(self.density(zero, zero, zero + DELTAS[0])).max() > 0:
+        with np.errstate(all="ignore"):
+            rest = np.abs(self.density(zero, zero, zero + DELTAS[0])).max()
+        if np.isnan(rest):
+            raise ProblemError("friction: a formula has no value at rest (vs = vn = 0); divide by speed, which is never zero.")
+        if rest > 0:
             raise ProblemError("friction: a formula does not vanish at rest (vs = vn = 0).")
         left = self.density(vs, -vn, delta)
         if not (same(left[0], fs) and same(left[1], -fn)):

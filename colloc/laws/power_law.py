@@ -75,7 +75,7 @@ class PowerLaw(Coefficients, FormulaLaw):
         return f"{each}, times the speed to the power {self.power:g}"
 
     def in_units_of(self, unit: float) -> PowerLaw:
-        return PowerLaw(self.power, self.mu_t / unit, self.mu_f / unit, self.mu_b / unit)
+        return PowerLaw(self.power, mu_t=self.mu_t / unit, mu_f=self.mu_f / unit, mu_b=self.mu_b / unit)
 
     def in_speeds_of(self, unit: float) -> PowerLaw:
         return self.in_units_of(unit**-self.power)

@@ -37,6 +37,7 @@ class Viscous:
     normal: float = 2.0
     tangential: float = 1.0
 
+    by_name = ("normal", "tangential")
     degree = 1.0
     reversible = associated = True
     regularised = False
@@ -61,7 +62,7 @@ class Viscous:
         return f"viscous drag, {self.normal:g} across and {self.tangential:g} along the body"
 
     def in_units_of(self, unit: float) -> Viscous:
-        return Viscous(self.normal / unit, self.tangential / unit)
+        return Viscous(normal=self.normal / unit, tangential=self.tangential / unit)
 
     def in_speeds_of(self, unit: float) -> Viscous:
         return self.in_units_of(1.0 / unit)

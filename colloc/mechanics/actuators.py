@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.feet import whole_links
 from colloc.mechanics.law import Law
+from colloc.mechanics.links import Links
 from colloc.numerics.arrays import Array, namespace
 
 
@@ -25,3 +27,21 @@ def joint_moments(body: Body, friction: Law, angles: Array, forces: Array, delta
         alone = body.with_forces(friction, angles, unit, still, forces, delta)
         moments.append(alone.power if load is None else alone.power - namespace(load).sum_rows(load * alone.centre))
     return namespace(angles, forces).stack(moments)
+
+
+def largest_moments(chain: Links, friction: Law, grade: float = 0.0) -> np.ndarray:
+    """What the moment of no joint exceeds in slow motion under dry friction, ``(n_joint,)``: on either side of it friction is
+    at most the largest coefficient times the weight, and acts, as a slope's pull does, no farther away than on the stretched
+    body."""
+    lengths, ends = np.array(chain.lengths), np.concatenate([[0.0], np.cumsum(chain.lengths)])
+    feet = chain.standing_on or whole_links(chain.weight_column()[:, 0])
+    pressed = [
+        (foot.link, foot.place, (foot.friction or friction).largest * (foot.weight or 0.0), foot.offset) for foot in feet
+    ]
+    pulled = [(link, 0.5, grade * mass, 0.0) for link, mass in enumerate(chain.mass_column()[:, 0])]
+    moments = np.zeros((2, chain.n_joint))
+    for link, place, force, aside in (*pressed, *pulled):
+        for joint in range(chain.n_joint):
+            arm = abs(ends[link] + place * lengths[link] - ends[joint + 1]) + abs(aside)
+            moments[int(link > joint), joint] += force * arm
+    return moments.min(axis=0)

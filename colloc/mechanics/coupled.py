@@ -216,7 +216,7 @@ def _checked_stuck(stuck: Mapping[int, float] | Sequence[Sequence[float]], count
 def _checked_gears(gears: Any, count: int) -> tuple[tuple[float, ...], ...]:
     try:
         table = np.array(gears, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         table = np.empty(0)
     if table.ndim != 2 or not table.shape[1] or not np.isfinite(table).all():
         raise ProblemError("gears must be a row of numbers for each joint, one for each motor.")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from keyword import iskeyword
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.expression import FUNCTIONS, Formula, formula
-from colloc.system.arguments import is_number
+from colloc.system.arguments import is_number, named_arguments
 from colloc.system.errors import ProblemError
 
 VARIABLES = {
@@ -161,6 +162,7 @@ class OfInstants:
             raise ProblemError(f"{what}: '{self.text}' has no finite value at a usual instant.")
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Quantity(OfInstants):
     """An integral over a period of a function of an instant, for objectives to speak of.
@@ -193,7 +195,9 @@ class Quantity(OfInstants):
 
     def __post_init__(self) -> None:
         name = self.name
-        known = isinstance(name, str) and name.isidentifier() and not name.endswith(("_error", "_delta"))
+        known = (
+            isinstance(name, str) and name.isidentifier() and not iskeyword(name) and not name.endswith(("_error", "_delta"))
+        )
         if not known or name in (*_TAKEN, *SUMMED):
             raise ProblemError(f"a quantity needs a name of its own that is a word, not {name!r}.")
         object.__setattr__(self, "density", read(self.density).text)
@@ -232,12 +236,13 @@ INTEGRALS = {each.name: each for each in (LENGTH, DRIVEN_WORK)}
 
 def quantities_of(asked: Any) -> tuple[Quantity, ...]:
     """Quantities by their names, or as they are. `ProblemError` for a name that is none."""
-    for each in asked:
+    for each in asked if isinstance(asked, Iterable) else (asked,):
         if not isinstance(each, Quantity) and each not in INTEGRALS:
             raise ProblemError(f"{each!r} is no quantity: name one of {', '.join(INTEGRALS)}, or state a Quantity.")
     return tuple(each if isinstance(each, Quantity) else INTEGRALS[each] for each in asked)
 
 
+@named_arguments
 @dataclass(frozen=True)
 class PathLimit(OfInstants):
     """The most that a function of an instant may be, at every instant of a period.

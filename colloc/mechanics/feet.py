@@ -16,7 +16,7 @@ import numpy as np
 
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import KernelLaw, Law
-from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments
+from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments, shown
 from colloc.system.errors import ProblemError
 
 _SAME = 1e-9
@@ -86,8 +86,8 @@ class Foot:
             )
         if self.extent and self.angle:
             raise ProblemError("a pad presses along its link: only a foot, without extent, may be turned by an angle.")
-        if self.friction is not None and not isinstance(self.friction, Law):
-            raise ProblemError(f"the friction of a foot must be a law of friction, not {type(self.friction).__name__}.")
+        if isinstance(self.friction, type) or not isinstance(self.friction, Law | None):
+            raise ProblemError(f"the friction of a foot must be a law of friction, as Friction(), not {shown(self.friction)}.")
 
     def from_head(self, n_link: int) -> Foot:
         """The same foot on the body named from its other end."""

@@ -29,6 +29,7 @@ class Coefficients:
     mu_t: float
     mu_f: float
     mu_b: float
+    by_name = ("mu_t", "mu_f", "mu_b")
 
     @property
     def smallest(self) -> float:
@@ -101,7 +102,7 @@ class Friction(Coefficients):
         return f"μt = {self.mu_t:g} sideways, μf = {self.mu_f:g} forwards, μb = {self.mu_b:g} backwards"
 
     def in_units_of(self, unit: float) -> Friction:
-        return type(self)(self.mu_t / unit, self.mu_f / unit, self.mu_b / unit)
+        return type(self)(mu_t=self.mu_t / unit, mu_f=self.mu_f / unit, mu_b=self.mu_b / unit)
 
     def in_speeds_of(self, unit: float) -> Friction:
         return self

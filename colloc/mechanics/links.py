@@ -22,6 +22,8 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import STATED_IF_SET, is_number
 from colloc.system.errors import ProblemError
 
+_SHORTEST = 1e-6
+"""Of a link, over the body: shorter ones move nothing, and drown in rounding."""
 TAIL = None
 """The reference of `Links.posture`: the free end of link 0; an integer means the midpoint of that link."""
 _WHOLES = {"weights": "the body's weight", "masses": "the body's mass"}
@@ -67,6 +69,10 @@ class Links:
         if len(lengths) < 2:
             raise ProblemError("body.lengths needs at least two links.")
         _check_parts("lengths", lengths, "the body length")
+        if min(lengths) < _SHORTEST:
+            raise ProblemError(
+                f"body.lengths has a link of {min(lengths):g}: no link may be shorter than {_SHORTEST:g} of the body."
+            )
         if not (is_number(width) and 0 <= width < min(lengths)):
             raise ProblemError(f"body.width must be a number from 0 to below the shortest link, not {width!r}.")
         parts = {name: _numbers(name, getattr(self, name)) for name in ("weights", "masses", "inertias")}

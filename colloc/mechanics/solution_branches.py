@@ -56,7 +56,7 @@ def all_balanced_velocities(
 
     >>> from colloc.mechanics.friction import Friction
     >>> at = np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
-    >>> found = all_balanced_velocities(Links(), Friction(1, 0.01, 100), *at, 1e-4)
+    >>> found = all_balanced_velocities(Links(), Friction(mu_t=1, mu_f=0.01, mu_b=100), *at, 1e-4)
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
     (array([3]), array([2.998, 2.96 , 2.994]), array([ 1.,  1., -1.]))
     """

@@ -168,11 +168,23 @@ def formula(text: str, variables: tuple[str, ...], functions: tuple[str, ...] = 
         number = not isinstance(node, ast.Constant) or type(node.value) in (int, float)
         plain = not isinstance(node, ast.Compare) or len(node.ops) == 1
         single = not isinstance(node, ast.Call) or (isinstance(node.func, ast.Name) and not node.keywords)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            name, count = node.func.id, 3 if node.func.id == "where" else 1
+            if len(node.args) != count:
+                raise ProblemError(f"'{text}': {name} takes {count} argument{'s' * (count > 1)}, not {len(node.args)}.")
         if not (isinstance(node, _NODES) and number and plain and single):
             allowed = f"numbers, + - * / **, comparisons within where(condition, a, b), and {', '.join(functions)}"
             raise ProblemError(f"'{text}' is no formula that can be differentiated; it may use {allowed}.")
     names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
     try:
-        return Formula(ast.unparse(tree), names, compile(_Floats().visit(tree), "<formula>", "eval"))
+        written, tree = ast.unparse(tree), _Floats().visit(tree)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.BinOp) and not any(isinstance(part, ast.Name) for part in ast.walk(node)):
+                value = eval(compile(ast.Expression(node), "<formula>", "eval"), {"__builtins__": {}})
+                if not isinstance(value, float):  # a root of what is negative
+                    raise ArithmeticError
+        return Formula(written, names, compile(tree, "<formula>", "eval"))
     except RecursionError:
         raise ProblemError(f"'{text}' is nested too deeply.") from None
+    except ArithmeticError:
+        raise ProblemError(f"'{text}' has numbers in it that come to no finite real number.") from None

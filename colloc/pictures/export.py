@@ -20,9 +20,10 @@ from colloc.mechanics.inertia import GRAVITY
 from colloc.results.robot import Robot, pressing
 from colloc.results.robot_model import FORMATS, one_coefficient
 from colloc.results.solution import Solution
+from colloc.system.arguments import check_count
 from colloc.system.errors import ProblemError
 from colloc.system.replaced_file import replaced_file
-from colloc.verification.trajectory import Trajectory, timed
+from colloc.verification.trajectory import MOST_SAMPLES, Trajectory, timed
 
 KINDS = ".csv", ".json", *FORMATS
 
@@ -72,8 +73,7 @@ def write_export(
         If neither `period` nor `max_speed` is given, the period is too short for the limits, a number or the ending of the
         path is unusable, the solution holds a prescribed motion, or only one of `length` and `mass` is given.
     """
-    if periods < 1:
-        raise ProblemError(f"periods must be at least 1, not {periods}.")
+    check_count(periods=periods)
     if path.suffix not in KINDS:
         raise ProblemError(f"{path} should end in {' or '.join(KINDS)}.")
     if not solution.problem.gait.free:
@@ -95,6 +95,8 @@ def write_export(
         torques = Robot(solution, length, mass, period or trajectory.period, gravity).torques(trajectory.phase)
         series |= {"N_m": torques, "W": torques * trajectory.speeds}
         facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
+    if periods * trajectory.time.size > MOST_SAMPLES:
+        raise ProblemError(f"{periods} periods have too many samples: a file holds at most {MOST_SAMPLES}.")
     time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
     series = {unit: np.tile(rows, periods) for unit, rows in series.items()}
     text = (_csv if path.suffix == ".csv" else _json)(facts, time, series, solution.gait.coordinate)

@@ -105,7 +105,7 @@ def write_movie(
     """
     count = round(seconds * fps) if np.isfinite(seconds * fps) else 0
     if periods < 1 or count < 2 or periods * count > _MOST_PICTURES:
-        raise ProblemError(f"{periods} periods of {count} pictures cannot be drawn; change periods, seconds or fps.")
+        raise ProblemError(f"{periods} periods of {count:g} pictures cannot be drawn; change periods, seconds or fps.")
     if not 200 <= width <= 4000:
         raise ProblemError(f"width must lie between 200 and 4000, not {width}.")
     if path.suffix not in (".gif", ".mp4"):

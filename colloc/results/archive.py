@@ -95,7 +95,7 @@ def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], tu
         if rows.values or rows.damaged:
             raise StoreError(f"{row_path(path)} is damaged: it does not say what problem it is about; move it away.")
         return None
-    if statement_hash(stated) != problem.hash:
+    if problem.hash not in (statement_hash(stated), Problem.from_dict(stated).hash):  # older files write 1 where 1.0 is meant
         raise StoreError(f"{row_path(path)} holds starts of another problem; choose another --output, or move it away.")
     outcomes, damaged = {}, list(rows.damaged)
     for key, value in rows.values.items():

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from colloc.collocation.layout import Layout
+from colloc.gaits.gait import finite_array
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
@@ -98,9 +99,7 @@ class CollocatedMotion:
         of mass at the origin at t = 0, and the first period's way along +x; on a slope +x is straight uphill, and the arc of a
         gait that is asked to turn sets out along +x.
         """
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        if t.ndim != 1 or not np.isfinite(t).all():
-            raise ValueError("t must be finite phases, a number or a one-dimensional array.")
+        t = finite_array("t", np.atleast_1d(t), 1)
         period, phase = np.divmod(t, 1.0)
         symmetry, body = self.problem.gait.motion_symmetry, self.problem.body
         solved, second = reduced(symmetry, phase)

@@ -40,6 +40,8 @@ _PACE = 0.01
 """Relative difference of the Froude numbers of a robot and of the gait, up to which it is played at the pace that it is for."""
 _LITTLE = 1e-3
 """Share of the efficiency below which what inertia takes is not told apart."""
+_LARGEST = 1e9
+"""Of the metres, kilograms and seconds of a robot; one over it is the smallest."""
 _INSTANTS, _A_SIDE = 2000, 8
 """Of a period at least, and of every side of a polygon."""
 
@@ -132,7 +134,11 @@ class Robot:
     max_torque: float | Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        check_finite(positive=True, **{name: getattr(self, name) for name in ("length", "mass", "period", "gravity")})
+        numbers = {name: getattr(self, name) for name in ("length", "mass", "period", "gravity")}
+        check_finite(positive=True, **numbers)
+        for name, value in numbers.items():
+            if not 1 / _LARGEST <= value <= _LARGEST:
+                raise ProblemError(f"{name} must lie between {1 / _LARGEST:g} and {_LARGEST:g} in SI units, not {value:g}.")
         problem, n = self.solution.problem, self.solution.gait.n_joint
         if (own := self.solution.froude) and abs(self.froude / own - 1.0) > _PACE:
             needed = math.sqrt(self.length / (self.pressing * own))

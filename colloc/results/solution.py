@@ -23,6 +23,7 @@ from colloc.results.arc import PHASES, Arc, arc
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame, turned
+from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.system.versions import versions
@@ -328,14 +329,17 @@ class Solution:
         """
         return bound("plot")(self) if ax is None else bound("plot_panel")(ax, self, panel)
 
+    @checked_arguments
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write the motion as GIF or MP4, by the ending of `path`; options as for `colloc.pictures.movie.write_movie`."""
         return bound("animate")(self, Path(path), **options)
 
+    @checked_arguments
     def report(self, path: str | os.PathLike[str], *, robot: Any = None) -> Path:
         """Write the web page of `colloc report`; with what `robot` returns also its sheet."""
         return bound("report")(self, Path(path), robot=robot)
 
+    @checked_arguments
     def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
         """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`, ``solution.export("mine.csv",
         period=4)``, or the robot as a model for simulators (``.xml``, ``.urdf``); returns what the file says. Options as for

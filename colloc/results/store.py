@@ -32,7 +32,7 @@ from colloc.numerics.schemes import scheme
 from colloc.results.answer import Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
 from colloc.results.solution import Solution
-from colloc.system.errors import ChangedFileWarning, StoreError
+from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 from colloc.system.store_file import (
     BETWEEN_DIMS,
     array,
@@ -93,6 +93,8 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
     True
     """
     path = Path(path)
+    if not path.name:
+        raise ProblemError(f"a result is saved in a file, which {path} does not name.")
     with new_file(path) as file:
         _write(file, solution)
     return path

@@ -37,7 +37,7 @@ import numpy as np
 
 from colloc.smooth.motion import Motion
 from colloc.smooth.prescribed_body import PrescribedBody
-from colloc.system.arguments import check_finite
+from colloc.system.arguments import check_finite, named_arguments
 from colloc.system.errors import ProblemError
 
 ODD_SCALE = 7**3.5 / 6**3
@@ -66,6 +66,7 @@ def even_slope(x: np.ndarray) -> np.ndarray:
     return -6 * x * np.clip(1 - x * x, 0.0, None) ** 2
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Concertina(PrescribedBody):
     """A concertina crawler.

@@ -22,7 +22,7 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.concertina import ODD_SCALE
 from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
-from colloc.system.arguments import check_finite, is_number, is_whole
+from colloc.system.arguments import check_finite, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 LAP = 1.3
@@ -31,6 +31,7 @@ _PLACES = 95
 """Along the bump, at which its tangent angle is bounded: modes of low degree exceed the bound little in between."""
 
 
+@named_arguments
 @dataclass(frozen=True)
 class CrawlerBody(PanelBody):
     """A straight body with one travelling bump; its shape coordinates are the bump's place and the profile's amplitudes.

@@ -16,7 +16,7 @@ from colloc.mechanics.bodies import Stretch
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
-from colloc.system.arguments import is_whole
+from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 LEGENDRE, FOURIER = "legendre", "fourier"
@@ -26,6 +26,7 @@ _PLACES_A_MODE = 4
 ends, where polynomials change fast."""
 
 
+@named_arguments
 @dataclass(frozen=True)
 class ModalBody(PanelBody):
     """A smooth body of unit length with a few bending modes; its shape coordinates are their amplitudes [rad].

@@ -15,7 +15,7 @@ from colloc.mechanics.bodies import Usual
 from colloc.mechanics.law import Law
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.smooth.smooth_body import SmoothBody
-from colloc.system.arguments import check_positive
+from colloc.system.arguments import check_positive, named_arguments
 from colloc.system.errors import ProblemError
 
 _TURN = 2 * np.pi
@@ -88,6 +88,7 @@ def _phase(angles: np.ndarray) -> np.ndarray:
     return np.arctan2(angles[1], angles[0]) / _TURN % 1.0
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Wave(PrescribedBody):
     """A body that runs through one of the paper's waves (figures 5 and 6).

@@ -13,7 +13,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.gaits.starts import LATIN_HYPERCUBE
+from colloc.gaits.starts import LARGEST_SEED, LATIN_HYPERCUBE, SAMPLERS
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import Outcome, counts
@@ -27,6 +27,7 @@ from colloc.studies.run import StudyRun
 from colloc.studies.saved import resumed, save_end
 from colloc.studies.study import Study, read_study_file
 from colloc.studies.table import StudyTable, cell_text, study_table
+from colloc.system.arguments import check_count, is_whole, shown
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.task_pool import pool_for
 
@@ -86,8 +87,8 @@ def solve(
     (True, 0.26)
     """
     stated = _stated(problem)
-    if starts is not None and starts < 1:
-        raise ProblemError(f"starts must be at least 1, not {starts}.")
+    if starts is not None:
+        check_count(starts=starts)
     if not seconds > 0:
         raise ProblemError(f"seconds must be positive, not {seconds:g}.")
     how = {"seconds": seconds, "search": search, "progress": _told(verbose, progress)}
@@ -95,6 +96,8 @@ def solve(
         solution = search_solve(stated.problem, starts or stated.starts, **how)  # type: ignore[arg-type]
         solution.source = stated.source
         return solution
+    if not Path(output).name:
+        raise ProblemError(f"output must name a file, not {shown(str(output))}.")
     solution = resumed(stated, Path(output), starts=starts or stated.starts, **how)  # type: ignore[arg-type]
     save_end(solution, Path(output))
     return solution
@@ -210,6 +213,13 @@ def multistart(
     >>> found.optima[0].best.efficiency > 0.2
     True
     """
+    check_count(starts=starts, workers=workers)
+    if not is_whole(seed, 0, LARGEST_SEED):
+        raise ProblemError(f"seed must be a whole number from 0 to {LARGEST_SEED}, not {shown(seed)}.")
+    if sampler not in SAMPLERS:
+        raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {shown(sampler)}.")
+    if not time_limit > 0:
+        raise ProblemError(f"time_limit must be positive, not {time_limit:g}.")
     problem = _stated(problem).problem
     told = _told(verbose, progress)
     kept = None if archive is None else open_archive(problem, archive)
@@ -263,7 +273,7 @@ def sweep(
     >>> def problem(mu_t):
     ...     return colloc.Problem(
     ...         "grid",
-    ...         friction=colloc.Friction(mu_t),
+    ...         friction=colloc.Friction(mu_t=mu_t),
     ...         gait=colloc.Harmonic(1, "bilateral"),
     ...         delta=1e-2,
     ...     )
@@ -271,6 +281,7 @@ def sweep(
     >>> colloc.sweep(study).variables["status"].tolist()
     ['solved', 'solved']
     """
+    check_count(workers=workers)
     study = study if isinstance(study, Study) else read_study_file(study)[0]
     told = _told(False, progress)
     with tempfile.TemporaryDirectory() as scratch:

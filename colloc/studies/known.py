@@ -88,7 +88,8 @@ class Known:
     @property
     def question(self) -> str:
         """What is asked, however it is answered: rows of equal questions are rivals."""
-        return json.dumps({name: value for name, value in self.statement.items() if name not in _HOW}, sort_keys=True)
+        stated = self.problem.to_dict()  # with numbers as they are written now
+        return json.dumps({name: value for name, value in stated.items() if name not in _HOW}, sort_keys=True)
 
     def certificate(self) -> Certificate:
         """The verdict of an independent replay of the gait as it stands here."""

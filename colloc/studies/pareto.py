@@ -18,11 +18,13 @@ from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
 from colloc.search.solve import solve
+from colloc.system.arguments import check_count
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.verification.replayer import replayer
 
 POINTS = 9
+_MOST_POINTS = 1000
 _SAME = 1e-6
 """Relative difference below which two values are the same: what the search leaves of it."""
 _BETTER = 1e-6
@@ -110,8 +112,9 @@ def pareto_front(
     aims = objective_from(first), objective_from(second)
     if aims[0].expression == aims[1].expression:
         raise ProblemError(f"a front needs two objectives, not {aims[0].name} twice.")
-    if points < 2:
-        raise ProblemError(f"a front has at least 2 points, not {points}.")
+    check_count(starts=starts)
+    if not 2 <= points <= _MOST_POINTS:
+        raise ProblemError(f"a front has 2 to {_MOST_POINTS} points, not {points}.")
     found: dict[int, Solution] = {}
 
     def put(k: int, solution: Solution) -> None:

@@ -22,7 +22,7 @@ from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
 from colloc.search.solve import solve
-from colloc.system.arguments import is_number
+from colloc.system.arguments import check_count, is_number
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 
@@ -153,6 +153,7 @@ def steer(
         raise ProblemError(
             f"turns must be angles of less than half a turn a period, and not 0 on the spot; not {[*turns, *spot]!r}."
         )
+    check_count(starts=starts)
 
     def put(turn: float, solution: Solution) -> Solution:
         if solution.interrupted:

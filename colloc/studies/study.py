@@ -17,14 +17,23 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import place_of, stated_names, words_of
-from colloc.system.arguments import is_whole
+from colloc.gaits.starts import LARGEST_SEED
+from colloc.system.arguments import is_whole, named_arguments, shown
 from colloc.system.errors import ProblemError
 from colloc.system.result_names import check_name
 
 Index = tuple[int, ...]
+NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
+COUNTS = ("bilateral", "antipodal", "retraced", "at_slowest", "winding", "below_neighbour", "starts", "starts_certified")
+OTHERS = ("delta", "trivial_bound", "upper_bound", "neighbour_value", "seconds", "wave", "forward")
+TEXTS = ("status", "message", "origin", "gait_class", "problem_hash")
+ARRAYS = {"mean": ("joint",), "cos": ("joint", "harmonic"), "sin": ("joint", "harmonic")}
+COLUMNS = {*NUMBERS, *COUNTS, *OTHERS, *TEXTS, *ARRAYS, "joint", "harmonic"}
+"""What the table of a study holds of every cell (`colloc.studies.store`), and its dimensions."""
 MOST_CELLS = 1_000_000
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Axis:
     """One direction of a grid.
@@ -55,12 +64,15 @@ class Axis:
 
     def __post_init__(self) -> None:
         try:
-            values = tuple(v if isinstance(v, str) else float(v) for v in self.values)
-        except (TypeError, ValueError):
+            given = (self.values,) if isinstance(self.values, str) else self.values
+            values = tuple(v if isinstance(v, str) else float(v) for v in given)
+        except (TypeError, ValueError, OverflowError):
             raise ProblemError(f"values of an axis must be numbers or names, not {self.values!r}.") from None
         object.__setattr__(self, "values", values)
-        if not self.name.isidentifier():
-            raise ProblemError(f"the name of an axis must be a Python name, not {self.name!r}.")
+        if not isinstance(self.name, str) or not self.name.isidentifier():
+            raise ProblemError(f"the name of an axis must be a Python name, not {shown(self.name)}.")
+        if self.name in COLUMNS:
+            raise ProblemError(f"an axis cannot be called {self.name}, as a column of the results is: take another name.")
         if not values or len(set(values)) != len(values):
             raise ProblemError(f"axis {self.name}: values must be distinct, and at least one.")
         if len({isinstance(v, str) for v in values}) > 1 or not all(isinstance(v, str) or math.isfinite(v) for v in values):
@@ -71,6 +83,7 @@ class Axis:
         return isinstance(self.values[0], str)
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Study:
     """A grid of problems, and how hard to search each cell.
@@ -98,7 +111,7 @@ class Study:
     --------
     >>> import colloc
     >>> def problem(mu_b):
-    ...     return colloc.Problem("grid", friction=colloc.Friction(1, 1, mu_b), gait=colloc.Harmonic(1, "bilateral"))
+    ...     return colloc.Problem("grid", friction=colloc.Friction(mu_b=mu_b), gait=colloc.Harmonic(1, "bilateral"))
     >>> study = colloc.Study("grid", (colloc.Axis("mu_b", (1, 2)),), problem)
     >>> study.shape
     (2,)
@@ -124,9 +137,9 @@ class Study:
             raise ProblemError("problem must be a function from coordinates to a Problem.")
         for field, least in (("cold_starts", 0), ("warm_starts", 1), ("chunk", 1), ("seed", 0)):
             value = getattr(self, field)
-            if not is_whole(value, least):
-                raise ProblemError(f"{field} must be a whole number, at least {least}, not {value!r}.")
-        if not isinstance(self.time_limit, (int, float)) or not self.time_limit > 0:
+            if not is_whole(value, least, LARGEST_SEED):
+                raise ProblemError(f"{field} must be a whole number from {least} to {LARGEST_SEED}, not {shown(value)}.")
+        if isinstance(self.time_limit, bool) or not isinstance(self.time_limit, (int, float)) or not self.time_limit > 0:
             raise ProblemError(f"time_limit must be positive, not {self.time_limit!r}.")
         if math.prod(self.shape) > MOST_CELLS:
             raise ProblemError(f"a study may have {MOST_CELLS} cells, not {math.prod(self.shape)}; split it.")

@@ -17,7 +17,7 @@ from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.gait_class import GaitClass, gait_class
 from colloc.studies.run import StudyRun
-from colloc.studies.study import Index, Study
+from colloc.studies.study import ARRAYS, COUNTS, NUMBERS, OTHERS, TEXTS, Index, Study
 from colloc.system.late_binding import optional
 
 if TYPE_CHECKING:
@@ -31,8 +31,6 @@ UNITS = {
     "neighbour_value": "of the objective",
     **dict.fromkeys(("mean", "cos", "sin"), "rad"),
 }
-_NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
-_COUNTS = ("bilateral", "antipodal", "retraced", "at_slowest", "winding", "below_neighbour", "starts", "starts_certified")
 KnownBound = Callable[[Problem], float | None]
 
 
@@ -74,15 +72,14 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
         variables[name] = np.full((*study.shape, *(sizes[e] for e in extra)), empty, dtype=kind)
         dimensions[name] = (*axes, *extra)
 
-    for name in (*_NUMBERS, "delta", "trivial_bound", "upper_bound", "neighbour_value", "seconds", "wave", "forward"):
+    for name in (*NUMBERS, *OTHERS):
         variable(name, float, np.nan)
-    for name in _COUNTS:
+    for name in COUNTS:
         variable(name, int, 0)
-    for name in ("status", "message", "origin", "gait_class", "problem_hash"):
+    for name in TEXTS:
         variable(name, object, "")
-    variable("mean", float, np.nan, ("joint",))
-    variable("cos", float, np.nan, ("joint", "harmonic"))
-    variable("sin", float, np.nan, ("joint", "harmonic"))
+    for name, extra in ARRAYS.items():
+        variable(name, float, np.nan, extra)
     for cell in run.cells:
         for name, value in _cell(run, cell, known_bound).items():
             here = variables[name][cell]
@@ -123,7 +120,7 @@ def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]
 
 def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     gait = fourier_series(problem, outcome.gait)
-    row: dict[str, Any] = {name: getattr(outcome, name) for name in _NUMBERS}
+    row: dict[str, Any] = {name: getattr(outcome, name) for name in NUMBERS}
     row["delta"] = outcome.delta * outcome.gait.delta_unit
     row |= {"mean": gait.mean, "cos": gait.cos, "sin": gait.sin}
     row["at_slowest"] = int(on_speed_floor(problem, outcome.gait))

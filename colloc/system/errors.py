@@ -14,6 +14,10 @@ class CollocError(Exception):
     there is no problem file nowhere.py.
     """
 
+    def __str__(self) -> str:
+        """The sentence, with what would drive a terminal made visible: it may quote files of others."""
+        return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in super().__str__())
+
 
 class ProblemError(CollocError, ValueError):
     """The problem, an option or an input file cannot be used as stated.
@@ -57,6 +61,10 @@ class ChangedFileWarning(UserWarning):
 
 class ReadOnlyRunWarning(UserWarning):
     """What a solve has found so far cannot be kept on the disk; it goes on."""
+
+
+class OrderWarning(UserWarning):
+    """Coefficients that differ were given by their place, and texts and programs do not agree on their order."""
 
 
 class SlowWarning(UserWarning):

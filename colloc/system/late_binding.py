@@ -6,6 +6,7 @@ So a lower package can offer what it must not import; the face of the library sa
 from __future__ import annotations
 
 import importlib
+import inspect
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -23,10 +24,14 @@ def bind(places: Mapping[str, str]) -> None:
 
 
 def bound(name: str) -> Callable[..., Any]:
-    """The function of that name. `KeyError` if nobody has said where it is."""
+    """The function of that name, which checks its arguments, but for axes, of which drawings know more to say. `KeyError` if
+    nobody has said where it is."""
+    from colloc.system.arguments import checked_arguments
+
     module, _, function = _WHERE[name].partition(":")
     with _whatever_backend():
-        return getattr(importlib.import_module(module), function)
+        found = getattr(importlib.import_module(module), function)
+    return checked_arguments(found) if inspect.isfunction(found) and not name.startswith("plot") else found
 
 
 @contextmanager

@@ -39,7 +39,7 @@ class Codec:
     >>> from colloc.system.plain_values import Codec
     >>> from colloc.mechanics.friction import Friction
     >>> codec = Codec([Friction])
-    >>> codec.read(codec.written((Friction(2.0), 0.1)))
+    >>> codec.read(codec.written((Friction(mu_t=2.0), 0.1)))
     (Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.1)
     """
 

@@ -30,8 +30,8 @@ from colloc.mechanics.inertia import checked_inertia, momenta
 from colloc.mechanics.law import Law
 from colloc.motion.compiled_momenta import MomentaAt
 from colloc.motion.follow import ONE_SIDED, STEP, Course, followed
-from colloc.system.arguments import check_finite, is_whole
-from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
+from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.played import Path, to_tolerance
 
@@ -365,8 +365,7 @@ def motion_from_rest(
     array([0.12 , 0.146])
     """
     check_finite(positive=True, froude=froude, delta=delta, tolerance=tolerance)
-    if not is_whole(periods) or periods < 1:
-        raise ProblemError(f"periods must be a whole number of at least 1, not {periods!r}.")
+    check_count(MOST_PERIODS, periods=periods)
     check_finite(grade=grade, theta=theta)
     regime = Slope(float(grade)) if grade else LEVEL
     played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, regime=regime)

@@ -31,6 +31,8 @@ from colloc.system.errors import ProblemError
 from colloc.verification.panels import WHOLE, Panels, begun, changes, halves, increments, left_over, travelled
 from colloc.verification.played import Path, Replay, lever
 
+MOST_INSTANTS = 10_000_000
+"""Of a first grid, which fill a gigabyte."""
 _NARROWEST = 1e-10
 
 
@@ -140,8 +142,8 @@ def replay(
         return inertial_replay(body, friction, path, delta, quantities=quantities, turn=turn, **played)
     if "period" in objective.uses:
         raise ProblemError(f"the objective {objective.name!r} speaks of the period: give the froude at which it is played.")
-    if instants < 4 or instants % 2:
-        raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
+    if not 4 <= instants <= MOST_INSTANTS or instants % 2:
+        raise ProblemError(f"instants must be an even number of at least 4, and at most {MOST_INSTANTS}, not {instants!r}.")
     friction = body.law(friction)
     ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
     counts = [2 * max(1, round(instants * (b - a) / 8)) for a, b in pairwise(ends)]

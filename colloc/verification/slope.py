@@ -32,8 +32,8 @@ from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.motion.follow import Course, followed
 from colloc.motion.on_slope import balance_on_slope
-from colloc.system.arguments import check_finite
-from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
+from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion
 from colloc.verification.played import Path
 
@@ -252,8 +252,7 @@ def slope_motion(
         theta = getattr(gait, "theta", None)
     check_finite(heading=0.0 if heading is None else heading, theta=0.0 if theta is None else theta)
     check_finite(positive=True, tolerance=tolerance)
-    if not isinstance(periods, (int, np.integer)) or periods < 1:
-        raise ProblemError(f"periods must be a whole number from 1, not {periods!r}.")
+    check_count(MOST_PERIODS, periods=periods)
     course = on.course(tolerance)
     heading = (heading or 0.0) if theta is None else theta + course
     loose = on.run(course, heading, periods, _LOOSER * tolerance).states[:5, -1]

@@ -17,11 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
 from colloc.verification.played import Path
 
 _PHASES = np.linspace(0.0, 1.0, 20001)
-_MOST_SAMPLES = 2_000_000
+MOST_SAMPLES = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +86,10 @@ def timed(
             f"a period of {wanted:g} s is too short for the joint speed limits{kept}; use at least {shortest:.6g} s."
         )
     count = int(np.ceil(wanted * rate - 1e-9))
-    if not 4 <= count <= _MOST_SAMPLES:
-        raise ProblemError(f"{count} samples a period are too {'few' if count < 4 else 'many'}; change the rate or the period.")
+    if not 4 <= count <= MOST_SAMPLES:
+        raise ProblemError(
+            f"{count:g} samples a period are too {'few' if count < 4 else 'many'}; change the rate or the period."
+        )
     period = count / rate
     pace = np.maximum(_level(slowest, period), slowest)
     clock = np.concatenate([[0.0], np.cumsum(pace) / pace.size])
@@ -120,7 +123,10 @@ def _slowest(vertices: np.ndarray, limits: np.ndarray, keep_pace: bool) -> np.nd
 
 def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: str) -> np.ndarray:
     """Limits that are positive numbers, ``(n_joint,)``, from one for all or one each; `what` one of them is."""
-    given = np.asarray(limits, dtype=float).ravel()
+    try:
+        given = np.asarray(limits, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise ProblemError(f"{what}s must be numbers, not {shown(limits)}.") from None
     if given.size not in (1, n_joint):
         raise ProblemError(f"{given.size} {what}s for {n_joint} joints; give one for all, or one each.")
     if not np.isfinite(given).all() or given.min() <= 0:

@@ -68,8 +68,9 @@ def waves(context: Context) -> Arrays:
 
 
 def _efficiency(task: Task) -> float:
-    kind, parameters, mu, delta, quadrature = task
-    return float(period(_motion(kind, **parameters), Friction(*mu), delta, **quadrature).efficiency)
+    kind, parameters, (mu_t, mu_f, mu_b), delta, quadrature = task
+    friction = Friction(mu_t=mu_t, mu_f=mu_f, mu_b=mu_b)
+    return float(period(_motion(kind, **parameters), friction, delta, **quadrature).efficiency)
 
 
 def wave_parameters(context: Context) -> Arrays:

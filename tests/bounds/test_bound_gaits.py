@@ -14,6 +14,7 @@ from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError
+from tests.shared.laws import coulomb
 
 ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)
 DIRECTED = dataclasses.replace(ODD, harmonics=(0, 1))
@@ -22,7 +23,7 @@ STEPS = 48
 
 @cache
 def bound_of(mu: tuple[float, float, float]) -> Bound:
-    friction = Friction(*mu)
+    friction = coulomb(*mu)
     return efficiency_bound(Chain(), friction, budget=ODD if friction.reversible else DIRECTED)
 
 
@@ -79,7 +80,7 @@ def ratios(friction: Friction, q: np.ndarray, rate: np.ndarray) -> tuple[np.ndar
     ],
 )
 def test_no_random_gait_beats_the_bound(mu):
-    friction = Friction(*mu)
+    friction = coulomb(*mu)
     bound = bound_of(mu)
     assert bound.sampled < 1 / friction.smallest
     rng = np.random.default_rng(21)
@@ -197,6 +198,6 @@ def test_small_gaits_of_many_joints_begin_with_directions_where_joints_and_links
 @pytest.mark.slow
 def test_the_best_small_gait_is_found_along_a_ridge_that_no_axis_follows():
     """At (3, 1, 1) it lies on the line where both ends are bent alike; a search along the axes ends at 0.188 beside it."""
-    best, shape = best_small_gait(Chain(), Friction(3.0, 1.0, 1.0), 2.5)
+    best, shape = best_small_gait(Chain(), Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0), 2.5)
     assert best.efficiency > 0.208
     assert shape[0] == pytest.approx(-shape[1], abs=5e-3)

@@ -29,6 +29,7 @@ from colloc.numerics.minimax_program import smallest_maximum
 from colloc.numerics.spline import TensorSpline
 from colloc.smooth.modal_body import ModalBody
 from colloc.system.errors import ProblemError, StoreError
+from tests.shared.laws import coulomb
 
 FRICTIONS = [(1.0, 1.0, 1.0), (3.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0)]
 
@@ -152,7 +153,7 @@ def test_largest_gain_is_the_maximum_over_heading():
 
 def test_rows_are_the_gain_and_its_derivatives():
     space = PotentialSpace(TensorSpline(2, np.pi, 4), (0, 1, 2), True)
-    motion = balanced_motion(Chain(), Friction(1.7, 1.0, 1.3), *random_points(6, 60))
+    motion = balanced_motion(Chain(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), *random_points(6, 60))
     samples = Samples(space, motion)
     free = 0.1 * np.random.default_rng(7).standard_normal(space.size)
     chosen, heading = np.arange(motion.size), np.random.default_rng(8).uniform(0, 6, motion.size)
@@ -165,7 +166,7 @@ def test_rows_are_the_gain_and_its_derivatives():
 @pytest.mark.parametrize("mu", FRICTIONS)
 def test_mirror_images_and_end_swap_move_alike(mu, lengths):
     """The symmetries that halve the unknowns hold for the solved motions, and so for the ratio of any symmetric potential."""
-    friction, body, rng = Friction(*mu), Chain(lengths), np.random.default_rng(9)
+    friction, body, rng = coulomb(*mu), Chain(lengths), np.random.default_rng(9)
     q, r = rng.uniform(-2.0, 2.0, (body.n_joint, 80)), rng.normal(size=(body.n_joint, 80))
     space = PotentialSpace(TensorSpline(body.n_joint, 2.0, 4), (1,) if friction.reversible else (0, 1), swaps_ends(body))
     free = 0.1 * np.random.default_rng(10).standard_normal(space.size)
@@ -209,7 +210,7 @@ def test_a_bound_says_whether_the_last_climbs_still_found_more():
 
 @pytest.mark.slow
 def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
-    bound = efficiency_bound(Chain((0.5, 0.5)), Friction(1.0, 1.0, 3.0), budget=Budget(8, (0, 1), 32, 2, 3, 20))
+    bound = efficiency_bound(Chain((0.5, 0.5)), Friction(mu_t=1.0, mu_f=1.0, mu_b=3.0), budget=Budget(8, (0, 1), 32, 2, 3, 20))
     assert 0.05 < bound.sampled < 1.0
 
 
@@ -272,7 +273,7 @@ def test_peaks_where_one_joint_turns_alone_are_met_and_climbed_along():
 @pytest.mark.parametrize("shift", [0.0, 0.37])
 def test_lattices_hold_the_corners_between_limit_and_contact(shift):
     """A potential that had converged at 0.8609 stood at 1.0283 in such a corner, (2.5, 1.8911), where nothing was sampled."""
-    angles = Domain(Chain(), Friction(0.5, 1, 5), 2.5).lattice(8, 6, shift).angles
+    angles = Domain(Chain(), Friction(mu_t=0.5, mu_f=1, mu_b=5), 2.5).lattice(8, 6, shift).angles
     assert np.abs(angles - np.array([[2.5], [1.89109]])).sum(axis=0).min() < 1e-4
     assert np.isclose(angles.max(), 2.5)  # and the limit
 
@@ -438,7 +439,9 @@ def test_the_exchange_does_not_drop_what_it_will_miss():
     assert program.settle(0.01) < program.best.value + 0.01
 
 
-@pytest.mark.parametrize("changes", [{"friction": Viscous(2.0, 1.0)}, {"body": ModalBody(2)}], ids=["drag", "smooth"])
+@pytest.mark.parametrize(
+    "changes", [{"friction": Viscous(normal=2.0, tangential=1.0)}, {"body": ModalBody(2)}], ids=["drag", "smooth"]
+)
 def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_path):
     usual = {"guess": None, "body": Chain(), "friction": Friction(), "gait": Harmonic(1, "antipodal")}
     problem = Problem("other", **(usual | changes))

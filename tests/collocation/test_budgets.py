@@ -16,6 +16,7 @@ from colloc.numerics.multiplier_estimate import estimated_multipliers, quasi_def
 from colloc.search.ipopt import Solver
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.motion import sine_wave
+from tests.shared.laws import coulomb
 
 
 @pytest.mark.parametrize(
@@ -82,7 +83,7 @@ def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_m
 def test_steps_of_the_balance_solver(law, delta, mean, largest):
     rng = np.random.default_rng(0)
     angles, rates = rng.uniform(-np.pi, np.pi, (2, 2000)), rng.normal(size=(2, 2000))
-    iterations = solve_balance(Chain(), Friction(*law), angles, rates, delta).require().iterations
+    iterations = solve_balance(Chain(), coulomb(*law), angles, rates, delta).require().iterations
     assert iterations.mean() <= mean
     assert iterations.max() <= largest
 

@@ -33,7 +33,7 @@ def program(problem, delta):
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
-@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)])
+@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)])
 def test_jacobian_and_hessian_against_differences(formulation, friction):
     problem = Problem(
         "p", ellipse(0.2, 1.3, 0.8), friction=friction, gait=Harmonic(1, "none"), intervals=6, formulation=formulation
@@ -114,7 +114,7 @@ def test_a_gait_with_more_joints_transcribes():
     from colloc.mechanics.chain import Chain
 
     guess = Fourier(np.zeros(3), np.array([[0.5], [0.2], [-0.4]]), np.array([[0.0], [0.6], [0.3]]))
-    problem = Problem("p", guess, body=Chain((0.25,) * 4), friction=Friction(3, 1, 1), intervals=8)
+    problem = Problem("p", guess, body=Chain((0.25,) * 4), friction=Friction(mu_t=3, mu_f=1, mu_b=1), intervals=8)
     transcription, _, x, p, fg = program(problem, 0.1)
     assert np.isfinite(np.array(fg(x, p)[1])).all()
     assert transcription.layout.angles.shape[0] == 3

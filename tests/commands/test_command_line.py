@@ -47,8 +47,14 @@ BAD = {
     "wrong type": ("PROBLEM = 3\n", "must be a colloc.Problem"),
     "syntax": ("a = 1\nb = = 2\n", "line 2"),
     "python error": ("a = 1\n\nb = 1/0\n", "line 3"),
-    "negative friction": (GOOD.replace("PROBLEM = Problem(", "PROBLEM = Problem(friction=Friction(-1, 1, 1), "), "mu_t"),
-    "nan friction": (GOOD.replace("PROBLEM = Problem(", "PROBLEM = Problem(friction=Friction(1, float('nan'), 1), "), "mu_f"),
+    "negative friction": (
+        GOOD.replace("PROBLEM = Problem(", "PROBLEM = Problem(friction=Friction(mu_t=-1, mu_f=1, mu_b=1), "),
+        "mu_t",
+    ),
+    "nan friction": (
+        GOOD.replace("PROBLEM = Problem(", "PROBLEM = Problem(friction=Friction(mu_t=1, mu_f=float('nan'), mu_b=1), "),
+        "mu_f",
+    ),
     "delta": (GOOD.replace("delta=0.3", "delta=-1e-4"), "delta must be positive"),
     "joint limit": (GOOD.replace("1.4, 0.8", "4.0, 0.8"), "inadmissible: joint"),
     "crossing": (

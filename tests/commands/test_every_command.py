@@ -12,7 +12,7 @@ from colloc.results.store import save
 PARSERS = {name: importlib.import_module(f"colloc.commands.{module}")._parser() for name, (module, _) in SUBCOMMANDS.items()}
 PROBLEM = "from colloc import *\nPROBLEM = Problem('quick', gait=Harmonic(1, 'bilateral'))\n"
 STUDY = """from colloc import *
-STUDY = Study("quick", (Axis("mu_t", (1, 2)),), lambda mu_t: Problem("q", friction=Friction(mu_t)))
+STUDY = Study("quick", (Axis("mu_t", (1, 2)),), lambda mu_t: Problem("q", friction=Friction(mu_t=mu_t)))
 """
 
 

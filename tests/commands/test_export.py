@@ -40,7 +40,7 @@ def path_through(angles):
 
 @pytest.mark.parametrize("settings", [{"period": 3.0}, {"limits": 2.0}, {"limits": np.array([1.0, 2.5, 4.0]), "period": 9.0}])
 def test_distance_and_work_do_not_depend_on_pacing(settings):
-    body, friction = Chain((0.25,) * 4), Friction(1.7, 1.0, 1.3)
+    body, friction = Chain((0.25,) * 4), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
     before = replay(body, friction, path_of(WAVE), 1e-4)
     after = replay(body, friction, path_through(timed(path_of(WAVE), 200.0, **settings).angles), 1e-4)
     assert after.distance == pytest.approx(before.distance, rel=2e-4)
@@ -164,7 +164,7 @@ def test_with_inertia_it_is_said_of_which_robot_the_numbers_are(unsolved, tmp_pa
 
 def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
     guess = Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
-    solution = unsolved(Problem("soft", guess, ModalBody(2, panels=4), Friction(3), Harmonic(1, "antipodal"), intervals=6))
+    solution = unsolved(Problem("soft", guess, ModalBody(2, panels=4), Friction(mu_t=3), Harmonic(1, "antipodal"), intervals=6))
     assert str(solution.gait).startswith("mode 1: ")
     assert repr(solution.gait) == "<Fourier of 2 modes>"
     solution.export(tmp_path / "soft.csv", period=4)

@@ -4,11 +4,14 @@ import json
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from colloc import Harmonic, Problem, ellipse, evaluate
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_dict, summary_lines
 from colloc.results.checks import Check
+from colloc.results.robot import joint_torques
 from colloc.results.store import load
 
 QUICK = """
@@ -37,6 +40,51 @@ def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
     assert f"  {bad[1].line()}" in lines
     assert sum(line.startswith("  NO ") for line in lines) == 2
     assert any(line.startswith(f"  {len(good)} checks hold (largest: ") for line in lines)
+
+
+def told_of_limits(**limits):
+    """What the summary says of the limits of a gait whose joints bend by 1.2 and 0.8 rad at two phases."""
+    stated = Problem("limited", gait=Harmonic(1), delta=1e-2, **limits)
+    found = evaluate(stated, ellipse(0.0, 1.2, 0.8))
+    return found, [line[18:] for line in summary_lines(found, None) if line.startswith("  limits ")]
+
+
+def test_the_share_of_every_limit_that_a_gait_uses_is_told_with_its_unit():
+    found, lines = told_of_limits(joint_limit=2.0, speed_limit=10.0, torque_limit=0.05, power_limit=(0.2, 0.4))
+    shares = summary_dict(found, None, None, None)["limits"]
+    assert list(shares) == ["joint angles", "joint speed", "torque", "power"]
+    t = np.linspace(0, 1, 4001)
+    angles, rates = found.gait(t)
+    assert shares["joint angles"] == pytest.approx(np.abs(angles).max() / 2.0, rel=1e-5)
+    assert shares["joint speed"] == pytest.approx(np.abs(rates).max() / 10.0, rel=1e-5)
+    torques = joint_torques(found, t)
+    assert shares["torque"] == pytest.approx(np.abs(torques).max() / 0.05, rel=1e-3)
+    assert shares["power"] == pytest.approx(((torques * rates).max(axis=1) / [0.2, 0.4]).max(), rel=1e-3)
+    of_speed, of_torque = f"{100 * shares['joint speed']:.0f}", f"{100 * shares['torque']:.0f}"
+    assert lines == [
+        f"joint angles {100 * shares['joint angles']:.0f} %, joint speed {of_speed} % of 10 rad per period, "
+        f"torque {of_torque} % of 0.05 weight x body length, power {100 * shares['power']:.0f} %"
+    ]
+
+
+def test_limits_that_no_gait_could_reach_are_named_with_what_it_could_need():
+    """1.5 N m and 40 rad/s of a robot's motors, typed where other units are meant: a third of the body on a floor of friction 1
+    has a torque of 1/18 at most, and one harmonic within 2 rad a speed of 4 pi."""
+    _, lines = told_of_limits(joint_limit=2.0, speed_limit=40.0, torque_limit=1.5, power_limit=2.0)
+    assert lines[1:] == [
+        "speed_limit 40 cannot matter: no gait needs more than 12.6 rad per period, its unit",
+        "torque_limit 1.5 cannot matter: no gait needs more than 0.0556 weight x body length, its unit",
+        "power_limit 2 cannot matter: no gait needs more than 0.698 weight x body length per period, its unit",
+    ]
+
+
+def test_a_speed_that_decides_says_how_far_joints_can_swing():
+    _, lines = told_of_limits(joint_limit=2.0, speed_limit=7.54)
+    assert lines[1:] == ["speed_limit 7.54 rad per period, its unit, lets a joint swing by 216 of 229 degrees at most"]
+
+
+def test_where_nothing_is_limited_nothing_is_told_of_limits():
+    assert told_of_limits()[1] == []
 
 
 def test_verbose_tells_every_check_the_search_and_the_gait(three_link):

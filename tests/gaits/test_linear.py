@@ -145,7 +145,9 @@ def test_statements_read_back_as_what_they_were():
 @pytest.mark.parametrize("gait_class", CLASSES)
 def test_reduced_gradients_are_those_of_differences(gait_class):
     problem = Problem(
-        "differences", friction=Friction(2.0, 1.0, 1.0 if gait_class.symmetry == "none" else 1.5), gait=gait_class
+        "differences",
+        friction=Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0 if gait_class.symmetry == "none" else 1.5),
+        gait=gait_class,
     )
     space, v = space_near(problem, problem.guess)
     program, h = ReducedProgram(space, 1e-2), 1e-6

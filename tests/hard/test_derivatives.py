@@ -17,6 +17,7 @@ from colloc.mechanics.balance import instant
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from tests.shared.laws import coulomb
 
 STENCIL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
 THREE, FOUR = Chain(), Chain((0.2, 0.35, 0.3, 0.15))
@@ -75,7 +76,7 @@ def balanced_point(body, friction, angles, rates, delta, formulation):
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
 @pytest.mark.parametrize(("body", "law"), [(THREE, (1, 1, 1)), (THREE, (1.7, 1, 1.3)), (FOUR, (10, 1, 3))], ids=str)
 def test_point_function_at_random_points(formulation, body, law):
-    friction, rng = Friction(*law), np.random.default_rng(6)
+    friction, rng = coulomb(*law), np.random.default_rng(6)
     local = point_function(formulation, body, friction)
     for delta in (0.3, 1e-2):
         for _ in range(2):
@@ -90,7 +91,7 @@ def test_point_function_at_random_points(formulation, body, law):
 @pytest.mark.parametrize("names", [STICK, FOLDS, STRAIGHT], ids=["stick", "folds", "straight"])
 def test_point_function_at_hard_points(formulation, names):
     for k, (law, delta) in enumerate((((1, 1, 1), 1e-3), ((1.7, 1, 1), 1e-4))):
-        friction = Friction(*law)
+        friction = coulomb(*law)
         local = point_function(formulation, THREE, friction)
         for name in names[k::2]:
             x, solved = balanced_point(THREE, friction, *HARD[name], delta, formulation)
@@ -100,7 +101,7 @@ def test_point_function_at_hard_points(formulation, names):
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
 def test_point_function_where_nothing_moves(formulation):
     """Frozen joints, everything at rest: friction is linear there, with a finite slope mu / delta."""
-    friction, delta = Friction(3, 1, 1), 1e-2
+    friction, delta = Friction(mu_t=3, mu_f=1, mu_b=1), 1e-2
     local = point_function(formulation, THREE, friction)
     x, solved = balanced_point(THREE, friction, (0.7, -0.4), (0.0, 0.0), delta, formulation)
     check(local, x, delta, 1e-2 * delta, solved, 1e-5)

@@ -18,6 +18,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from scripts.models.static_friction import SYMMETRIC_CASES, WORKED_CASES
+from tests.shared.laws import coulomb
 
 BODY = Chain()
 NAMES = list(HARD)
@@ -39,7 +40,7 @@ def errors(coefficients, delta, solved, chosen):
 @pytest.mark.parametrize("delta", DELTAS)
 @pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)
 def test_every_hard_instant_converges(coefficients, delta):
-    solved = solve_balance(BODY, Friction(*coefficients), ANGLES, RATES, delta)
+    solved = solve_balance(BODY, coulomb(*coefficients), ANGLES, RATES, delta)
     assert solved.converged.all(), [NAMES[k] for k in np.flatnonzero(~solved.converged)]
     assert np.isfinite(solved.z).all()
     assert solved.residual.max() <= 1e-11
@@ -55,7 +56,7 @@ def test_every_hard_instant_is_the_one_answer_of_isotropic_friction(delta):
 @pytest.mark.parametrize("coefficients", [(1.7, 1.0, 1.3), (100.0, 0.01, 1.0), (0.01, 100.0, 1.0)], ids=str)
 def test_hard_instants_are_roots_for_unequal_coefficients(coefficients):
     for delta in (1e-4, 1e-12):
-        solved = solve_balance(BODY, Friction(*coefficients), ANGLES, RATES, delta)
+        solved = solve_balance(BODY, coulomb(*coefficients), ANGLES, RATES, delta)
         found = errors(coefficients, delta, solved, range(0, len(NAMES), 2))
         assert max(found.values()) < 1e-10 * max(coefficients) / min(coefficients), found
 
@@ -64,13 +65,15 @@ def test_hard_instants_are_roots_for_unequal_coefficients(coefficients):
 @pytest.mark.parametrize("delta", DELTAS)
 @pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)
 def test_every_hard_instant_against_the_reference(coefficients, delta):
-    solved = solve_balance(BODY, Friction(*coefficients), ANGLES, RATES, delta)
+    solved = solve_balance(BODY, coulomb(*coefficients), ANGLES, RATES, delta)
     found = errors(coefficients, delta, solved, range(len(NAMES)))
     assert max(found.values()) < 1e-10 * max(coefficients) / min(coefficients), found
 
 
 def test_coefficients_equal_up_to_rounding_give_the_isotropic_answer():
-    one, other = (solve_balance(BODY, Friction(1, mu_f, 1), ANGLES, RATES, 1e-8).z for mu_f in (1.0, 1.0 + 1e-15))
+    one, other = (
+        solve_balance(BODY, Friction(mu_t=1, mu_f=mu_f, mu_b=1), ANGLES, RATES, 1e-8).z for mu_f in (1.0, 1.0 + 1e-15)
+    )
     np.testing.assert_allclose(one / SPEED, other / SPEED, atol=1e-10)
 
 
@@ -88,14 +91,14 @@ def test_at_stick_the_velocity_tends_to_its_limit_linearly_in_delta(case):
 def test_frozen_joints_leave_the_body_exactly_at_rest(coefficients):
     rest = np.zeros_like(RATES)
     for delta in (1.0, 1e-4, 1e-14):
-        assert np.array_equal(solve_balance(BODY, Friction(*coefficients), ANGLES, rest, delta).z, np.zeros((3, len(NAMES))))
+        assert np.array_equal(solve_balance(BODY, coulomb(*coefficients), ANGLES, rest, delta).z, np.zeros((3, len(NAMES))))
 
 
 def test_frozen_joints_come_to_rest_from_any_start():
     rng = np.random.default_rng(3)
     for scale in (1.0, 1e6):
         start = scale * rng.normal(size=(3, len(NAMES)))
-        solved = solve_balance(BODY, Friction(1.7, 1, 1.3), ANGLES, np.zeros_like(RATES), 1e-4, start=start)
+        solved = solve_balance(BODY, Friction(mu_t=1.7, mu_f=1, mu_b=1.3), ANGLES, np.zeros_like(RATES), 1e-4, start=start)
         assert solved.converged.all()
         # at rest the force is viscous, about mu v / delta: the residual bounds the speed
         assert np.abs(solved.z).max() < 1e-11
@@ -104,7 +107,7 @@ def test_frozen_joints_come_to_rest_from_any_start():
 @pytest.mark.parametrize("coefficients", COEFFICIENTS[:7], ids=str)
 def test_the_answer_does_not_depend_on_a_start_1e6_away(coefficients):
     rng = np.random.default_rng(4)
-    friction, chosen = Friction(*coefficients), SPEED == 1
+    friction, chosen = coulomb(*coefficients), SPEED == 1
     angles, rates = ANGLES[:, chosen], RATES[:, chosen]
     for delta in (1e-2, 1e-8):
         near = solve_balance(BODY, friction, angles, rates, delta)
@@ -116,7 +119,7 @@ def test_the_answer_does_not_depend_on_a_start_1e6_away(coefficients):
 
 def test_a_joint_at_1e9_of_the_other_moves_the_body_like_a_frozen_one():
     angles = ANGLES[:, :12]
-    for friction in (Friction(), Friction(10, 1, 1), Friction(0.5, 1, 5)):
+    for friction in (Friction(), Friction(mu_t=10, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=1, mu_b=5)):
         z = [solve_balance(BODY, friction, angles, np.full_like(angles, 1.0) * [[1.0], [r]], 1e-6).z for r in (0, 1e-9, -1e-9)]
         # at delta = 1e-6 a held link yields by about delta per unit force: 1e-9 of rate can do no more than that
         np.testing.assert_allclose(z[1], z[0], atol=1e-8)
@@ -128,13 +131,13 @@ def test_mirror_images_of_a_straight_body_cannot_move_it_along_itself(coefficien
     """Opposite bends of a straight body: the reflected motion is the same one, seen from the other side."""
     angles, rates = np.zeros((2, 1)), np.array([[1.0], [-1.0]])
     for delta in (1.0, 1e-4, 1e-12):
-        solved = solve_balance(BODY, Friction(*coefficients), angles, rates, delta).require()
+        solved = solve_balance(BODY, coulomb(*coefficients), angles, rates, delta).require()
         assert abs(solved.z[0, 0]) < 1e-13
 
 
 @pytest.mark.parametrize("lengths", [(1 / 3, 1 / 3, 1 / 3), (0.1, 0.6, 0.3), (0.001, 0.998, 0.001)])
 def test_a_straight_body_sliding_along_itself_meets_coulomb_friction_exactly(lengths):
-    body, friction = Chain(lengths), Friction(7.0, 2.0, 5.0)
+    body, friction = Chain(lengths), Friction(mu_t=7.0, mu_f=2.0, mu_b=5.0)
     still = np.zeros((2, 2))
     z = np.array([[3.0, -3.0], [0.0, 0.0], [0.0, 0.0]])
     for delta in (1e-3, 1e-9, 1e-14):
@@ -148,7 +151,7 @@ def test_rates_below_delta_are_solved_to_their_own_scale():
     """Viscous limit: the velocity is linear in the rates, whatever their size, and does not depend on delta."""
     angles, rates = ANGLES[:, 7:12], np.array([[1.0], [0.3]]) * np.ones((1, 5))
     for coefficients in COEFFICIENTS[:7]:
-        friction = Friction(*coefficients)
+        friction = coulomb(*coefficients)
         z = [solve_balance(BODY, friction, angles, k * rates, 1.0).require().z / k for k in (1e-6, 1e-12, 1e-100, 1e-300)]
         for other in z[1:]:
             np.testing.assert_allclose(other, z[0], atol=2e-10 * friction.largest / friction.smallest)
@@ -184,6 +187,6 @@ def test_two_links_that_nearly_rest_beside_one_that_turns_are_followed_from_smoo
     """Every attempt at delta itself stopped at residuals of 7e-5 and above; at twice delta all is well."""
     angles = np.array([[2.41881], [-2.41881]])
     rates = np.array([[1.0], [-1.5312e-4]])
-    solved = solve_balance(BODY, Friction(10.0, 1.0, 1.7), angles, rates, 1e-6)
+    solved = solve_balance(BODY, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.7), angles, rates, 1e-6)
     assert solved.converged.all()
     assert solved.residual.max() <= 1e-11

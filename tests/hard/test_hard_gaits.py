@@ -7,6 +7,7 @@ from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, re
 from colloc.mechanics.contact import crossing_depth
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED
 from colloc.search.solve import solve
+from tests.shared.laws import coulomb
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")
@@ -112,7 +113,7 @@ def test_refinement_repairs_what_a_coarse_mesh_gets_wrong():
     ids=str,
 )
 def test_extreme_coefficients_are_solved_or_refused(law):
-    friction = Friction(*law)
+    friction = coulomb(*law)
     problem = Problem("extreme", ellipse(0.2, 1.0, 0.6), friction=friction, gait=BILATERAL, intervals=12, delta=1e-3)
     solution = solve(problem, 1)
     if solution.status == SOLVED:

@@ -8,6 +8,7 @@ from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import dissipation_potential, instant, net_force, total_power
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from research.guarantee.loaded_balance import loaded_balance
+from tests.shared.laws import coulomb
 
 ANGLES = np.array([angles for angles, _ in HARD.values()]).T
 RATES = np.array([rates for _, rates in HARD.values()]).T
@@ -28,7 +29,7 @@ def by_both(*arguments, **named):
 @pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)
 def test_every_hard_instant_moves_as_numpy_says(coefficients, delta):
     """A residual leaves the velocity uncertain by max(mu)/min(mu) times as much, so a small one is asked for."""
-    compiled, reference = by_both(Chain(), Friction(*coefficients), ANGLES, RATES, delta, tolerance=1e-13)
+    compiled, reference = by_both(Chain(), coulomb(*coefficients), ANGLES, RATES, delta, tolerance=1e-13)
     np.testing.assert_allclose(compiled.z / SPEED, reference.z / SPEED, rtol=0, atol=1e-9)
 
 
@@ -41,7 +42,7 @@ def test_chains_of_any_number_of_links_take_the_same_steps(lengths):
     for coefficients in LAWS:
         for delta in (1e-2, 1e-6):
             for near in (None, start):
-                args = Chain(lengths), Friction(*coefficients), angles, rates, delta
+                args = Chain(lengths), coulomb(*coefficients), angles, rates, delta
                 compiled, reference = by_both(*args, start=near, tolerance=1e-13)
                 assert compiled.converged.all()
                 np.testing.assert_allclose(compiled.z, reference.z, rtol=0, atol=1e-9)

@@ -53,7 +53,7 @@ def test_pure_translation_and_near_it(w, delta):
         np.testing.assert_allclose(moments.I0, LENGTH / root, rtol=1e-14)
         np.testing.assert_allclose(moments.I2, LENGTH**3 / (12 * root), rtol=1e-14)
         assert abs(moments.I1.item()) <= abs(w * vn) * LENGTH**3 / (12 * root**3) * (1 + 1e-10) + 5e-324
-        force = link_force(*column(vs, vn, w), LENGTH, delta, Friction(2.0, 1.0, 3.0))
+        force = link_force(*column(vs, vn, w), LENGTH, delta, Friction(mu_t=2.0, mu_f=1.0, mu_b=3.0))
         np.testing.assert_allclose(force.tangential, -LENGTH * vs / root, rtol=1e-14, atol=0)
         np.testing.assert_allclose(force.normal, -2 * LENGTH * vn / root, rtol=1e-14, atol=0)
 
@@ -72,7 +72,7 @@ def test_turning_about_an_end_or_the_midpoint():
 def test_forces_never_exceed_their_coefficients_nor_dissipation_its_speed():
     rng = np.random.default_rng(8)
     vs, vn, w = (10 ** rng.uniform(-16, 8, (1, 4000)) * rng.choice([-1.0, 1.0], (1, 4000)) for _ in range(3))
-    friction = Friction(2.0, 1.0, 5.0)
+    friction = Friction(mu_t=2.0, mu_f=1.0, mu_b=5.0)
     for delta in (1.0, 1e-7, 1e-14):
         force = link_force(vs, vn, w, LENGTH, delta, friction)
         assert np.all(np.abs(force.tangential) <= np.where(vs > 0, 1.0, 5.0) * LENGTH * (1 + 1e-13))

@@ -18,8 +18,8 @@ angle = st.one_of(st.floats(-PI, PI, allow_subnormal=False), special)
 rate = st.one_of(st.floats(-1.0, 1.0, allow_subnormal=False), st.sampled_from([0.0, 1.0, -1.0, 1e-9, -1e-12]))
 log_delta = st.floats(-12, 0)
 coefficient = st.floats(-1, 1).map(lambda e: 10.0**e)
-friction = st.one_of(st.just(Friction()), st.builds(Friction, coefficient, coefficient, coefficient))
-reversible = st.builds(lambda t, s: Friction(t, s, s), coefficient, coefficient)
+friction = st.one_of(st.just(Friction()), st.builds(Friction, mu_t=coefficient, mu_f=coefficient, mu_b=coefficient))
+reversible = st.builds(lambda t, s: Friction(mu_t=t, mu_f=s, mu_b=s), coefficient, coefficient)
 
 
 @st.composite

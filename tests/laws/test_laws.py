@@ -22,8 +22,14 @@ from colloc.smooth.modal_body import ModalBody
 
 LENGTHS = Chain().length_column()
 OWN = OwnLaw("-where(vs > 0, 1, 1.5)*vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))")
-EVERY = [Friction(2.0, 1.0, 1.5), Elliptic(2.0, 1.0, 1.5), Viscous(1.8, 1.0), PowerLaw(0.4, 2.0, 1.0, 1.5), OWN]
-ASSOCIATED = [Elliptic(0.3, 1.0, 4.0), Viscous(1.8, 1.0), PowerLaw(0.4, 1.5, 1.5, 1.5)]
+EVERY = [
+    Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5),
+    Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.5),
+    Viscous(normal=1.8, tangential=1.0),
+    PowerLaw(0.4, mu_t=2.0, mu_f=1.0, mu_b=1.5),
+    OWN,
+]
+ASSOCIATED = [Elliptic(mu_t=0.3, mu_f=1.0, mu_b=4.0), Viscous(normal=1.8, tangential=1.0), PowerLaw(0.4, 1.5, 1.5, 1.5)]
 each = pytest.mark.parametrize("law", EVERY, ids=lambda law: type(law).__name__)
 each_associated = pytest.mark.parametrize("law", ASSOCIATED, ids=lambda law: type(law).__name__)
 
@@ -168,9 +174,9 @@ def test_an_associated_law_is_the_gradient_of_a_convex_function(law):
 
 def test_where_coulomb_friction_leaves_three_motions_the_elliptic_law_leaves_one():
     body, angles, rates = Chain(), np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
-    several = body.all_velocities(Friction(1, 0.01, 100), angles, rates, 1e-4)
+    several = body.all_velocities(Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4)
     assert several.number.tolist() == [3]
-    law = Elliptic(1, 0.01, 100)
+    law = Elliptic(mu_t=1, mu_f=0.01, mu_b=100)
     found = [body.solve(law, angles, rates, 1e-4, start=z).require() for z in several.z]
     for one in found:
         np.testing.assert_allclose(one.z, found[0].z, atol=1e-6)
@@ -192,19 +198,24 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
 
 
 def test_bounds_of_the_two_laws_are_kept_apart():
-    keys = {bound_key(Domain(Chain(), law, 3.0), QUICK) for law in (Friction(2, 1, 1), Elliptic(2, 1, 1))}
+    keys = {
+        bound_key(Domain(Chain(), law, 3.0), QUICK)
+        for law in (Friction(mu_t=2, mu_f=1, mu_b=1), Elliptic(mu_t=2, mu_f=1, mu_b=1))
+    }
     assert len(keys) == 2
 
 
 def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
     for vs, vn in ((2.0, 0.0), (-2.0, 0.0), (0.0, 3.0)):
         at = np.array([[vs]]), np.array([[vn]]), 1e-12
-        np.testing.assert_allclose(Elliptic(2, 1, 5).density(*at), Friction(2, 1, 5).density(*at), rtol=1e-14)
+        np.testing.assert_allclose(
+            Elliptic(mu_t=2, mu_f=1, mu_b=5).density(*at), Friction(mu_t=2, mu_f=1, mu_b=5).density(*at), rtol=1e-14
+        )
 
 
 @pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 def test_the_kernel_knows_the_elliptic_law():
-    body, law, (angles, rates) = Chain(), Elliptic(3.0, 1.0, 2.0), instants(10, 60)
+    body, law, (angles, rates) = Chain(), Elliptic(mu_t=3.0, mu_f=1.0, mu_b=2.0), instants(10, 60)
     assert native_kernel(body, law) is not None
     assert native_kernel(body, Viscous()) is None
 
@@ -218,7 +229,7 @@ def test_the_kernel_knows_the_elliptic_law():
             np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
 
 
-@pytest.mark.parametrize("law", [Viscous(), PowerLaw(0.5, 2.0), OWN], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize("law", [Viscous(), PowerLaw(0.5, mu_t=2.0), OWN], ids=lambda law: type(law).__name__)
 def test_smooth_bodies_obey_any_law_whatever_solver_they_are_asked_by(law):
     body, rng = ModalBody(), np.random.default_rng(14)
     at = law, 0.3 * rng.normal(size=(body.n_joint, 2)), 5.0 * rng.normal(size=(body.n_joint, 2)), 0.1
@@ -233,7 +244,7 @@ def test_smooth_bodies_obey_any_law_whatever_solver_they_are_asked_by(law):
 def test_coulomb_friction_costs_what_it_did_and_keeps_its_digits(monkeypatch):
     """The kernel treats it alone; no law is asked in Python but for its coefficients."""
     angles, rates = np.array([[0.5, -1.2], [0.2, 0.7]]), np.array([[1.0, 0.3], [-2.0, 1.5]])
-    law, body = Friction(1.7, 1.0, 1.3), Chain()
+    law, body = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), Chain()
     expected = [  # before other laws were known
         [0.0111061444960639, 0.0153392649399081],
         [0.0299279046686109, 0.1135819154364744],
@@ -268,7 +279,7 @@ def test_the_power_law_ends_in_drag_and_in_coulomb_friction():
             z = body.solve(law, angles, rates, delta).require()
             return body.motion(law, angles, rates, delta, z).power
 
-    drag, dry = power(Viscous(2.0, 1.0)), power(Friction(**mu))
+    drag, dry = power(Viscous(normal=2.0, tangential=1.0)), power(Friction(**mu))
     np.testing.assert_allclose(power(PowerLaw(1.0, **mu)), drag, rtol=1e-12)
     np.testing.assert_allclose(power(PowerLaw(0.0, **mu)), dry, rtol=1e-9)
     # smooth across 1: differences on both sides are equal and opposite to first order

@@ -33,9 +33,9 @@ def test_traits_are_found_from_samples():
 @pytest.mark.parametrize(
     ("own", "built_in"),
     [
-        (COULOMB, Friction(2.0, 1.0, 1.5)),
-        (OwnLaw("-vs", "-2*vn"), Viscous(2.0, 1.0)),
-        (OwnLaw("-vs/sqrt(speed)", "-2*vn*speed**(-0.5)"), PowerLaw(0.5, 2.0, 1.0, 1.0)),
+        (COULOMB, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5)),
+        (OwnLaw("-vs", "-2*vn"), Viscous(normal=2.0, tangential=1.0)),
+        (OwnLaw("-vs/sqrt(speed)", "-2*vn*speed**(-0.5)"), PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0)),
     ],
     ids=["Coulomb", "viscous", "power"],
 )
@@ -76,7 +76,7 @@ def test_what_is_no_law_of_friction_is_refused_with_its_reason(tangential, norma
 @pytest.mark.slow
 def test_a_stated_law_has_the_optimum_of_the_built_in_one():
     values = []
-    for law in (Friction(2.0, 1.0, 1.0), OwnLaw("-vs/speed", "-2*vn/speed")):
+    for law in (Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), OwnLaw("-vs/speed", "-2*vn/speed")):
         problem = Problem("own", friction=law, gait=Harmonic(1, "bilateral"), guess=ellipse(0, 2.5, 1.2), mesh_tolerance=1e-3)
         solution = solve(problem, 1)
         assert solution.status == "solved"
@@ -100,7 +100,7 @@ COMPILED = {
         unit=3.0,
         speed_unit=0.5,
     ),
-    "power": PowerLaw(0.4, 2.0, 1.0, 1.5),
+    "power": PowerLaw(0.4, mu_t=2.0, mu_f=1.0, mu_b=1.5),
     "power with a potential": PowerLaw(1.6, 2.0, 2.0, 2.0),
 }
 

@@ -11,7 +11,7 @@ from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.native_kernel import native_kernel
 
 BODIES = [Chain((0.4, 0.6)), Chain(), Chain((0.3, 0.2, 0.15, 0.35))]
-LAWS = [Friction(), Friction(1.7, 1, 1.3), Friction(0.5, 1, 5)]
+LAWS = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), Friction(mu_t=0.5, mu_f=1, mu_b=5)]
 
 
 def rows(motion):

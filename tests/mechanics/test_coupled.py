@@ -8,7 +8,7 @@ from colloc import Chain, Coupled, Foot, Friction, Harmonic, Problem, ProblemErr
 from colloc.gaits.gait_fields import body_from, fields
 from colloc.mechanics.bodies import Body
 
-LAW = Friction(2.0, 1.0, 1.5)
+LAW = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5)
 BELTS = Coupled(Chain((0.2,) * 5), gears=((1, 0), (0.5, 0), (0, 0.5), (0, 1)))
 BROKEN = Coupled(Chain((0.25,) * 4), stuck={1: 0.4})
 

@@ -13,13 +13,20 @@ from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 LENGTHS = (0.3, 0.45, 0.25)
 PAIR = (Foot(0, 0.2), Foot(1, 0.3, offset=0.05), Foot(1, 0.3, offset=-0.05), Foot(2, 1.0))
 WHEELS = tuple(Wheel(link, 0.4, rolling=0.1) for link in range(3))
-MIXED = (Foot(0), Wheel(1, 0.7, rolling=0.2, sideways=2.0), Foot(2, 0.1, friction=Elliptic(2, 1, 1.5)))
+MIXED = (Foot(0), Wheel(1, 0.7, rolling=0.2, sideways=2.0), Foot(2, 0.1, friction=Elliptic(mu_t=2, mu_f=1, mu_b=1.5)))
 STANDS = {"middles": 1, "three": 3, "offset": PAIR, "wheels": WHEELS, "mixed": MIXED}
 PADDED = {
     "pads": tuple(Pad(link, 0.25, 0.75) for link in range(3)),
     "pads and a wheel": (Pad(0, 0.2, 0.8), Pad(1, 0, 1), Wheel(2, 0.5)),
 }
-LAWS = [Friction(), Friction(1.7, 1, 1.3), Elliptic(2, 1, 1.5), Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")]
+LAWS = [
+    Friction(),
+    Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    Elliptic(mu_t=2, mu_f=1, mu_b=1.5),
+    Viscous(),
+    PowerLaw(0.5),
+    OwnLaw("-vs/speed", "-2*vn/speed"),
+]
 
 
 def feet_in_the_lab(body, angles, rates, z):
@@ -48,7 +55,7 @@ def wrench(body, law, angles, rates, z, delta):
 
 @pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
 def test_the_balance_is_that_of_a_program_of_its_own(feet):
-    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(1.7, 1, 1.3), random_instants(8)
+    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), random_instants(8)
     solved = solve_balance(body, law, angles, rates, 1e-2).require()
     power = body.motion(law, angles, rates, 1e-2, solved).power
     for k in range(8):
@@ -88,7 +95,7 @@ def test_the_stiffness_of_an_associated_law_is_symmetric():
     """Reciprocity: a push here moves there as one there moves here."""
     from colloc.mechanics.balance import balance_jacobian, dissipation_potential, instant
 
-    body, law, (angles, rates) = Chain(LENGTHS, feet=PAIR), Elliptic(2, 1, 1.5), random_instants(20)
+    body, law, (angles, rates) = Chain(LENGTHS, feet=PAIR), Elliptic(mu_t=2, mu_f=1, mu_b=1.5), random_instants(20)
     z, delta = np.random.default_rng(1).normal(size=(3, 20)), np.full((1, 20), 0.1)
     now = instant(body, law, angles, rates, z, delta)
     matrix = balance_jacobian(body, law, now.posture, now.velocity, delta)
@@ -106,7 +113,7 @@ def test_the_stiffness_of_an_associated_law_is_symmetric():
 
 @pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
 def test_mirror_image_other_end_and_reversal_move_alike(feet):
-    law, (angles, rates) = Friction(2.0, 1.0, 1.0), random_instants(30)
+    law, (angles, rates) = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), random_instants(30)
     body = Chain(LENGTHS, feet=feet)
     turned = Chain(LENGTHS[::-1], feet=tuple(foot.from_head(3) for foot in body.feet))
 
@@ -123,7 +130,7 @@ def test_mirror_image_other_end_and_reversal_move_alike(feet):
 
 @pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
 def test_slopes_are_differences(feet):
-    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(2.0, 1.0, 1.0), random_instants(5)
+    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), random_instants(5)
 
     def values(q, r):
         motion = body.motion(law, q, r, 1e-2, solve_balance(body, law, q, r, 1e-2, tolerance=1e-13))
@@ -138,7 +145,7 @@ def test_slopes_are_differences(feet):
 
 @pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
 def test_casadi_says_the_same(feet):
-    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(1.7, 1, 1.3), random_instants(1)
+    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), random_instants(1)
     rng = np.random.default_rng(3)
     given = angles, rates, rng.normal(size=(3, 1)), rng.normal(size=(len(body.force_names), 1)), np.array([[0.01]])
     symbols = [ca.SX.sym("x", len(part)) for part in given]
@@ -266,7 +273,7 @@ def test_compiled_balances_and_slopes_are_those_of_numpy(law, feet):
 
 def test_feet_nearly_on_a_line_are_balanced_where_the_residual_must_rise_before_it_falls():
     bend = np.geomspace(1e-6, 0.1, 400)
-    at = Chain((0.5, 0.5), feet=2), Friction(1, 1, 3), np.stack([[*bend, *-bend]]), np.ones((1, 800)), 5e-6
+    at = Chain((0.5, 0.5), feet=2), Friction(mu_t=1, mu_f=1, mu_b=3), np.stack([[*bend, *-bend]]), np.ones((1, 800)), 5e-6
     solved = solve_balance(*at).require()
     net = [wrench(*at[:2], at[2][:, k], at[3][:, k], solved.z[:, k], 5e-6)[0] for k in range(0, 800, 40)]
     np.testing.assert_allclose(net, 0.0, atol=3e-9)  # rounding of velocities, over delta

@@ -12,7 +12,14 @@ from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError, ProblemError
 
 ISOTROPIC = Friction()
-FRICTIONS = [Friction(), Friction(1.7, 1, 1.3), Friction(10, 1, 1), Friction(0.5, 1, 5), Friction(1, 1, 3), Friction(3, 1, 1)]
+FRICTIONS = [
+    Friction(),
+    Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    Friction(mu_t=10, mu_f=1, mu_b=1),
+    Friction(mu_t=0.5, mu_f=1, mu_b=5),
+    Friction(mu_t=1, mu_f=1, mu_b=3),
+    Friction(mu_t=3, mu_f=1, mu_b=1),
+]
 
 
 def random_instants(seed, count, n_joint=2):
@@ -98,7 +105,7 @@ def test_a_start_next_to_the_answer_does_not_lose_it():
     angles = np.array([[-2.450491783538704], [3.0288778624868327]])
     rates = np.array([[-11.194977583218439], [4.929179798711658e-04]])
     start = np.array([[6.882907034601281e-04], [-3.7304329219234784], [11.192336543699575]])
-    law = Friction(3, 1, 1)
+    law = Friction(mu_t=3, mu_f=1, mu_b=1)
     from_rest, from_start = (solve_balance(Chain(), law, angles, rates, 1e-6, start=s).require() for s in (None, start))
     assert np.abs(from_start.z - from_rest.z).max() < 1e-9
     assert np.abs(start - from_rest.z).max() < 1e-3
@@ -113,7 +120,7 @@ def test_scaling_the_rates_and_delta_scales_the_solution(friction):
 
 def test_reversing_the_rates_reverses_the_solution_where_friction_is_reversible_and_only_there():
     angles, rates = random_instants(17, 60)
-    for friction, reverses in ((Friction(3, 1, 1), True), (Friction(1, 1, 3), False)):
+    for friction, reverses in ((Friction(mu_t=3, mu_f=1, mu_b=1), True), (Friction(mu_t=1, mu_f=1, mu_b=3), False)):
         there, back = (solve_balance(Chain(), friction, angles, k * rates, 1e-3).z for k in (1, -1))
         assert np.allclose(there, -back, atol=1e-9) == reverses
 
@@ -126,7 +133,7 @@ def test_mirror_image(friction):
 
 
 def test_balance_does_not_change_when_the_lab_is_rotated():
-    body, friction = Chain(), Friction(1.7, 1, 1.3)
+    body, friction = Chain(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)
     angles, rates = random_instants(19, 30)
     z = solve_balance(body, friction, angles, rates, 1e-3).z
     now = instant(body, friction, angles, rates, z, 1e-3)
@@ -160,7 +167,7 @@ def test_the_balanced_velocity_minimises_dissipation_and_power_is_at_least_frict
 
 def test_frozen_joints_do_not_move_the_body():
     angles, _ = random_instants(22, 10)
-    solved = solve_balance(Chain(), Friction(10, 1, 3), angles, np.zeros_like(angles), 1e-4)
+    solved = solve_balance(Chain(), Friction(mu_t=10, mu_f=1, mu_b=3), angles, np.zeros_like(angles), 1e-4)
     assert np.array_equal(solved.z, np.zeros((3, 10)))
 
 
@@ -202,19 +209,19 @@ def test_a_link_at_stick_keeps_its_relative_accuracy_at_tiny_delta():
 
 BESIDE_A_FOLD = [
     (
-        Chain((0.2, 0.2, 0.2, 0.2, 0.2)), Friction(0.3732971441138048, 1.0, 1.0), 1e-4,
+        Chain((0.2, 0.2, 0.2, 0.2, 0.2)), Friction(mu_t=0.3732971441138048, mu_f=1.0, mu_b=1.0), 1e-4,
         [0.2902139692001954, 0.41142221419266584, -0.24741914938788861, 0.5570036473833548],
         [1.5208964099572015, -0.442939356313379, -3.631156061252283, 2.5549055153555553],
     ),
     (
         Chain((0.12294025905001435, 0.3350092716615993, 0.2503457939937866, 0.29170467529459976)),
-        Friction(3.041129126875383, 1.0, 1.0), 1e-6,
+        Friction(mu_t=3.041129126875383, mu_f=1.0, mu_b=1.0), 1e-6,
         [-0.3771453161256885, 1.8087369384145267, 0.4682390817703179],
         [-0.030994899599743775, 0.0007943275201016675, -3.2631510952794907],
     ),
     (
         Chain((0.18256804397346088, 0.19015637257632248, 0.2545511669004333, 0.19015637257632248, 0.18256804397346094)),
-        Friction(0.4809270258518652, 1.0, 3.636603686191716), 1e-4,
+        Friction(mu_t=0.4809270258518652, mu_f=1.0, mu_b=3.636603686191716), 1e-4,
         [2.597688063049994, -2.786161703726339, 3.0860764570646855, -2.866002211321948],
         [0.0026765635702248325, 2.586684889251715, -0.9621272363129159, -2.9613888780556366],
     ),

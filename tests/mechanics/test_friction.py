@@ -53,7 +53,7 @@ def test_moments_agree_with_graded_quadrature_over_all_regimes():
 
 def test_normal_force_and_couple_agree_with_graded_quadrature():
     vs, vn, w, length, delta = random_links(2, 3000)
-    force = link_force(vs, vn, w, length, delta, Friction(2.0, 1.0, 1.0))
+    force = link_force(vs, vn, w, length, delta, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0))
     for order, closed in ((0, force.normal), (1, force.couple)):
         reference, magnitude = graded_quadrature(vs, vn, w, length, delta, order, lambda r, y: -2.0 * y / r)
         assert np.max(np.abs(closed - reference) / np.maximum(magnitude, 1e-300)) < 1e-13
@@ -120,7 +120,7 @@ def test_isotropic_force_is_minus_the_gradient_of_the_dissipation_and_its_jacobi
 
 
 def test_pure_translation_gives_coulomb_friction_in_the_limit():
-    force = link_force(np.array([3.0]), np.array([4.0]), np.array([0.0]), 0.5, 1e-9, Friction(2.0, 1.5, 7.0))
+    force = link_force(np.array([3.0]), np.array([4.0]), np.array([0.0]), 0.5, 1e-9, Friction(mu_t=2.0, mu_f=1.5, mu_b=7.0))
     np.testing.assert_allclose(force.tangential, -1.5 * 0.5 * 0.6, rtol=1e-12)
     np.testing.assert_allclose(force.normal, -2.0 * 0.5 * 0.8, rtol=1e-12)
     np.testing.assert_allclose(force.couple, 0.0, atol=1e-15)
@@ -128,7 +128,7 @@ def test_pure_translation_gives_coulomb_friction_in_the_limit():
 
 def test_backward_motion_meets_the_backward_coefficient():
     forward, backward = (
-        link_force(np.array([v]), np.array([0.0]), np.array([0.0]), 1.0, 1e-9, Friction(1, 2, 5)).tangential
+        link_force(np.array([v]), np.array([0.0]), np.array([0.0]), 1.0, 1e-9, Friction(mu_t=1, mu_f=2, mu_b=5)).tangential
         for v in (1.0, -1.0)
     )
     np.testing.assert_allclose([forward[0], backward[0]], [-2.0, 5.0], rtol=1e-12)
@@ -137,7 +137,7 @@ def test_backward_motion_meets_the_backward_coefficient():
 def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed():
     vs, vn, w, length, _ = random_links(7, 2000)
     delta = np.full(2000, 1e-12)
-    friction = Friction(1.7, 1.0, 1.3)
+    friction = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
     work = power(vs, vn, w, link_force(vs, vn, w, length, delta, friction))
     speed = link_dissipation(vs, vn, w, length, delta)
     moving = speed > 1e-9

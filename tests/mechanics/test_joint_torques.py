@@ -12,10 +12,10 @@ from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 
 ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
-BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
+BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
 
-@pytest.mark.parametrize("law", [LAW, PowerLaw(0.5, 2.0, 1.0, 1.0), Viscous(2, 1)], ids=str)
+@pytest.mark.parametrize("law", [LAW, PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), Viscous(normal=2, tangential=1)], ids=str)
 def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
     """So the driven power is smooth there: half of it is gained with every bit of power, whichever way."""
     (angles, rates), delta = random_instants(20), 1e-2

@@ -11,6 +11,7 @@ from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from tests.shared.laws import coulomb
 
 BODY = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 ON_FEET = Chain(
@@ -19,7 +20,13 @@ ON_FEET = Chain(
 )  # fmt: skip
 HELD = {BODY: 1.0, ON_FEET: 0.4}
 """What friction of coefficient 1 holds in every shape, about."""
-LAWS = [Friction(), Friction(1.7, 1, 1.3), Friction(10, 1, 3), Elliptic(2, 1, 1.5), OwnLaw("-vs/speed", "-2*vn/speed")]
+LAWS = [
+    Friction(),
+    Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    Friction(mu_t=10, mu_f=1, mu_b=3),
+    Elliptic(mu_t=2, mu_f=1, mu_b=1.5),
+    OwnLaw("-vs/speed", "-2*vn/speed"),
+]
 
 
 def random_loads(count, size, seed=3):
@@ -38,7 +45,7 @@ def test_the_velocities_are_those_of_a_program_of_points(mu, body):
     angles, rates = random_instants(12)
     load, delta = random_loads(12, 0.6 * HELD[body]), 0.2
     points = standing(body.feet, mu) if body.feet else lying(body.weights, mu)
-    solved = solve_balance(body, Friction(*mu), angles, rates, delta, load=load).require()
+    solved = solve_balance(body, coulomb(*mu), angles, rates, delta, load=load).require()
     for t in range(12):
         at = body.lengths, body.mass_column()[:, 0], points, angles[:, t], rates[:, t], load[:, t], delta
         theirs = least_squares(left_over, np.zeros(3), args=at, xtol=1e-14, ftol=1e-14, gtol=1e-14)
@@ -46,7 +53,7 @@ def test_the_velocities_are_those_of_a_program_of_points(mu, body):
         np.testing.assert_allclose(solved.z[:, t], theirs.x, atol=1e-6)
 
 
-@pytest.mark.parametrize("law", [*LAWS, Viscous(2, 1), PowerLaw(0.5)], ids=lambda law: law.label)
+@pytest.mark.parametrize("law", [*LAWS, Viscous(normal=2, tangential=1), PowerLaw(0.5)], ids=lambda law: law.label)
 @pytest.mark.parametrize("size", [0.3, 0.95])
 def test_joints_do_the_work_of_friction_less_that_of_the_load(law, size):
     angles, rates = random_instants(60)
@@ -121,7 +128,7 @@ def test_a_body_whose_joints_rest_creeps_as_friction_on_a_point_says():
 
 def test_a_load_beyond_friction_is_not_balanced():
     angles, rates = random_instants(6)
-    for law in (Friction(), Friction(1.7, 1, 1.3)):
+    for law in (Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)):
         load = random_loads(6, 1.01 * law.largest)
         assert not solve_balance(BODY, law, angles, rates, 1e-3, load=load, max_iterations=50).converged.any()
 
@@ -133,7 +140,7 @@ def test_unusable_loads_are_named(load):
 
 
 def test_all_motions_under_a_load_are_balanced_and_counted_by_their_signs():
-    law = Friction(1, 0.01, 100)  # as in the printed example of several motions
+    law = Friction(mu_t=1, mu_f=0.01, mu_b=100)  # as in the printed example of several motions
     angles, rates = (np.tile(a, 9) for a in ([[0.78302927], [1.74481885]], [[-3.0], [0.0]]))
     load = np.vstack([np.linspace(-0.004, 0.004, 9), np.full(9, 1e-4)])
     found = all_balanced_velocities(Chain(), law, angles, rates, 1e-4, load)

@@ -38,7 +38,7 @@ def fields(solution):
 
 
 @needs_kernel
-@pytest.mark.parametrize("law", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
+@pytest.mark.parametrize("law", [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)], ids=str)
 def test_an_instant_has_the_same_bits_on_repetition_on_threads_and_in_any_batch(monkeypatch, law):
     angles, rates = random_instants(N_TIME)
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
@@ -124,7 +124,8 @@ rng = np.random.default_rng(0)
 for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
     body, n = Chain(lengths), len(lengths) - 1
     at = rng.uniform(-3, 3, (n, 20)), rng.normal(size=(n, 20))
-    for law in (Friction(), Friction(10, 1, 3), OwnLaw("-where(vs > 0, 1, 2) * vs/speed", "-vn/speed * tanh(2 + speed)")):
+    laws = Friction(), Friction(mu_t=10, mu_b=3), OwnLaw("-where(vs > 0, 1, 2) * vs/speed", "-vn/speed * tanh(2 + speed)")
+    for law in laws:
         assert native_kernel.native_kernel(body, law) is not None
         chain_slopes(body, law, *at, 1e-4, solve_balance(body, law, *at, 1e-4))
         for method in ("newton", "fixed_point"):

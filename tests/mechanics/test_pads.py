@@ -12,10 +12,21 @@ from colloc.mechanics.native_kernel import native_kernel
 LENGTHS = (0.3, 0.45, 0.25)
 WEIGHTS = (0.2, 0.5, 0.3)
 PADS = (Pad(0, 0.1, 0.6), Pad(1, 0.2, 0.5, offset=0.05), Pad(1, 0.2, 0.5, offset=-0.05), Pad(2, 0.0, 1.0))
-OWN = (Pad(0, 0.1, 0.6, friction=Elliptic(2, 1, 1.5)), Pad(1), Pad(2, 0.4, 0.5, friction=Friction(0.5, 1, 2)))
-MIXED = (Foot(0), Pad(1, 0.3, 0.9), Wheel(1, 0.1, rolling=0.2), Pad(2, 0.0, 0.2, friction=Friction(0.5, 1, 2)))
+OWN = (
+    Pad(0, 0.1, 0.6, friction=Elliptic(mu_t=2, mu_f=1, mu_b=1.5)),
+    Pad(1),
+    Pad(2, 0.4, 0.5, friction=Friction(mu_t=0.5, mu_f=1, mu_b=2)),
+)
+MIXED = (Foot(0), Pad(1, 0.3, 0.9), Wheel(1, 0.1, rolling=0.2), Pad(2, 0.0, 0.2, friction=Friction(mu_t=0.5, mu_f=1, mu_b=2)))
 STANDS = {"pads": PADS, "own": OWN, "mixed": MIXED}
-LAWS = [Friction(), Friction(1.7, 1, 1.3), Elliptic(2, 1, 1.5), Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")]
+LAWS = [
+    Friction(),
+    Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    Elliptic(mu_t=2, mu_f=1, mu_b=1.5),
+    Viscous(),
+    PowerLaw(0.5),
+    OwnLaw("-vs/speed", "-2*vn/speed"),
+]
 names = {"ids": lambda law: type(law).__name__ + str(law.associated)}
 
 
@@ -53,7 +64,7 @@ def test_a_pad_is_many_points(law, feet):
 
 @pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
 def test_the_balance_on_pads_is_one_for_many_points(feet):
-    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(1.7, 1, 1.3), random_instants(8)
+    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), random_instants(8)
     z = solve_balance(body, law, angles, rates, 1e-2).require().z
     for k in range(8):
         net, _ = dense_wrench(body, law, angles[:, k], rates[:, k], z[:, k], 1e-2)
@@ -145,7 +156,7 @@ def test_laws_that_are_stated_as_formulas_are_compiled_for_pads_and_feet(law):
     [
         (lambda: Pad(0, 0.2, 1.2), "must lie on its link"),
         (lambda: Pad(0, 0.6, 0.4), "must end behind where it begins"),
-        (lambda: Pad(0, "tail", 0.4), "must lie on its link"),
+        (lambda: Pad(0, "tail", 0.4), "first must be a number, not 'tail'"),
         (lambda: Pad(0, angle=0.3), "may be turned"),
         (lambda: Foot(0, 0.9, extent=0.4), "must lie on its link"),
         (lambda: Foot(0, extent=-0.4), "from 0 \\(a point\\) to 1"),

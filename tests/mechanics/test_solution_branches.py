@@ -13,6 +13,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.mechanics.solution_branches import DISTINCT, all_balanced_velocities
+from tests.shared.laws import coulomb
 
 PRINTED = (np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]]))
 
@@ -24,7 +25,7 @@ def random_instants(seed, count, n_joint=2):
 
 
 def test_the_printed_instant_has_three_motions_and_the_middle_one_is_unstable():
-    found = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), *PRINTED, 1e-4)
+    found = all_balanced_velocities(Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), *PRINTED, 1e-4)
     assert found.number == [3]
     spin = found.z[:, 2, 0]
     order = np.argsort(spin)
@@ -38,7 +39,7 @@ def test_motions_scale_with_the_unit_of_time(unit):
     """Friction knows no speed but delta: the same motions, as many and in the same order."""
     angles, rates = random_instants(4, 60)
     at = (np.concatenate([angles, PRINTED[0]], axis=1), np.concatenate([rates, PRINTED[1]], axis=1))
-    law = Friction(1, 0.01, 100)
+    law = Friction(mu_t=1, mu_f=0.01, mu_b=100)
     slow = all_balanced_velocities(Chain(), law, *at, 1e-4)
     fast = all_balanced_velocities(Chain(), law, at[0], unit * at[1], unit * 1e-4)
     np.testing.assert_array_equal(fast.sign, slow.sign)
@@ -47,7 +48,7 @@ def test_motions_scale_with_the_unit_of_time(unit):
 
 def test_each_of_them_is_a_root_of_the_reference_in_forty_digits():
     body, coefficients = Chain(), (1, 0.01, 100)
-    found = all_balanced_velocities(body, Friction(*coefficients), *PRINTED, 1e-4)
+    found = all_balanced_velocities(body, coulomb(*coefficients), *PRINTED, 1e-4)
     posture = body.posture(PRINTED[0], 1)
     for z in found.z[:, :, 0]:
         # the velocity of the middle link's midpoint, and back
@@ -82,7 +83,7 @@ def test_equal_coefficients_have_one_motion(n_joint):
 )
 def test_the_signs_of_all_motions_add_up_to_one(law, lengths, several):
     """As the degree of the map demands; so none is missing, or they are missing in pairs."""
-    body, friction = Chain(lengths), Friction(*law)
+    body, friction = Chain(lengths), coulomb(*law)
     angles, rates = random_instants(2, 2000, body.n_joint)
     found = all_balanced_velocities(body, friction, angles, rates, 1e-4)
     assert found.complete.all()
@@ -95,7 +96,7 @@ def test_the_signs_of_all_motions_add_up_to_one(law, lengths, several):
 
 
 def test_links_at_rest_find_at_least_what_hundreds_of_random_starts_find():
-    body, friction = Chain(), Friction(100, 1, 1)
+    body, friction = Chain(), Friction(mu_t=100, mu_f=1, mu_b=1)
     angles, rates = random_instants(3, 60)
     few = all_balanced_velocities(body, friction, angles, rates, 1e-4)
     rng = np.random.default_rng(4)
@@ -108,9 +109,9 @@ def test_links_at_rest_find_at_least_what_hundreds_of_random_starts_find():
 
 def test_numpy_finds_the_same_as_the_compiled_solver():
     angles, rates = (np.tile(a, 2) for a in PRINTED)
-    compiled = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), angles, rates, 1e-4)
+    compiled = all_balanced_velocities(Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4)
     with numpy_instead():
-        found = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), angles, rates, 1e-4)
+        found = all_balanced_velocities(Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4)
     np.testing.assert_allclose(np.sort(found.z, axis=0), np.sort(compiled.z, axis=0), atol=1e-7)
 
 
@@ -120,7 +121,7 @@ def test_where_no_start_at_rest_leads_to_a_balance_the_long_way_is_gone(monkeypa
         return z, sign if method == "auto" else 0.0 * sign
 
     solved, at = solution_branches._solved, ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 5))
-    friction = Friction(1.0, 0.5, 2.0)
+    friction = Friction(mu_t=1.0, mu_f=0.5, mu_b=2.0)
     monkeypatch.setattr(solution_branches, "_solved", direct_fails)
     found = all_balanced_velocities(Chain(), friction, *at, 1e-2)
     np.testing.assert_allclose(found.z[0], solve_balance(Chain(), friction, *at, 1e-2).z, atol=1e-9)

@@ -15,15 +15,17 @@ from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.search.solve import solve
 from research.guarantee.guaranteed import certify
+from tests.shared.laws import coulomb
 
 LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
-LAWS = [Friction(), Friction(1.7, 1, 1.3), Elliptic(2, 1, 1.5)]
+LAWS = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), Elliptic(mu_t=2, mu_f=1, mu_b=1.5)]
 
 
 def test_weights_in_proportion_to_the_lengths_are_no_weights_to_the_last_bit():
     angles, rates = random_instants(50)
     said, unsaid = (
-        solve_balance(body, Friction(2, 1, 3), angles, rates, 1e-4) for body in (Chain(weights=(1 / 3,) * 3), Chain())
+        solve_balance(body, Friction(mu_t=2, mu_f=1, mu_b=3), angles, rates, 1e-4)
+        for body in (Chain(weights=(1 / 3,) * 3), Chain())
     )
     np.testing.assert_array_equal(said.z, unsaid.z)
 
@@ -49,7 +51,7 @@ def test_a_body_named_from_its_other_end_moves_the_same_way():
     # shape coordinates from the head: the chain turned round, its weights with it
     angles, rates = random_instants(30)
     body, turned = Chain(LENGTHS, weights=WEIGHTS), Chain(LENGTHS[::-1], weights=WEIGHTS[::-1])
-    law = Friction(2.0, 1.0, 1.0)
+    law = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0)
     power = [
         chain_motion(b, law, q, r, 1e-4, solve_balance(b, law, q, r, 1e-4)).power
         for b, q, r in ((body, angles, rates), (turned, -angles[::-1], -rates[::-1]))
@@ -72,7 +74,7 @@ def test_compiled_balances_and_slopes_are_those_of_numpy(law):
 
 
 def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced():
-    body, law, (angles, rates) = Chain(LENGTHS, weights=WEIGHTS), Friction(1.7, 1, 1.3), random_instants(40)
+    body, law, (angles, rates) = Chain(LENGTHS, weights=WEIGHTS), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), random_instants(40)
     solved = solve_balance(body, law, angles, rates, 1e-3)
     forces = body.forces(law, angles, rates, solved.z, 1e-3)
     lifted = body.with_forces(law, angles, rates, solved.z, forces, 1e-3)
@@ -86,7 +88,7 @@ def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced(
 @pytest.mark.parametrize("mu", [(1, 1, 3), (1, 3, 1), (3, 1, 2)], ids=str)
 def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_themselves_or_turn_about_an_end(mu):
     """A straight body that slides as a whole, forwards, backwards and sideways; couples by a turn about a link's own end."""
-    body, law, straight, delta = Chain(LENGTHS, weights=WEIGHTS), Friction(*mu), np.zeros((2, 3)), 1e-9
+    body, law, straight, delta = Chain(LENGTHS, weights=WEIGHTS), coulomb(*mu), np.zeros((2, 3)), 1e-9
     most = body.largest_forces(law).ravel()
     along, across, couples = np.split(most, 3)
     ways = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
@@ -105,7 +107,7 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_them
 def test_the_replay_is_that_of_a_program_of_its_own():
     gait = Fourier([0.2, -0.1], [[1.2], [0.3]], [[0.2], [1.0]])
     theirs = played(Crawler(LENGTHS, (1.7, 1.0, 1.3), WEIGHTS), lambda t: (gait.angles(t), gait.rates(t)), 1e-2, 1e-5)
-    ours = replay(Chain(LENGTHS, weights=WEIGHTS), Friction(1.7, 1, 1.3), gait, 1e-2)
+    ours = replay(Chain(LENGTHS, weights=WEIGHTS), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait, 1e-2)
     assert ours.work == pytest.approx(theirs.work, rel=1e-4)
     assert ours.distance == pytest.approx(theirs.distance, rel=1e-4)
     assert ours.rotation == pytest.approx(theirs.rotation, rel=1e-4)
@@ -153,7 +155,7 @@ def test_masses_that_are_the_weights_are_no_masses():
     said, unsaid = Chain(LENGTHS, weights=WEIGHTS, masses=WEIGHTS), Chain(LENGTHS, weights=WEIGHTS)
     assert said.largest_imbalance == unsaid.largest_imbalance == 0.0
     angles, rates = random_instants(30)
-    both = (by_both(body, Friction(2.0), angles, rates, 1e-4) for body in (said, unsaid))
+    both = (by_both(body, Friction(mu_t=2.0), angles, rates, 1e-4) for body in (said, unsaid))
     for one, other in zip(*both, strict=True):
         np.testing.assert_array_equal(one[0], other[0])
         np.testing.assert_array_equal(one[1].centre, other[1].centre)

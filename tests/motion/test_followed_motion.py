@@ -14,6 +14,7 @@ from colloc.motion.followed_motion import BACKWARDS, FORWARDS, followed_motion, 
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import fine_motion
 from colloc.verification.replay import replay
+from tests.shared.laws import coulomb
 
 BODY = Chain()
 
@@ -49,7 +50,7 @@ def test_equal_coefficients_leave_nothing_open():
 
 def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
     """Panels count as at the worse of their ends, so a little more; and never more than all of it."""
-    friction, path, t = Friction(100, 1, 1), random_path(3), (np.arange(2000) + 0.5) / 2000
+    friction, path, t = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(3), (np.arange(2000) + 0.5) / 2000
     several = (all_balanced_velocities(BODY, friction, *path(t), 1e-4).number > 1).mean()
     found = replay(BODY, friction, path, 1e-4, instants=1600, most_instants=1600)
     assert 0.02 < several <= found.several + 1e-3
@@ -58,7 +59,7 @@ def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
 
 @pytest.mark.parametrize("sense", [FORWARDS, BACKWARDS])
 def test_the_replay_follows_the_branch_in_time(sense):
-    friction, path = Friction(100, 1, 1), random_path(5)
+    friction, path = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(5)
     followed, other = (replay(BODY, friction, path, 1e-4, sense=s) for s in (sense, -sense))
     expected = step_by_step(friction, path, sense)
     assert abs(followed.efficiency / expected - 1) < 5e-4
@@ -70,7 +71,7 @@ def test_the_replay_follows_the_branch_in_time(sense):
 
 
 def test_velocities_solved_one_by_one_are_put_on_the_branch_that_steps_in_time_stay_on():
-    friction, (angles, rates) = Friction(100, 1, 1), random_path(3)(np.arange(1500) / 1500)
+    friction, (angles, rates) = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(3)(np.arange(1500) / 1500)
     alone = solve_balance(BODY, friction, angles, rates, 1e-4).z
     found, z = on_one_branch(BODY, friction, angles, rates, 1e-4, alone), alone[:, :1]
     walked = np.empty_like(found)
@@ -85,28 +86,28 @@ def test_velocities_solved_one_by_one_are_put_on_the_branch_that_steps_in_time_s
 def test_velocities_put_on_one_branch_are_of_motions_that_last(law, seed):
     """A step from a branch that ends, or a solve from nothing, may come to one that does not."""
     (angles, rates), at = random_path(seed)(np.arange(400) / 400), np.arange(400)
-    alone = solve_balance(BODY, Friction(*law), angles, rates, 1e-4).z
-    every = all_balanced_velocities(BODY, Friction(*law), angles, rates, 1e-4)
+    alone = solve_balance(BODY, coulomb(*law), angles, rates, 1e-4).z
+    every = all_balanced_velocities(BODY, coulomb(*law), angles, rates, 1e-4)
 
     def lasting(z):
         which = np.nan_to_num(np.abs(every.z - z).max(axis=1), nan=np.inf).argmin(axis=0)
         return (every.sign[which, at] > 0) | (every.number == 1)
 
     assert not lasting(alone).all()
-    assert lasting(on_one_branch(BODY, Friction(*law), angles, rates, 1e-4, alone)).all()
+    assert lasting(on_one_branch(BODY, coulomb(*law), angles, rates, 1e-4, alone)).all()
 
 
 def test_where_one_motion_is_balanced_nothing_is_changed():
     """To the last bit: the searches of all such problems go their way."""
     angles, rates = random_path(1)(np.arange(300) / 300)
-    z = solve_balance(BODY, Friction(1.5, 1, 1.2), angles, rates, 1e-3).z
-    assert on_one_branch(BODY, Friction(1.5, 1, 1.2), angles, rates, 1e-3, z) is z
+    z = solve_balance(BODY, Friction(mu_t=1.5, mu_f=1, mu_b=1.2), angles, rates, 1e-3).z
+    assert on_one_branch(BODY, Friction(mu_t=1.5, mu_f=1, mu_b=1.2), angles, rates, 1e-3, z) is z
 
 
 @pytest.mark.parametrize("seed", [3, 5])
 def test_the_adaptive_motion_follows_the_branch_that_the_replay_follows(seed):
     """Solved for one by one, instants fall on either branch, and these lie 6 % and 0.03 % apart in the efficiency."""
-    friction, path = Friction(100, 1, 1), random_path(seed)
+    friction, path = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(seed)
     fine = fine_motion(BODY, friction, path, 1e-4, np.linspace(0, 1, 61), 1e-6)
     expected = replay(BODY, friction, path, 1e-4).efficiency
     assert abs(fine.path[-1]) / fine.work[-1] == pytest.approx(expected, rel=1e-5)
@@ -119,7 +120,7 @@ def test_the_stated_error_covers_both_directions(law, seeds):
     """All of these but seeds 4 and 8 run through shapes with several motions."""
     for seed in seeds:
         forwards, backwards = (
-            replay(BODY, Friction(*law), random_path(seed), 1e-4, instants=800, tolerance=1e-4, sense=s)
+            replay(BODY, coulomb(*law), random_path(seed), 1e-4, instants=800, tolerance=1e-4, sense=s)
             for s in (FORWARDS, BACKWARDS)
         )
         for known, other in ((forwards, backwards), (backwards, forwards)):
@@ -133,7 +134,7 @@ def test_the_stated_error_covers_both_directions(law, seeds):
 
 def test_a_period_that_is_open_at_its_ends_is_followed_around_them():
     """The phase at which a period begins changes neither its work nor its rotation."""
-    friction, path = Friction(100, 1, 1), random_path(3)
+    friction, path = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(3)
     t = np.arange(2000) / 2000
     several = followed_motion(BODY, friction, *path(t), 1e-4).apart.any(axis=0)
     middle = t[np.flatnonzero(several)[several.sum() // 4]]
@@ -157,4 +158,4 @@ def test_an_instant_without_any_balance_is_said_to_have_none():
 
     angles, rates = ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 20))
     with pytest.raises(NotConvergedError, match="at 1 of 20 instants"):
-        followed_motion(Lost(), Friction(1.0, 0.01, 100.0), angles, rates, 1e-4)
+        followed_motion(Lost(), Friction(mu_t=1.0, mu_f=0.01, mu_b=100.0), angles, rates, 1e-4)

@@ -15,7 +15,7 @@ from colloc.search.spaces import space_near
 from colloc.verification.inertial_motion import inertial_motion
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[1.17], [0.12]], sin=[[0.0], [-0.91]], theta=0.7)
-BODY, FRICTION, DELTA = colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(1.7, 1.0, 1.3), 1e-2
+BODY, FRICTION, DELTA = colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), 1e-2
 
 
 def problem(**fields):

@@ -105,7 +105,7 @@ CASES = {
     "series": {"gait": Harmonic(1)},
     "with inertia": {"gait": Harmonic(1), "froude": 0.05},
     "free path": {"gait": FreePath(4.0, "none")},
-    "polygon of unequal friction": {"gait": Polygon(4, "none"), "friction": Friction(1.7, 1, 1.3)},
+    "polygon of unequal friction": {"gait": Polygon(4, "none"), "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)},
 }
 
 

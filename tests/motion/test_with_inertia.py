@@ -33,7 +33,12 @@ STANDING = colloc.Chain((0.3, 0.45, 0.25), feet=1)
 
 
 def problem(**fields):
-    usual = {"gait": colloc.Harmonic(1), "guess": LEANING, "friction": colloc.Friction(1.7, 1.0, 1.3), "rotation": None}
+    usual = {
+        "gait": colloc.Harmonic(1),
+        "guess": LEANING,
+        "friction": colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3),
+        "rotation": None,
+    }
     return colloc.Problem("paced", **({"body": colloc.Chain((0.3, 0.45, 0.25)), "froude": 0.1, "delta": 1e-2} | usual | fields))
 
 
@@ -45,10 +50,10 @@ def program(stated):
 @pytest.mark.parametrize(
     ("body", "friction"),
     [
-        (colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(1.7, 1.0, 1.3)),
-        (colloc.Chain((0.2, 0.3, 0.5), masses=(0.5, 0.1, 0.4), inertias=(0.01, 0.02, 0.03)), colloc.Friction(0.4)),
-        (STANDING, colloc.Friction(3.0, 0.5, 1.0)),
-        (colloc.Chain((0.5, 0.5)), colloc.Viscous(2.0)),
+        (colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)),
+        (colloc.Chain((0.2, 0.3, 0.5), masses=(0.5, 0.1, 0.4), inertias=(0.01, 0.02, 0.03)), colloc.Friction(mu_t=0.4)),
+        (STANDING, colloc.Friction(mu_t=3.0, mu_f=0.5, mu_b=1.0)),
+        (colloc.Chain((0.5, 0.5)), colloc.Viscous(normal=2.0)),
     ],
 )
 def test_the_kernel_and_the_symbolic_statement_have_the_derivatives_of_differences(body, friction):
@@ -324,10 +329,10 @@ def test_two_equal_links_go_nowhere_by_an_antipodal_gait_and_such_a_problem_is_r
 
     def distance(body):
         whole = objective_from("distance + work")  # no error is small beside no distance
-        return colloc.replay(body, colloc.Friction(2.0), gait, 1e-2, froude=0.1, tolerance=1e-4, objective=whole).distance
+        return colloc.replay(body, colloc.Friction(mu_t=2.0), gait, 1e-2, froude=0.1, tolerance=1e-4, objective=whole).distance
 
     assert distance(colloc.Chain((0.5, 0.5))) < 1e-6 < 1e-4 < distance(colloc.Chain((0.4, 0.6)))
-    stated = {"friction": colloc.Friction(2.0), "gait": colloc.Harmonic(3, "antipodal"), "guess": None, "rotation": 0.0}
+    stated = {"friction": colloc.Friction(mu_t=2.0), "gait": colloc.Harmonic(3, "antipodal"), "guess": None, "rotation": 0.0}
     with pytest.raises(colloc.ProblemError, match="own axis of symmetry"):
         problem(body=colloc.Chain((0.5, 0.5)), **stated)
     assert problem(body=colloc.Chain((0.4, 0.6)), **stated).froude == 0.1
@@ -335,7 +340,7 @@ def test_two_equal_links_go_nowhere_by_an_antipodal_gait_and_such_a_problem_is_r
 
 def test_two_equal_links_never_turn_so_that_nothing_has_to_keep_them_from_it():
     """In every shape they are their own mirror image; that a mesh errs is no reason to look for gaits that make up for it."""
-    gait, friction = colloc.Fourier(mean=[0.7], cos=[[0.4, 0.5]], sin=[[0.9, -0.2]]), colloc.Friction(0.4)
+    gait, friction = colloc.Fourier(mean=[0.7], cos=[[0.4, 0.5]], sin=[[0.9, -0.2]]), colloc.Friction(mu_t=0.4)
     turned = [
         colloc.replay(colloc.Chain(lengths), friction, gait, 1e-2, froude=0.05, tolerance=1e-5).rotation
         for lengths in ((0.5, 0.5), (0.4, 0.6))

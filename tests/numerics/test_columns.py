@@ -28,7 +28,7 @@ def test_a_function_of_columns_takes_any_number_of_them():
 @pytest.mark.parametrize("seed", [1, 2])
 def test_chosen_rows_are_those_of_the_program(body, gait, seed):
     """Every other row, at a point that keeps none of them."""
-    problem, rng = Problem("rows", body=body, friction=Friction(2, 1, 1), gait=gait), np.random.default_rng(seed)
+    problem, rng = Problem("rows", body=body, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=gait), np.random.default_rng(seed)
     rows = path_geometry(control_problem(problem), problem.guess).rows
     x = rng.uniform(0.5, 1.5, rows.linear.shape[1])
     given = [block.parameters for block in rows.blocks]

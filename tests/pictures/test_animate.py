@@ -22,7 +22,9 @@ from colloc.results.store import save
 def crawler(n_link):
     j = np.arange(n_link - 1)
     guess = Fourier(np.zeros(n_link - 1), 0.6 * np.cos(0.9 * j)[:, None], 0.6 * np.sin(0.9 * j)[:, None] + 0.1)
-    return Problem("crawler", guess, Chain((1 / n_link,) * n_link), Friction(1.0, 1.0, 2.0), delta=1e-2, intervals=8)
+    return Problem(
+        "crawler", guess, Chain((1 / n_link,) * n_link), Friction(mu_t=1.0, mu_f=1.0, mu_b=2.0), delta=1e-2, intervals=8
+    )
 
 
 def dark(picture):

@@ -31,7 +31,9 @@ def crawler(n_link, size=0.6):
     j = np.arange(n_link - 1)
     guess = Fourier(np.zeros(n_link - 1), size * np.cos(0.9 * j)[:, None], size * np.sin(0.9 * j)[:, None] + 0.1)
     lengths = (1 / n_link,) * n_link
-    return Problem("crawler", guess, Chain(lengths), Friction(1.5, 1.0, 1.2), gait=Harmonic(1), delta=1e-2, intervals=8)
+    return Problem(
+        "crawler", guess, Chain(lengths), Friction(mu_t=1.5, mu_f=1.0, mu_b=1.2), gait=Harmonic(1), delta=1e-2, intervals=8
+    )
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.7, 2.5])
@@ -50,7 +52,9 @@ def snake(size):
     wave = Fourier(
         np.zeros(4), size * np.cos(0.4 * np.pi * np.arange(4.0))[:, None], size * np.sin(0.4 * np.pi * np.arange(4.0))[:, None]
     )
-    return Problem("snake", wave, Chain((0.2,) * 5), Friction(10.0, 1.0, 1.0), gait=Harmonic(1), delta=1e-2, intervals=8)
+    return Problem(
+        "snake", wave, Chain((0.2,) * 5), Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), gait=Harmonic(1), delta=1e-2, intervals=8
+    )
 
 
 def bodies(axes):

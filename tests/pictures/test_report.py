@@ -74,7 +74,7 @@ def crawler(n_link, **changes):
     fields = {
         "name": f"crawler{n_link}",
         "body": Chain((1 / n_link,) * n_link),
-        "friction": Friction(1.5, 1.0, 1.2),
+        "friction": Friction(mu_t=1.5, mu_f=1.0, mu_b=1.2),
         "gait": Harmonic(1),
         "guess": Fourier(np.zeros(n_link - 1), 0.6 * np.cos(0.9 * j)[:, None], 0.6 * np.sin(0.9 * j)[:, None] + 0.1),
         "delta": 1e-2,

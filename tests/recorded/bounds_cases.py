@@ -23,7 +23,7 @@ from tests.research.random_cells import random_cells
 PRECISION, FLOOR = 1e-6, 1e-10
 
 THREE, ODD = Chain(), Chain((0.3, 0.45, 0.25))
-ISOTROPIC, UNEQUAL, STEEP = Friction(), Friction(1.7, 1.0, 1.3), Friction(100.0, 1.0, 1.0)
+ISOTROPIC, UNEQUAL, STEEP = Friction(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
 SPACES = {
     "odd": PotentialSpace(TensorSpline(2, np.pi, 6), (1, 3), True),
     "even": PotentialSpace(TensorSpline(2, 2.5, 5, (-1.0, -0.3, 0.3, 1.0)), (0, 1), False),
@@ -93,7 +93,7 @@ def small_gaits():
 def a_sampled_bound():
     """The program's digits are the solver's: values alone, and few of their digits."""
     found = []
-    for law, rounds in ((ISOTROPIC, 2), (Friction(1.0, 1.0, 3.0), 1)):
+    for law, rounds in ((ISOTROPIC, 2), (Friction(mu_t=1.0, mu_f=1.0, mu_b=3.0), 1)):
         budget = Budget(intervals=5, shapes=5, directions=6, rounds=rounds, starts=8, tolerance=5e-2, first=3)
         bound = efficiency_bound(Chain((0.5, 0.5)) if rounds == 1 else THREE, law, 2.5, budget=budget)
         found += [np.round([bound.sampled, bound.floor], 4), bound.converged, bound.intervals, bound.harmonics, bound.graded]

@@ -27,7 +27,7 @@ from tests.recorded.bodies import form, mechanics, shapes
 
 PRECISION, FLOOR = 1e-7, 1e-11
 
-UNEQUAL = Friction(1.7, 1.0, 1.3)
+UNEQUAL = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 TWO, THREE, ODD = Chain((0.4, 0.6)), Chain(), Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 WIDE, FIVE = Chain((0.25, 0.25, 0.25, 0.25), width=0.05), Chain((0.1, 0.3, 0.2, 0.25, 0.15))
 
@@ -58,14 +58,20 @@ def contact():
 
 
 def mechanics_of_chains():
-    laws = Friction(), UNEQUAL, Friction(0.5, 1.0, 5.0)
+    laws = Friction(), UNEQUAL, Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0)
     return [mechanics(body, law, 1e-3, 2.0) for body, law in zip((THREE, ODD, FIVE), laws, strict=True)]
 
 
 def laws_of_friction():
     vs, vn, w = np.random.default_rng(16).normal(size=(3, 3, 9))
     length, found = np.array([[0.2], [0.5], [0.3]]), []
-    for law in (Friction(), UNEQUAL, Elliptic(1.7, 1.0, 1.3), PowerLaw(0.5, 2.0, 1.0), Viscous(1.7, 1.0)):
+    for law in (
+        Friction(),
+        UNEQUAL,
+        Elliptic(mu_t=1.7, mu_f=1.0, mu_b=1.3),
+        PowerLaw(0.5, mu_t=2.0, mu_f=1.0),
+        Viscous(normal=1.7, tangential=1.0),
+    ):
         found += [getattr(law, name)(vs, vn, 0.1) for name in ("density", "density_secant", "density_jacobian")]
         on_links = line_integrals(law)
         found += [integral(vs, vn, w, length, 0.1) for integral in (on_links.force, on_links.jacobian, on_links.secant)]
@@ -77,7 +83,10 @@ def laws_of_friction():
 
 
 def mechanics_under_other_laws():
-    return [mechanics(THREE, law, 1e-2, 2.0, count=3) for law in (Elliptic(1.7, 1.0, 1.3), PowerLaw(0.5, 2.0, 1.0))]
+    return [
+        mechanics(THREE, law, 1e-2, 2.0, count=3)
+        for law in (Elliptic(mu_t=1.7, mu_f=1.0, mu_b=1.3), PowerLaw(0.5, mu_t=2.0, mu_f=1.0))
+    ]
 
 
 def _loaded(body, law, delta):
@@ -89,7 +98,7 @@ def _loaded(body, law, delta):
 
 def _at_rest():
     angles, _, start = shapes(THREE, 4, 15, 2.0)
-    found = [solve_balance(THREE, law, angles, 0 * angles, 1e-3, start=start).z for law in (UNEQUAL, PowerLaw(0.5, 2.0))]
+    found = [solve_balance(THREE, law, angles, 0 * angles, 1e-3, start=start).z for law in (UNEQUAL, PowerLaw(0.5, mu_t=2.0))]
     load = np.array([[0.05, 0.0, 0.1, 0.0], [0.1, 0.2, 0.0, 0.0]])
     return found, solve_balance(THREE, UNEQUAL, angles, 0 * angles, 1e-3, load=load).z
 
@@ -101,7 +110,10 @@ def bodies_whose_joints_rest():
 
 
 def under_loads():
-    return [_loaded(body, law, 1e-4) for body, law in ((THREE, Friction()), (ODD, UNEQUAL), (FIVE, Friction(10.0, 1.0, 1.0)))]
+    return [
+        _loaded(body, law, 1e-4)
+        for body, law in ((THREE, Friction()), (ODD, UNEQUAL), (FIVE, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)))
+    ]
 
 
 def _steps(count, methods=("auto",)):
@@ -110,7 +122,12 @@ def _steps(count, methods=("auto",)):
     hard = np.array(list(HARD.values())).transpose(1, 2, 0)
     angles, rates = np.concatenate([angles, hard[0]], axis=1), np.concatenate([rates, hard[1]], axis=1)
     start, found = np.concatenate([start, np.zeros((3, hard.shape[2]))], axis=1), []
-    for law, delta in ((Friction(), 1e-10), (UNEQUAL, 1e-5), (Friction(0.5, 1.0, 5.0), 1e-7), (Friction(10.0, 1.0, 1.0), 1e-4)):
+    for law, delta in (
+        (Friction(), 1e-10),
+        (UNEQUAL, 1e-5),
+        (Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0), 1e-7),
+        (Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), 1e-4),
+    ):
         for near in (None, start):
             for method in methods:
                 solved = solve_balance(THREE, law, angles, rates, delta, start=near, method=method, max_iterations=300)
@@ -134,7 +151,9 @@ def by_numpy():
 
 def every_motion():
     angles, rates, _ = shapes(THREE, 30, 12, 2.5)
-    return [all_balanced_velocities(THREE, Friction(100.0, 1.0, 1.0), angles, rates, delta) for delta in (1e-3, 1e-5)]
+    return [
+        all_balanced_velocities(THREE, Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), angles, rates, delta) for delta in (1e-3, 1e-5)
+    ]
 
 
 def actuators():

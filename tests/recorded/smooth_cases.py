@@ -11,7 +11,7 @@ from tests.recorded.bodies import form, mechanics, shapes
 
 PRECISION, FLOOR = 1e-6, 1e-10
 
-UNEQUAL = Friction(1.7, 1.0, 1.3)
+UNEQUAL = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 LEGENDRE, FOURIER = ModalBody(modes=3, panels=6, order=5), ModalBody(modes=4, basis="fourier")
 CRAWLER = CrawlerBody(epsilon=0.12, share=0.4, modes=3, panels=6, order=5)
 ONE_BUMP, TWO_BUMPS = Concertina(epsilon=0.1, amplitude=1.2, share=0.3, backwards=True), Concertina(0.08, 1.1, 0.6, bumps=2)
@@ -31,7 +31,7 @@ def mechanics_of_legendre_modes():
 
 
 def mechanics_of_fourier_modes():
-    return mechanics(FOURIER, Friction(3.0, 1.0, 1.0), 1e-2, 0.6)
+    return mechanics(FOURIER, Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0), 1e-2, 0.6)
 
 
 def mechanics_of_a_crawler():

@@ -27,7 +27,7 @@ OPEN = Fourier([-0.7, -0.4], [[0.3, -0.5], [-0.4, -0.2]], [[-1.6, -0.2], [-0.7, 
 """Runs through shapes with several motions where friction is a hundred times as large across the links as along them."""
 LOPSIDED = Chain((0.25, 0.45, 0.3))
 WEIGHTY = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
-UNEQUAL = Friction(1.7, 1.0, 1.3)
+UNEQUAL = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
 
 def replay_of_equal_coefficients():
@@ -41,7 +41,15 @@ def replay_of_unequal_coefficients_with_limits():
 
 
 def replay_with_corners():
-    return replay(LOPSIDED, Friction(3.0, 1.0, 1.0), SQUARE, 1e-3, instants=120, tolerance=1e-4, breaks=SQUARE.corner_phases)
+    return replay(
+        LOPSIDED,
+        Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0),
+        SQUARE,
+        1e-3,
+        instants=120,
+        tolerance=1e-4,
+        breaks=SQUARE.corner_phases,
+    )
 
 
 def replays_of_other_objectives():
@@ -51,20 +59,20 @@ def replays_of_other_objectives():
 
 
 def replay_where_several_motions_are_balanced():
-    at = Chain(), Friction(100.0, 1.0, 1.0), OPEN, 1e-4
+    at = Chain(), Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), OPEN, 1e-4
     return replay(*at, instants=200, tolerance=1e-3), replay(*at, instants=200, tolerance=1e-3, sense=BACKWARDS)
 
 
 def motions_that_are_followed():
     t = np.arange(120) / 120
-    found = followed_motion(Chain(), Friction(100.0, 1.0, 1.0), *OPEN(t), 1e-4)
+    found = followed_motion(Chain(), Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), *OPEN(t), 1e-4)
     assert found.apart.any()
     return found
 
 
 def replay_of_a_smooth_body():
     gait = Fourier(np.zeros(3), [[1.0], [0.0], [0.2]], [[0.0], [0.9], [0.1]])
-    return replay(ModalBody(modes=3), Friction(4.0, 1.0, 1.0), gait, 1e-2, instants=40, tolerance=1e-3)
+    return replay(ModalBody(modes=3), Friction(mu_t=4.0, mu_f=1.0, mu_b=1.0), gait, 1e-2, instants=40, tolerance=1e-3)
 
 
 def measured_for_vanishing_delta():

@@ -19,19 +19,23 @@ from tests.shared.stages import answer_near
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0.9], [-0.2]])}
 CASES = {
-    "harmonics": {"gait": Harmonic(2, "none"), "friction": Friction(0.5, 1, 5)},
+    "harmonics": {"gait": Harmonic(2, "none"), "friction": Friction(mu_t=0.5, mu_f=1, mu_b=5)},
     "bilateral harmonics": {"gait": Harmonic(2, "bilateral")},
-    "antipodal harmonics": {"gait": Harmonic(1, "antipodal"), "friction": Friction(1.7, 1, 1.3), "guess": ellipse(0, 1.3, 0.8)},
+    "antipodal harmonics": {
+        "gait": Harmonic(1, "antipodal"),
+        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+        "guess": ellipse(0, 1.3, 0.8),
+    },
     "shared nodes": {"gait": Harmonic(1, "none"), "scheme": "hermite-simpson"},
     "free path": {"gait": FreePath(4.0, "none")},
-    "bilateral path": {"gait": FreePath(4.0, "bilateral"), "friction": Friction(1.7, 1, 1.3)},
+    "bilateral path": {"gait": FreePath(4.0, "bilateral"), "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)},
     "antipodal path": {"gait": FreePath(4.0, "antipodal")},
     "bilateral path of three joints": {"gait": FreePath(6.0, "bilateral"), **FOUR},
     "path of three joints": {"gait": FreePath(6.0, "none"), **WAVE},
     "antipodal path of three joints": {"gait": FreePath(6.0, "antipodal"), **WAVE},
     "path with two intervals an arc": {"gait": FreePath(4.0, "none"), "halved": True},
     "path of three joints with two intervals an arc": {"gait": FreePath(6.0, "bilateral"), "halved": True, **FOUR},
-    "polygon": {"gait": Polygon(4, "none"), "friction": Friction(3, 1, 2)},
+    "polygon": {"gait": Polygon(4, "none"), "friction": Friction(mu_t=3, mu_f=1, mu_b=2)},
     "bilateral polygon": {"gait": Polygon(5, "bilateral")},
 }
 DELTA = 0.05
@@ -127,7 +131,9 @@ def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
 )
 def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
     """Tail velocities and link forces among the variables, the balance among the constraints; two programs, one solution."""
-    problem = Problem("p", ellipse(1.0, 0.7, 1.1), friction=Friction(1.7, 1, 1.3), gait=gait, intervals=24, delta=3e-3)
+    problem = Problem(
+        "p", ellipse(1.0, 0.7, 1.1), friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait=gait, intervals=24, delta=3e-3
+    )
     answer = answer_near(problem.with_(mesh_tolerance=0.0))
     found = answer.history[-2]
     assert (found.program, answer.program) == ("reduced", "full")

@@ -185,7 +185,7 @@ def test_the_gait_between_two_ways_of_bending_is_a_saddle():
 
 
 def test_an_optimum_is_better_than_its_neighbours():
-    answer = answer_near(PROBLEM.with_(friction=Friction(10, 1, 1), intervals=20))
+    answer = answer_near(PROBLEM.with_(friction=Friction(mu_t=10, mu_f=1, mu_b=1), intervals=20))
     space, v = space_near(answer.problem, answer.gait, answer.edges, answer.scheme)
     program = ReducedProgram(space, answer.delta)
     found = curvature(program, v)

@@ -20,7 +20,8 @@ def bump(t):
 
 LEVEL = Problem("bilateral", gait=Harmonic(1, "bilateral"), grade=0.4, intervals=60)
 SKEW = Problem(
-    "skew", body=Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)), friction=Friction(1.7, 1, 1.3), gait=Harmonic(2), grade=0.4,
+    "skew", body=Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)),
+    friction=Friction(mu_t=1.7, mu_b=1.3), gait=Harmonic(2), grade=0.4,
     intervals=60,
 )  # fmt: skip
 FEET = SKEW.with_(
@@ -31,7 +32,7 @@ FEET = SKEW.with_(
 
 SNAKE = SKEW.with_(name="snake", gait=Serpenoid(2), guess=None)
 SPLINE = SKEW.with_(name="spline", gait=BSpline(7, degree=3), guess=None)
-ARCS = Problem("arcs", friction=Friction(1.7, 1, 1.3), gait=FreePath(5.0), grade=0.4, intervals=12)
+ARCS = Problem("arcs", friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait=FreePath(5.0), grade=0.4, intervals=12)
 ARCS_OF_THREE = ARCS.with_(name="arcs-3", body=Chain((0.25,) * 4), guess=None, grade=0.2)
 SIDES = SKEW.with_(name="sides", gait=Polygon(5), guess=None)
 NOTHING_MORE = (None, "driven efficiency", {"torque_limit": 0.06})
@@ -131,7 +132,7 @@ def test_a_serpenoid_gait_on_a_slope_is_known_by_its_few_parameters():
 
 
 def test_what_friction_does_not_hold_has_no_value():
-    program, v = program_at(LEVEL.with_(friction=Friction(10, 0.1, 0.1), grade=5.0, intervals=12), 1e-3)
+    program, v = program_at(LEVEL.with_(friction=Friction(mu_t=10, mu_f=0.1, mu_b=0.1), grade=5.0, intervals=12), 1e-3)
     assert np.isnan(program.objective(v))
 
 

@@ -60,7 +60,7 @@ def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, 
     if not follows:
         monkeypatch.setattr(Constraints, "following", lambda held: held)
     monkeypatch.setattr(converge, "BOX", 0.5)
-    body, friction = Chain((0.25, 0.25, 0.25, 0.25)), Friction(0.4, 1, 1)
+    body, friction = Chain((0.25, 0.25, 0.25, 0.25)), Friction(mu_t=0.4, mu_f=1, mu_b=1)
     problem = Problem("touch", body=body, friction=friction, gait=Harmonic(4), joint_limit=2.5, intervals=20)
     space, v = space_near(problem, latin_hypercube_gait(problem, 0, 0))
     conditions = at_rest(ReducedProgram(space, 0.02), v, FINE).conditions

@@ -129,10 +129,10 @@ def test_speed_of_a_link_end_is_bounded_by_its_dissipation():
 
 
 ODD_LENGTHS = Chain((0.3, 0.45, 0.25))
-DIRECTED = Elliptic(1.0, 0.6, 1.4)
+DIRECTED = Elliptic(mu_t=1.0, mu_f=0.6, mu_b=1.4)
 CASES = pytest.mark.parametrize(
     ("body", "friction"),
-    [(BODY, UNIT), (ODD_LENGTHS, UNIT), (BODY, Elliptic(1.0, 0.5, 0.5)), (ODD_LENGTHS, DIRECTED)],
+    [(BODY, UNIT), (ODD_LENGTHS, UNIT), (BODY, Elliptic(mu_t=1.0, mu_f=0.5, mu_b=0.5)), (ODD_LENGTHS, DIRECTED)],
     ids=["equal", "unlike lengths", "elliptic", "unlike and directed"],
 )
 
@@ -174,11 +174,11 @@ def test_balanced_motions_stay_within_what_is_allowed(potential, body, friction,
         (ODD_LENGTHS, UNIT, 0.002, True, 49),
         (ODD_LENGTHS, UNIT, 0.0003, True, 50),
         (ODD_LENGTHS, UNIT, 0.02, True, 68),
-        (ODD_LENGTHS, Elliptic(1.0, 0.5, 0.5), 0.01, False, 44),
-        (BODY, Elliptic(1.0, 2.0, 2.0), 0.002, True, 49),
+        (ODD_LENGTHS, Elliptic(mu_t=1.0, mu_f=0.5, mu_b=0.5), 0.01, False, 44),
+        (BODY, Elliptic(mu_t=1.0, mu_f=2.0, mu_b=2.0), 0.002, True, 49),
         (ODD_LENGTHS, DIRECTED, 0.01, False, 136),
-        (BODY, Elliptic(1.0, 2.0, 1.5), 0.002, True, 50),
-        (BODY, Elliptic(1.0, 1.2, 1.0), 0.02, False, 79),
+        (BODY, Elliptic(mu_t=1.0, mu_f=2.0, mu_b=1.5), 0.002, True, 50),
+        (BODY, Elliptic(mu_t=1.0, mu_f=1.2, mu_b=1.0), 0.02, False, 79),
         (BODY, DIRECTED, 0.002, True, 64),
     ],
     ids=[
@@ -442,11 +442,11 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
 @pytest.mark.parametrize(
     ("body", "friction", "harmonics"),
     [
-        (BODY, Friction(2.0, 1.0, 1.0), (1,)),
+        (BODY, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), (1,)),
         (Chain((0.25,) * 4), Friction(), (1,)),
         (Chain(weights=(0.25, 0.5, 0.25)), Friction(), (1,)),
         (BODY, Friction(), (0, 1)),
-        (BODY, Elliptic(2.0, 1.0, 1.0), (0, 1)),
+        (BODY, Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0), (0, 1)),
         (BODY, Friction(), (3,)),
     ],
     ids=["no convex potential", "four links", "weights", "even harmonics", "those of a reversible law", "no displacement"],

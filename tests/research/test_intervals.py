@@ -73,7 +73,7 @@ def exact_state(lengths, sigma, point, z, load):
     return [total, *flat, forces[0][2] + s * forces[2][2], mpmath.hypot(*left[:2]), abs(left[2])]
 
 
-@pytest.mark.parametrize("friction", [Friction(), Elliptic(1.0, 0.6, 1.4)], ids=["equal", "directed"])
+@pytest.mark.parametrize("friction", [Friction(), Elliptic(mu_t=1.0, mu_f=0.6, mu_b=1.4)], ids=["equal", "directed"])
 def test_what_is_stated_of_a_corner_holds_what_it_is_to_sixty_digits(friction):
     """Of motions of any speed; of links that hardly turn, and of ones that turn about a point of their own."""
     rng, body, n = np.random.default_rng(72), Chain((0.3, 0.45, 0.25)), 60

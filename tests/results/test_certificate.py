@@ -270,7 +270,7 @@ def test_a_certificate_knows_the_limit_of_a_distance_that_falls_in_proportion_to
 
 
 def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(three_link, replays):
-    unequal, fine = three_link.problem.with_(friction=Friction(1.7, 1.0, 1.3)), replays[max(replays)]
+    unequal, fine = three_link.problem.with_(friction=Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)), replays[max(replays)]
     for problem, several, said in (
         (three_link.problem, 0.0, "leaves one balanced motion"),
         (unequal, 0.0, "no other balanced motion was found"),

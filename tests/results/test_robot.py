@@ -146,7 +146,7 @@ def test_a_smooth_body_has_no_torques_to_tell(unsolved):
     guess = colloc.Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
     soft = colloc.ModalBody(2, panels=4)
     gait = colloc.Harmonic(1, "antipodal")
-    solution = unsolved(colloc.Problem("soft", guess, soft, colloc.Friction(3), gait, intervals=6))
+    solution = unsolved(colloc.Problem("soft", guess, soft, colloc.Friction(mu_t=3), gait, intervals=6))
     with pytest.raises(colloc.ProblemError, match="smooth body: it has no joints"):
         _ = solution.robot(**SIZE).facts
 

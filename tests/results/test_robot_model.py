@@ -25,7 +25,9 @@ def uneven():
     )
     body = Chain((0.2, 0.5, 0.3), weights=(0.2, 0.5, 0.3), feet=feet, masses=MASSES, inertias=INERTIAS)
     limits = ((-1.0, 2.0), 1.5)
-    problem = Problem("uneven", body=body, friction=Friction(2, 1, 1), gait=Harmonic(1), joint_limit=limits, delta=1e-2)
+    problem = Problem(
+        "uneven", body=body, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), joint_limit=limits, delta=1e-2
+    )
     return colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
 
 
@@ -49,8 +51,8 @@ def test_an_mjcf_has_the_links_masses_ranges_and_feet_of_the_robot(uneven):
 
 
 def test_every_foot_slides_by_the_mean_of_its_own_friction(uneven, tmp_path):
-    feet = (Foot(0), Foot(1, friction=Friction(4, 1, 1)), Wheel(2, rolling=0.04, sideways=1.0))
-    problem = uneven.problem.with_(body=Chain(feet=feet), friction=Friction(9, 1, 1), joint_limit=3.0)
+    feet = (Foot(0), Foot(1, friction=Friction(mu_t=4, mu_f=1, mu_b=1)), Wheel(2, rolling=0.04, sideways=1.0))
+    problem = uneven.problem.with_(body=Chain(feet=feet), friction=Friction(mu_t=9, mu_f=1, mu_b=1), joint_limit=3.0)
     solution = colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
     root = ElementTree.fromstring(mjcf(solution.robot(**SIZE)))
     found = {geom.get("name"): numbers(geom.get("friction"))[0] for geom in root.iter("geom") if geom.get("priority") == "1"}

@@ -58,7 +58,9 @@ def test_a_gait_that_is_named_from_the_other_end_travels_the_other_end_first():
 
 @pytest.mark.parametrize(("mu_f", "mu_b", "first"), [(1.0, 5.0, "head first"), (5.0, 1.0, "tail first")])
 def test_a_body_travels_to_the_side_to_which_it_slides_easily(mu_f, mu_b, first):
-    problem = Problem("eased", body=Chain((0.5, 0.5)), friction=Friction(1.0, mu_f, mu_b), gait=Harmonic(1), delta=1e-2)
+    problem = Problem(
+        "eased", body=Chain((0.5, 0.5)), friction=Friction(mu_t=1.0, mu_f=mu_f, mu_b=mu_b), gait=Harmonic(1), delta=1e-2
+    )
     solution = evaluate(problem, Fourier([0.0], [[1.0]], [[0.0]]))
     assert solution.travels == first
     assert any(first in line for line in summary_lines(solution, None)) == (first != "head first")  # which is told if it is not

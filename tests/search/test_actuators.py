@@ -32,7 +32,7 @@ from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 
 ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
-BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
+BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 USUAL = Problem("limited", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"))
 
 
@@ -78,14 +78,18 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
     angles, rates = random_instants(50)
     slow, fast = (moments(BODY, LAW, angles, pace * rates, pace * 1e-3)[0] for pace in (1.0, 2.0))
     np.testing.assert_allclose(fast, slow, rtol=1e-7, atol=1e-9)
-    drag = [moments(Chain(), Viscous(2, 1), angles, pace * rates, 1e-3)[0] for pace in (1.0, 2.0)]
+    drag = [moments(Chain(), Viscous(normal=2, tangential=1), angles, pace * rates, 1e-3)[0] for pace in (1.0, 2.0)]
     np.testing.assert_allclose(drag[1], 2 * drag[0], rtol=1e-9)
     z = BODY.solve(LAW, angles, rates, 1e-3).z
     powers = Instants(BODY, LAW, angles, rates, 1e-3, z=z).power
     np.testing.assert_allclose(powers, slow * rates, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("law", "degree"), [(LAW, 0), (PowerLaw(0.5, 2.0, 1.0, 1.0), 0.5), (Viscous(2, 1), 1)], ids=str)
+@pytest.mark.parametrize(
+    ("law", "degree"),
+    [(LAW, 0), (PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.5), (Viscous(normal=2, tangential=1), 1)],
+    ids=str,
+)
 def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
     angles, rates = random_instants(50)
     z = Chain().solve(law, angles, rates, 0.1).z
@@ -194,7 +198,7 @@ DEMANDS = {
     "three links": USUAL.with_(guess=None, torque_limit=1.0),
     "four links": Problem("four", body=Chain((0.25,) * 4), gait=Harmonic(2), torque_limit=(1.0, 0.5, 1.0)),
     "power": USUAL.with_(guess=None, gait=Harmonic(2), power_limit=1.0, smallest_shape_speed=0.5),
-    "drag": Problem("drag", friction=Viscous(2, 1), gait=Harmonic(1), objective="towing", torque_limit=1.0),
+    "drag": Problem("drag", friction=Viscous(normal=2, tangential=1), gait=Harmonic(1), objective="towing", torque_limit=1.0),
 }
 
 
@@ -240,7 +244,11 @@ def test_joints_too_weak_for_any_gait_are_told_before_the_search(case):
 
 
 def test_what_may_be_kept_is_not_refused():
-    for changes in ({"torque_limit": 0.05}, {"torque_limit": 0.03, "friction": Friction(1, 1, 3)}, {"power_limit": 0.05}):
+    for changes in (
+        {"torque_limit": 0.05},
+        {"torque_limit": 0.03, "friction": Friction(mu_t=1, mu_f=1, mu_b=3)},
+        {"power_limit": 0.05},
+    ):
         check_actuators_suffice(USUAL.with_(guess=None, **changes))
 
 
@@ -277,4 +285,4 @@ def test_limits_that_have_no_meaning_are_refused(case):
 def test_a_problem_says_why_its_pace_matters():
     assert USUAL.with_(torque_limit=1.0).paced_by == ""
     assert USUAL.with_(power_limit=1.0).paced_by == "the joints' power is limited"
-    assert "drag" in USUAL.with_(friction=Viscous(2, 1)).paced_by
+    assert "drag" in USUAL.with_(friction=Viscous(normal=2, tangential=1)).paced_by

@@ -154,7 +154,7 @@ def test_a_held_share_follows_the_peak_where_tips_pass_to_second_order():
 
 
 @pytest.mark.parametrize("lengths", [(0.5, 0.5), (0.3, 0.7)])
-@pytest.mark.parametrize("friction", [Friction(), Friction(3, 1, 1), Friction(0.5, 2, 2)])
+@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=3, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=2, mu_b=2)])
 def test_scallop_theorem(lengths, friction):
     # one joint retraces its path; with equal speeds both ways nothing is left, whatever the delta
     body = Chain(lengths)
@@ -185,7 +185,7 @@ def test_two_links_without_directional_friction_are_refused_in_words():
 def test_classes_whose_gaits_all_go_back_the_way_they_came_are_refused_unless_that_leads_somewhere(kind):
     with pytest.raises(ProblemError, match="it retraces its path, and reversed rates"):
         Problem("back", gait=kind)
-    assert Problem("forth", gait=kind, friction=Friction(1, 1, 2)).gait is kind
+    assert Problem("forth", gait=kind, friction=Friction(mu_t=1, mu_f=1, mu_b=2)).gait is kind
 
 
 def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_friction_gives(solved):

@@ -31,7 +31,7 @@ def test_an_optimum_that_rounds_the_corner_of_the_contact_region_is_certified():
 @pytest.mark.slow
 def test_refinement_encloses_a_kink_instead_of_following_it():
     """Five meshes, each with its knot moved after the kink, had ended at an error of 3.1e-5."""
-    first = solve(from_start(6, Friction(1.7, 1.0, 1.3), "none", intervals=40), 1)
+    first = solve(from_start(6, Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), "none", intervals=40), 1)
     problem = first.problem.with_(guess=first.gait, delta=1e-6, delta_start=4e-3)
     solution = solve(problem, 1)
     assert solution.status == "solved", solution.message
@@ -44,7 +44,7 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
 @pytest.mark.parametrize("start", [0, 3])
 def test_refinement_ends_where_an_optimum_is_flat(start):
     """Every new mesh moved these gaits by 0.01 rad, away from where it was fine: after eight the error was 8e-5 and 1.1e-4."""
-    problem = Problem("flat", body=Chain((0.2, 0.5, 0.3)), friction=Friction(3, 1, 1), gait=Harmonic(3, "none"))
+    problem = Problem("flat", body=Chain((0.2, 0.5, 0.3)), friction=Friction(mu_t=3, mu_f=1, mu_b=1), gait=Harmonic(3, "none"))
     solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, start)), 1)
     assert solution.status == "solved", solution.message
     checks = {check.name: check for check in solution.certificate.checks}
@@ -54,7 +54,11 @@ def test_refinement_ends_where_an_optimum_is_flat(start):
 def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     """Nearest to it, no gradient is below 1e-3; those of both sides cancel."""
     problem = Problem(
-        "kink", body=Chain((0.2, 0.5, 0.3)), friction=Friction(0.5, 1.0, 5.0), gait=Harmonic(3, "none"), delta=1e-4
+        "kink",
+        body=Chain((0.2, 0.5, 0.3)),
+        friction=Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0),
+        gait=Harmonic(3, "none"),
+        delta=1e-4,
     )
     solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 3)), 1)
     assert solution.status == "solved", solution.message

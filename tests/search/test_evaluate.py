@@ -151,7 +151,7 @@ def test_by_what_gaits_differ(changed, differs):
     ("changes", "alike"),
     [
         ({}, (True, True, True)),
-        ({"friction": colloc.Friction(1, 1, 1.5)}, (True, False, False)),
+        ({"friction": colloc.Friction(mu_t=1, mu_f=1, mu_b=1.5)}, (True, False, False)),
         ({"body": colloc.Chain((0.3, 0.3, 0.4))}, (False, True, False)),
     ],
 )

@@ -21,7 +21,9 @@ from colloc.search.solve import solve
 from colloc.system.errors import NotConvergedError
 
 ALONE = Helpers(Problem("alone"))
-UNEQUAL = Problem("unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(2, 1, 1.4), gait=Harmonic(2, "none"))
+UNEQUAL = Problem(
+    "unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(mu_t=2, mu_f=1, mu_b=1.4), gait=Harmonic(2, "none")
+)
 
 
 @pytest.mark.slow
@@ -270,7 +272,7 @@ def test_a_gait_that_jumps_between_balanced_motions_gives_way_to_one_that_certif
     """Three links on a foot between two wheels: most of what promises well turns in jumps, whose phase no mesh decides."""
     wheels = [Wheel(link, place, rolling=0.056, weight=0.2872234) for link, place in ((0, 0.24857), (2, 0.75143))]
     feet = (wheels[0], Foot(1, 0.5, weight=1 - 2 * 0.2872234), wheels[1])
-    solution = solve(Problem("rolls", body=Chain(feet=feet), friction=Friction(0.5488), gait=Harmonic(1, "antipodal")))
+    solution = solve(Problem("rolls", body=Chain(feet=feet), friction=Friction(mu_t=0.5488), gait=Harmonic(1, "antipodal")))
     assert solution.status == "solved"
     assert solution.value > 0.69
 

@@ -110,7 +110,7 @@ def test_a_film_shows_which_feet_hold(on_feet):
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():
     """Wheels alone: the problem's friction acts nowhere. The search sees it in units of its own size."""
     wheels = Chain(feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(3)))
-    one, other = (Problem("wheels", body=wheels, friction=own) for own in (Friction(), Elliptic(7, 8, 9)))
+    one, other = (Problem("wheels", body=wheels, friction=own) for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9)))
     assert one.law == other.law
     scaled = control_problem(other)
     law = scaled.dynamics.law
@@ -118,7 +118,9 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     assert 0.1 < law.smallest < 10
     assert Problem.from_dict(other.with_(friction=law).to_dict()).law == law
     angles, rates = random_instants(20)
-    z, same, again = (solve_balance(wheels, own, angles, rates, 1e-3).z for own in (Friction(), Elliptic(7, 8, 9), law))
+    z, same, again = (
+        solve_balance(wheels, own, angles, rates, 1e-3).z for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9), law)
+    )
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
     stated, resolved = (replay(wheels, law, KNOWN, 1e-2, tolerance=1e-4, instants=200) for law in (Friction(), one.law))
@@ -168,8 +170,8 @@ def test_at_a_zigzag_every_foot_steps_the_same_way_while_two_hold_with_no_smooth
 
 def test_what_feet_cannot_do_yet_is_refused():
     with pytest.raises(ProblemError, match="on feet no upper bound"):
-        Domain(Chain(feet=1), Friction(2, 1, 1), 2.0)
-    assert "on feet no upper bound" in refusal(Problem("bound", body=Chain(feet=1), friction=Friction(2, 1, 1)))
+        Domain(Chain(feet=1), Friction(mu_t=2, mu_f=1, mu_b=1), 2.0)
+    assert "on feet no upper bound" in refusal(Problem("bound", body=Chain(feet=1), friction=Friction(mu_t=2, mu_f=1, mu_b=1)))
     assert refusal(Problem("bound", body=Chain(feet=1))) == ""
     with pytest.raises(ProblemError, match="read the same from both ends"):
         Problem("half", body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=Harmonic(1, "bilateral"))

@@ -13,6 +13,9 @@ from colloc.search.spaces import space_near
 ROUND, STANDING_POWER = colloc.ellipse(A0=0, A1=2.2, B1=1.3), "distance / (work + 0.1 * period)"
 
 
+SKATING = colloc.Fourier(mean=[2.7, -2.7], cos=[[0.4], [0.0]], sin=[[0.0], [0.3]])
+
+
 def problem(froude, **fields):
     usual = {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "delta": 1e-2, "objective": STANDING_POWER}
     return colloc.Problem("free", froude=froude, **(usual | fields))
@@ -28,9 +31,11 @@ def best(stated):
     return converged(*space_near(stated, stated.guess), stated.delta, FINE)
 
 
-@pytest.mark.parametrize("objective", [STANDING_POWER, "distance / period", "distance / work + 0 * period"])
-def test_gradients_are_those_of_differences(objective):
-    space, v = space_near(problem(colloc.Free(0.01, 1.0), objective=objective, gait=colloc.Harmonic(1), rotation=None), ROUND)
+@pytest.mark.parametrize("mu", [1.0, 0.1])
+@pytest.mark.parametrize("objective", [STANDING_POWER, "distance / period", "efficiency"])
+def test_gradients_are_those_of_differences(objective, mu):
+    usual = {"gait": colloc.Harmonic(1), "rotation": None, "friction": colloc.Friction(mu_t=mu)}
+    space, v = space_near(problem(colloc.Free(0.01, 1.0), objective=objective, **usual), ROUND)
     program, step = ReducedProgram(space, 1e-2), 1e-5
     differences = [(program.objective(v + step * e) - program.objective(v - step * e)) / (2 * step) for e in np.eye(v.size)]
     np.testing.assert_allclose(program.gradient(v), differences, atol=2e-6 * np.abs(differences).max())
@@ -47,6 +52,20 @@ def test_the_best_pace_is_that_of_the_best_fixed_one():
     assert values[2] == pytest.approx(found.value, rel=1e-9)
     assert values[2] > max(values) - 1e-12
     assert abs(values[3] - values[1]) / (2e-2 * values[2]) < 1e-3
+
+
+def test_inertia_alone_decides_the_pace_of_the_efficiency_where_sideways_friction_is_small():
+    """Slower and faster the same gait does less for its work; so nothing has to say what time is worth."""
+    law = {"friction": colloc.Friction(mu_t=0.1), "gait": colloc.Harmonic(1), "rotation": None, "intervals": 20}
+    found = best(problem(colloc.Free(0.02, 3.0), objective="efficiency", guess=SKATING, **law))
+    froude = played(found)
+    assert found.optimal
+    assert 0.03 < froude < 2.5
+    at = [
+        colloc.inertial_motion(colloc.Chain(), law["friction"], found.gait, 1e-2, froude * by).efficiency
+        for by in (0.7, 1, 1.4)
+    ]
+    assert at[1] > max(at[0], at[2])
 
 
 def test_it_is_certified_kept_and_told(tmp_path):
@@ -82,7 +101,7 @@ def test_speed_under_a_limit_of_power_takes_all_of_it():
         ({"froude": (1.0, 0.1)}, "the smaller one first"),
         ({"froude": (-1.0, 0.1)}, "above 0"),
         ({"froude": (0.1, np.inf)}, "two numbers"),
-        ({"froude": (0.1, 1.0), "objective": "efficiency"}, "what time is worth"),
+        ({"froude": (0.1, 1.0), "objective": "1 / length"}, "depends on it"),
         ({"froude": (0.1, 1.0), "gait": colloc.FreePath(2.0)}, "of a class Harmonic"),
         ({"froude": (0.1, 1.0, 2.0)}, "two numbers"),
     ],

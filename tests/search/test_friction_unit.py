@@ -11,11 +11,12 @@ from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
+from tests.shared.laws import coulomb
 
 
 def stated(*mu, **changes):
     settings = {"gait": Harmonic(1, "bilateral"), "intervals": 24, "delta": 1e-2, "mesh_tolerance": 1e-4} | changes
-    return Problem("unit", ellipse(0.3, 1.0, 0.5), friction=Friction(*mu), **settings)
+    return Problem("unit", ellipse(0.3, 1.0, 0.5), friction=coulomb(*mu), **settings)
 
 
 def test_friction_of_usual_size_is_left_alone():
@@ -23,7 +24,7 @@ def test_friction_of_usual_size_is_left_alone():
         problem = stated(*mu)
         control = control_problem(problem)
         assert (control.unit, control.dynamics.law) == (1.0, problem.law)
-    assert friction_unit(Friction(2e-6, 1e-6, 3e-6)) == pytest.approx(1e-6)
+    assert friction_unit(Friction(mu_t=2e-6, mu_f=1e-6, mu_b=3e-6)) == pytest.approx(1e-6)
 
 
 def test_every_limit_follows_friction_by_its_own_power():

@@ -8,7 +8,7 @@ from colloc.gaits.limits import under_one_limit
 from colloc.results.store import load, save
 from colloc.search.solve import solve
 
-LAW = Friction(3, 1, 1)
+LAW = Friction(mu_t=3, mu_f=1, mu_b=1)
 ONE_SIDED = ((-0.6, 1.5), (-1.5, 0.6))
 
 

@@ -10,7 +10,7 @@ from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 
 T = np.linspace(0, 1, 20001)
-FAR = {"objective": "distance", "friction": Friction(2, 1, 1.5)}
+FAR = {"objective": "distance", "friction": Friction(mu_t=2, mu_f=1, mu_b=1.5)}
 
 
 def fastest(solution):
@@ -39,9 +39,9 @@ def test_a_limit_that_nothing_reaches_changes_nothing():
     [
         (Harmonic(2, "bilateral"), (8.0, 8.0), FAR),
         (BSpline(8, symmetry="bilateral"), 8.0, FAR),
-        (Serpenoid(1), 3.0, {"body": Chain((0.2,) * 5), "friction": Friction(3, 1, 1)}),
+        (Serpenoid(1), 3.0, {"body": Chain((0.2,) * 5), "friction": Friction(mu_t=3, mu_f=1, mu_b=1)}),
         (Harmonic(1, "antipodal"), 10.0, {"froude": 0.05}),
-        (Harmonic(1), 6.0, {"grade": 0.05, "friction": Friction(3, 1, 1.5), "objective": "distance"}),
+        (Harmonic(1), 6.0, {"grade": 0.05, "friction": Friction(mu_t=3, mu_f=1, mu_b=1.5), "objective": "distance"}),
     ],
     ids=["harmonics", "splines", "serpenoid", "inertia", "slope"],
 )
@@ -68,7 +68,9 @@ def test_a_flat_top_that_the_second_round_comes_back_to_is_no_end():
 
 
 def test_derivatives_of_the_rows_are_those_of_differences():
-    problem = Problem("rows", gait=Serpenoid(2), body=Chain((0.25,) * 4), friction=Friction(2, 1, 1.5), speed_limit=(5, 6, 7))
+    problem = Problem(
+        "rows", gait=Serpenoid(2), body=Chain((0.25,) * 4), friction=Friction(mu_t=2, mu_f=1, mu_b=1.5), speed_limit=(5, 6, 7)
+    )
     space, v = space_near(problem, problem.guess)
     program, h = ReducedProgram(space, 1e-2), 1e-6
     program.place_rows(v)

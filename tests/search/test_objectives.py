@@ -49,7 +49,7 @@ DELTA = 0.1
 
 
 def stated(case):
-    usual = {"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10, "friction": Friction(1.7, 1, 1.3)}
+    usual = {"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10, "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)}
     return Problem("p", **(usual | CASES[case]))
 
 
@@ -141,7 +141,7 @@ def test_speed_does_not_depend_on_the_size_of_friction(fast):
 
 
 def test_a_least_distance_is_reached_for_the_price_of_efficiency():
-    friction = Friction(3, 1, 1)
+    friction = Friction(mu_t=3, mu_f=1, mu_b=1)
     free = solve(Problem("free", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1, "bilateral"), friction=friction), 1)
     least = 1.05 * free.distance
     far = solve(free.problem.with_(at_least={"distance": least}, guess=free.gait), 1)
@@ -192,7 +192,7 @@ def test_an_objective_may_be_negative_and_of_any_sign():
 
 
 def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
-    body, friction, delta, rng = Chain((0.3, 0.2, 0.5)), Friction(1.7, 1, 1.3), 1e-2, np.random.default_rng(3)
+    body, friction, delta, rng = Chain((0.3, 0.2, 0.5)), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), 1e-2, np.random.default_rng(3)
     angles, rates = rng.normal(size=(2, 2, 40))
     solved = body.solve(friction, angles, rates, delta)
     motion = body.motion(friction, angles, rates, delta, solved)
@@ -231,7 +231,7 @@ def test_driven_work_needs_the_forces_on_the_parts():
 
 
 def test_every_joint_has_a_limit_of_its_own():
-    problem = Problem("stiff", gait=Harmonic(1), joint_limit=(1.0, 2.0), friction=Friction(3, 1, 1), delta=1e-3)
+    problem = Problem("stiff", gait=Harmonic(1), joint_limit=(1.0, 2.0), friction=Friction(mu_t=3, mu_f=1, mu_b=1), delta=1e-3)
     solution = solve(problem, 1)
     assert solution.success
     first, second = np.abs(solution.gait.angles(np.linspace(0, 1, 20_001))).max(axis=1)

@@ -36,7 +36,7 @@ def test_panels_are_added_where_a_point_at_rest_moves_over_them():
 
 def test_panels_stay_where_they_do_not_matter():
     assert on_more_panels(found(16, delta=0.5)) is None
-    assert on_more_panels(found(8, Friction(100.0, 1.0, 1.0), mesh_tolerance=1e-2)) is None
+    assert on_more_panels(found(8, Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), mesh_tolerance=1e-2)) is None
 
 
 def test_a_chain_has_none_to_add():

@@ -18,10 +18,10 @@ from colloc.search.spaces import nearest_parameters, transcribed
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 CASES = {
     "free path": {"gait": FreePath(4.0, "none")},
-    "free path, bilateral, unequal": {"gait": FreePath(4.0, "bilateral"), "friction": Friction(1.7, 1, 1.3)},
+    "free path, bilateral, unequal": {"gait": FreePath(4.0, "bilateral"), "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)},
     "free path of three joints": {"gait": FreePath(6.0, "bilateral"), **FOUR},
     "antipodal": {"gait": FreePath(4.0, "antipodal")},
-    "polygon": {"gait": Polygon(4, "none"), "friction": Friction(3, 1, 2)},
+    "polygon": {"gait": Polygon(4, "none"), "friction": Friction(mu_t=3, mu_f=1, mu_b=2)},
     "bilateral polygon": {"gait": Polygon(5, "bilateral")},
 }
 

@@ -32,7 +32,7 @@ AT = {"delta": 1e-2, "delta_start": 0.1, "intervals": 12, "mesh_tolerance": 1e-3
 QUICK = Problem("quick", gait=Harmonic(1, "bilateral"), **AT)
 FILE = """
 from colloc import *
-PROBLEM = Problem("quick", gait=Harmonic(1, "bilateral"), friction=Friction(2, 1, 1.4), delta=1e-3)
+PROBLEM = Problem("quick", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=2, mu_f=1, mu_b=1.4), delta=1e-3)
 """
 
 

@@ -149,7 +149,11 @@ def test_wheels_have_numbers_of_their_own(middle, others):
     own = [f"friction {way} of feet 1 and 3" for way in WAYS]
     assert {name for name in stated if "friction" in name} == {*others, *own}
     changed = [foot.friction for foot in stated[own[1]].changed(0.2).body.feet]
-    assert changed == [colloc.Friction(1, 0.06, 0.05), body.feet[1].friction, colloc.Friction(1, 0.06, 0.05)]
+    assert changed == [
+        colloc.Friction(mu_t=1, mu_f=0.06, mu_b=0.05),
+        body.feet[1].friction,
+        colloc.Friction(mu_t=1, mu_f=0.06, mu_b=0.05),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -213,7 +213,10 @@ def test_the_level_is_stated_as_before():
 @pytest.mark.slow
 def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     free = PROBLEM.with_(
-        gait=Harmonic(1), guess=Fourier([0.2, 0.3], [[1.3], [0.1]], [[0.1], [1.2]]), friction=Friction(3, 1, 2), delta=1e-3
+        gait=Harmonic(1),
+        guess=Fourier([0.2, 0.3], [[1.3], [0.1]], [[0.1], [1.2]]),
+        friction=Friction(mu_t=3, mu_f=1, mu_b=2),
+        delta=1e-3,
     )
     found = solve(free, 1)
     assert found.status == "solved", found.message
@@ -260,7 +263,7 @@ def test_what_cannot_be_asked_is_named(changed, said):
 
 
 def test_a_viscous_body_may_be_on_any_slope():
-    assert PROBLEM.with_(friction=Viscous(2.0, 1.0), grade=3.0).regime.grade == 3.0
+    assert PROBLEM.with_(friction=Viscous(normal=2.0, tangential=1.0), grade=3.0).regime.grade == 3.0
 
 
 def test_a_slope_that_is_not_climbed_is_said_so():

@@ -13,7 +13,7 @@ ASKED = 0.02
 @pytest.fixture(scope="module")
 def shrunk():
     """An optimum on the bound, of a problem whose delta is far too large for it."""
-    problem = Problem("tiny", friction=Friction(0.5, 1, 5), gait=Harmonic(1, "bilateral"), delta=ASKED)
+    problem = Problem("tiny", friction=Friction(mu_t=0.5, mu_f=1, mu_b=5), gait=Harmonic(1, "bilateral"), delta=ASKED)
     return solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 0)), 1)
 
 

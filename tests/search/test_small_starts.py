@@ -16,7 +16,7 @@ PROBLEMS = {
     "bilateral": Problem("bilateral", gait=Harmonic(3, "bilateral"), joint_limit=2.5),
     "antipodal": Problem("antipodal", body=Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1, "antipodal")),
     "limits": Problem("limits", body=Chain((0.3, 0.3, 0.4)), gait=Harmonic(1), joint_limit=(0.5, 2.0)),
-    "polygon": Problem("polygon", friction=Friction(0.4, 1, 2), gait=Polygon(8)),
+    "polygon": Problem("polygon", friction=Friction(mu_t=0.4, mu_f=1, mu_b=2), gait=Polygon(8)),
 }
 
 ALONE = Helpers(Problem("alone"))
@@ -53,7 +53,9 @@ def test_mirror_images_are_one():
 
 def test_viscous_drag_has_none():
     """In first order what a small loop goes forth it goes back."""
-    assert small_loops(Problem("drag", friction=Viscous(2.0, 1.0), gait=Harmonic(1), objective="towing")) == []
+    assert (
+        small_loops(Problem("drag", friction=Viscous(normal=2.0, tangential=1.0), gait=Harmonic(1), objective="towing")) == []
+    )
 
 
 def test_a_small_gait_at_the_fold_is_found_where_it_is_the_best():

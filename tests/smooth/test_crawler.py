@@ -61,7 +61,7 @@ def test_angle_rate_and_slopes_are_those_of_finite_differences():
     np.testing.assert_allclose(rate, differences(lambda y: BODY.angle_rate(s, y[:n], y[n:]), at), atol=1e-5)
 
 
-@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1.0, 1.3)])
+@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)])
 def test_balance_and_power_agree_with_adaptive_panels(friction):
     (q, rates), delta = shapes(3), 1e-2
     solved = BODY.solve(friction, q, rates, delta)

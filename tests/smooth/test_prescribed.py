@@ -24,7 +24,7 @@ from colloc.smooth.prescribed_body import Wave
 from colloc.system.errors import ProblemError
 from scripts.models.period import measured_period, period
 
-ALONG = Friction(100.0, 1.0, 1.0)
+ALONG = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
 BODIES = [Wave(), Wave("tanh", 1.3, 2.0), Wave("standing"), Concertina(epsilon=0.2), Concertina(epsilon=0.1, bumps=2)]
 
 
@@ -75,7 +75,9 @@ def test_the_friction_that_is_drawn_has_no_resultant():
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
 def test_the_work_on_the_mesh_is_that_of_the_general_solver(body):
-    problem = Problem("any", body=body, friction=Friction(2.0, 1.0, 1.0), delta=1e-2, mesh_tolerance=0, scheme="gauss-2")
+    problem = Problem(
+        "any", body=body, friction=Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), delta=1e-2, mesh_tolerance=0, scheme="gauss-2"
+    )
     reference = period(body.prescribed(), problem.friction, 1e-2, intervals=4, nodes=2)
     assert prescribed_answer(problem).work == pytest.approx(reference.W, rel=1e-6)  # the same quadrature in time
 

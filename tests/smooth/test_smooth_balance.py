@@ -13,7 +13,7 @@ from colloc.smooth.curve import PanelGrid, curve, node_velocity, resultant
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.system.errors import NotConvergedError, ProblemError
 
-ANISOTROPIC = Friction(1.7, 1.0, 1.3)
+ANISOTROPIC = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
 
 def straight(rate: float) -> Motion:
@@ -96,7 +96,7 @@ def naive_resultant(motion, friction, t, delta, z):
     return total
 
 
-@pytest.mark.parametrize("friction", [Friction(), Friction(10.0, 1.0, 1.0)])
+@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)])
 def test_solution_balances_by_independent_quadrature(friction):
     motion, t, delta = sine_wave(0.8, 1.0), 0.13, 0.3
     solution = solve_smooth(motion, friction, np.array([t]), delta).require()

@@ -16,7 +16,11 @@ POINTS = 9601
 S = np.linspace(0.0, 1.0, POINTS)
 PRESCRIBED = [Wave("sine", 1.2, 1.5), Wave("standing"), Concertina(0.2, bumps=1), Concertina(0.2, share=0.6, bumps=2)]
 BODIES = [ModalBody(4, panels=12), ModalBody(4, "fourier", panels=12), CrawlerBody(0.2, panels=24), *PRESCRIBED]
-LAWS = [Friction(1.7, 1.0, 1.7), Viscous(2.0, 1.0), PowerLaw(0.5, 2.0, 1.0, 1.0)]
+LAWS = [
+    Friction(mu_t=1.7, mu_f=1.0, mu_b=1.7),
+    Viscous(normal=2.0, tangential=1.0),
+    PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0),
+]
 each_body = pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:40].replace(" ", "_"))
 
 

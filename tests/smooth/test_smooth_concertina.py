@@ -10,7 +10,9 @@ from colloc.smooth.concertina import Concertina
 from colloc.system.errors import ProblemError
 from scripts.models.epsilon_study import Crawler, EpsilonPoint, delta_for, epsilon_point, fitted_order, fitted_orders, table
 
-SIDEWAYS = Crawler(Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2), Friction(1.0, 3.0, 3.0), delta=1e-6)
+SIDEWAYS = Crawler(
+    Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2), Friction(mu_t=1.0, mu_f=3.0, mu_b=3.0), delta=1e-6
+)
 ONE = Crawler(Concertina(epsilon=0.05, amplitude=1.3), delta=1e-6)
 
 
@@ -69,15 +71,15 @@ def test_two_bump_crawler_beats_nine_tenths_of_the_bound():
 
 
 def test_backwards_is_forwards_with_the_coefficients_exchanged():
-    forwards = ONE.with_(friction=Friction(1.7, 1.0, 1.3))
-    backwards = ONE.with_(friction=Friction(1.7, 1.3, 1.0), backwards=True)
+    forwards = ONE.with_(friction=Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3))
+    backwards = ONE.with_(friction=Friction(mu_t=1.7, mu_f=1.3, mu_b=1.0), backwards=True)
     a, b = (c.period(intervals=1, nodes=4) for c in (forwards, backwards))
     assert a.efficiency == pytest.approx(b.efficiency, rel=1e-8)
 
 
 def test_a_bump_that_takes_half_its_region_tears_the_anchor_loose_on_very_rough_sideways_friction():
     """With mu_t = 10 the bump drags harder than the anchor's margin; a smaller share of the region mends it."""
-    rough = ONE.with_(friction=Friction(10.0, 1.0, 1.0), epsilon=0.02)
+    rough = ONE.with_(friction=Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), epsilon=0.02)
     loose, firm = (rough.with_(share=share).period(intervals=1, nodes=4) for share in (0.5, 0.15))
     assert loose.d < 0.8 * rough.body.stroke
     assert firm.d == pytest.approx(rough.with_(share=0.15).body.stroke, rel=1e-2)

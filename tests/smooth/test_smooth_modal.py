@@ -21,7 +21,7 @@ from colloc.smooth.motion import Motion, sine_wave
 from colloc.system.errors import ProblemError
 from scripts.models.period import measured_period
 
-SIDEWAYS = Friction(100.0, 1.0, 1.0)
+SIDEWAYS = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
 FOURIER = ModalBody(4, "fourier")
 
 
@@ -65,7 +65,7 @@ def test_a_straight_staircase_is_laid_into_the_line_through_it():
     np.testing.assert_allclose(amplitudes, [0.5, 0.0, 0.0], atol=2.0 / n**2)
 
 
-@pytest.mark.parametrize("friction", [SIDEWAYS, Friction(0.5, 1.0, 5.0)])
+@pytest.mark.parametrize("friction", [SIDEWAYS, Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0)])
 def test_balance_and_power_agree_with_adaptive_panels(friction):
     body = ModalBody(4, panels=24, order=8)
     gait, t, delta = wave(body, 1.0), np.array([0.05, 0.2, 0.4]), 0.05
@@ -97,7 +97,7 @@ def test_the_statement_vanishes_at_the_solver_s_velocity_and_gives_the_same_moti
     np.testing.assert_allclose(stated.power[0], motion.power, rtol=1e-11)
 
 
-@pytest.mark.parametrize("friction", [SIDEWAYS, Friction(), Friction(0.5, 1.0, 3.0)])
+@pytest.mark.parametrize("friction", [SIDEWAYS, Friction(), Friction(mu_t=0.5, mu_f=1.0, mu_b=3.0)])
 def test_slopes_are_those_of_finite_differences_whatever_the_anchor(friction):
     body, delta, h = ModalBody(3, panels=6), 0.1, 1e-6
     q, rates = shapes(body, 4)
@@ -157,7 +157,7 @@ def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_progra
 @pytest.mark.parametrize("basis", ["legendre", "fourier"])
 def test_a_gait_seen_from_the_other_end_backwards_in_time_is_the_same_gait(basis):
     """The reversed swap keeps distance and work under every friction (`colloc.results.distinct_optima`), smooth bodies too."""
-    body, friction, t = ModalBody(4, basis), Friction(2.0, 1.0, 3.0), np.arange(40) / 40
+    body, friction, t = ModalBody(4, basis), Friction(mu_t=2.0, mu_f=1.0, mu_b=3.0), np.arange(40) / 40
     gait = wave(body, 0.8)
     image = reversed_in_time(swapped(gait, body))
     powers = []

@@ -9,7 +9,7 @@ from colloc.system.errors import ProblemError
 from scripts.models.period import measured_period, period
 from tests.shared.chain_period import chain_period
 
-ALONG = Friction(100.0, 1.0, 1.0)
+ALONG = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
 
 
 def test_wave_B_to_eight_digits():
@@ -32,7 +32,7 @@ def test_a_chain_overestimates_the_work_in_proportion_to_the_anisotropy():
     """Relative excess (mu_t/mu_f) <kappa^2> / (12 n^2), derived in tests/shared/chain_period.py."""
     n = 80
     for mu in (10.0, 100.0):
-        friction = Friction(mu, 1.0, 1.0)
+        friction = Friction(mu_t=mu, mu_f=1.0, mu_b=1.0)
         smooth = period(sine_wave(), friction, 1e-4, intervals=2)
         _, W = chain_period(sine_wave(), friction, 1e-4, n, 16)
         predicted = mu * (2 * np.pi) ** 2 / 2 / (12 * n**2)
@@ -58,13 +58,15 @@ def test_the_half_period_and_the_whole_agree():
     """The mirror-image second half, computed instead of inferred."""
     wave = sine_wave()
     whole = Motion(wave.angle, wave.rate, stages=(0.0, 0.5, 1.0))
-    a, b = (period(m, Friction(10.0, 1.0, 1.0), 1e-3, intervals=3, quadrature_tolerance=1e-8) for m in (wave, whole))
+    a, b = (
+        period(m, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), 1e-3, intervals=3, quadrature_tolerance=1e-8) for m in (wave, whole)
+    )
     assert a.d == pytest.approx(b.d, abs=1e-8)
     assert pytest.approx(b.W, abs=1e-8) == a.W
     assert abs(b.rotation) < 1e-10
 
 
-@pytest.mark.parametrize("friction", [Friction(), Friction(0.5, 1.0, 2.0), ALONG])
+@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=0.5, mu_f=1.0, mu_b=2.0), ALONG])
 def test_no_wave_beats_the_bound(friction):
     for wave in (sine_wave(0.5, 2.0), sine_wave(1.2, 1.0)):
         assert period(wave, friction, 1e-4, intervals=1).efficiency < 1 / friction.smallest

@@ -36,9 +36,10 @@ from colloc.studies import calls, campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
 from scripts.continue_delta import resolution_warning, value_at_zero_delta
+from tests.shared.laws import coulomb
 from tests.shared.stages import answer_near
 
-REVERSIBLE, IRREVERSIBLE = Friction(3, 1, 1), Friction(0.5, 1, 5)
+REVERSIBLE, IRREVERSIBLE = Friction(mu_t=3, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=1, mu_b=5)
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
 
 
@@ -73,7 +74,7 @@ def test_reversal_alone_changes_the_motion_where_friction_tells_forward_from_bac
 def test_bilateral_gaits_close_their_rotation_for_any_friction(coefficients):
     rng = np.random.default_rng(5)
     gait = Harmonic(2, "bilateral").fourier(0.5 * rng.normal(size=5), 2)
-    motion = replayed(gait, Friction(*coefficients))
+    motion = replayed(gait, coulomb(*coefficients))
     assert abs(motion.rotation) < 1e-10
     assert motion.distance > 1e-3
 
@@ -162,7 +163,7 @@ def test_a_start_that_reached_no_optimum_is_told_with_what_its_replay_measured(m
 def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
     # without the bound the best gait has a shape speed of 1.86
     bounds = {"smallest_shape_speed": 2.0, "delta": 1e-3, "mesh_tolerance": 1e-4}
-    stated = problem(friction=Friction(0.5, 1, 5), guess=ellipse(0, 1.8, 1.2), **bounds)
+    stated = problem(friction=Friction(mu_t=0.5, mu_f=1, mu_b=5), guess=ellipse(0, 1.8, 1.2), **bounds)
     solution = solve(stated, 1)
     assert solution.status == SOLVED
     assert on_speed_floor(stated, solution.gait)
@@ -297,7 +298,7 @@ def test_a_worker_that_dies_costs_one_start(workers):
 FILE = """
 from colloc import *
 PROBLEM = Problem(name="quick", gait=Harmonic(1, "bilateral"), guess=ellipse(0.2, 1.2, 0.8),
-                  friction=Friction(10, 1, 1), delta=0.1, intervals=10, mesh_tolerance=1e-3)
+                  friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=0.1, intervals=10, mesh_tolerance=1e-3)
 """
 
 

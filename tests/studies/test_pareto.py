@@ -12,7 +12,9 @@ from colloc.commands.main import main
 from colloc.pictures.front_figure import front_figure
 from colloc.search.solve import solve
 
-PROBLEM = Problem("wide", gait=Harmonic(1, "bilateral"), friction=Friction(10, 1, 1), delta=1e-2, mesh_tolerance=1e-4)
+PROBLEM = Problem(
+    "wide", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-4
+)
 
 
 @pytest.fixture(scope="module")

@@ -40,7 +40,7 @@ from colloc import *
 from colloc.studies.study import Axis, Study
 
 def problem(mu_t, mu_b):
-    return Problem("tiny", ellipse(0.0, 2.85, 1.3), friction=Friction(mu_t, 1, mu_b), gait=Harmonic(1, "bilateral"),
+    return Problem("tiny", ellipse(0.0, 2.85, 1.3), friction=Friction(mu_t=mu_t, mu_b=mu_b), gait=Harmonic(1, "bilateral"),
                    delta=1e-2, delta_start=1e-2, intervals=12, mesh_tolerance=1e-4)
 
 STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1)), Axis("mu_b", (1.0,))), problem, cold_starts=0)
@@ -49,7 +49,7 @@ STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1)), Axis("mu_b", (1.0,))), problem,
 
 def problem(x=1.0, y=1.0, kind="a"):
     guess = ellipse(0.0, 1.0 + 0.01 * len(kind), 0.5)
-    return Problem("p", guess, friction=Friction(x, 1, y), gait=Harmonic(1, "bilateral"), intervals=10)
+    return Problem("p", guess, friction=Friction(mu_t=x, mu_f=1, mu_b=y), gait=Harmonic(1, "bilateral"), intervals=10)
 
 
 def grid(**changes):
@@ -138,8 +138,11 @@ def test_a_study_file_is_code_and_its_mistakes_are_named_with_their_line(tmp_pat
     study, source = read_study_file(path)
     assert study.shape == (2, 1)
     assert source == FILE
-    for stated, line, what in (("Frction(mu_t, 1", 6, "NameError: .*"), ("Friction(-mu_t, 1", 6, "friction.mu_t must be .*")):
-        path.write_text(FILE.replace("Friction(mu_t, 1", stated))
+    for stated, line, what in (
+        ("Frction(mu_t=mu_t, mu_b=mu_b", 6, "NameError: .*"),
+        ("Friction(mu_t=-mu_t, mu_b=mu_b", 6, "friction.mu_t must be .*"),
+    ):
+        path.write_text(FILE.replace("Friction(mu_t=mu_t, mu_b=mu_b", stated))
         with pytest.raises(ProblemError, match=rf"no problem at mu_t = 1.0, mu_b = 1.0: .*s\.py, line {line}: {what}"):
             read_study_file(path)[0].problem_at((0, 0))
 
@@ -468,7 +471,7 @@ def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
 def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_end_all_runs_the_other_way(symmetry):
     kind = Harmonic(3, symmetry)
     gait = kind.member(0.4 * np.random.default_rng(3).normal(size=kind.size(2)), 2)
-    body, friction = Chain(), Friction(3.0, 1.0, 1.0)
+    body, friction = Chain(), Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0)
     found = gait_class(gait, body, friction)
     assert found.symmetry == symmetry
     assert not found.retraced
@@ -482,7 +485,7 @@ def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_en
 def test_what_is_off_by_a_hundredth_of_a_gait_still_counts_as_symmetric(size):
     for off, symmetry in ((0.01, "both"), (0.03, "none")):
         gait = Fourier([0, 0], [[size, off * size], [0.0, 0.0]], [[0.0, 0.0], [size, 0.0]])
-        assert gait_class(gait, Chain(), Friction(3, 1, 1)).symmetry == symmetry
+        assert gait_class(gait, Chain(), Friction(mu_t=3, mu_f=1, mu_b=1)).symmetry == symmetry
 
 
 @pytest.mark.parametrize(
@@ -500,7 +503,7 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
     # the paper, section I: retrograde waves where transverse friction is large, direct ones where it is small
     for sign in (1, -1):
         gait = Fourier([0, 0], [[0.4], [0.0]], [[0.0], [sign * 0.4]])
-        found = gait_class(gait, Chain(), Friction(mu_t, 1, 1))
+        found = gait_class(gait, Chain(), Friction(mu_t=mu_t, mu_f=1, mu_b=1))
         assert found.kind == kind
         assert found.symmetry == "both"
         assert not found.retraced
@@ -508,7 +511,7 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
 
 
 def test_the_displacement_that_decides_the_class_is_that_of_the_replay():
-    gait, friction = Fourier([0, 0], [[0.9], [-0.3]], [[0.0], [0.8]]), Friction(5, 1, 1)
+    gait, friction = Fourier([0, 0], [[0.9], [-0.3]], [[0.0], [0.8]]), Friction(mu_t=5, mu_f=1, mu_b=1)
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
     assert replay(Chain(), friction, path, 1e-3, instants=400, most_instants=400).distance > 0.01
     assert abs(gait_class(gait, Chain(), friction).forward) > 0.9

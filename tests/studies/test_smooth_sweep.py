@@ -13,7 +13,7 @@ from colloc import Axis, Friction, Harmonic, ModalBody, Problem, Study
 
 def problem(mu_t):
     body, gait = ModalBody(2, panels=4), Harmonic(1, "antipodal")
-    return Problem("modes", body=body, friction=Friction(mu_t, 1, 1), gait=gait, delta=0.02, intervals=8)
+    return Problem("modes", body=body, friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1), gait=gait, delta=0.02, intervals=8)
 
 STUDY = Study("modes", (Axis("mu_t", (100.0, 50.0)),), problem, cold_starts=0, warm_starts=1)
 """
@@ -32,7 +32,7 @@ PRESCRIBED = """
 from colloc import Axis, Friction, Problem, Study, Wave
 
 def problem(mu_t):
-    return Problem("waves", body=Wave("sine"), friction=Friction(mu_t, 1, 1), delta=1e-2, mesh_tolerance=1e-3)
+    return Problem("waves", body=Wave("sine"), friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-3)
 
 PROBLEM = problem(100.0)
 STUDY = Study("waves", (Axis("mu_t", (100.0, 50.0)),), problem)
@@ -63,7 +63,7 @@ from colloc import *
 BODY = CrawlerBody(0.2, modes=2)
 AT = {"delta": 1e-4, "delta_start": 1e-4, "mesh_tolerance": 1e-4}
 PROBLEM = Problem("p", Corners(BODY.concertina(1.2), "antipodal"), BODY, gait=Polygon(8, "antipodal"), **AT)
-STUDY = Study("p", (Axis("mu_t", (1.0, 1.1)),), lambda mu_t: PROBLEM.with_(friction=Friction(mu_t, 1, 1)), cold_starts=0)
+STUDY = Study("p", (Axis("mu_t", (1.0, 1.1)),), lambda mu_t: PROBLEM.with_(friction=Friction(mu_t=mu_t)), cold_starts=0)
 """)
     for command, more in (("multistart", ("--starts", "1")), ("sweep", ())):
         assert colloc_main([command, str(tmp_path / "p.py"), *more, "--output", f"{tmp_path}/"]) == 0

@@ -12,7 +12,9 @@ from colloc.gaits.harmonic import Fourier
 from colloc.pictures.steering_figure import steering_figure
 from colloc.studies.steering import Steering
 
-PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=Friction(4, 1, 1), delta=1e-2, mesh_tolerance=1e-4)
+PROBLEM = Problem(
+    "p", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-4
+)
 TURNS = np.radians([-10, 0, 10])
 
 
@@ -46,7 +48,7 @@ def test_a_turn_to_the_right_is_the_mirror_image_of_that_to_the_left(family):
 
 @pytest.mark.parametrize("kind", [Polygon(3, "bilateral"), FreePath(2, "bilateral")])
 def test_gaits_of_every_class_have_a_mirror_image(kind):
-    family = steer(Problem("p", gait=kind, friction=Friction(4, 1, 1), delta=1e-2), [-0.2, 0.2], starts=1)
+    family = steer(Problem("p", gait=kind, friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2), [-0.2, 0.2], starts=1)
     right, left = family.points
     assert family.certified
     # sought from the other's mirror image, on a mesh and so with arcs of its own
@@ -55,7 +57,7 @@ def test_gaits_of_every_class_have_a_mirror_image(kind):
 
 def test_a_body_that_is_not_its_mirror_image_turns_to_both_sides():
     bent = Coupled(Chain((0.2,) * 5), stuck={1: 0.5})
-    problem = Problem("stuck", body=bent, friction=Friction(2, 1, 1), gait=Harmonic(1), delta=1e-2)
+    problem = Problem("stuck", body=bent, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), delta=1e-2)
     assert steer(problem, [-0.2, 0.2], starts=2).certified
 
 
@@ -77,7 +79,13 @@ def test_gaits_begin_where_they_are_nearest_to_their_neighbours():
 
 
 def test_an_offset_turns_a_serpenoid_snake():
-    snake = Problem("s", body=Chain((0.2,) * 5), friction=Friction(10, 1, 1), gait=Serpenoid(symmetry="antipodal"), delta=1e-2)
+    snake = Problem(
+        "s",
+        body=Chain((0.2,) * 5),
+        friction=Friction(mu_t=10, mu_f=1, mu_b=1),
+        gait=Serpenoid(symmetry="antipodal"),
+        delta=1e-2,
+    )
     family = steer(snake, [-0.2, 0.2], starts=1)
     assert family.certified
     right, left = (point.gait.mean[0] for point in family.points)

@@ -26,7 +26,7 @@ STUDY = """
 from colloc import *
 from colloc.studies.study import Axis, Study
 def problem(mu_t):
-    return Problem("tiny", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), friction=Friction(mu_t, 1, 1),
+    return Problem("tiny", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1),
                    delta=1e-2, delta_start=1e-2, intervals=12, mesh_tolerance=1e-4)
 STUDY = Study("tiny", (Axis("mu_t", tuple(1 + k / 50 for k in range(CELLS)), travels=False),), problem, cold_starts=0)
 """

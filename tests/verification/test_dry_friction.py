@@ -11,7 +11,7 @@ from colloc.system.errors import ProblemError
 from colloc.verification.dry_balance import dry_balance
 from colloc.verification.dry_friction import dry_friction
 
-ISOTROPIC, ELLIPTIC = Friction(), Elliptic(2.0, 1.0, 1.0)
+ISOTROPIC, ELLIPTIC = Friction(), Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0)
 UNEVEN = Chain((0.3, 0.2, 0.5), feet=(Foot(0, 0.4, weight=0.2), Foot(1, 0.5, weight=0.3), Foot(2, 0.1), Foot(2, 0.9)))
 
 
@@ -139,7 +139,7 @@ def test_corners_where_rates_jump_do_not_widen_the_interval_of_a_period(body):
 def test_unequal_coefficients_drag_and_curved_bodies_have_no_bounds():
     gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
     with pytest.raises(ProblemError, match="no bounds for delta = 0"):
-        dry_friction(Chain(), Friction(2.0, 1.0, 1.5), gait)
+        dry_friction(Chain(), Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5), gait)
     with pytest.raises(ProblemError, match="no bounds for delta = 0"):
         dry_friction(Chain(), colloc.Viscous(), gait)
     with pytest.raises(ProblemError, match="not for a ModalBody"):

@@ -13,7 +13,7 @@ from colloc.verification.inertial_motion import GaitWithInertia
 GAIT = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 CHAIN, UNEQUAL = colloc.Chain(), colloc.Chain((0.3, 0.45, 0.25))
-ISOTROPIC, ANISOTROPIC = colloc.Friction(), colloc.Friction(1.7, 1.0, 1.3)
+ISOTROPIC, ANISOTROPIC = colloc.Friction(), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
 
 def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=40, masses=None, inertias=None):
@@ -158,7 +158,7 @@ def test_corners_are_passed_where_they_are():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [ISOTROPIC, ANISOTROPIC, colloc.Friction(10.0, 1.0, 1.0)])
+@pytest.mark.parametrize("friction", [ISOTROPIC, ANISOTROPIC, colloc.Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)])
 def test_slow_enough_is_where_the_part_is_lost(friction):
     froude = colloc.slow_enough(CHAIN, friction, GAIT, 1e-3, 0.01)
     slow = colloc.replay(CHAIN, friction, GAIT, 1e-3).efficiency
@@ -261,7 +261,7 @@ def test_on_the_level_it_does_not_matter_where_a_body_points_at_first():
 def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_friction_is(monkeypatch):
     """Steps that err by more than delta shake a body that should rest, and there is no end to them."""
     standing, asked, at = colloc.Chain((0.3, 0.45, 0.25), feet=1), [], GaitWithInertia._at
-    played = GaitWithInertia(standing, standing.law(colloc.Friction(1.7, 1.0, 1.3)), LEANING, 1e-7, froude=0.02)
+    played = GaitWithInertia(standing, standing.law(colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)), LEANING, 1e-7, froude=0.02)
     monkeypatch.setattr(GaitWithInertia, "_at", lambda *given: asked.append(1) or at(*given))
     _, slopes = played.mapped(played.slow_momenta())
     assert np.abs(slopes).max() < 1e-6, "friction leaves nothing of the momenta of the period before"

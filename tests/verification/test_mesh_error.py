@@ -45,7 +45,7 @@ def path(t):
     return GAIT.angles(t), GAIT.rates(t)
 
 
-@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
+@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)], ids=str)
 def test_adaptive_panels_agree_with_a_uniform_replay(friction):
     fine = fine_motion(problem().body, friction, path, DELTA, np.linspace(0, 1, 21), 1e-8)
     known = replayed(friction)
@@ -59,7 +59,7 @@ def test_adaptive_panels_agree_with_a_uniform_replay(friction):
         np.testing.assert_allclose(mine, theirs, atol=1e-7)
 
 
-@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
+@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)], ids=str)
 @pytest.mark.parametrize("name", ["trapezoid", "hermite-simpson", "gauss-2", "gauss-5", "radau-3"])
 def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, friction):
     # collocating a given gait, by the scheme's own quadrature written out here
@@ -132,7 +132,7 @@ def test_velocity_error_is_largest_where_links_stick():
     assert np.any((kinks > mesh.edges[worst] - mesh.h[0]) & (kinks < mesh.edges[worst + 1] + mesh.h[0]))
 
 
-@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
+@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)], ids=str)
 def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     stated = problem(friction=friction)
     fine = gait_motion(control_problem(stated), GAIT, DELTA, uniform_mesh(scheme("gauss-3"), 20, 0.5), 1e-6)
@@ -148,7 +148,7 @@ def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
 
 def test_a_kink_is_found_where_the_body_comes_to_rest():
     """One joint that swings to and fro: everything rests where it turns back."""
-    body, friction, turns = Chain((0.4, 0.6)), Friction(1, 1, 3), np.array([0.1234, 0.6234])
+    body, friction, turns = Chain((0.4, 0.6)), Friction(mu_t=1, mu_f=1, mu_b=3), np.array([0.1234, 0.6234])
 
     def swinging(t):
         phase = 2 * np.pi * (t - turns[0])
@@ -178,9 +178,9 @@ def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts
 @pytest.mark.parametrize(
     ("rule", "friction", "held"),
     [
-        ("radau-3", Friction(1.7, 1, 1.3), False),
+        ("radau-3", Friction(mu_t=1.7, mu_f=1, mu_b=1.3), False),
         ("radau-3", Friction(), True),
-        ("gauss-3", Friction(1.7, 1, 1.3), True),
+        ("gauss-3", Friction(mu_t=1.7, mu_f=1, mu_b=1.3), True),
     ],
 )
 def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards(rule, friction, held, monkeypatch):

@@ -12,6 +12,7 @@ from colloc.mechanics.densities import LENGTH
 from colloc.mechanics.friction import Friction
 from colloc.verification.adaptive_motion import fine_motion, totals_along
 from colloc.verification.replay import replay
+from tests.shared.laws import coulomb
 
 
 def test_reciprocal_gaits_go_nowhere():
@@ -24,7 +25,7 @@ def test_reciprocal_gaits_go_nowhere():
 
 def test_a_scallop_with_directional_friction_crawls_and_obeys_the_bound():
     # two links, one joint: mu_b > mu_f makes even a reciprocal motion advance
-    body, friction = Chain((0.5, 0.5)), Friction(1.0, 1.0, 5.0)
+    body, friction = Chain((0.5, 0.5)), Friction(mu_t=1.0, mu_f=1.0, mu_b=5.0)
 
     def path(t):
         angle = 1.2 + 0.8 * np.cos(2 * np.pi * t)
@@ -50,7 +51,7 @@ def random_path(seed):
     rng = np.random.default_rng(seed)
     n_joint = int(rng.integers(2, 5))
     gait = Fourier(rng.uniform(-1, 1, n_joint), rng.normal(0, 0.4, (n_joint, 2)), rng.normal(0, 0.4, (n_joint, 2)))
-    return Chain((1 / (n_joint + 1),) * (n_joint + 1)), Friction(*LAWS[seed % 4]), lambda t: (gait.angles(t), gait.rates(t))
+    return Chain((1 / (n_joint + 1),) * (n_joint + 1)), coulomb(*LAWS[seed % 4]), lambda t: (gait.angles(t), gait.rates(t))
 
 
 @pytest.mark.parametrize("seed", range(8))

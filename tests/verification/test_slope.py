@@ -7,6 +7,7 @@ from shared.loaded_chain import left_over, lying, standing
 
 from colloc import Chain, CrawlerBody, Foot, Fourier, Friction, NotConvergedError, Pad, ProblemError, Wheel, ellipse, replay
 from colloc.verification.slope import gait_on_slope, slope_motion
+from tests.shared.laws import coulomb
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 """A gait without any symmetry."""
@@ -39,7 +40,7 @@ def still(t):
 def test_the_motion_is_that_of_a_program_of_its_own(body, grade):
     """Runge and Kutta's rule on balances point by point; delta is large, so that both are smooth and few steps do."""
     mu, delta, steps = (1.7, 1.0, 1.3), 0.3, 20
-    ours = slope_motion(body, Friction(*mu), SKEW, delta, grade, heading=1.0)
+    ours = slope_motion(body, coulomb(*mu), SKEW, delta, grade, heading=1.0)
     points = standing(body.feet, mu) if body.feet else lying(body.weights, mu)
     masses, near = body.mass_column()[:, 0], np.zeros(3)
 
@@ -72,8 +73,8 @@ def test_the_motion_is_that_of_a_program_of_its_own(body, grade):
 
 
 def test_on_the_level_it_is_the_replay():
-    level = replay(LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-2)
-    ran = slope_motion(LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-2, 0.0, heading=0.7)
+    level = replay(LOPSIDED, Friction(mu_t=1.7, mu_f=1, mu_b=1.3), SKEW, 1e-2)
+    ran = slope_motion(LOPSIDED, Friction(mu_t=1.7, mu_f=1, mu_b=1.3), SKEW, 1e-2, 0.0, heading=0.7)
     away = ran.climb[0] + 1j * ran.aside[0]
     assert away == pytest.approx(level.distance * np.exp(0.7j), abs=1e-5)
     assert ran.friction_work[0] == pytest.approx(level.work, abs=1e-5)
@@ -90,7 +91,7 @@ def test_a_gentle_slope_changes_little_and_in_proportion(body):
 
 @pytest.mark.parametrize(("body", "grade"), [(LOPSIDED, 0.4), (ON_FEET, 0.25)], ids=["lying", "standing"])
 def test_joints_pay_for_friction_and_for_the_climb(body, grade):
-    ran = slope_motion(body, Friction(1.7, 1, 1.3), SKEW, 1e-2, grade, heading=1.0, periods=2)
+    ran = slope_motion(body, Friction(mu_t=1.7, mu_f=1, mu_b=1.3), SKEW, 1e-2, grade, heading=1.0, periods=2)
     lifted = grade * ran.climb
     assert np.abs(lifted).min() > 1e-3
     np.testing.assert_allclose(ran.joint_work, ran.friction_work + lifted, atol=1e-9)
@@ -121,7 +122,7 @@ def test_skates_hold_across_the_slope_and_not_along():
     def straight(t):
         return np.zeros((2, np.size(t))), np.zeros((2, np.size(t)))
 
-    skates = Friction(10, 0.1, 0.1)
+    skates = Friction(mu_t=10, mu_f=0.1, mu_b=0.1)
     across = slope_motion(Chain(), skates, straight, 1e-6, 0.5, heading=np.pi / 2)
     assert across.climb[0] == pytest.approx(-1e-6 * 0.5 / np.sqrt(10**2 - 0.5**2), rel=1e-4)
     with pytest.raises(NotConvergedError, match="friction may be too weak"):
@@ -133,12 +134,12 @@ def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
     """Backwards in time, and read from the other end, it is the same gait; the slope is turned over with the friction. So the
     map of headings is its own inverse, and a monotone one that is must be none."""
     for heading in (-np.pi, -0.5 * np.pi, 0.0, 0.5 * np.pi):
-        ran = slope_motion(Chain(), Friction(*mu), REVERSIBLE, 1e-2, 0.3, heading=heading, tolerance=1e-5)
+        ran = slope_motion(Chain(), coulomb(*mu), REVERSIBLE, 1e-2, 0.3, heading=heading, tolerance=1e-5)
         assert abs(ran.turn) < 1e-4
-    there = slope_motion(Chain(), Friction(*mu), REVERSIBLE, 1e-2, 0.3, heading=1.0, tolerance=1e-5)
+    there = slope_motion(Chain(), coulomb(*mu), REVERSIBLE, 1e-2, 0.3, heading=1.0, tolerance=1e-5)
     assert there.steering[0] == pytest.approx(1.0, abs=1e-4)
     # which is no matter of course: in between it does turn, otherwise than on the level
-    level = slope_motion(Chain(), Friction(*mu), REVERSIBLE, 1e-2, 0.0, heading=1.0, tolerance=1e-5)
+    level = slope_motion(Chain(), coulomb(*mu), REVERSIBLE, 1e-2, 0.0, heading=1.0, tolerance=1e-5)
     half = [np.interp(0.5, ran.phases, ran.states[0]) for ran in (there, level)]
     assert abs(half[0] - half[1]) > 1e-2
 
@@ -178,7 +179,7 @@ def test_the_steering_is_the_slope_of_the_map():
 
 
 def test_the_stated_error_covers_the_true_one():
-    at = LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-3, 0.3
+    at = LOPSIDED, Friction(mu_t=1.7, mu_f=1, mu_b=1.3), SKEW, 1e-3, 0.3
     exact = slope_motion(*at, tolerance=1e-7).states[:5, -1]
     for tolerance in (1e-3, 1e-4):
         ran = slope_motion(*at, tolerance=tolerance)
