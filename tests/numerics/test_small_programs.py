@@ -1,5 +1,7 @@
 """Small programs that are solved without SciPy's optimize: least squares with signs, and linear programs."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from scipy.optimize import nnls
@@ -33,6 +35,19 @@ def test_a_linear_program_meets_its_dual():
     assert gain @ x == pytest.approx(value, abs=1e-12)
     assert multipliers @ right == pytest.approx(value, abs=1e-12)
     assert (gain - multipliers @ equations).max() <= 1e-9
+
+
+def test_linear_programs_on_two_threads_are_what_they_are_one_after_another():
+    def solved(seed):
+        rng = np.random.default_rng(seed)
+        equations, gain = rng.standard_normal((4, 60)), rng.standard_normal(60)
+        equations[-1] = np.abs(equations[-1]) + 0.1
+        value, x, multipliers = linear_maximum(gain, equations, np.array([0.0, 0.0, 0.0, 1.0]))
+        return np.concatenate([[value], x, multipliers])
+
+    alone = [solved(seed) for seed in range(100)]
+    with ThreadPoolExecutor(2) as threads:
+        np.testing.assert_array_equal(list(threads.map(solved, range(100))), alone)
 
 
 @pytest.mark.parametrize(("column", "why"), [(-1.0, "Unbounded"), (1.0, "Infeasible")])

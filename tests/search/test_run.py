@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -220,6 +221,17 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
     # its space is made anew, and its program says the same
     assert again.program().objective(again.v) == found.program().objective(found.v)
     np.testing.assert_array_equal(again.program().rows(again.v), found.program().rows(found.v))
+
+
+@pytest.mark.slow
+def test_solves_on_two_threads_end_as_one_after_another():
+    kinds = [Problem("a", gait=Harmonic(2), **AT), Problem("b", gait=Harmonic(2), friction=Friction(2, 1, 1), **AT)]
+    with ThreadPoolExecutor(2) as threads:
+        together = list(threads.map(colloc.solve, kinds))
+    for problem, found in zip(kinds, together, strict=True):
+        alone = colloc.solve(problem)
+        np.testing.assert_array_equal(found.answer.x, alone.answer.x)
+        assert found.certificate == alone.certificate
 
 
 def test_a_relaxed_gait_is_kept_too(tmp_path, at_once):
