@@ -97,9 +97,9 @@ def _is_of_script(task: tuple) -> bool:
 @contextlib.contextmanager
 def _without_script() -> Iterator[None]:
     """Processes that are begun inside are not told which file this one was begun with."""
-    main = vars(sys.modules["__main__"])
+    main: dict[str, Any] = vars(sys.modules["__main__"])
     with _ONE_BEGINS:
-        before = {name: main.pop(name) for name in ("__file__", "__spec__") if name in main}
+        before = {str(name): main.pop(name) for name in ("__file__", "__spec__") if name in main}
         main["__spec__"] = None
         try:
             yield

@@ -85,9 +85,7 @@ def test_none_is_begun_where_a_stage_is_called_by_itself(learnt):
 
 
 @pytest.mark.parametrize("name", ["random.py", "sitecustomize.py"])
-def test_files_of_the_folder_are_not_run_and_what_python_prints_as_it_starts_is_no_answer(
-    learnt, tmp_path, monkeypatch, name
-):
+def test_files_of_the_folder_are_not_run_and_what_python_prints_as_it_starts_is_no_answer(learnt, tmp_path, monkeypatch, name):
     (tmp_path / name).write_text("print('hello\\n' * 3); open('ran', 'w').close()", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     if name == "sitecustomize.py":  # which Python runs, wherever it was told to look for it
