@@ -253,7 +253,7 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     assert "--fresh begins again" in capsys.readouterr().err
     run.write_bytes(b"not SQLite" * 100)
     assert main(command) == 2
-    assert "begins again (solve --fresh)" in capsys.readouterr().err
+    assert "begin again (solve --fresh)" in capsys.readouterr().err
     assert main([*command, "--fresh"]) in (0, 4)
     assert not run.exists()
 
