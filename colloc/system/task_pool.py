@@ -58,7 +58,7 @@ def environment_of_workers() -> Iterator[None]:
     finally:
         for name, value in before.items():
             if value is None:
-                del os.environ[name]
+                os.environ.pop(name, None)  # another thread may have done so
             else:
                 os.environ[name] = value
 
