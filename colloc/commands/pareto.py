@@ -12,8 +12,9 @@ from pathlib import Path
 from colloc.commands.ending import FAILED, OK, command, said_if_interrupted
 from colloc.commands.options import add_printing, add_problem, changed, new_parser, output_path, tell
 from colloc.commands.summary import kept_facts, kept_lines
-from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
-from colloc.gaits.problem_file import read_problem_file
+from colloc.gaits.objective import EFFICIENCY, SPEED, Objective, objective_from
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
@@ -53,8 +54,17 @@ def main(options: argparse.Namespace) -> int:
     stated = read_problem_file(options.problem)
     problem = changed(stated.problem, options)
     first, second = (objective_from(text) for text in options.objectives)
-    aims = (first, second)
     table = output_path(options.output, Path("results") / f"{problem.name}.front.csv")
+    from colloc.studies.saved import members_kept
+
+    with members_kept(table.with_suffix("")):
+        return _front(options, stated, problem, (first, second), table)
+
+
+def _front(
+    options: argparse.Namespace, stated: ProblemFile, problem: Problem, aims: tuple[Objective, Objective], table: Path
+) -> int:
+    first, second = aims
     from colloc.results.kept import save_result
     from colloc.search.explore import STARTS
     from colloc.studies.pareto import pareto_front

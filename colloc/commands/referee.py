@@ -6,8 +6,8 @@ Exit codes: 0 every row holds, 2 bad table or result, or one that is not better,
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Sequence
+from pathlib import Path
 
 from colloc.commands.ending import FAILED, OK, command
 from colloc.commands.options import add_printing, new_parser, tell
@@ -69,12 +69,14 @@ def _taken_in(options: argparse.Namespace) -> int:
     from colloc.commands.verify import check_trusted
     from colloc.results.store import load
     from colloc.studies.known import known, row_of, save_known, with_row
+    from colloc.system.file_lock import alone_in
 
     solution = load(options.add)
     check_trusted(solution, options.add)
     new = row_of(solution, options.by)
-    table = options.table or "known.json"
-    save_known(with_row(known(table if os.path.exists(table) else None), new), table)
+    table = Path(options.table or "known.json")
+    with alone_in(table.parent):  # no other takes a row in between the reading and the writing
+        save_known(with_row(known(table if table.exists() else None), new), table)
     said = f"{new.statement['name']}: {new.value:.8f} +- {new.value_error:.0e} is the best that is known; saved {table}"
-    tell(options, {"name": new.statement["name"], "value": new.value, "table": table}, [said])
+    tell(options, {"name": new.statement["name"], "value": new.value, "table": str(table)}, [said])
     return OK

@@ -13,7 +13,8 @@ from pathlib import Path
 from colloc.commands.ending import FAILED, OK, command, said_if_interrupted
 from colloc.commands.options import add_printing, add_problem, changed, new_parser, output_path, tell
 from colloc.commands.summary import kept_facts, kept_lines
-from colloc.gaits.problem_file import read_problem_file
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
@@ -58,6 +59,13 @@ def main(options: argparse.Namespace) -> int:
     stated = read_problem_file(options.problem)
     problem = changed(stated.problem, options)
     table = output_path(options.output, Path("results") / f"{problem.name}.steer.json")
+    from colloc.studies.saved import members_kept
+
+    with members_kept(table.with_suffix("")):
+        return _steered(options, stated, problem, table)
+
+
+def _steered(options: argparse.Namespace, stated: ProblemFile, problem: Problem, table: Path) -> int:
     from colloc.results.kept import save_result
     from colloc.search.explore import STARTS
     from colloc.studies.steering import steer

@@ -5,6 +5,7 @@ It knows nothing of meshes and of collocation. Rates may jump at given phases, a
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
@@ -26,6 +27,8 @@ _METHODS = ("LSODA", 50_000), ("Radau", np.inf)
 inertia, one that costs more. Adams' may not see that his steps are as short as stability, not accuracy, wants them: 1e-8."""
 ONE_SIDED = 1e-12
 """How far beside a jump of the rates they are asked for on its side, in phase."""
+_ONE_AT_A_TIME = threading.RLock()
+"""Older ones of SciPy's LSODA can do no more in a process, and which warnings are ignored is the same for all its threads."""
 
 
 class _TooOften(Exception):
@@ -102,7 +105,12 @@ def followed(
         for method, most in _METHODS:
             left = most
             giving_up = warnings.catch_warnings(action="ignore", category=UserWarning)
-            with suppress(_TooOften), giving_up, np.errstate(over="ignore"):  # of the steps of Radau's differences
+            with (
+                suppress(_TooOften),
+                _ONE_AT_A_TIME,
+                giving_up,
+                np.errstate(over="ignore"),
+            ):  # of the steps of Radau's differences
                 run = solve_ivp(slope, (first, last), state, method=method, dense_output=True, **accuracy)
                 if run.success:
                     break

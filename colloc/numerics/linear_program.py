@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from threading import Lock
 
 import casadi as ca
 import numpy as np
 
 from colloc.system.errors import NotConvergedError
+
+_ONE_AT_A_TIME = Lock()
+"""CasADi lets other threads run while HiGHS does, and a second one in the same solver ends the process."""
 
 
 def linear_maximum(gain: np.ndarray, equations: np.ndarray, right: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
@@ -25,10 +29,12 @@ def linear_maximum(gain: np.ndarray, equations: np.ndarray, right: np.ndarray) -
     >>> value, x.tolist(), multipliers.tolist()
     (1.5, [0.0, 0.5], [1.5])
     """
-    solver = _solver(*equations.shape)
-    found = solver(g=-gain, a=equations, lba=right, uba=right, lbx=0.0, ubx=np.inf)
-    if not solver.stats()["success"]:
-        raise NotConvergedError(f"a linear program failed: {solver.stats()['return_status']}")
+    with _ONE_AT_A_TIME:
+        solver = _solver(*equations.shape)
+        found = solver(g=-gain, a=equations, lba=right, uba=right, lbx=0.0, ubx=np.inf)
+        stats = solver.stats()
+    if not stats["success"]:
+        raise NotConvergedError(f"a linear program failed: {stats['return_status']}")
     return -float(found["cost"]), found["x"].toarray()[:, 0], found["lam_a"].toarray()[:, 0]
 
 

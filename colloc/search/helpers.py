@@ -29,7 +29,14 @@ from colloc.system.processors import available_threads
 
 _WORTH = 2.0
 """Seconds of work still to be done for which a process is begun, which takes about one."""
-_COMMAND = "from colloc.search.helpers import serve; serve()"
+_COMMAND = """
+import os, pickle, sys
+says = os.fdopen(os.dup(1), "wb")
+os.dup2(2, 1)  # for all else that is printed
+sys.path[:] = pickle.load(sys.stdin.buffer)
+from colloc.search.helpers import serve
+serve(says)
+"""
 
 
 class Helpers:
@@ -54,13 +61,12 @@ class Helpers:
         if self._processes or count == 0 or seconds < _WORTH or self._run.problem is None:
             return
         try:
-            given = pickle.dumps((sys.path, self._problem))
+            given = pickle.dumps(sys.path) + pickle.dumps(self._problem)
         except (pickle.PicklingError, AttributeError, TypeError):
             return  # a part of the problem is known in this process only
         for _ in range(count):
-            process = subprocess.Popen(
-                [sys.executable, "-c", _COMMAND], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-            )
+            command = [sys.executable, "-P", "-c", _COMMAND]  # -P: no file of the folder is imported instead of another module
+            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
             self._processes.append(process)
             threading.Thread(target=self._lead, args=(process, given), daemon=True).start()
 
@@ -111,7 +117,8 @@ class Helpers:
         with suppress(OSError), process:
             process.stdin.write(given)
             process.stdin.flush()
-            alive = process.stdout.readline()
+            answers = (line for line in process.stdout if line.endswith(b"}\n"))  # not what Python prints as it starts
+            alive = next(answers, b"")
             while alive and (task := self._next.get()):
                 answer = self._waiting.pop(task, None)
                 if answer is None:
@@ -120,7 +127,7 @@ class Helpers:
                 try:
                     process.stdin.write(task.encode() + b"\n")
                     process.stdin.flush()
-                    alive = process.stdout.readline()
+                    alive = next(answers, b"")
                 finally:
                     answer.put(alive)
 
@@ -135,12 +142,11 @@ def helping(problem: Problem) -> Iterator[Helpers]:
         helpers.end()
 
 
-def serve() -> None:
+def serve(says: BinaryIO) -> None:
     """What a helper does until nobody asks it any more: a line of rows for every line that asks."""
     signal(SIGINT, SIG_IGN)
-    says, asks = os.fdopen(os.dup(1), "wb"), sys.stdin.buffer
-    os.dup2(2, 1)
-    sys.path[:], problem = pickle.load(asks)
+    asks = sys.stdin.buffer
+    problem = pickle.load(asks)
     os.environ["OMP_NUM_THREADS"] = "1"  # the others have the other processors
     tasks: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_listen, args=(asks, tasks), daemon=True).start()

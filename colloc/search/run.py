@@ -119,7 +119,7 @@ class Run:
         try:
             rows = read_rows(self.path, ROWS).values
         except StoreError as error:
-            raise StoreError(f"{error} It was left by an interrupted run; --fresh begins again.") from None
+            raise StoreError(f"{error} It was left by an interrupted run; remove it to begin again (solve --fresh).") from None
         if rows.pop(_PROBLEM, self.problem.hash) != self.problem.hash:
             raise StoreError(f"{self.path} was left by a run of another problem of that name; --fresh begins again.")
         self._known = rows

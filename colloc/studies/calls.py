@@ -196,8 +196,8 @@ def multistart(
     starts, seed, sampler, time_limit
         As for `colloc.studies.campaign.run_starts`; starts 0 to `starts` - 1.
     workers : int
-        Processes; with one everything runs in this process. A script that asks for more has to be safe to import
-        (``if __name__ == "__main__":``), as the workers import it.
+        Processes; with one everything runs in this process. They import the script that asks for more only if it defines a
+        part of the problem; it has to be safe to import then (``if __name__ == "__main__":``).
     archive : path-like, optional
         HDF5 file in which starts are kept; what it holds already is not solved again.
     verbose : bool

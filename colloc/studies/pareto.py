@@ -18,6 +18,7 @@ from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
 from colloc.search.solve import solve
+from colloc.studies.saved import member_file
 from colloc.system.arguments import check_count
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
@@ -151,7 +152,7 @@ def pareto_front(
 
 
 def _uninterrupted(problem: Problem, starts: int) -> Solution:
-    solution = solve(problem, starts)
+    solution = solve(problem, starts, keep=member_file(problem))
     if solution.interrupted:
         raise KeyboardInterrupt
     return solution

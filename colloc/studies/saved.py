@@ -1,18 +1,24 @@
-"""A solve whose result is a file: it goes on from a run that was interrupted, and its end removes what was kept for that."""
+"""A solve whose result is a file, or several that belong together: they go on from a run that was interrupted, and their end
+removes what was kept for that."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 import numpy as np
 
+from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile
 from colloc.results.kept import Saved, save_result
 from colloc.results.solution import Solution
 from colloc.search.run import Progress
 from colloc.search.solve import REDUCED, solve
 from colloc.system.result_names import run_file
+
+_FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 
 
 def resumed(
@@ -64,3 +70,25 @@ def save_end(solution: Solution, path: Path) -> list[Saved]:
     if not solution.interrupted:
         run_file(path).unlink(missing_ok=True)
     return saved
+
+
+@contextmanager
+def members_kept(folder: Path) -> Iterator[None]:
+    """A block that solves several problems, of which each keeps what it finds in a folder (`member_file`) until the block ends
+    well. After Ctrl-C, which says so, or a power cut, the same block goes on from there."""
+    token = _FOLDER.set(folder)
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        kept = f"what was found is kept in {folder}; the same command goes on from there."
+        raise KeyboardInterrupt(str(stop) or kept) from None
+    finally:
+        _FOLDER.reset(token)
+    for file in folder.glob(run_file(Path("member-*.h5")).name):
+        file.unlink(missing_ok=True)
+
+
+def member_file(problem: Problem) -> Path | None:
+    """Where a solve within `members_kept` keeps what it finds; None outside."""
+    folder = _FOLDER.get()
+    return None if folder is None else run_file(folder / f"member-{problem.hash[:16]}.h5")

@@ -22,6 +22,7 @@ from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
 from colloc.search.solve import solve
+from colloc.studies.saved import member_file
 from colloc.system.arguments import check_count, is_number
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
@@ -155,14 +156,15 @@ def steer(
         )
     check_count(starts=starts)
 
-    def put(turn: float, solution: Solution) -> Solution:
+    def solved(turn: float, stated: Problem, starts: int) -> Solution:
+        solution = solve(stated, starts, keep=member_file(stated))
         if solution.interrupted:
             raise KeyboardInterrupt
         if progress is not None:
             progress(turn, solution)
         return solution
 
-    straight = put(0.0, solve(problem, starts))
+    straight = solved(0.0, problem, starts)
     if not straight.success:
         raise ProblemError(f"the straight gait is not certified, so there is nothing to steer: {straight.message}")
     free = {"gait": replace(problem.gait, symmetry=NONE)}
@@ -176,11 +178,11 @@ def steer(
             for turn in side:
                 if -turn in known and mirrors:
                     guess = known[-turn].gait.mirrored
-                    near = put(turn, solve(stated.with_(rotation=turn, guess=guess, **from_neighbour), 1))
+                    near = solved(turn, stated.with_(rotation=turn, guess=guess, **from_neighbour), 1)
                 elif near is not None:
-                    near = put(turn, solve(stated.with_(rotation=turn, guess=near.gait, **from_neighbour), 1))
+                    near = solved(turn, stated.with_(rotation=turn, guess=near.gait, **from_neighbour), 1)
                 else:
-                    near = put(turn, solve(stated.with_(rotation=turn, guess=None, delta_start=None, **free), starts))
+                    near = solved(turn, stated.with_(rotation=turn, guess=None, delta_start=None, **free), starts)
                 known[turn] = near
         return tuple(known[turn] for turn in wanted)
 

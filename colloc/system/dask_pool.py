@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import Any
 
 from colloc.system.errors import ProblemError
-from colloc.system.task_pool import EngineGone
+from colloc.system.task_pool import EngineGone, environment_of_workers
 
 PATIENCE = 60.0
 """Seconds for which a scheduler may be without workers, or give no answer."""
@@ -49,8 +49,9 @@ def connected(
     except ImportError:
         raise ProblemError("--dask needs the package distributed: pip install 'colloc[dask]'.") from None
     try:  # for the study alone: what else the process does with Dask, xarray for one, is not sent there
-        if address == "local":  # any port that is free
-            client = Client(n_workers=workers, threads_per_worker=1, dashboard_address=":0", set_as_default=False)
+        if address == "local":  # any port that is free, for this machine alone
+            with environment_of_workers():
+                client = Client(n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", set_as_default=False)
         else:
             client = Client(address, timeout=_CONNECT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:

@@ -29,6 +29,7 @@ import numpy as np
 from h5py import h5d, h5s, h5t
 
 from colloc.system.errors import CollocError, StoreError
+from colloc.system.file_lock import NO_LOCKS
 from colloc.system.replaced_file import replaced_file
 from colloc.system.sealed_file import LONGEST_TEXT, check_seal, is_sealed, write_sealed
 
@@ -75,7 +76,7 @@ def sealed_file(
         check_seal(path, largest, kind)
     try:
         _check_head(path, kind, version)
-        with h5py.File(path, "r") as file:
+        with _opened(path) as file:
             if attribute(file, "format") != kind:
                 raise StoreError(f"{path} is an HDF5 file, but not a {kind}.")
             found = attribute(file, "format_version")
@@ -92,6 +93,16 @@ def sealed_file(
     except Exception as error:
         # h5py raises many kinds for a damaged file
         raise StoreError(f"{path} is not a readable {kind} ({type(error).__name__}: {error}).") from None
+
+
+def _opened(path: Path) -> h5py.File:
+    """A file to read: locked, if its file system can do that. Those of colloc are replaced whole, and need no lock."""
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        if error.errno not in NO_LOCKS:
+            raise
+        return h5py.File(path, "r", locking=False)
 
 
 def was_changed(path: Path, kind: str) -> bool:

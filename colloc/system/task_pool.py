@@ -8,6 +8,8 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import pickle
+import sys
 import threading
 from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, wait
@@ -22,6 +24,8 @@ from colloc.system.interruption import interruptible
 _MOMENT = 0.1
 """Longest time for which Ctrl-C is held back [s]."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+_ENVIRONMENT = dict.fromkeys((*_THREADS, "PYTHONSAFEPATH"), "1")
+_ONE_BEGINS = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -44,16 +48,17 @@ class EngineGone(CollocError, RuntimeError):
 
 
 @contextlib.contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Processes started inside use one BLAS thread each; the environment is put back afterwards."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+def environment_of_workers() -> Iterator[None]:
+    """Processes started inside use one BLAS thread each, and import no file of the folder instead of another module; the
+    environment is put back afterwards."""
+    before = {name: os.environ.get(name) for name in _ENVIRONMENT}
+    os.environ.update(_ENVIRONMENT)
     try:
         yield
     finally:
         for name, value in before.items():
             if value is None:
-                del os.environ[name]
+                os.environ.pop(name, None)  # another thread may have done so
             else:
                 os.environ[name] = value
 
@@ -73,13 +78,44 @@ def _started() -> None:
     threading.Thread(target=leave, daemon=True).start()
 
 
+class _Processes(ProcessPoolExecutor):
+    """Processes that do not run the script which begins them, unless a task is of something it defines: so it needs no
+    ``if __name__ == "__main__"`` for those of colloc alone."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future:
+        with contextlib.nullcontext() if _is_of_script((function, arguments, named)) else _without_script():
+            return super().submit(function, *arguments, **named)
+
+
+def _is_of_script(task: tuple) -> bool:
+    try:
+        return b"__main__" in pickle.dumps(task)
+    except Exception:
+        return True  # which the executor is to say
+
+
+@contextlib.contextmanager
+def _without_script() -> Iterator[None]:
+    """Processes that are begun inside are not told which file this one was begun with."""
+    main: dict[str, Any] = vars(sys.modules["__main__"])
+    with _ONE_BEGINS:
+        before = {str(name): main.pop(name) for name in ("__file__", "__spec__") if name in main}
+        main["__spec__"] = None
+        try:
+            yield
+        finally:
+            main.update(before)
+
+
 def process_pool(workers: int) -> Executor:
     """Fresh processes: they inherit no state, and their number of BLAS threads is settled before NumPy is loaded."""
-    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_started)
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        sys.exit(1)  # a worker, in a script without that line: the process that began it does its task itself
+    return _Processes(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_started)
 
 
 class InThisProcess(Executor):
-    """Runs every task at once where it is handed over: for scripts, which need no ``if __name__ == "__main__"`` then."""
+    """Runs every task at once where it is handed over."""
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future:
         future: Future = Future()
@@ -152,7 +188,7 @@ def completed(
     """
     suspects: list[Task] = []
     more = True
-    with one_thread_each():
+    with environment_of_workers():
         while more or suspects:
             alone = bool(suspects)
             pool = executor(1 if alone else workers)

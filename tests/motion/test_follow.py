@@ -1,5 +1,9 @@
 """States followed through a period: a closed form, a jump in the rates, and what the tolerance promises."""
 
+import threading
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 import scipy.integrate
@@ -64,3 +68,25 @@ def test_where_one_method_gives_up_or_asks_without_end_another_goes_on(monkeypat
     else:
         with pytest.raises(NotConvergedError, match="could not be followed beyond phase 1"):
             followed(turning, BEGIN, 1e-7)
+
+
+def test_two_threads_follow_what_one_follows_and_leave_warnings_as_they_were():
+    begun, ended = (threading.Event(), threading.Event()), threading.Event()
+
+    def thread(k):
+        def rates(t, state, asked):
+            begun[k].set()
+            (ended if k else begun[1]).wait(0 if asked else 0.3)  # for the other one, to begin or to end
+            return turning(t, state, asked)
+
+        if k:
+            begun[0].wait()
+        states = followed(rates, BEGIN, 1e-7).states
+        ended.set()
+        return states
+
+    alone, before = followed(turning, BEGIN, 1e-7).states, list(warnings.filters)
+    with ThreadPoolExecutor(2) as threads:
+        for states in threads.map(thread, (0, 1)):
+            np.testing.assert_array_equal(states, alone)
+    assert warnings.filters == before

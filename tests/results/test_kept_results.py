@@ -2,12 +2,15 @@
 
 import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
 
 from colloc.commands.main import main as colloc
 from colloc.gaits.problem import Problem
+from colloc.numerics.c_compiler import c_compiler
 from colloc.results import kept
 from colloc.results.kept import save_result
 from colloc.results.store import load
@@ -50,6 +53,24 @@ def test_a_better_answer_to_the_same_question_is_kept_and_a_worse_or_equal_one_r
         assert load(path).certificate.value == value
     assert values(tmp_path) == {"x.h5": 0.1, "x.former-1.h5": 0.3}
     assert "which is better (0.3, best of 8 starts)" in saved.why
+
+
+@pytest.mark.skipif(sys.platform != "linux" or c_compiler() is None, reason="a library that is preloaded stands for the system")
+def test_on_a_file_system_without_locks_a_result_is_read_and_replaced(three_link, tmp_path):
+    """As the system says it there: to HDF5, which locks what it opens, as to Python."""
+    path, source, library = (tmp_path / name for name in ("x.h5", "flock.c", "flock.so"))
+    source.write_text("#include <errno.h>\nint flock(int file, int how) { errno = ENOLCK; return -1; }\n")
+    subprocess.run([c_compiler(), "-shared", "-fPIC", source, "-o", library], check=True)
+    save_result(three_link, path)
+    code = f"""if True:
+        from pathlib import Path
+        from colloc.results.kept import save_result
+        from colloc.results.store import load
+        path = Path({str(path)!r})
+        print(save_result(load(path), path)[0].former)"""
+    environment = {**os.environ, "LD_PRELOAD": str(library)}
+    ran = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert (ran.stdout, ran.stderr) == ("None\n", "")
 
 
 def test_two_problems_in_turns_fill_no_folder(three_link, tmp_path):

@@ -13,7 +13,8 @@ from colloc.search.explore import explore, sketched
 from colloc.search.run import Run
 
 PROBLEM = Problem("quick", gait=Harmonic(1, "none"), delta=1e-2, delta_start=0.1, intervals=12, mesh_tolerance=1e-3)
-DIES = "import sys, pickle; pickle.load(sys.stdin.buffer); print(flush=True); sys.stdin.readline()"
+DIES = "import sys; print('{}', flush=True); next(line for line in sys.stdin.buffer if b'colloc.search.explore' in line)"
+TORN = f"{DIES}; print('{{', end='', flush=True)"
 
 
 @pytest.fixture
@@ -54,7 +55,9 @@ def test_the_file_is_the_same_to_the_last_bit(alone, learnt, tmp_path, monkeypat
 
 
 @pytest.mark.parametrize(
-    "command", [pytest.param("raise SystemExit(1)", marks=pytest.mark.slow), DIES], ids=["at once", "at its first task"]
+    "command",
+    [pytest.param("raise SystemExit(1)", marks=pytest.mark.slow), DIES, TORN],
+    ids=["at once", "at its first task", "in its first answer"],
 )
 def test_so_it_is_if_they_die(alone, learnt, tmp_path, monkeypatch, command):
     monkeypatch.setattr(helpers, "_COMMAND", command)
@@ -79,6 +82,22 @@ def test_none_is_begun_for_what_this_process_alone_knows_nor_for_little(learnt, 
 def test_none_is_begun_where_a_stage_is_called_by_itself(learnt):
     assert explore(PROBLEM, starts=4).starts >= 4
     assert not learnt
+
+
+@pytest.mark.parametrize("name", ["random.py", "sitecustomize.py"])
+def test_files_of_the_folder_are_not_run_and_what_python_prints_as_it_starts_is_no_answer(learnt, tmp_path, monkeypatch, name):
+    (tmp_path / name).write_text("print('hello\\n' * 3); open('ran', 'w').close()", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    if name == "sitecustomize.py":  # which Python runs, wherever it was told to look for it
+        monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with Run(problem=PROBLEM).under_way(60.0), helpers.helping(PROBLEM) as some:
+        some.begin(1e3)
+        some.ask(sketched, PROBLEM, PROBLEM.guess, True, [0.1])
+        while some.waiting:
+            time.sleep(0.01)
+        some.await_for(sketched, PROBLEM, PROBLEM.guess, True, [0.1])
+    assert learnt[0][0] > 0
+    assert (tmp_path / "ran").exists() == (name == "sitecustomize.py")
 
 
 def test_what_is_asked_for_twice_is_waited_for_once(learnt):

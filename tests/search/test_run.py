@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -223,6 +224,18 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
     np.testing.assert_array_equal(again.program().rows(again.v), found.program().rows(found.v))
 
 
+@pytest.mark.slow
+def test_solves_on_two_threads_end_as_one_after_another():
+    friction = Friction(mu_t=2, mu_f=1, mu_b=1)
+    kinds = [Problem("a", gait=Harmonic(2), **AT), Problem("b", gait=Harmonic(2), friction=friction, **AT)]
+    with ThreadPoolExecutor(2) as threads:
+        together = list(threads.map(colloc.solve, kinds))
+    for problem, found in zip(kinds, together, strict=True):
+        alone = colloc.solve(problem)
+        np.testing.assert_array_equal(found.answer.x, alone.answer.x)
+        assert found.certificate == alone.certificate
+
+
 def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_again(tmp_path, capsys):
     from colloc.commands.solve import main
 
@@ -234,7 +247,7 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     assert "--fresh begins again" in capsys.readouterr().err
     run.write_bytes(b"not SQLite" * 100)
     assert main(command) == 2
-    assert "--fresh begins again" in capsys.readouterr().err
+    assert "begin again (solve --fresh)" in capsys.readouterr().err
     assert main([*command, "--fresh"]) in (0, 4)
     assert not run.exists()
 

@@ -1,8 +1,11 @@
 """The table of known gaits: what it says comes out of a replay, and only what is certified and better gets in."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
+from threading import Barrier, BrokenBarrierError
 
 import pytest
 
@@ -108,6 +111,26 @@ def test_without_a_table_the_referee_begins_a_copy_of_its_own_where_it_is_called
     assert known("known.json")[:-1] == ROWS
     assert known("known.json")[-1].statement["name"] == "quick"
     assert main(arguments) == 2  # it goes on from the table that is there
+
+
+def test_two_that_are_taken_in_at_once_are_both_there(best, tmp_path, monkeypatch):
+    both, save, table = Barrier(2, timeout=0.5), save_known, tmp_path / "known.json"
+    save([], table)
+
+    def after_both_have_read(rows, path):
+        with suppress(BrokenBarrierError):  # one waits for the other to end
+            both.wait()
+        save(rows, path)
+
+    def take_in(solution):
+        result = colloc.save(solution, tmp_path / f"{solution.problem.name}.h5")
+        return main(["referee", "--table", str(table), "--add", str(result), "--by", "colloc solve quick.py"])
+
+    monkeypatch.setattr("colloc.studies.known.save_known", after_both_have_read)
+    other = colloc.solve(PROBLEM.with_(name="other", friction=colloc.Friction(2, 1, 1)), starts=1)
+    with ThreadPoolExecutor(2) as threads:
+        assert list(threads.map(take_in, [best, other])) == [0, 0]
+    assert {row.statement["name"] for row in known(table)} == {"quick", "other"}
 
 
 def test_bounds_under_dry_friction_are_saved_and_checked_again(tmp_path, capsys):

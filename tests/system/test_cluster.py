@@ -56,6 +56,17 @@ def test_the_task_of_a_worker_that_is_killed_or_does_not_answer_goes_to_another(
             assert [task.key for task, result in naps(dask, [0.1, 0.1]) if result is None] == [0, 1]
 
 
+def test_a_local_cluster_listens_to_this_machine_alone():
+    psutil = pytest.importorskip("psutil")
+    executor, _ = connected("local", 1)
+    try:
+        processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+        listening = [each for process in processes for each in process.net_connections("inet") if each.status == "LISTEN"]
+        assert {each.laddr.ip for each in listening} == {"127.0.0.1"}
+    finally:
+        executor(1)._client.shutdown()
+
+
 def test_a_scheduler_that_is_stopped_ends_the_run():
     with DaskProcesses() as dask:
         dask.worker()

@@ -3,6 +3,8 @@
 import asyncio
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -68,6 +70,29 @@ def test_blas_threads_do_not_multiply_with_processes(monkeypatch):
     # the main thread, the one that watches the parent, and the queue's feeder if it has started
     assert count <= 3
     assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
+
+
+UNGUARDED = {
+    "colloc's": "import colloc\nfrom operator import neg as task",
+    "its own": "def task(x):\n    return -x",
+}
+
+
+@pytest.mark.parametrize("whose", UNGUARDED)
+def test_a_script_without_a_main_guard_runs_tasks_on_processes_without_a_word(tmp_path, whose):
+    (tmp_path / "script.py").write_text(
+        f"""{UNGUARDED[whose]}
+from colloc.system.task_pool import Task, completed, pool_for
+waiting = iter([Task(x, (x,)) for x in range(3)])
+print(sorted(result for _, result in completed(task, lambda: next(waiting, None), workers=2, executor=pool_for)))
+""",
+        encoding="utf-8",
+    )
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "pickle.py").write_text("open('ran', 'w').close()", encoding="utf-8")
+    ran = subprocess.run([sys.executable, "../script.py"], cwd=tmp_path / "elsewhere", capture_output=True, text=True)
+    assert (ran.stdout, ran.stderr) == ("[-2, -1, 0]\n", "")
+    assert not (tmp_path / "elsewhere" / "ran").exists()
 
 
 def test_a_task_may_wait_for_the_result_of_another():
