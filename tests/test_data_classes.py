@@ -14,7 +14,7 @@ VALUES = {
     "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Period", "Polygon",
     "Coupled", "Known", "Paced", "PacedOnSlope", "PathLimit", "PathLimits", "PotentialSpace", "Quantity", "Regime", "Slope",
     "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Replay", "Rows", "Saved", "TensorSpline",
-    "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
+    "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step", "Gap",
 }
 MUTABLE = {
     "Archive", "Candidate", "CellState", "Group", "Journal", "PathGeometry", "Run", "Solution", "State", "_Heard",

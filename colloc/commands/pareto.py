@@ -1,12 +1,13 @@
 """Command line: the front of two objectives of a problem: certified gaits of which none is better in both.
 
-Exit codes: 0 every point certified, 2 bad problem or option, 3 not converged, 4 a point is not certified, 130 interrupted.
+Exit codes: 0 found, 2 bad problem or option, 3 not converged, 4 a gap is left where gaits are not certified, 130 interrupted.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+from dataclasses import asdict
 from pathlib import Path
 
 from colloc.commands.ending import FAILED, OK, command, said_if_interrupted
@@ -37,7 +38,9 @@ def _parser() -> argparse.ArgumentParser:
         "--objectives", nargs=2, metavar=("FIRST", "SECOND"), default=[SPEED.name, EFFICIENCY.name],
         help=f"default: {SPEED.name} {EFFICIENCY.name}",
     )  # fmt: skip
-    parser.add_argument("--points", type=int, default=_POINTS, metavar="N", help=f"of the front (default: {_POINTS})")
+    parser.add_argument(
+        "--points", type=int, default=_POINTS, metavar="N", help=f"of the front, if none hardly differ (default: {_POINTS})"
+    )
     parser.add_argument("--starts", type=int, metavar="N", help="starts to find both ends of (default: 32)")
     parser.add_argument("--output", metavar="PATH", help="folder, or .csv file (default: results/NAME.front.csv)")
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.front.png")
@@ -75,7 +78,8 @@ def _front(
         starts = options.starts or stated.starts or STARTS
 
         def told(k: int, found: Solution) -> None:
-            line.say(f"{problem.name}: point {k} of {options.points - 1}: {found}")
+            what = f"point {k} of {options.points - 1}" if k < options.points else "in a gap"
+            line.say(f"{problem.name}: {what}: {found}")
 
         front = pareto_front(problem, first, second, options.points, starts=starts, progress=told)
     rows, kept = [], []
@@ -94,11 +98,15 @@ def _front(
         with said_if_interrupted([f"{table}, {rows[0][-1]} ..."]):
             files += save_figure(front.plot(), table.with_suffix(""), ("png",))
     points = [dict(zip(names, row, strict=True)) for row in rows]
+    gaps = [asdict(gap) for gap in front.gaps]
+    empty = {gap.after: f"\n       nothing was found between: {gap.why}" for gap in front.gaps}
     lines = [
         f"{problem.name}: {first.name} against {second.name}, {len(rows)} points",
-        *(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}" for k, a, b, _, _, status, _ in rows),
+        *(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}" for k, a, b, _, _, status, _ in rows),
         f"  saved {', '.join(map(str, files))}, {rows[0][-1]} ...",
         *kept_lines(kept),
     ]
-    tell(options, {"objectives": [aim.fields() for aim in aims], "points": points, "kept": kept_facts(kept)}, lines)
+    tell(
+        options, {"objectives": [aim.fields() for aim in aims], "points": points, "gaps": gaps, "kept": kept_facts(kept)}, lines
+    )
     return OK if front.certified else FAILED

@@ -25,16 +25,19 @@ def front_figure(front: ParetoFront) -> Figure:
 
 
 def draw_front(axes: Axes, front: ParetoFront) -> Axes:
-    """The two objectives of every gait; returns the axes."""
+    """The two objectives of every gait, with a line that breaks off at gaps; returns the axes."""
     first, second = front.objectives
     values = front.values
-    axes.plot(values[:, 1], values[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
+    after = [gap.after + 1 for gap in front.gaps]
+    whole = np.insert(values, after, np.nan, axis=0)
+    axes.plot(whole[:, 1], whole[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
+    for k in after:
+        label = "nothing found between" if k == after[0] else None
+        axes.plot(values[k - 1 : k + 1, 1], values[k - 1 : k + 1, 0], ":", color=VERMILION, lw=0.8, zorder=1, label=label)
     axes.scatter(values[:, 1], values[:, 0], c=snapshot_colours(len(front.points)), s=28, zorder=2)
-    failed = ~np.array([point.success for point in front.points])
-    axes.plot(values[failed, 1], values[failed, 0], "x", color=VERMILION, ms=9, label="not certified")
     axes.set(xlabel=second.label, ylabel=first.label)
     axes.set_title(front.problem.name)
-    if failed.any():
+    if after:
         axes.legend()
     return axes
 

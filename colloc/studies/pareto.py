@@ -3,33 +3,58 @@
 The ends of the front are the best gaits by one objective alone. Between them the first objective is maximised while the second
 is kept at a value (an epsilon constraint), which finds the front where it is not convex, too. Every point is begun at the gait
 of a neighbour, from both ends, and the better one counts: so the front may pass from one kind of gait to another.
+
+Evenly spaced in the second objective, points may lie far apart in the first. Wherever neighbours are too far apart, a gait
+halfway is sought in the objective in which they are, from both of them, and from as many starts as the ends where that leads to
+nothing new. What stays empty is named as a gap: there the front jumps, or the search failed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, SPEED, Objective, objective_from
+from colloc.gaits.period import Period
 from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
 from colloc.search.solve import solve
 from colloc.studies.saved import member_file
 from colloc.system.arguments import check_count
-from colloc.system.errors import ProblemError
+from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.late_binding import bound
 from colloc.verification.replayer import replayer
 
 POINTS = 9
 _MOST_POINTS = 1000
-_SAME = 1e-6
-"""Relative difference below which two values are the same: what the search leaves of it."""
 _BETTER = 1e-6
 """Relative gain for which a point is replaced."""
+_CLOSE, _APART = 0.1, 2.0
+"""Neighbours are nearer than this part of the even spacing, in both objectives, or farther apart than that in either."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Where a front is empty for more than twice the even spacing of its points.
+
+    Attributes
+    ----------
+    after : int
+        The point before it.
+    why : str
+    certified : bool
+        Whether the gaits that were found there are; then they are no better than the points beside it.
+    """
+
+    after: int
+    why: str
+    certified: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +67,16 @@ class ParetoFront:
         Whatever its own objective is.
     objectives : (Objective, Objective)
     points : tuple of Solution
-        Each with a certificate of its own.
+        Each with a certificate of its own. By more than its errors none is worse than another one in both objectives, and
+        neighbours differ; where one gait is best in both, it is the only point.
+    gaps : tuple of Gap
+        Between which neighbours nothing was found; elsewhere they are less than twice the even spacing apart.
     """
 
     problem: Problem
     objectives: tuple[Objective, Objective]
     points: tuple[Solution, ...]
+    gaps: tuple[Gap, ...] = ()
 
     @property
     def values(self) -> np.ndarray:
@@ -56,8 +85,8 @@ class ParetoFront:
 
     @property
     def certified(self) -> bool:
-        """Whether every point is."""
-        return all(point.success for point in self.points)
+        """Whether every gait is that was found in its gaps, too."""
+        return all(gap.certified for gap in self.gaps)
 
     def plot(self, ax: Any = None) -> Any:
         """The front and its gaits as a matplotlib Figure; with `ax`, a matplotlib Axes, the front there, and the Axes is
@@ -66,8 +95,8 @@ class ParetoFront:
 
     def __repr__(self) -> str:
         first, second = (aim.name for aim in self.objectives)
-        verdict = "all certified" if self.certified else "NOT all certified"
-        return f"<ParetoFront of {self.problem.name}: {first} against {second}, {len(self.points)} points, {verdict}>"
+        counts = f"{len(self.points)} certified points, {len(self.gaps)} gaps"
+        return f"<ParetoFront of {self.problem.name}: {first} against {second}, {counts}>"
 
 
 def pareto_front(
@@ -88,11 +117,13 @@ def pareto_front(
     first, second : Objective or str
         As for `colloc.gaits.problem.Problem`.
     points : int
-        At least 2, the ends; those between are evenly spaced in the second objective.
+        At least 2, the ends; those between are evenly spaced in the second objective. What is no better than another one, or
+        hardly differs from it, is left out; what fills gaps is added.
     starts : int
-        From which both ends are the best.
+        From which both ends are the best, and what lies in a gap that no neighbour leads into.
     progress : callable, optional
-        Called with the number of a point and its solution, also when it is replaced by a better one.
+        Called with the number of a point, in the order in which they are begun, and its solution, also when it is replaced by a
+        better one.
 
     Raises
     ------
@@ -106,7 +137,7 @@ def pareto_front(
     >>> import colloc
     >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     >>> colloc.pareto_front(problem, "speed", "efficiency", 3, starts=1)
-    <ParetoFront of quick: speed against efficiency, 3 points, all certified>
+    <ParetoFront of quick: speed against efficiency, 3 certified points, 0 gaps>
     """
     if not problem.gait.free:
         raise ProblemError("nothing is free in a prescribed motion: it is one point, and no front.")
@@ -126,29 +157,53 @@ def pareto_front(
             if progress is not None:
                 progress(k, solution)
 
+    def reaching(which: int, level: float, begin: Solution | None) -> Solution:
+        """The best by the other objective of what reaches a level of one, begun at a gait; without one from starts."""
+        reached = (*problem.at_least, (aims[which], level))
+        stated = problem.with_(objective=aims[1 - which], at_least=reached)
+        if begin is None:
+            return _uninterrupted(stated, starts)
+        return _uninterrupted(stated.with_(guess=begin.gait, delta_start=problem.delta), 1)
+
     last = points - 1
     for k, aim in zip((0, last), aims, strict=True):
         put(k, _uninterrupted(problem.with_(objective=aim), starts))
         if not found[k].success:
             raise ProblemError(f"the gait of best {aim.name} is not certified, so there is no front: {found[k].message}")
-    least, most = (_value(found[k], aims[1]) for k in (0, last))
-    if most - least < _SAME * abs(most):
-        return ParetoFront(problem, aims, (found[0], found[last]))
-    levels = np.linspace(least, most, points)
-
-    def begun_at(k: int, neighbour: int) -> Solution:
-        reached = (*problem.at_least, (aims[1], float(levels[k])))
-        gait = found[neighbour].gait
-        return _uninterrupted(problem.with_(objective=aims[0], at_least=reached, guess=gait, delta_start=problem.delta), 1)
-
-    for k in range(last - 1, 0, -1):
-        put(k, begun_at(k, k + 1))
-    for k in range(1, last):
-        put(k, begun_at(k, k - 1))
-    for k in range(last - 1, -1, -1):  # what reaches more of the second objective and of the first is better here, too
-        if k > 0 and _value(found[k + 1], aims[0]) > _value(found[k], aims[0]):
-            put(k, begun_at(k, k + 1))
-    return ParetoFront(problem, aims, tuple(found[k] for k in range(points)))
+    if len(_spaced(found.values(), aims, last)) > 1:
+        levels = np.linspace(_value(found[0], aims[1]), _value(found[last], aims[1]), points)
+        for k in range(last - 1, 0, -1):
+            put(k, reaching(1, float(levels[k]), found[k + 1]))
+        for k in range(1, last):
+            put(k, reaching(1, float(levels[k]), found[k - 1]))
+        for k in range(last - 1, 0, -1):  # what reaches more of the second objective and of the first is better here, too
+            if _value(found[k + 1], aims[0]) > _value(found[k], aims[0]):
+                put(k, reaching(1, float(levels[k]), found[k + 1]))
+    front, empty = _spaced(found.values(), aims, last), {}
+    for _ in range(2 * points):
+        wide = {pair: size for pair, size in _wide(front, aims, last).items() if pair not in empty}
+        if not wide:
+            break
+        pair = max(wide, key=lambda each: wide[each].max())
+        which, tried, failure = int(wide[pair].argmax()), [], ""
+        level = 0.5 * sum(_value(each, aims[which]) for each in pair)
+        for begin in (*pair, None):
+            if begin is None and pair not in pairwise(front):
+                break  # a neighbour led into the gap
+            try:
+                tried.append(reaching(which, level, begin))
+            except NotConvergedError as error:
+                failure = str(error)
+                continue
+            put(len(found), tried[-1])
+            front = _spaced(found.values(), aims, last)
+        if tried:
+            failure = "" if any(each.success for each in tried) else tried[0].message
+        empty[pair] = failure or "the best gaits found there are those beside it", not failure
+    unknown = "not sought: ask for more points", True
+    wide = _wide(front, aims, last)
+    gaps = [Gap(k, *empty.get(pair, unknown)) for k, pair in enumerate(pairwise(front)) if pair in wide]
+    return ParetoFront(problem, aims, tuple(front), tuple(gaps))
 
 
 def _uninterrupted(problem: Problem, starts: int) -> Solution:
@@ -159,9 +214,47 @@ def _uninterrupted(problem: Problem, starts: int) -> Solution:
 
 
 def _value(solution: Solution, aim: Objective) -> float:
-    """An objective of a solution, of its certificate or, where that does not hold what it takes, of a replay."""
-    known, problem, gait = solution.certificate.values, solution.problem, solution.gait
-    if set(aim.uses) <= set(known):
-        return aim(known)
-    at: Any = (problem.body, problem.law, gait, solution.delta_per_period)
-    return replayer(problem.regime)(*at, breaks=gait.corner_phases, objective=aim, turn=problem.rotation or 0.0).value
+    """An objective of a solution."""
+    return _measured(solution, aim)[0]
+
+
+@lru_cache(maxsize=256)
+def _measured(solution: Solution, aim: Objective) -> tuple[float, float]:
+    """An objective of a solution and its error, of its certificate or, where that does not hold what it takes, of a replay."""
+    known: Period = solution.certificate
+    problem, gait = solution.problem, solution.gait
+    if not set(aim.uses) <= set(known.values):
+        at: Any = (problem.body, problem.law, gait, solution.delta_per_period)
+        known = replayer(problem.regime)(*at, breaks=gait.corner_phases, objective=aim, turn=problem.rotation or 0.0)
+    value = aim(known.values)
+    return value, abs(value) * known.error_of(aim)
+
+
+def _spaced(solutions: Iterable[Solution], aims: tuple[Objective, Objective], intervals: int) -> list[Solution]:
+    """Certified ones of which, by more than the errors, none is better in both objectives, without near duplicates; of those
+    the first counts."""
+    front: list[Solution] = []
+    for each in (solution for solution in solutions if solution.success):
+        (values, errors), others = _both(each, aims), [_both(other, aims) for other in front]
+        if any((values <= other + errors + error).all() for other, error in others):
+            continue
+        left = [point for point, (other, error) in zip(front, others, strict=True) if (values < other - errors - error).any()]
+        close = np.ptp([values, *(other for other, _ in others)], axis=0) * _CLOSE / intervals
+        if len(left) == len(front) > 1 and any((abs(values - other) < close).all() for other, _ in others):
+            continue
+        front = [*left, each]
+    return sorted(front, key=lambda each: -_value(each, aims[0]))
+
+
+def _both(solution: Solution, aims: tuple[Objective, Objective]) -> np.ndarray:
+    """Two objectives of a solution and their errors, ``(2, 2)``."""
+    return np.transpose([_measured(solution, aim) for aim in aims])
+
+
+def _wide(
+    front: list[Solution], aims: tuple[Objective, Objective], intervals: int
+) -> dict[tuple[Solution, Solution], np.ndarray]:
+    """Neighbours that are too far apart, and how far in each objective, as a share of the whole front."""
+    apart = np.abs(np.diff([_both(each, aims)[0] for each in front], axis=0))
+    shares = apart / apart.sum(axis=0)
+    return {pair: size for pair, size in zip(pairwise(front), shares, strict=True) if size.max() * intervals > _APART}

@@ -78,6 +78,16 @@ def test_slopes_are_those_of_gaits_that_are_sought_again(name, three_link, found
     assert abs(found[name].slope - slope) <= found[name].error + error
 
 
+def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(solved, of):
+    """The gait on the mesh of an answer lies beside the true one, which moves slopes to first order."""
+    rough = solved("three_link_offset")[0]
+    fine = colloc.solve(rough.problem.with_(guess=rough.gait, delta_start=rough.problem.delta, mesh_tolerance=1e-8), starts=1)
+    of("friction sideways", "friction backwards")
+    for effect, finer in zip(rough.sensitivity().effects, fine.sensitivity().effects, strict=True):
+        assert abs(effect.slope - finer.slope) <= effect.error + finer.error, effect.name
+        assert effect.error < 5e-3 * abs(effect.slope), effect.name
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("problem", ["three_link", "three_link_folded", "three_link_feet", "three_link_uphill"])
 def test_all_slopes_are_those_of_gaits_that_are_sought_again(problem, solved, of):
