@@ -67,7 +67,10 @@ def main(options: argparse.Namespace) -> int:
     facts = solution.export(path, **settings)
     if kind in ("xml", "urdf"):
         said = f"saved {path}: a robot of {facts['length_m']:g} m and {facts['mass_kg']:g} kg; its joint angles: --format csv"
-        tell(options, {**facts, "file": str(path)}, [said, *([f"  note: {facts['note']}"] if "note" in facts else [])])
+        lines = [said]
+        if (moves := facts.get("moves_body_lengths_per_period")) is not None:
+            lines.append(f"  colloc has it move {moves:.4g} body lengths a period on its floor, with inertia")
+        tell(options, {**facts, "file": str(path)}, [*lines, *([f"  note: {facts['note']}"] if "note" in facts else [])])
         return OK
     samples = facts["samples_per_period"] * options.periods
     fastest = ", ".join(f"{speed:.3g}" for speed in facts["largest_speed_rad_per_s"])

@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,13 @@ import numpy as np
 
 from colloc.gaits.gait_fields import fields
 from colloc.mechanics.inertia import GRAVITY
+from colloc.mechanics.law import rate_independent
 from colloc.results.robot import Robot, pressing
-from colloc.results.robot_model import FORMATS, one_coefficient
+from colloc.results.robot_model import FORMATS, floor_of, note_of
 from colloc.results.solution import Solution
-from colloc.system.errors import ProblemError
+from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.replaced_file import replaced_file
+from colloc.verification.inertial_motion import inertial_motion
 from colloc.verification.trajectory import Trajectory, timed
 
 KINDS = ".csv", ".json", *FORMATS
@@ -108,9 +111,21 @@ def _written_model(robot: Robot, path: Path) -> dict[str, Any]:
     text, size = FORMATS[path.suffix](robot), {"length_m": robot.length, "mass_kg": robot.mass, "period_s": robot.period}
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
-    note = one_coefficient(robot) if path.suffix == ".xml" else ""
     facts = {name: robot.facts[name] for name in ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")} | size
-    return facts | ({"note": note} if note else {})
+    if path.suffix == ".urdf":
+        return facts | {"note": "a URDF says nothing of friction, nor of how the weight is spread over what touches the floor"}
+    if rate_independent(robot.solution.problem.law):
+        with suppress(ProblemError, NotConvergedError):
+            facts["moves_body_lengths_per_period"] = _moves(robot)
+    return facts | ({"note": note} if (note := note_of(robot)) else {})
+
+
+def _moves(robot: Robot) -> float:
+    """What colloc says of the robot on the floor of its MJCF [body lengths]."""
+    body, law = floor_of(robot)
+    problem, gait = robot.solution.problem, robot.solution.gait
+    how: dict[str, Any] = {"turn": robot.solution.rotation, "breaks": gait.corner_phases, "regime": problem.regime}
+    return inertial_motion(body, law, gait, robot.solution.delta_per_period, robot.froude, tolerance=1e-3, **how).distance
 
 
 def _about(solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None) -> dict[str, Any]:

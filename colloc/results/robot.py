@@ -1,9 +1,9 @@
 """A gait on a robot of so many metres and kilograms: the one module that knows units.
 
 Everything else counts lengths in body lengths L, forces in weights m g and time in periods T. So a torque is one in m g L,
-work too, a power in m g L / T, and a speed in L / T; the cost of transport W / (m g d) has no unit. The numbers are those at the
-robot's pace, with inertia: what that does depends on the *Froude number* Fr = L / (g T^2) alone. Where the body has no masses, or
-the motion with inertia is not found, they are those of slow motion, which is said.
+work too, a power in m g L / T, and a speed in L / T; the cost of transport W / (m g d) has no unit. The numbers are those at
+the robot's pace, with inertia: what that does depends on the *Froude number* Fr = L / (g T^2) alone. Where the body has no
+masses, or the motion with inertia is not found, they are those of slow motion, which is said.
 """
 
 from __future__ import annotations
@@ -379,8 +379,8 @@ class Robot:
             else:
                 limit = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
                 said.append(
-                    f"Joint {worst + 1} needs {peak:.3g} N m and has {has:.3g}. Played slowly it is too weak as well, so a longer "
-                    f"period does not help: solve with torque_limit=({limit})."
+                    f"Joint {worst + 1} needs {peak:.3g} N m and has {has:.3g}. Played slowly motors are too weak as well, so "
+                    f"a longer period does not help: solve with torque_limit=({limit})."
                 )
         if not rate_independent(problem.law):
             said.append(

@@ -158,7 +158,7 @@ def test_weak_motors_are_told_whether_a_longer_period_helps(three_link):
     assert "The torques suffice at this pace" in str(three_link.robot(**SIZE, max_torque=4))
     assert "take a longer period" in str(three_link.robot(**SIZE, max_torque=2.2))
     weak = three_link.robot(**SIZE, max_torque=[4, 1.5])
-    assert "Joint 2 needs 2.36 N m and has 1.5. Played slowly it is too weak as well" in str(weak)
+    assert "Joint 2 needs 2.36 N m and has 1.5. Played slowly motors are too weak as well" in str(weak)
     assert f"torque_limit=({4 / weak.torque_unit:.4g}, {1.5 / weak.torque_unit:.4g})" in str(weak)
 
 
