@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from colloc.commands.ending import OK, command
 from colloc.commands.options import (
@@ -48,6 +49,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--max-speed", type=float, nargs="+", metavar="V", help="joint speed limit(s) [rad/s], one or one each")
     add_robot(parser)
     parser.add_argument("--periods", type=int, default=1, metavar="N", help="repeat the period N times (default: 1)")
+    parser.add_argument(
+        "--ramp", action=argparse.BooleanOptionalAction, default=True, help="begin straight, at rest, before time 0 (default)"
+    )
     parser.add_argument("--format", choices=("csv", "json", "mjcf", "urdf"), default=None, help="default: --output's, else csv")
     parser.add_argument("--output", metavar="PATH", help="folder or file (default: beside the result)")
     add_printing(parser)
@@ -63,6 +67,7 @@ def main(options: argparse.Namespace) -> int:
     kind = output_kind(options, ("csv", "json", "xml", "urdf"))
     path = output_path(options.output, source.with_suffix(f".{kind}"))
     settings = {"period": options.period, "max_speed": options.max_speed, "rate": options.rate, "periods": options.periods}
+    settings["ramp"] = options.ramp
     settings |= robot_options(options)
     facts = solution.export(path, **settings)
     if kind in ("xml", "urdf"):
@@ -79,6 +84,12 @@ def main(options: argparse.Namespace) -> int:
         f"  {solution.gait.coordinate} speeds up to {fastest} rad/s; "
         f"{facts['distance_per_period_body_lengths']:.4g} body lengths a period",
     ]
+    if "ramp_s" in facts:
+        lines.append(
+            f"  {facts['ramp_s']:g} s before time 0 lead from straight, at rest, into the gait (--no-ramp leaves them out)"
+        )
+    if "end_body_lengths" in facts:
+        lines.append(_end(facts, options.periods))
     if solution.turning:
         lines.append(f"  {solution.turning}")
     if "pace" in facts:
@@ -87,3 +98,15 @@ def main(options: argparse.Namespace) -> int:
         lines.append(f"  note: the result is not certified ({solution.status})")
     tell(options, {**facts, "file": str(path), "samples": samples}, lines)
     return OK
+
+
+def _end(facts: dict[str, Any], periods: int) -> str:
+    """Where the body ends, in words."""
+    size = facts.get("length_m", 1.0)
+    unit, (x, y) = "m" if "length_m" in facts else "body lengths", (size * place for place in facts["end_body_lengths"])
+    ahead, aside = ("ahead" if x >= 0 else "behind"), ("left" if y >= 0 else "right")
+    return (
+        f"  after {periods} period{'s' * (periods > 1)} its centre is {abs(x):.3g} {unit} {ahead} and {abs(y):.3g} to the "
+        f"{aside} of where it was straight, its tail link turned by {facts['end_turned_deg']:.3g}° "
+        f"({'with inertia' if facts['end_includes_inertia'] else 'in slow motion'})"
+    )

@@ -35,6 +35,8 @@ _LARGEST = 2 * np.pi
 """An angle beyond it is taken for one in degrees."""
 _FEWEST = 6
 """Samples of a gait, and of each of its periods."""
+RAMP = "# ramp_s: "
+"""Begins the line of a file whose samples before time 0 are the way from rest into the gait."""
 _OTHERS = "_per_s", "_n_m", "_w"
 """Ends of names of columns that are no angles."""
 
@@ -165,6 +167,8 @@ def _numbers(name: str, given: object) -> np.ndarray:
 def _read(path: Path, n_joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times, angles ``(n_joint, n_time)``, and of which joints the names say degrees."""
     names, table = csv_table(path, _FEWEST)
+    if RAMP in path.read_text(encoding="utf-8", errors="replace"):
+        table = table[table[:, 0] >= 0]
     values, width = table.T, table.shape[1]
     kept = [j for j in range(1, width) if not (names and names[j].endswith(_OTHERS))]
     if len(kept) != n_joint:

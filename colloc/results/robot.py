@@ -68,14 +68,29 @@ def joint_torques(
         raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
     motion = motion or solution.sample(t)
     froude = solution.froude if froude is None else froude
-    body, delta = problem.body, solution.delta_per_period
     (angles, rates), z, load = solution.gait(t), motion.z, problem.regime.pull(motion.theta[None])
-    at = problem.law, angles, rates
     if not froude:
-        balanced = body.solve if load is None else partial(solve_balance, body, load=load)  # type: ignore[arg-type]
-        z = balanced(*at, delta, start=z).z
-    moments = np.asarray(joint_moments(body, at[0], angles, body.forces(*at, z, delta), delta, load))
-    return moments + _of_inertia(solution, t, z, load, froude) if froude else moments
+        return slow_torques(solution, angles, rates, load, z)
+    return _of_friction(solution, angles, rates, load, z) + _of_inertia(solution, t, z, load, froude)
+
+
+def slow_torques(
+    solution: Solution, angles: np.ndarray, rates: np.ndarray, load: np.ndarray | None, start: np.ndarray | None = None
+) -> np.ndarray:
+    """Torques of the motors in balance [weight x body length] at any angles and rates of joints, ``(n_joint, n_time)``, with a
+    pull on the centre of mass ``(2, n_time)`` if there is one; tail velocities are sought near `start`."""
+    body: Any = solution.problem.body
+    balanced = body.solve if load is None else partial(solve_balance, body, load=load)
+    z = balanced(solution.problem.law, angles, rates, solution.delta_per_period, start=start).z
+    return _of_friction(solution, angles, rates, load, z)
+
+
+def _of_friction(
+    solution: Solution, angles: np.ndarray, rates: np.ndarray, load: np.ndarray | None, z: np.ndarray
+) -> np.ndarray:
+    """Torques of the motors against friction and pull, with tail velocities z."""
+    body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
+    return np.asarray(joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta, load))
 
 
 def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None, froude: float) -> np.ndarray:
