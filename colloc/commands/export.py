@@ -27,7 +27,9 @@ _EPILOG = """\
 Under dry friction pacing does not change what a gait does: distance and work per period are those of the result. With
 --max-speed the path is run through as evenly as the limits allow; without --period as fast as they allow. Where the pace
 matters (drag, power limits) it stays the gait's own, and limits make the period longer. The period is rounded up to a whole
-number of samples, and the sample after the last is the first one again.
+number of samples, and the sample after the last is the first one again. Samples at times below 0 (# ramp_s seconds of them)
+lead from the straight body, at rest, into the gait, which begins at time 0; where the body ends is said. --no-ramp leaves them
+out.
 
   colloc export results/three_link.h5 --period 4                          50 samples a second
   colloc export results/three_link.h5 --max-speed 2.0 --rate 100          as fast as 2 rad/s allow

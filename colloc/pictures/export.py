@@ -22,7 +22,6 @@ from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.limits import range_of
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import rate_independent
 from colloc.results.motion import RigidMotion
@@ -123,6 +122,7 @@ def write_export(
         series |= {"N_m": torques, "W": torques * trajectory.speeds}
         facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
         if own_pace:
+            facts["torques"] = "those of this pace; of slow motion before time 0"
             facts["distance_at_this_pace_m"] = robot.facts["speed_m_per_s"] * robot.period
         else:
             facts["torques"] = "those of slow motion, as the pace is not the gait's own"
@@ -145,16 +145,12 @@ def write_export(
 
 
 def _approach(solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None) -> Approach:
-    """From the straight body, or from as near to it as its joints bend."""
-    problem, n = solution.problem, solution.gait.n_joint
-    own = problem.joint_limit if isinstance(problem.joint_limit, tuple) else (problem.joint_limit,) * n
-    rest = np.array([np.clip(0.0, *range_of(limit)) for limit in own])
+    """From the straight body, which every range of joints allows."""
+    problem, n, fastest = solution.problem, solution.gait.n_joint, np.abs(trajectory.speeds).max()
     if limits is None:
-        fastest = np.full(n, np.abs(trajectory.speeds).max())
-        limits = np.maximum(
-            np.array(problem.largest_speeds or 0.0) / trajectory.period, 0.0 if problem.largest_speeds else fastest
-        )
-    way = approach(trajectory, rate, one_each(limits, n, "joint speed limit"), rest)
+        stated = np.array(problem.largest_speeds) / trajectory.period
+        limits = np.maximum(stated, np.abs(trajectory.speeds).max(axis=1)) if stated.size else fastest
+    way = approach(trajectory, rate, one_each(limits, n, "joint speed limit"))
     depth = max(float(problem.body.crossing_depth(way.angles).max()), problem.body.passing_depth(way.angles))
     if depth > _CROSSES:
         raise ProblemError(

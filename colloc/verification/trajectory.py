@@ -9,7 +9,7 @@ that takes T seconds is
 
 T = int s dt, with level = 0, is the fastest: some joint is at its limit all the time.
 
-A machine comes to it from rest (`approach`): over a period the gait grows out of the straight body, ``c + a(t) (q(t) - c)``,
+A machine comes to it from rest (`approach`): over a period the gait grows out of the straight body, ``a(t) q(t)``,
 where a rises from 0 to 1 and is flat at both ends, so that joints begin at rest and enter the period with its angles and
 speeds. No joint bends farther than the gait bends it. Where a joint would be too fast, the clock slows down.
 """
@@ -115,15 +115,14 @@ class Approach(NamedTuple):
     speeds: np.ndarray
 
 
-def approach(trajectory: Trajectory, rate: float, limits: np.ndarray, rest: np.ndarray) -> Approach:
-    """The way of joints from angles `rest` ``(n_joint,)`` into a trajectory, no faster than limits ``(n_joint,)`` [rad/s] that
-    the trajectory keeps.
+def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approach:
+    """The way of joints from 0, at rest, into a trajectory, no faster than limits ``(n_joint,)`` [rad/s] that this keeps.
 
     Examples
     --------
     >>> import colloc
     >>> made = timed(colloc.ellipse(A0=0, A1=0.5, B1=0.3), 50.0, period=2.0)
-    >>> way = approach(made, 50.0, limits=np.array([2.0, 2.0]), rest=np.zeros(2))
+    >>> way = approach(made, 50.0, limits=np.array([2.0, 2.0]))
     >>> float(way.time[0]), float(way.time[-1]), bool(np.abs(way.angles[:, 0]).max() < 1e-4)
     (-2.0, -0.02, True)
     """
@@ -134,14 +133,16 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray, rest: np.n
     share = np.linspace(0.0, 1.0, _APPROACH + 1)
     grown = share**3 * (10.0 + share * (6.0 * share - 15.0))
     growth = 30.0 * share**2 * (1.0 - share) ** 2 / trajectory.period
-    bent = cycle(share * trajectory.period) - rest[:, None]
-    angles, speeds = rest[:, None] + grown * bent, grown * cycle(share * trajectory.period, 1) + growth * bent
-    pace = np.maximum(1.0, np.abs(speeds / limits[:, None]).max(axis=0))
-    clock = np.append(0.0, np.cumsum(0.5 * (pace[1:] + pace[:-1]))) * trajectory.period / _APPROACH
-    count = int(np.ceil(clock[-1] * rate - 1e-9))
-    time = np.arange(-count, 0) / rate
-    sampled = [np.interp(time + clock[-1], clock, row) for row in [*angles, *(speeds / pace)]]
-    return Approach(time, *np.split(np.array(sampled), 2))
+    bent, turning = cycle(share * trajectory.period), cycle(share * trajectory.period, 1)
+    angles, speeds = grown * bent, grown * turning + growth * bent
+    step = trajectory.period / _APPROACH
+    pace = np.maximum(1.0, np.abs(np.diff(angles) / step / limits[:, None]).max(axis=0))
+    clock = np.append(0.0, np.cumsum(pace)) * step
+    time = np.arange(-int(np.ceil(clock[-1] * rate - 1e-9)), 0) / rate
+    at = time + clock[-1]
+    bent, turning = (np.array([np.interp(at, clock, row) for row in rows]) for rows in (angles, speeds))
+    side = np.clip(np.searchsorted(clock, at, side="right") - 1, 0, pace.size - 1)
+    return Approach(time, bent, np.clip(turning / pace[side], -limits[:, None], limits[:, None]))
 
 
 def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) -> float:

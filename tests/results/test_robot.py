@@ -198,7 +198,7 @@ def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, 
         assert told[name] == (value if isinstance(value, str) else pytest.approx(value, rel=1e-9)), name
     assert (tmp_path / "x.robot.png").stat().st_size > 10_000
     assert main(["export", str(file), *words, "--rate", "100"]) == 0
-    columns = pandas.read_csv(tmp_path / "x.csv", comment="#")
+    columns = pandas.read_csv(tmp_path / "x.csv", comment="#").query("time_s >= 0")
     torques = np.stack([columns["joint_1_N_m"], columns["joint_2_N_m"]])
     np.testing.assert_allclose(torques, robot.torques(np.arange(500) / 500), rtol=1e-4, atol=2e-3)
     np.testing.assert_allclose(columns["joint_2_W"], torques[1] * columns["joint_2_rad_per_s"], atol=1e-6)
