@@ -194,7 +194,7 @@ class Robot:
     >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
     >>> round(robot.facts["work_per_period_J"], 1)
-    36.4
+    36.5
     """
 
     solution: Solution = field(repr=False)

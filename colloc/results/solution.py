@@ -360,7 +360,7 @@ class Solution:
         >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
         >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
         >>> round(robot.facts["cost_of_transport"], 2)
-        3.85
+        3.95
         """
         return bound("robot")(self, length, mass, period, **options)
 
