@@ -134,7 +134,7 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
     grown = share**3 * (10.0 + share * (6.0 * share - 15.0))
     growth = 30.0 * share**2 * (1.0 - share) ** 2 / trajectory.period
     bent, turning = cycle(share * trajectory.period), cycle(share * trajectory.period, 1)
-    angles, speeds = grown * bent, grown * turning + growth * bent
+    angles, speeds = grown * bent + 0.0, grown * turning + growth * bent + 0.0  # no -0
     step = trajectory.period / _APPROACH
     pace = np.maximum(1.0, np.abs(np.diff(angles) / step / limits[:, None]).max(axis=0))
     clock = np.append(0.0, np.cumsum(pace)) * step
