@@ -6,7 +6,7 @@ and the law of friction acts at points: Gauss points of every link, or its feet.
 LSODA over periods until all are alike, in units of body length, mass and period. What colloc says of the same motion, with
 its own equations, friction in closed form and its own integrator, stands beside it.
 
-``--contacts`` adds the engine's own way: servos, gravity, and MuJoCo's contacts with a floor of one coefficient. ``--film``
+``--contacts`` adds the file as it is exported: servos, gravity, and MuJoCo's contacts, whose friction is elliptic. ``--film``
 writes that as a GIF. Needs ``pip install colloc[engines]``.
 """
 
@@ -92,7 +92,8 @@ class Played:
         problem = solution.problem
         self.gait, self.delta, self.froude = solution.gait, delta, froude
         # a body length, mass and period of 1; weight is 1 / Fr
-        self.model = mujoco.MjModel.from_xml_string(mjcf(solution.robot(1.0, 1.0, 1.0), planar=True))
+        self.model = mujoco.MjModel.from_xml_string(mjcf(solution.robot(1.0, 1.0, 1.0), contacts=False))
+        self.model.opt.gravity[:] = 0.0
         self.data = mujoco.MjData(self.model)
         body = checked_mass(problem.body)
         self.points = [_Points.of_foot(problem, body, foot) for foot in body.standing_on] or _Points.of_lines(problem, body)

@@ -26,7 +26,7 @@ from colloc.results.store import load
 
 _EPILOG = """\
 The robot is as long as its links together, and its mass is spread over them as the problem says. The numbers
-are those of slow motion, and what inertia takes at that pace is told. The friction coefficients are those of the problem.
+are those at the period that is given, with inertia. The friction coefficients are those of the problem.
 
   colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5
   colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --max-speed 2.0 --max-torque 2.5 2.0

@@ -142,6 +142,9 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
         joints = [_Column(j, f"column {j + 1}", ()) for j in range(width - n_joint, width)]
     time, unit = _times(path, table, columns, clock)
     rows, said = _rows(path, table, [time, *(table.values[:, c.at] for c in joints)], [*clock[:1], *(c.at for c in joints)])
+    if re.search(r"^#\s*ramp_s:", table.preamble, re.M):
+        rows = rows[time[rows] >= 0]
+        said.append("the way into the gait, before time 0, left out")
     time = time[rows]
     falls = np.flatnonzero(np.diff(time) < 0)
     if falls.size:

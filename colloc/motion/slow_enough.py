@@ -26,7 +26,6 @@ _INTERVALS, _DOUBLED = 50, 6
 """Of the first mesh, and how many there are, each of twice as many."""
 _ACCURACY = 0.02
 """Relative, of a loss, and of what a finer mesh may change in the Froude number for it."""
-_LOSS_ACCURACY = 1e-3
 _POWER = 1.5
 """Of the Froude number, to which the change of the efficiency is in proportion; between 1 and 2 where it is small."""
 _FIRST, _FASTEST, _FARTHEST = 0.3, 10.0, np.log(5.0)
@@ -55,10 +54,6 @@ class GaitOnMesh:
     def __init__(self, body: Chain, friction: Law, gait: Path, mesh: Mesh) -> None:
         self._body, self._friction, self._mesh, self.times = body, friction, mesh, mesh.times
         self._angles, self._rates = gait(self.times)
-
-    def carried(self, times: np.ndarray, other: Played) -> Played:
-        """A motion known at other times, at these points."""
-        return other._replace(states=np.array([np.interp(self.times, times, row, period=1.0) for row in other.states]))
 
     def played(self, delta: float, froude: float = 0.0, near: Played | None = None) -> Played:
         """The motion in which all periods are alike, sought near another one with inertia, or the slow one.
@@ -132,40 +127,6 @@ def slow_enough(
     return _refined(
         chain, law, joints, breaks, lambda on_mesh: _froude(on_mesh, law, delta, loss), lambda froude: accurate * froude
     )
-
-
-def inertial_loss(
-    body: Body,
-    friction: Law,
-    gait: Path,
-    delta: float,
-    froude: float,
-    *,
-    breaks: np.ndarray | tuple[float, ...] = (),
-) -> float:
-    """The part of a gait's efficiency that inertia takes at a Froude number L/(g T^2), to 1e-3; negative where it helps.
-
-    Arguments, and what is raised, are as of `slow_enough`.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-    >>> round(inertial_loss(colloc.Chain(), colloc.Friction(), gait, delta=1e-4, froude=0.05), 2)
-    0.39
-    """
-    check_finite(positive=True, froude=froude, delta=delta)
-    chain, joints = checked_inertia(body, gait)
-
-    coarser: tuple[np.ndarray, Played] | None = None
-
-    def lost(on_mesh: GaitOnMesh) -> float:
-        nonlocal coarser
-        near = None if coarser is None else on_mesh.carried(*coarser)
-        coarser = on_mesh.times, on_mesh.played(delta, froude, near)
-        return 1.0 - coarser[1].efficiency / on_mesh.played(delta).efficiency
-
-    return _refined(chain, chain.law(friction), joints, breaks, lost, lambda _: _LOSS_ACCURACY)
 
 
 def _refined(

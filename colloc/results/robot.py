@@ -1,8 +1,9 @@
 """A gait on a robot of so many metres and kilograms: the one module that knows units.
 
 Everything else counts lengths in body lengths L, forces in weights m g and time in periods T. So a torque is one in m g L,
-work too, a power in m g L / T, and a speed in L / T; the cost of transport W / (m g d) has no unit. Motion is taken to be slow.
-What inertia takes at the robot's pace stands beside it: that depends on the *Froude number* Fr = L / (g T^2) alone.
+work too, a power in m g L / T, and a speed in L / T; the cost of transport W / (m g d) has no unit. The numbers are those at
+the robot's pace, with inertia: what that does depends on the *Froude number* Fr = L / (g T^2) alone. Where the body has no
+masses, or the motion with inertia is not found, they are those of slow motion, which is said.
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import GRAVITY, checked_mass, inertial_moments, momenta, momentum_rates, tail_velocity
+from colloc.mechanics.inertia import GRAVITY, checked_inertia, inertial_moments, momenta, momentum_rates, tail_velocity
 from colloc.mechanics.law import rate_independent
 from colloc.mechanics.links import LinkVelocity
-from colloc.motion.slow_enough import inertial_loss
-from colloc.results.motion import Column, motion_dataset
-from colloc.results.solution import Solution
+from colloc.results.arc import arc
+from colloc.results.motion import Column, SampledMotion, motion_dataset, turned
+from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.late_binding import bound
@@ -38,16 +40,25 @@ _MOMENT = 1e-5
 """Of a period, over which velocities of links are differentiated."""
 _PACE = 0.01
 """Relative difference of the Froude numbers of a robot and of the gait, up to which it is played at the pace that it is for."""
+_ACCURACY = 1e-6
+"""Of the momenta in the motion with inertia."""
 _LITTLE = 1e-3
 """Share of the efficiency below which what inertia takes is not told apart."""
 _LARGEST = 1e9
 """Of the metres, kilograms and seconds of a robot; one over it is the smallest."""
+_TURNS = 0.1
+"""Degrees a period, from which on a turn by inertia is said."""
 _INSTANTS, _A_SIDE = 2000, 8
 """Of a period at least, and of every side of a polygon."""
+_PHASES = np.arange(_INSTANTS) / _INSTANTS
 
 
-def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
-    """Torques of the joints' motors in balance [weight x body length] at phases t ``(n_time,)``, ``(n_joint, n_time)``.
+def joint_torques(
+    solution: Solution, t: np.ndarray, motion: SampledMotion | None = None, froude: float | None = None
+) -> np.ndarray:
+    """Torques of the joints' motors [weight x body length] at phases t ``(n_time,)``, ``(n_joint, n_time)``.
+
+    Those of the result, unless another `motion` at these phases is given, with the Froude number that it belongs to.
 
     Raises
     ------
@@ -57,20 +68,38 @@ def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
     problem = solution.problem
     if not problem.body.force_names:
         raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
-    motion, body, delta = solution.sample(t), problem.body, solution.delta_per_period
+    motion = motion or solution.sample(t)
+    froude = solution.froude if froude is None else froude
     (angles, rates), z, load = solution.gait(t), motion.z, problem.regime.pull(motion.theta[None])
-    at = problem.law, angles, rates
-    if not problem.froude:
-        balanced = body.solve if load is None else partial(solve_balance, body, load=load)  # type: ignore[arg-type]
-        z = balanced(*at, delta, start=z).z
-    moments = np.asarray(joint_moments(body, at[0], angles, body.forces(*at, z, delta), delta, load))
-    return moments + _of_inertia(solution, t, z, load) if problem.froude else moments
+    if not froude:
+        return slow_torques(solution, angles, rates, load, z)
+    return _of_friction(solution, angles, rates, load, z) + _of_inertia(solution, t, z, load, froude)
 
 
-def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None) -> np.ndarray:
+def slow_torques(
+    solution: Solution, angles: np.ndarray, rates: np.ndarray, load: np.ndarray | None, start: np.ndarray | None = None
+) -> np.ndarray:
+    """Torques of the motors in balance [weight x body length] at any angles and rates of joints, ``(n_joint, n_time)``, with a
+    pull on the centre of mass ``(2, n_time)`` if there is one; tail velocities are sought near `start`."""
+    body: Any = solution.problem.body
+    balanced = body.solve if load is None else partial(solve_balance, body, load=load)
+    z = balanced(solution.problem.law, angles, rates, solution.delta_per_period, start=start).z
+    return _of_friction(solution, angles, rates, load, z)
+
+
+def _of_friction(
+    solution: Solution, angles: np.ndarray, rates: np.ndarray, load: np.ndarray | None, z: np.ndarray
+) -> np.ndarray:
+    """Torques of the motors against friction and pull, with tail velocities z."""
+    body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
+    return np.asarray(joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta, load))
+
+
+def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None, froude: float) -> np.ndarray:
     """Torques of the motors that change how the links move, at phases with tail velocities z."""
-    problem, (angles, rates) = solution.problem, solution.gait(t)
-    body, froude = checked_mass(problem.body), solution.froude
+    problem = solution.problem
+    body, joints = checked_inertia(problem.body, solution.gait)
+    angles, rates = joints(t)
     link = body.velocity(body.posture(angles), rates, z)
     states = momenta(body, body.posture(angles), link)
     grows = momentum_rates(body, problem.law, angles, rates, states, delta=solution.delta_per_period, froude=froude).rates
@@ -78,13 +107,58 @@ def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarr
         grows[:2] += load / froude
 
     def later(by: float) -> LinkVelocity:
-        then, pace = solution.gait(t + by)
+        then, pace = joints(t + by)
         return body.velocity(body.posture(then), pace, tail_velocity(body, then, pace, states + by * grows))
 
     growth = LinkVelocity(
         *((after - before) / (2 * _MOMENT) for before, after in zip(later(-_MOMENT), later(_MOMENT), strict=True))
     )
-    return froude * inertial_moments(body, angles, link, growth)
+    moments = froude * inertial_moments(body, angles, link, growth)
+    return np.array(problem.body.gears).T @ moments if isinstance(problem.body, Coupled) else moments
+
+
+class _Played:
+    """The motion of a gait with inertia in which all periods are alike, at a Froude number.
+
+    Attributes
+    ----------
+    distance, work, rotation : float
+        Of a period; distance as in `colloc.results.arc.Arc`.
+
+    Raises
+    ------
+    ProblemError
+        If the gait or the body cannot be played with inertia.
+    NotConvergedError
+        If the motion is not found.
+    """
+
+    def __init__(self, solution: Solution, froude: float) -> None:
+        from colloc.verification.inertial_motion import gait_with_inertia  # loads what integrates
+
+        problem, self._gait = solution.problem, solution.gait
+        self._body = problem.body
+        how: Any = {"froude": froude, "breaks": solution.gait.corner_phases, "regime": problem.regime}
+        played = gait_with_inertia(problem.body, problem.law, solution.gait, solution.delta_per_period, **how)
+        start, slopes = played.closed_from(None)
+        self._course, _ = played.periodic_run(start, _ACCURACY, slopes)
+        passed = played.passed(self._course.states)
+        self.work, self.rotation, self.distance = passed["work"], passed["rotation"], passed["distance"]
+        self._ahead = 0.0
+        if not problem.regime.slides:
+            way = arc(self.rotation, self._course.at(np.linspace(0.0, 1.0, _INSTANTS + 1))[4:6])
+            self.distance = way.chord
+            end = self._course.states[4:6, -1]
+            self._ahead = float(np.arctan2(end[1], end[0])) - 0.5 * self.rotation
+
+    def sample(self, t: np.ndarray) -> SampledMotion:
+        """At ascending phases in [0, 1], in the axes of `Solution.sample`."""
+        states, (angles, rates) = self._course.at(t), self._gait(t)
+        chain, joints = checked_inertia(self._body, self._gait)
+        theta, centre = states[3] - self._ahead, turned(states[4:6], -self._ahead)
+        z = tail_velocity(chain, *joints(t), states[:3])
+        tail = centre - turned(np.array(chain.centre(joints(t)[0])), theta)
+        return SampledMotion(t, angles, rates, z, theta, centre, tail)
 
 
 def pressing(solution: Solution, gravity: float) -> float:
@@ -108,7 +182,7 @@ class Robot:
     gravity : float
         [m/s^2]
     max_speed, max_torque : float or (n_joint,), optional
-        Of the motors [rad/s], [N m]: then the shortest period is told, and whether the torques suffice.
+        Of the motors [rad/s], [N m]: then the shortest period is told, and whether the torques at this one suffice.
 
     Raises
     ------
@@ -122,7 +196,7 @@ class Robot:
     >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
     >>> round(robot.facts["work_per_period_J"], 1)
-    36.4
+    36.5
     """
 
     solution: Solution = field(repr=False)
@@ -170,16 +244,24 @@ class Robot:
         """L / (g T^2)."""
         return self.length / (self.pressing * self.period**2)
 
+    @cached_property
+    def _played(self) -> _Played | None:
+        """With inertia, where the result has none and the motion is found."""
+        with suppress(ProblemError, NotConvergedError):
+            return None if self.solution.problem.froude else _Played(self.solution, self.froude)
+        return None
+
     def torques(self, t: np.ndarray) -> np.ndarray:
-        """Of the joints [N m] at phases t ``(n_time,)``, ``(n_joint, n_time)``."""
-        return self.torque_unit * joint_torques(self.solution, t)
+        """Of the joints [N m] at ascending phases t in [0, 1] ``(n_time,)``, ``(n_joint, n_time)``."""
+        played = () if self._played is None else (self._played.sample(t), self.froude)
+        return self.torque_unit * joint_torques(self.solution, t, *played)
 
     @cached_property
     def columns(self) -> dict[str, Column]:
         """The motion over a period at the gait's own pace: name to values, units and dimensions."""
         n = max(_INSTANTS, _A_SIDE * (len(self.solution.gait.corner_phases) + 1))
         t = np.arange(n + 1) / n
-        motion = self.solution.sample(t)
+        motion = (self._played or self.solution).sample(t)
         torques, speeds = self.torques(t), motion.rates / self.period
         return {
             "t": Column(t * self.period, "s", ("t",)),
@@ -204,9 +286,10 @@ class Robot:
     @cached_property
     def facts(self) -> dict[str, Any]:
         """All numbers by names that end in their units (JSON)."""
-        measured, problem = self.solution.measured, self.solution.problem
+        problem, motion = self.solution.problem, self._played or self.solution.measured
+        distance = motion.distance
         torques, speeds, powers = (self.columns[f"joint_{name}"].values for name in ("torques", "speeds", "powers"))
-        work, total = self.torque_unit * measured.work, powers.sum(axis=0)
+        work, total = self.torque_unit * motion.work, powers.sum(axis=0)
         facts = {
             "name": problem.name,
             "status": self.solution.status,
@@ -214,14 +297,14 @@ class Robot:
             "mass_kg": float(self.mass),
             "period_s": float(self.period),
             "gravity_m_per_s2": float(self.gravity),
-            "speed_m_per_s": measured.distance * self.length / self.period,
-            "body_lengths_per_period": measured.distance,
-            "travels": self.solution.travels,
+            "speed_m_per_s": distance * self.length / self.period,
+            "body_lengths_per_period": distance,
+            "travels": direction_of_travel(*(self.columns[name].values for name in ("centre", "tail"))),
             "work_per_period_J": work,
             "motor_work_per_period_J": self.period * float(_mean(np.maximum(powers, 0.0)).sum()),
             "mean_power_W": work / self.period,
             "peak_power_W": float(total.max()),
-            "cost_of_transport": measured.work / measured.distance * self.pressing / self.gravity,
+            "cost_of_transport": motion.work / distance * self.pressing / self.gravity,
             "froude_number": self.froude,
             "peak_torque_N_m": np.abs(torques).max(axis=1).tolist(),
             "rms_torque_N_m": np.sqrt(_mean(torques**2)).tolist(),
@@ -234,7 +317,6 @@ class Robot:
     def _inertia(self) -> dict[str, Any]:
         """What inertia takes at this pace, and at which it takes little."""
         solution, problem = self.solution, self.solution.problem
-        at = problem.body, problem.law, solution.gait, solution.answer.delta_per_period
         found: dict[str, Any] = {}
         if problem.froude:
             with suppress(NotConvergedError):
@@ -242,9 +324,10 @@ class Robot:
             return found
         if problem.regime.slides:
             return found
-        with suppress(NotConvergedError):
-            found["inertia_takes"] = inertial_loss(*at, self.froude, breaks=solution.gait.corner_phases)
-        with suppress(NotConvergedError):
+        if self._played is not None:
+            found["inertia_takes"] = 1.0 - self._played.distance / self._played.work / solution.efficiency
+            found["rotation_by_inertia_rad"] = self._played.rotation - solution.rotation
+        with suppress(ProblemError, NotConvergedError):
             if rate_independent(problem.law):
                 found["slow_enough_period_s"] = math.sqrt(self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH)))
         return found
@@ -255,12 +338,18 @@ class Robot:
         if self.max_speed is not None:
             gait, limits = self.solution.gait, np.asarray(self.max_speed)
             found["max_speed_rad_per_s"] = limits.tolist()
-            found["shortest_period_s"] = shortest_period(gait, limits, keep_pace=True)
+            found["shortest_period_s"] = shortest = shortest_period(gait, limits, keep_pace=True)
+            with suppress(ProblemError, NotConvergedError):
+                played = _Played(self.solution, self.froude * (self.period / shortest) ** 2)
+                found["speed_at_shortest_period_m_per_s"] = played.distance * self.length / shortest
             if not self.solution.problem.paced_by:
                 found["shortest_period_paced_by_speed_s"] = shortest_period(gait, limits)
         if self.max_torque is not None:
             found["max_torque_N_m"] = np.asarray(self.max_torque).tolist()
             found["torque_used"] = (peak / self.max_torque).tolist()
+            if self._played is not None:
+                slowly = np.abs(joint_torques(self.solution, _PHASES)).max(axis=1)
+                found["torque_used_slowly"] = (self.torque_unit * slowly / self.max_torque).tolist()
         return found
 
     def lines(self) -> list[str]:
@@ -289,23 +378,31 @@ class Robot:
         f, problem = self.facts, self.solution.problem
         said = []
         if "shortest_period_s" in f:
-            paced = f.get("shortest_period_paced_by_speed_s")
+            paced, fast = f.get("shortest_period_paced_by_speed_s"), f.get("speed_at_shortest_period_m_per_s")
+            does = "" if fast is None else f" ({fast:.4g} m/s)"
             more = "" if paced is None else f", {paced:.3g} s as colloc export --max-speed paces it"
-            said.append(f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the gait's own pace{more}.")
-            if (paced or f["shortest_period_s"]) > self.period:
-                limit = ", ".join(f"{each * self.period:.4g}" for each in f["max_speed_rad_per_s"])
-                said.append(f"That is more than {self.period:g} s: the best gait for these motors has speed_limit=({limit}).")
+            said.append(
+                f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the gait's own pace{does}{more}."
+            )
+            if f["shortest_period_s"] > self.period * (1 + 1e-9):
+                said.append(f"That is more than {self.period:g} s, at which the numbers above are: the joints cannot follow.")
         if "torque_used" in f:
             worst = int(np.argmax(f["torque_used"]))
             peak, has = f["peak_torque_N_m"][worst], f["max_torque_N_m"][worst]
-            if f["torque_used"][worst] > 1:
-                limit = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
+            slowly = max(f.get("torque_used_slowly", f["torque_used"]))
+            if f["torque_used"][worst] <= 1:
+                said.append(f"The torques suffice at this pace: joint {worst + 1} uses {100 * peak / has:.3g} % of its own.")
+            elif slowly <= 1:
                 said.append(
-                    f"Joint {worst + 1} needs {peak:.3g} N m and has {has:.3g}. Torques of dry friction do not depend on the "
-                    f"pace, so no period helps: solve with torque_limit=({limit})."
+                    f"Joint {worst + 1} needs {peak:.3g} N m at this pace and has {has:.3g}; played slowly no joint needs more "
+                    "than it has: take a longer period."
                 )
             else:
-                said.append(f"The torques suffice at any pace: joint {worst + 1} uses {100 * peak / has:.3g} % of its own.")
+                limit = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
+                said.append(
+                    f"Joint {worst + 1} needs {peak:.3g} N m and has {has:.3g}. Played slowly motors are too weak as well, so "
+                    f"a longer period does not help: solve with torque_limit=({limit})."
+                )
         if not rate_independent(problem.law):
             said.append(
                 f"Torques depend on the pace under {problem.law.label}: its coefficients are taken to be those in units "
@@ -319,13 +416,18 @@ class Robot:
             return [*said[:-1], f"{said[-1]}."]
         pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
         lost, slow = f.get("inertia_takes"), f.get("slow_enough_period_s")
-        if lost is None:
-            does = f"What inertia does {pace} could not be computed"
-        else:
+        more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
+        if self._played is None:
+            return [*said, f"All this is slow motion. What inertia does {pace} could not be computed{more}."]
+        said.append(f"All this includes inertia {pace}")
+        if lost is not None:
             share = f"{100 * abs(lost):.2g} %" if abs(lost) > _LITTLE else f"less than {100 * _LITTLE:g} %"
             does = f"Inertia {'takes' if lost >= 0 else 'adds'} {share} of the efficiency {pace}"
-        more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
-        said.append(f"All this is slow motion. {does}{more}.")
+            said[-1] = f"All this includes inertia. {does}{more}"
+            if abs(turns := math.degrees(f["rotation_by_inertia_rad"])) > _TURNS:
+                said.append(f"Inertia also turns the robot by {turns:.2g}° a period: its way is an arc")
+        slowly = self.solution.distance * self.length / self.period
+        said[-1] += f". At this period slow motion would be {slowly:.4g} m/s."
         return said
 
     def __str__(self) -> str:

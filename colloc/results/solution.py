@@ -311,9 +311,7 @@ class Solution:
     def travels(self) -> str:
         """Which way the body points as it travels, on average: "head first", "tail first" or "sideways"."""
         motion = self.sample(_INSTANTS)
-        (x, y), (ahead, aside) = (motion.centre - motion.tail).mean(axis=1), motion.centre[:, -1] - motion.centre[:, 0]
-        along, across = x * ahead + y * aside, abs(x * aside - y * ahead)
-        return "sideways" if abs(along) <= across else "head first" if along > 0 else "tail first"
+        return direction_of_travel(motion.centre, motion.tail)
 
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
@@ -357,7 +355,7 @@ class Solution:
         >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
         >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
         >>> round(robot.facts["cost_of_transport"], 2)
-        3.85
+        3.95
         """
         return bound("robot")(self, length, mass, period, **options)
 
@@ -398,3 +396,11 @@ class Solution:
     def _repr_html_(self) -> str:
         """What a notebook shows: verdict, numbers and checks."""
         return bound("card")(self)
+
+
+def direction_of_travel(centre: np.ndarray, tail: np.ndarray) -> str:
+    """Which way a body points as it travels, on average: "head first", "tail first" or "sideways"; from places of its centre of
+    mass and of its tail over a period, ``(2, n_time)``."""
+    (x, y), (ahead, aside) = (centre - tail).mean(axis=1), centre[:, -1] - centre[:, 0]
+    along, across = x * ahead + y * aside, abs(x * aside - y * ahead)
+    return "sideways" if abs(along) <= across else "head first" if along > 0 else "tail first"

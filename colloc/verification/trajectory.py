@@ -8,12 +8,17 @@ that takes T seconds is
     p(t) = max(level, s(t)),   level such that  int p dt = T;
 
 T = int s dt, with level = 0, is the fastest: some joint is at its limit all the time.
+
+A machine comes to it from rest (`approach`): over a period the gait grows out of the straight body, ``a(t) q(t)``,
+where a rises from 0 to 1 and is flat at both ends, so that joints begin at rest and enter the period with its angles and
+speeds. No joint bends farther than the gait bends it. Where a joint would be too fast, the clock slows down.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +28,8 @@ from colloc.verification.played import Path
 
 _PHASES = np.linspace(0.0, 1.0, 20001)
 MOST_SAMPLES = 2_000_000
+_APPROACH = 5000
+"""Steps in which the clock of an approach is summed up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +107,45 @@ def timed(
     index = np.clip(np.searchsorted(clock, time, side="right") - 1, 0, pace.size - 1)
     speeds = np.clip(path(phase)[1] / pace[index], -most[:, None], most[:, None])
     return Trajectory(time, phase, angles, speeds, period)
+
+
+class Approach(NamedTuple):
+    """From rest to a trajectory, at equal steps that end one step before it begins."""
+
+    time: np.ndarray
+    """Seconds, below 0, ``(n,)``."""
+    angles: np.ndarray
+    speeds: np.ndarray
+
+
+def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approach:
+    """The way of joints from 0, at rest, into a trajectory, no faster than limits ``(n_joint,)`` [rad/s] that this keeps.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> made = timed(colloc.ellipse(A0=0, A1=0.5, B1=0.3), 50.0, period=2.0)
+    >>> way = approach(made, 50.0, limits=np.array([2.0, 2.0]))
+    >>> float(way.time[0]), float(way.time[-1]), bool(np.abs(way.angles[:, 0]).max() < 1e-4)
+    (-2.0, -0.02, True)
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    closed = (np.append(rows, rows[:, :1], axis=1) for rows in (trajectory.angles, trajectory.speeds))
+    cycle = CubicHermiteSpline(np.append(trajectory.time, trajectory.period), *closed, axis=1)
+    share = np.linspace(0.0, 1.0, _APPROACH + 1)
+    grown = share**3 * (10.0 + share * (6.0 * share - 15.0))
+    growth = 30.0 * share**2 * (1.0 - share) ** 2 / trajectory.period
+    bent, turning = cycle(share * trajectory.period), cycle(share * trajectory.period, 1)
+    angles, speeds = grown * bent + 0.0, grown * turning + growth * bent + 0.0  # no -0
+    step = trajectory.period / _APPROACH
+    pace = np.maximum(1.0, np.abs(np.diff(angles) / step / limits[:, None]).max(axis=0))
+    clock = np.append(0.0, np.cumsum(pace)) * step
+    time = np.arange(-int(np.ceil(clock[-1] * rate - 1e-9)), 0) / rate
+    at = time + clock[-1]
+    bent, turning = (np.array([np.interp(at, clock, row) for row in rows]) for rows in (angles, speeds))
+    side = np.clip(np.searchsorted(clock, at, side="right") - 1, 0, pace.size - 1)
+    return Approach(time, bent, np.clip(turning / pace[side], -limits[:, None], limits[:, None]))
 
 
 def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) -> float:

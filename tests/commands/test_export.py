@@ -5,6 +5,7 @@ import json
 
 import h5py
 import numpy as np
+import pandas
 import pytest
 from scipy.interpolate import CubicSpline
 
@@ -102,6 +103,77 @@ def test_impossible_wishes_are_refused(settings, complaint):
         timed(path_of(WAVE), 100.0, **settings)
 
 
+def written(path):
+    """Times, angles and speeds of a file."""
+    columns = pandas.read_csv(path, comment="#")
+    return columns["time_s"].to_numpy(), *(
+        columns[[name for name in columns if name.endswith(end)]].to_numpy().T for end in ("_rad", "_rad_per_s")
+    )
+
+
+@pytest.mark.parametrize(
+    "how",
+    [{"period": 4.0}, {"max_speed": [2.0, 1.5]}, {"max_speed": 1.0, "period": 20.0, "periods": 2}],
+    ids=["even", "fast", "slower"],
+)
+def test_an_export_leads_from_straight_at_rest_into_the_gait_within_speed_limits(three_link, how, tmp_path):
+    stated = three_link.export(tmp_path / "x.csv", rate=200, **how)
+    time, angles, speeds = written(tmp_path / "x.csv")
+    np.testing.assert_allclose(np.diff(time), 1 / 200, atol=1e-8)
+    first = np.flatnonzero(time >= 0)[0]
+    assert time[first] == 0
+    assert time[0] == pytest.approx(-stated["ramp_s"])
+    assert np.abs(angles[:, 0]).max() < 1e-4
+    assert np.abs(speeds[:, 0]).max() < 0.05
+    limits = np.broadcast_to(how.get("max_speed", np.abs(speeds[:, first:]).max()), 2)[:, None]
+    assert (np.abs(speeds) <= limits * (1 + 1e-6)).all()
+    steps = np.diff(angles) * 200
+    assert (np.abs(steps) <= limits * (1 + 1e-5)).all()  # angles have 9 digits
+    np.testing.assert_allclose(steps, 0.5 * (speeds[:, 1:] + speeds[:, :-1]), atol=0.02 * limits.max())  # no jump anywhere
+    assert np.abs(angles).max() <= np.abs(angles[:, first:]).max() + 1e-6
+
+
+def test_a_way_on_which_the_body_crosses_itself_is_refused(three_link, tmp_path, monkeypatch):
+    monkeypatch.setattr(Chain, "crossing_depth", lambda body, angles: np.full(angles.shape[1], 0.01))
+    with pytest.raises(ProblemError, match="crosses itself on the way from straight"):
+        three_link.export(tmp_path / "x.csv", period=4)
+    three_link.export(tmp_path / "x.csv", period=4, ramp=False)
+
+
+def test_the_body_ends_where_the_samples_take_it(three_link, tmp_path):
+    """Balanced from each to the next; seen from where it lay straight along +x."""
+    stated = three_link.export(tmp_path / "x.csv", period=4.0, periods=2, rate=250)
+    _, angles, _ = written(tmp_path / "x.csv")
+    angles = np.append(angles, angles[:, [-2000]], axis=1)  # the end of the second period
+    problem, middle, step = three_link.problem, 0.5 * (angles[:, 1:] + angles[:, :-1]), 1 / 1000
+    z = problem.body.solve(problem.law, middle, np.diff(angles) / step, 1e-4).z
+    theta = np.append(0.0, np.cumsum(z[2] * step))
+    tail = (np.exp(0.5j * (theta[1:] + theta[:-1])) * (z[0] + 1j * z[1]) * step).sum()
+    start, end = (complex(*place) for place in problem.body.centre(angles[:, [0, -1]]).T)
+    way = tail + np.exp(1j * theta[-1]) * end - start
+    np.testing.assert_allclose(stated["end_body_lengths"], [way.real, way.imag], atol=2e-3)
+    assert stated["end_turned_deg"] == pytest.approx(np.degrees(theta[-1]), abs=0.3)
+
+
+@pytest.mark.slow
+def test_with_inertia_the_body_ends_where_mujoco_takes_it(three_link, tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    size = {"length": 1.0, "mass": 2.0, "period": 2.0}
+    stated = three_link.export(tmp_path / "x.csv", **size, rate=500)
+    assert stated["end_includes_inertia"]
+    three_link.export(tmp_path / "x.xml", **size)
+    time, angles, _ = written(tmp_path / "x.csv")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "x.xml"))
+    data, places = mujoco.MjData(model), []
+    for now in np.arange(time[0], 2.0 + 1e-9, model.opt.timestep):
+        data.ctrl[:] = [np.interp(now, time, row) for row in angles]
+        mujoco.mj_step(model, data)
+        places.append([*data.subtree_com[1][:2], data.qpos[2]])
+    way = np.subtract(places[-1], places[0])
+    np.testing.assert_allclose(way[:2], stated["end_body_lengths"], atol=0.01)
+    assert np.degrees(way[2]) == pytest.approx(stated["end_turned_deg"], abs=2.0)
+
+
 def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")
     assert main([str(file), "--max-speed", "2", "--rate", "100", "--periods", "2"]) == 0
@@ -110,6 +182,8 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     rows = list(csv.reader(line for line in lines if not line.startswith("#")))
     assert rows[0] == ["time_s", "joint_1_rad", "joint_2_rad", "joint_1_rad_per_s", "joint_2_rad_per_s"]
     values = np.array(rows[1:], dtype=float)
+    assert values[0, 0] == pytest.approx(-float(facts["ramp_s"]))
+    values = values[values[:, 0] >= 0]
     n = int(facts["samples_per_period"])
     assert len(values) == 2 * n
     np.testing.assert_allclose(values[:n, 1:], values[n:, 1:], atol=1e-12)
@@ -119,7 +193,7 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     assert replayed.efficiency == pytest.approx(json.loads(facts["efficiency"]), rel=2e-4)
     assert replayed.distance == pytest.approx(json.loads(facts["distance_per_period_body_lengths"]), rel=2e-4)
 
-    assert main([str(file), "--period", "4", "--output", str(tmp_path / "y.json")]) == 0
+    assert main([str(file), "--period", "4", "--no-ramp", "--output", str(tmp_path / "y.json")]) == 0
     data = json.loads((tmp_path / "y.json").read_text())
     assert np.shape(data["angles_rad"]) == (2, 200)
     assert data["status"] == "solved"
@@ -139,7 +213,7 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
 def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hold(changes, unsolved, tmp_path):
     solution = unsolved(Problem("paced", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **changes))
     problem, limits = solution.problem, np.array([2.0, 1.5])
-    stated = solution.export(tmp_path / "x.json", max_speed=limits, rate=400)
+    stated = solution.export(tmp_path / "x.json", max_speed=limits, rate=400, ramp=False)
     written = json.loads((tmp_path / "x.json").read_text())
     made = replay(problem.body, problem.friction, path_through(np.array(written["angles_rad"])), 1e-2)
     assert made.work == pytest.approx(stated["work_per_period_weight_times_length"], rel=2e-4)

@@ -13,6 +13,8 @@ from colloc.pictures.report_page import report_page
 from colloc.results.robot import joint_torques
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
+SLOW = SIZE | {"period": 5000.0}
+"""Where inertia does nothing."""
 POINTS = 400
 """A link."""
 
@@ -24,7 +26,7 @@ def robot(three_link):
 
 def in_metres(solution, seconds):
     """Points ``(n_link, POINTS)`` of the body [m], complex, with its tail link at rest on the x axis, and the ends of links."""
-    angles = solution.gait.angles(np.array([seconds / SIZE["period"]]))[:, 0]
+    angles = solution.gait.angles(np.array([seconds / SLOW["period"]]))[:, 0]
     heading = np.concatenate([[0.0], np.cumsum(angles)])
     links = SIZE["length"] * np.array(solution.problem.body.lengths) * np.exp(1j * heading)
     ends = np.concatenate([[0.0], np.cumsum(links)])
@@ -33,10 +35,10 @@ def in_metres(solution, seconds):
 
 def friction_of_points(solution, seconds, gravity=9.81):
     """Force [N] and velocity [m/s] of every point where all of them balance, and the points."""
-    step = 1e-5 * SIZE["period"]
+    step = 1e-5 * SLOW["period"]
     bending = (in_metres(solution, seconds + step)[0] - in_metres(solution, seconds - step)[0]) / (2 * step)
     points = in_metres(solution, seconds)[0]
-    slow = solution.answer.delta * SIZE["length"] / SIZE["period"]
+    slow = solution.answer.delta * SIZE["length"] / SLOW["period"]
     weight = SIZE["mass"] * gravity * np.array(solution.problem.body.lengths)[:, None] / POINTS
 
     def moved(z):
@@ -54,16 +56,17 @@ def friction_of_points(solution, seconds, gravity=9.81):
     return *moved(found.x), points
 
 
-def test_torques_and_power_are_those_of_the_forces_on_dense_points(three_link, robot):
-    for seconds in (0.7, 1.3, 2.5, 4.0):
+def test_torques_and_power_are_those_of_the_forces_on_dense_points(three_link):
+    robot = three_link.robot(**SLOW)
+    for seconds in (700.0, 1300.0, 2500.0, 4000.0):
         force, velocity, points = friction_of_points(three_link, seconds)
         ends = in_metres(three_link, seconds)[1]
-        torques = robot.torques(np.array([seconds / SIZE["period"]]))[:, 0]
+        torques = robot.torques(np.array([seconds / SLOW["period"]]))[:, 0]
         for joint, torque in enumerate(torques, 1):
             arm = points[joint:] - ends[joint]
             assert torque == pytest.approx(-(arm.conj() * force[joint:]).imag.sum(), rel=2e-3)
         power = -(force.conj() * velocity).real.sum()
-        speeds = three_link.gait.rates(np.array([seconds / SIZE["period"]]))[:, 0] / SIZE["period"]
+        speeds = three_link.gait.rates(np.array([seconds / SLOW["period"]]))[:, 0] / SLOW["period"]
         assert torques @ speeds == pytest.approx(power, rel=1e-3)
 
 
@@ -79,9 +82,9 @@ def test_work_over_a_period_is_the_mean_power_and_moves_the_body_its_way(three_l
     assert facts["peak_speed_rad_per_s"] == pytest.approx(np.abs(speeds).max(axis=1), rel=1e-4)
 
 
-def test_no_end_joint_carries_more_than_its_link_swung_broadside(robot):
+def test_no_end_joint_carries_more_than_its_link_swung_broadside(three_link):
     """mu m g / 3 at a sixth of the length."""
-    assert max(robot.facts["peak_torque_N_m"]) <= 3 * 9.81 / 3 * 1.2 / 6 * (1 + 1e-9)
+    assert max(three_link.robot(**SLOW).facts["peak_torque_N_m"]) <= 3 * 9.81 / 3 * 1.2 / 6 * (1 + 1e-4)
 
 
 def test_every_side_of_a_polygon_is_sampled_eight_times_however_many_there_are(three_link, monkeypatch):
@@ -93,13 +96,14 @@ def test_every_side_of_a_polygon_is_sampled_eight_times_however_many_there_are(t
 
 
 def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
-    """Friction is proportional to the weight, torques to the length too; the pace is in speeds and powers alone."""
+    """Friction is proportional to the weight, torques to the length too; at one Froude number the pace is in speeds and powers
+    alone."""
     other = three_link.robot(length=2.4, mass=6, period=10, gravity=9.81 / 2).facts
     for name, factor in (("work_per_period_J", 2), ("mean_power_W", 1), ("speed_m_per_s", 1), ("froude_number", 1)):
         assert other[name] == pytest.approx(factor * robot.facts[name]), name
     assert other["peak_torque_N_m"] == pytest.approx(2 * np.array(robot.facts["peak_torque_N_m"]))
     assert other["rms_speed_rad_per_s"] == pytest.approx(np.array(robot.facts["rms_speed_rad_per_s"]) / 2)
-    assert other["cost_of_transport"] == pytest.approx(1 / three_link.efficiency)
+    assert three_link.robot(**SLOW).facts["cost_of_transport"] == pytest.approx(1 / three_link.efficiency, rel=1e-4)
 
 
 def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(three_link, tmp_path):
@@ -111,17 +115,51 @@ def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(thr
     assert facts["shortest_period_paced_by_speed_s"] < facts["shortest_period_s"]
 
 
-def test_motors_too_slow_for_the_pace_are_told_the_limit_to_solve_with(three_link):
-    """5 s a period at 2 and 3 rad/s are 10 and 15 rad per period."""
-    assert "the best gait for these motors has speed_limit=(10, 15)" in str(three_link.robot(1.2, 3, 5, max_speed=[2, 3]))
-    assert "speed_limit" not in str(three_link.robot(1.2, 3, 50, max_speed=[2, 3]))
+def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
+    """As of the same gait in a problem for that pace, whose motion is collocated, and of one followed through time."""
+    size = {"length": 1.0, "mass": 2.0, "period": 1.5}
+    robot = three_link.robot(**size)
+    problem = three_link.problem.with_(froude=robot.froude, gait=colloc.Harmonic(1), delta=1e-3, name="paced")
+    paced = colloc.evaluate(problem, three_link.gait).robot(**size).facts
+    names = ("speed_m_per_s", "work_per_period_J", "mean_power_W", "cost_of_transport", "peak_torque_N_m", "peak_power_W")
+    for name in names:
+        assert robot.facts[name] == pytest.approx(paced[name], rel=0.01), name
+    played = colloc.inertial_motion(problem.body, problem.friction, three_link.gait, 1e-4, robot.froude, tolerance=1e-4)
+    assert robot.facts["body_lengths_per_period"] == pytest.approx(played.distance, rel=1e-3)
+    assert played.distance < 0.7 * three_link.distance
+    assert f"slow motion would be {three_link.distance / 1.5:.4g} m/s" in str(robot)
+    np.testing.assert_allclose(robot.columns["centre"].values[:, -1], [played.distance, 0.0], atol=2e-3)
 
 
-def test_weak_motors_are_told_the_limit_to_solve_with(three_link, robot):
-    assert "The torques suffice at any pace" in str(three_link.robot(**SIZE, max_torque=4))
+def test_motors_share_what_inertia_asks_of_coupled_joints():
+    """Power is that of the joints: over a period the work against friction."""
+    body = colloc.Coupled(colloc.Chain((0.25,) * 4), gears=((1, 0), (0.5, 0.5), (0, 1)))
+    gait = colloc.ellipse(0.1, 0.7, 0.6)
+    robot = colloc.evaluate(colloc.Problem("belts", body=body, gait=colloc.Harmonic(1), delta=1e-2), gait).robot(1.0, 1.0, 1.0)
+    powers = robot.columns["joint_powers"].values.sum(axis=0)
+    assert abs(robot.facts["inertia_takes"]) > 0.05
+    assert powers[:-1].mean() == pytest.approx(robot.facts["work_per_period_J"], rel=1e-3)
+
+
+def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_at_the_period_that_they_allow(three_link):
+    """No limit to solve with is advised: such a gait may be slower."""
+    sheet = str(three_link.robot(1.2, 3, 5, max_speed=[2, 3]))
+    facts = three_link.robot(1.2, 3, 5, max_speed=[2, 3]).facts
+    slower = three_link.robot(1.2, 3, facts["shortest_period_s"]).facts["speed_m_per_s"]
+    assert facts["speed_at_shortest_period_m_per_s"] == pytest.approx(slower, rel=1e-6)
+    assert f"at the gait's own pace ({slower:.4g} m/s)" in sheet
+    assert "the joints cannot follow" in sheet
+    assert "speed_limit" not in sheet
+    assert "cannot follow" not in str(three_link.robot(1.2, 3, 50, max_speed=[2, 3]))
+
+
+def test_weak_motors_are_told_whether_a_longer_period_helps(three_link):
+    """At 5 s joints need 2.36 N m, slowly 1.96."""
+    assert "The torques suffice at this pace" in str(three_link.robot(**SIZE, max_torque=4))
+    assert "take a longer period" in str(three_link.robot(**SIZE, max_torque=2.2))
     weak = three_link.robot(**SIZE, max_torque=[4, 1.5])
-    assert "Joint 2 needs 1.96 N m and has 1.5" in str(weak)
-    assert f"torque_limit=({4 / robot.torque_unit:.4g}, {1.5 / robot.torque_unit:.4g})" in str(weak)
+    assert "Joint 2 needs 2.36 N m and has 1.5. Played slowly motors are too weak as well" in str(weak)
+    assert f"torque_limit=({4 / weak.torque_unit:.4g}, {1.5 / weak.torque_unit:.4g})" in str(weak)
 
 
 def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
@@ -160,11 +198,11 @@ def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, 
         assert told[name] == (value if isinstance(value, str) else pytest.approx(value, rel=1e-9)), name
     assert (tmp_path / "x.robot.png").stat().st_size > 10_000
     assert main(["export", str(file), *words, "--rate", "100"]) == 0
-    columns = pandas.read_csv(tmp_path / "x.csv", comment="#")
+    columns = pandas.read_csv(tmp_path / "x.csv", comment="#").query("time_s >= 0")
     torques = np.stack([columns["joint_1_N_m"], columns["joint_2_N_m"]])
     np.testing.assert_allclose(torques, robot.torques(np.arange(500) / 500), rtol=1e-4, atol=2e-3)
     np.testing.assert_allclose(columns["joint_2_W"], torques[1] * columns["joint_2_rad_per_s"], atol=1e-6)
-    assert "cost of transport  3.846" in report_page(three_link, robot=robot)
+    assert "cost of transport  3.942" in report_page(three_link, robot=robot)
     assert "cost of transport" not in report_page(three_link)
 
 
