@@ -33,6 +33,7 @@ from colloc.motion.kinds import (
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import totals_along
 from colloc.verification.inertial_motion import amplified, gait_with_inertia
+from colloc.verification.played import LEAST
 from colloc.verification.slope import gait_on_slope
 
 
@@ -78,8 +79,9 @@ def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: floa
     played = gait_with_inertia(*at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime)
     kind: Any = kind_of_motion(dynamics)
     begin, _, slopes = played.closed(kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0])
-    amplification = 1.0 + np.abs(amplified(slopes)).sum(axis=1).max()
-    return CourseOfGait(played.periodic_run(begin, error / amplification, slopes).course.at, error, alone=kind.alone)
+    times = 1.0 + np.abs(amplified(slopes)).sum(axis=1).max()
+    ran = played.periodic_run(begin, max(error / times, LEAST), slopes)
+    return CourseOfGait(ran.course.at, times * ran.aim, alone=kind.alone)
 
 
 def _shapes(gait: Any, mesh: Mesh, delta: float) -> Shapes:

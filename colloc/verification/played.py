@@ -20,8 +20,10 @@ MixedPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 ``(n_direction, n_time)``, of sum 1."""
 Ran = TypeVar("Ran")
 Numbers = dict[str, float]
-_TENTH, _LEAST = 0.1, 1e-12
-"""Error of each run over that of the last, and the smallest tried."""
+_TENTH = 0.1
+"""Error of each run over that of the last."""
+LEAST = 1e-12
+"""The smallest tried."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +111,8 @@ def to_tolerance(
     is what they differ by, but half of the error that was asked for at least: differences vanish now and then.
     `NotConvergedError` if rounding hides the accuracy that is asked for.
     """
-    aim, before = max(first, _LEAST / _TENTH), None
-    while aim > 0.5 * _LEAST:
+    aim, before = max(first, LEAST / _TENTH), None
+    while aim > 0.5 * LEAST:
         ran, now = run(aim)
         if before is not None:
             if errors_of is None:
