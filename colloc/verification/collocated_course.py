@@ -32,7 +32,8 @@ from colloc.motion.kinds import (
 )
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import totals_along
-from colloc.verification.inertial_motion import gait_with_inertia
+from colloc.verification.inertial_motion import amplified, gait_with_inertia
+from colloc.verification.played import LEAST
 from colloc.verification.slope import gait_on_slope
 
 
@@ -77,8 +78,10 @@ def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: floa
     at, regime = (dynamics.body, dynamics.law, gait, delta), regime.at(gait)
     played = gait_with_inertia(*at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime)
     kind: Any = kind_of_motion(dynamics)
-    ran, _ = played.periodic_run(kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0], error)
-    return CourseOfGait(ran.at, error, alone=kind.alone)
+    begin, _, slopes = played.closed(kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0])
+    times = 1.0 + np.abs(amplified(slopes)).sum(axis=1).max()
+    ran = played.periodic_run(begin, max(error / times, LEAST), slopes)
+    return CourseOfGait(ran.course.at, times * ran.aim, alone=kind.alone)
 
 
 def _shapes(gait: Any, mesh: Mesh, delta: float) -> Shapes:

@@ -33,7 +33,7 @@ from colloc.motion.follow import ONE_SIDED, STEP, Course, followed
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.played import Path, to_tolerance
+from colloc.verification.played import Numbers, Path, to_tolerance
 
 _ROUGH = 1e-4
 """Error of the runs that say how the momenta at the end depend on those at the start, over the size of the momenta; less where
@@ -42,6 +42,8 @@ _APART = 1e-3
 """How far the runs of that start from each other."""
 _CLOSED = 10.0
 """Gap between the momenta at start and end that is left open at most, over the error of a run: where steps close it no more."""
+_USUAL = 0.125
+"""What the ends of two runs differ by, over the larger of the errors that were asked of their steps: at most, in 19 of 20."""
 _MOST_PERIODS = 30
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
@@ -50,8 +52,7 @@ _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 class InertialMotion(Period):
     """A gait played with inertia, over one period of the motion in which all periods are alike.
 
-    The work is that against friction [weight x length]; errors are how much a quantity changes where every step may err ten
-    times as much.
+    The work is that against friction [weight x length]; errors are those of `GaitWithInertia.errors`.
 
     Attributes
     ----------
@@ -128,41 +129,38 @@ class GaitWithInertia:
 
     def run(self, start: np.ndarray, aim: float) -> Course:
         """`InertialMotion.states` through a period from a state ``(7,)``, or from momenta ``(3,)`` at the origin."""
+        return self._run(np.append(start, [self.theta, 0.0, 0.0, 0.0][start.size - 3 :])[None], aim)
 
-        def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            _, _, omega, vx, vy, power, *rates = self._at(t, state[None])[0]
-            moved = np.exp(1j * state[_THETA]) * complex(vx, vy)
-            return np.array([*rates, omega - self.turn, moved.real, moved.imag, power]), None
+    def _run(self, begin: np.ndarray, aim: float) -> Course:
+        """Several such motions with the same steps, from states ``(n, 7)``."""
 
-        return followed(slope, np.append(start, [self.theta, 0.0, 0.0, 0.0][start.size - 3 :]), aim, self.breaks)
+        def slope(t: float, states: np.ndarray, _: None) -> tuple[np.ndarray, None]:
+            return self._rates(t, states.reshape(begin.shape)).ravel(), None
+
+        return followed(slope, begin.ravel(), aim, self.breaks)
 
     def mapped(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Momenta after a period ``(3,)`` and their derivatives ``(3, 3)`` with respect to those before it, by differences."""
-        apart = np.concatenate([np.zeros((1, 3)), _APART * np.eye(3)])
-        begin = np.column_stack([start + apart, np.full(4, self.theta)])[:, : 3 + self.regime.slides]
-        rows = [-3, -2, -1, 2][: begin.shape[1]]
+        """States before and after a period ``(7, 2)``, and derivatives of the latter with respect to the momenta before it,
+        ``(7, 3)``, by differences."""
+        begin = np.zeros((4, 7))
+        begin[:, _MOMENTA], begin[:, _THETA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)]), self.theta
+        end = self._run(begin, self._rough).states[:, -1].reshape(begin.shape)
+        return np.stack([begin[0], end[0]], axis=1), (end[1:] - end[0]).T / _APART
 
-        def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            return self._at(t, state.reshape(begin.shape))[:, rows].ravel(), None
-
-        end = followed(slope, begin.ravel(), self._rough, self.breaks).states[:, -1].reshape(begin.shape)[:, :3].T
-        return end[:, 0], (end[:, 1:] - end[:, :1]) / _APART
-
-    def closed(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Momenta ``(3,)`` near others that a period leaves as they are, but for the error of rough runs, and the derivatives
-        there."""
+    def closed(self, near: np.ndarray) -> Closed:
+        """A period near some momenta that leaves them as they are, but for the error of rough runs."""
         start = near
         for _ in range(_MOST_PERIODS):
-            end, slopes = self.mapped(start)
-            step = _newton_step(end - start, slopes)
+            ends, slopes = self.mapped(start)
+            step = _newton_step(ends[_MOMENTA, 1] - start, slopes)
             start = start + step
             if np.abs(step).max() < _CLOSED * self._rough:
-                return start, slopes
+                return Closed(start, ends, slopes)
         raise NotConvergedError(
             f"at a Froude number of {self.froude:g} no motion was found in which all periods are alike; try a smaller one."
         )
 
-    def closed_from(self, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    def closed_from(self, near: np.ndarray | None) -> Closed:
         """`closed` near some momenta; where they are not given or lead nowhere, near the slow ones, or near none: a body that
         friction hardly brakes keeps what it begins with at rest."""
         for begin in (lambda: near, self.slow_momenta):
@@ -171,22 +169,41 @@ class GaitWithInertia:
                     return self.closed(momenta)
         return self.closed(np.zeros(3))
 
-    def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray | None = None) -> tuple[Course, np.ndarray]:
-        """`InertialMotion.states` through a period that leaves the momenta as they are, to an error, sought near some momenta;
-        with the derivatives of `closed`, if they are known. And momenta that close the gap it leaves, ``(3,)``: where a body
-        glides far they are much further away than the gap is wide."""
+    def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
+        """A period that leaves the momenta as they are, to an error, sought near those of `closed`, with its derivatives."""
         start, before = near, np.inf
-        if slopes is None:
-            start, slopes = self.closed(near)
         for _ in range(_MOST_PERIODS):
             ran = self.run(start, aim)
             gap = ran.states[_MOMENTA, -1] - start
             step = _newton_step(gap, slopes)
             start, size = start + step, np.abs(step).max()
             if size < aim or (before <= size and np.abs(gap).max() < _CLOSED * aim):
-                return ran, start
+                return PeriodicRun(ran, start, aim)
             before = size
         raise NotConvergedError(f"at a Froude number of {self.froude:g} the periods do not become alike; try a smaller one.")
+
+    def errors(self, ran: PeriodicRun, before: PeriodicRun, slopes: np.ndarray) -> Numbers:
+        """How wrong `passed` of a run may be, seen from one whose steps might err more.
+
+        From a start s a run ends at F(s) + e, F being the exact map of a period, and e what its steps err by. The true motion
+        starts where the momenta are those at the end, s* = F(s*); so
+
+            s* - s = (I - M)^-1 (gap - e),
+
+        M being the derivatives of the momenta, and gap what is left open. Errors of momenta are multiplied many times where
+        friction brakes little, and so carried with the body through all the period. Of e a bound is the difference of the ends
+        of both runs, had they had one start; but it is the aim at least, as differences vanish now and then.
+        """
+        (first, last), (other, end) = (each.ends.T for each in (ran, before))
+        steps = np.maximum(np.abs(end - last - slopes @ (other - first)[_MOMENTA]), ran.aim)
+        return self.changes(ran.ends, slopes, steps, np.abs(last - first)[_MOMENTA])
+
+    def changes(self, ends: np.ndarray, slopes: np.ndarray, steps: np.ndarray, gap: np.ndarray) -> Numbers:
+        """Of `passed` between states ``(7, 2)``, where those at the end err by `steps` ``(7,)``, and momenta do not close by a
+        gap ``(3,)``."""
+        off = np.column_stack([np.diag(steps), amplified(slopes) * (steps[_MOMENTA] + gap)])
+        numbers, changed = self.passed(ends), [self.passed(np.column_stack([ends[:, 0], ends[:, 1] + each])) for each in off.T]
+        return {name: sum(abs(each[name] - value) for each in changed) for name, value in numbers.items()}
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
         """What `colloc.motion.compiled_momenta` says of a phase and n momenta, with the weight's pull, ``(n, 9)``."""
@@ -197,6 +214,14 @@ class GaitWithInertia:
             now[:, -3:-1] += pull.T / self.froude
         return now
 
+    def _rates(self, t: float, states: np.ndarray) -> np.ndarray:
+        """Of `InertialMotion.states` ``(n, 7)`` at a phase."""
+        now, rates = self._at(t, states), np.empty(states.shape)
+        moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
+        rates[:, _MOMENTA], rates[:, _THETA], rates[:, _WORK] = now[:, 6:], now[:, 2] - self.turn, now[:, 5]
+        rates[:, 4], rates[:, 5] = moved.real, moved.imag
+        return rates
+
     def passed(self, states: np.ndarray) -> dict[str, float]:
         """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the last."""
         gone = states[:, -1] - states[:, 0]
@@ -205,9 +230,40 @@ class GaitWithInertia:
         return {"distance": chord_per_way(self.turn) * way.real, "work": work, "rotation": float(gone[_THETA]) + self.turn}
 
 
+class Closed(NamedTuple):
+    """A period that leaves the momenta as they are, but for the error of rough runs."""
+
+    momenta: np.ndarray
+    """At the start, ``(3,)``."""
+    ends: np.ndarray
+    """States at the start and the end, ``(7, 2)``, about."""
+    slopes: np.ndarray
+    """Of the states at the end with respect to the momenta at the start, ``(7, 3)``."""
+
+
+class PeriodicRun(NamedTuple):
+    """A period that leaves the momenta as they are, to an error."""
+
+    course: Course
+    momenta: np.ndarray
+    """At the start of one that would close the gap that is left, ``(3,)``: where a body glides far they are much further away
+    than the gap is wide."""
+    aim: float
+
+    @property
+    def ends(self) -> np.ndarray:
+        """States at the start and the end, ``(7, 2)``."""
+        return self.course.states[:, [0, -1]]
+
+
+def amplified(slopes: np.ndarray) -> np.ndarray:
+    """Derivatives ``(7, 3)`` of the states at the end of a period with respect to what every period adds to the momenta."""
+    return np.asarray(np.linalg.solve(np.eye(3) - slopes[_MOMENTA].T, slopes.T).T)
+
+
 def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """To where a period changes nothing."""
-    return np.linalg.solve(np.eye(3) - slopes, gap)
+    return np.linalg.solve(np.eye(3) - slopes[_MOMENTA], gap)
 
 
 def gait_with_inertia(
@@ -289,22 +345,23 @@ def inertial_motion(
     """
     check_finite(positive=True, froude=froude, delta=delta)
     played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime)
-    start, slopes = played.closed_from(near)
+    start, ends, slopes = played.closed_from(near)
     totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
+    period = {"period": float(froude) ** -0.5}
 
-    def run(aim: float) -> tuple[tuple[Course, np.ndarray], dict[str, float]]:
+    def run(aim: float) -> tuple[PeriodicRun, Numbers]:
         nonlocal start
-        ran, start = played.periodic_run(start, aim, slopes)
-        return (ran, start), played.passed(ran.states) | {"period": float(froude) ** -0.5}
+        ran = played.periodic_run(start, aim, slopes)
+        start = ran.momenta
+        return ran, played.passed(ran.ends) | period
 
-    def left_open(of: tuple[Course, np.ndarray]) -> dict[str, float]:
-        """As far as the velocity that is missing to a closed period carries the body in one."""
-        ran, closed = of
-        return {"distance": float(np.linalg.norm(closed[:2] - ran.states[:2, 0]))}
-
-    (ran, _), values, errors = to_tolerance(run, tolerance, objective, tolerance, totals, left_open)
-    multipliers = np.linalg.eigvals(slopes)
-    return InertialMotion(values, errors, {}, froude, multipliers, phases=ran.phases, states=ran.states)
+    # runs that cannot be the last but one are left out
+    usual = played.changes(ends, slopes, np.full(7, _USUAL * tolerance), np.zeros(3))
+    lost = objective.relative_error(played.passed(ends) | period | totals[0], usual)
+    first = tolerance / max(1.0, lost / tolerance)
+    ran, values, errors = to_tolerance(run, first, objective, tolerance, totals, partial(played.errors, slopes=slopes))
+    multipliers, course = np.linalg.eigvals(slopes[_MOMENTA]), ran.course
+    return InertialMotion(values, errors, {}, froude, multipliers, phases=course.phases, states=course.states)
 
 
 class FromRest(NamedTuple):

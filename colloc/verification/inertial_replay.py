@@ -56,7 +56,7 @@ def inertial_replay(
     from_rest = ran.states[:3, 0]
     if near is None or near.several:
         with suppress(NotConvergedError):  # Newton's method need not lead to any from there
-            from_rest = played.closed(np.zeros(3))[0]
+            from_rest = played.closed(np.zeros(3)).momenta
     several = float(np.abs(from_rest - ran.states[:3, 0]).max() > _APART)
     other: Any = played.run(from_rest, tolerance) if several else ran
     z = tail_velocity(chain, angles, rates, ran.states[:3])

@@ -17,8 +17,10 @@ Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
 Ran = TypeVar("Ran")
 Numbers = dict[str, float]
-_TENTH, _LEAST = 0.1, 1e-12
-"""Error of each run over that of the last, and the smallest tried."""
+_TENTH = 0.1
+"""Error of each run over that of the last."""
+LEAST = 1e-12
+"""The smallest tried."""
 
 
 @dataclass(frozen=True)
@@ -96,24 +98,28 @@ def to_tolerance(
     objective: Objective,
     tolerance: float,
     known: tuple[Numbers, Numbers],
-    left_open: Callable[[Ran], Numbers] = lambda ran: {},
+    errors_of: Callable[[Ran, Ran], Numbers] | None = None,
 ) -> tuple[Ran, Numbers, Numbers]:
-    """A differential equation solved with ever smaller errors a step, until the last tenth of them changes an objective by less
-    than a relative error: what ran last, the numbers of its period, and their errors.
+    """A differential equation solved with ever smaller errors a step, until these change an objective by less than a relative
+    error: what ran last, the numbers of its period, and their errors.
 
     `run` takes an error, `first` to begin with, and gives what ran and its numbers; `known` are other numbers, and their
-    errors; `left_open` says what else may be wrong with numbers of what ran. `NotConvergedError` if rounding hides the
-    accuracy that is asked for.
+    errors; `errors_of` says how wrong numbers of what ran may be, seen from what ran with ten times the error. By default that
+    is what they differ by, but half of the error that was asked for at least: differences vanish now and then.
+    `NotConvergedError` if rounding hides the accuracy that is asked for.
     """
-    aim, before = first, None
-    while aim >= _LEAST:
+    aim, before = max(first, LEAST / _TENTH), None
+    while aim > 0.5 * LEAST:
         ran, now = run(aim)
         if before is not None:
-            more = left_open(ran)
-            errors = {name: abs(value - before[name]) + more.get(name, 0.0) for name, value in now.items()} | known[1]
+            if errors_of is None:
+                errors = {name: max(abs(value - before[1][name]), 0.5 * aim) for name, value in now.items()}
+            else:
+                errors = dict.fromkeys(now, 0.0) | errors_of(ran, before[0])
+            errors |= known[1]
             if not objective.relative_error(now | known[0], errors) > tolerance:
                 return ran, now | known[0], errors
-        aim, before = _TENTH * aim, now
+        aim, before = _TENTH * aim, (ran, now)
     raise NotConvergedError(f"the motion cannot be replayed to a relative error of {tolerance:.0e}.")
 
 

@@ -300,7 +300,7 @@ def test_a_mesh_is_fine_where_errors_are_made_not_where_they_are_felt():
 def test_a_motion_that_does_not_follow_from_rest_is_another_one(monkeypatch):
     def other_from_rest(self, near):
         found = closed(self, near)
-        return found if near.any() else (found[0] + np.array([0.5, 0.0, 0.0]), found[1])
+        return found if near.any() else found._replace(momenta=found.momenta + np.array([0.5, 0.0, 0.0]))
 
     closed = GaitWithInertia.closed
     at = colloc.Chain(), colloc.Friction(), ROUND, 1e-2

@@ -113,8 +113,10 @@ def meshes_for_a_gait_without_symmetry():
 
 
 def meshes_for_a_polygon():
-    stated = Problem("p", SQUARE, gait=Polygon(4, "none"), delta=1e-2, delta_start=1e-2, intervals=8, joint_limit=0.92)
-    return _plans(stated, SQUARE)
+    """One without symmetry: of two panels that are each other's images rounding says which is halved."""
+    uneven = Corners(np.array([[0.9, -0.3, -0.8, 0.4], [0.2, 0.7, -0.3, -0.8]]))
+    stated = Problem("p", uneven, gait=Polygon(4, "none"), delta=1e-2, delta_start=1e-2, intervals=8, joint_limit=0.92)
+    return _plans(stated, uneven)
 
 
 def an_uneven_mesh():

@@ -237,10 +237,10 @@ HOPELESS = {
 @pytest.mark.parametrize("case", HOPELESS)
 def test_joints_too_weak_for_any_gait_are_told_before_the_search(case):
     changes, words = HOPELESS[case]
-    begin = time.perf_counter()
+    begin = time.process_time()
     with pytest.raises(ProblemError, match=words):
         solve(USUAL.with_(guess=None, **changes))
-    assert time.perf_counter() - begin < 5.0
+    assert time.process_time() - begin < 5.0
 
 
 def test_what_may_be_kept_is_not_refused():
