@@ -236,8 +236,10 @@ class Solution:
             return ["none: the gait was given"]
         if self.starts == 1 or not self.others:
             return ["local optimum, from one start"]
-        best, *others = self.others
-        lines = [f"local optimum, best of {self.starts} starts, {best.starts} of which met it"]
+        # others are as a coarse mesh sees them, and one that shrank may be better
+        this = min(self.others, key=lambda other: abs(other.value - self.answer.value))
+        others = [other for other in self.others if other is not this]
+        lines = [f"local optimum, best of {self.starts} starts, {this.starts} of which met it"]
         if others:
             lines.append("also met, on a coarse mesh: " + "; ".join(map(str, others[:_MOST_OTHERS])))
         return lines
