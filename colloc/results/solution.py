@@ -64,9 +64,9 @@ class Solution:
     starts : int
         How many the gait is the best of.
     others : tuple of Alternative
-        Distinct gaits they led to, the one of this solution first; empty for a single start.
+        Distinct gaits they led to, the best first, of any size; empty for a single start.
     shrunk : Solution, optional
-        A better gait that is as small as the bound on the shape speed allows, which nobody could build; saved by itself.
+        A better gait that is so small that nobody sees it move; saved by itself.
     relaxed : Relaxation, optional
         The relaxed gait that the gait of this solution comes near, for a class of relaxed gaits.
     interrupted : bool

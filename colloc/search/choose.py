@@ -100,9 +100,9 @@ def _message(problem: Problem, answer: Answer, certificate: Certificate, failure
         )
     elif problem.gait.free and on_speed_floor(answer.problem, answer.gait):
         text = (
-            f"Gaits that become smaller become better here, so the search kept them large: no gait that it met with a shape speed "
-            f"of {answer.problem.smallest_shape_speed:.2g} or more is better. For another size state smallest_shape_speed, or "
-            'the distance, at_least={"distance": 0.1}.'
+            "Gaits that become smaller become better here, so the search kept them large: it met no better gait with a shape "
+            f"speed of {answer.problem.smallest_shape_speed:.2g} or more. For another size state smallest_shape_speed, or the "
+            'distance, at_least={"distance": 0.1}.'
         )
     return f"{text} {lowered}".strip()
 

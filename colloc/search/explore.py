@@ -51,7 +51,7 @@ _HOP = 0.4
 take turns with as many hops. At 0.2 a hop mostly falls back, at 0.8 it lands where any start would; which of them leads on
 differs from problem to problem. What start k is depends on what came before alone: more starts go wherever fewer do."""
 _SIZE = 0.5
-"""Root-mean-square shape speed of gaits that are searched where no optimum has a finite size: five joints swing by 18 degrees."""
+"""Least root-mean-square shape speed searched where no optimum is of finite size: five joints that swing by 18 degrees."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction: without them one harmonic of other bodies is missed at
 times, as that of `problems/purcell.py`."""

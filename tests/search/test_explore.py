@@ -64,8 +64,6 @@ def test_where_gaits_shrink_the_search_goes_on_among_those_that_a_person_sees_mo
     kept_large = large[0].problem.smallest_shape_speed
     assert large[0].gait.shape_speed == pytest.approx(kept_large, rel=1e-3)
     assert kept_large == pytest.approx(min((other.gait.shape_speed for other in large[1:]), default=0.5), rel=1e-3)
-    # unless the problem asks for what shrank
-    assert all(swing(optimum.gait) < 9 for optimum in explore.explore(problem.with_(shrinking=True), 1).optima[:1])
 
 
 @pytest.mark.slow
