@@ -112,8 +112,8 @@ class Problem:
     motion : Regime, optional
         A kind of motion of your own, instead of `grade` and `froude` (`colloc.gaits.regime`).
     shrinking : bool
-        Whether a gait may be the answer that shrank to ``smallest_shape_speed``. By default the best gait of finite size is,
-        if there is one.
+        Whether a gait may be the answer that shrank until nobody sees it move. By default the best gait of finite size is, if
+        there is one.
 
     Examples
     --------

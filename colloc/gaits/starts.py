@@ -33,6 +33,9 @@ _SPREAD = 0.3
 _ON_FLOOR = 1e-4
 _SHORT = 1.002
 """An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
+_VISIBLE = np.pi / 20
+"""Least swing of one joint to either side [rad] in a gait that a person sees move, 9 degrees: a little more than one joint that
+moves alone has at the usual `Problem.smallest_shape_speed`."""
 _PERIOD = np.linspace(0.0, 1.0, 1001)
 _NEAR = 10.0
 """A search from a known optimum begins at so many times the final delta: friction more regularised than that prefers other
@@ -49,6 +52,11 @@ def largest_amplitude(problem: Problem, gait: AnyGait) -> float:
 def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:
     """Whether a gait is as slow as ``smallest_shape_speed`` allows: then that bound, and no mechanics, decided its size."""
     return gait.shape_speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
+
+
+def is_visible(gait: AnyGait) -> bool:
+    """Whether a person sees a gait move, so that it is of finite size: a joint swings by 9 degrees or more to either side."""
+    return bool(np.ptp(gait.angles(_PERIOD), axis=1).max() >= 2 * _VISIBLE)
 
 
 def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndarray:

@@ -140,8 +140,8 @@ class _Played:
         self._body = problem.body
         how: Any = {"froude": froude, "breaks": solution.gait.corner_phases, "regime": problem.regime}
         played = gait_with_inertia(problem.body, problem.law, solution.gait, solution.delta_per_period, **how)
-        start, slopes = played.closed_from(None)
-        self._course, _ = played.periodic_run(start, _ACCURACY, slopes)
+        closed = played.closed_from(None)
+        self._course = played.periodic_run(closed.momenta, _ACCURACY, closed.slopes).course
         passed = played.passed(self._course.states)
         self.work, self.rotation, self.distance = passed["work"], passed["rotation"], passed["distance"]
         self._ahead = 0.0

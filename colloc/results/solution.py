@@ -64,9 +64,9 @@ class Solution:
     starts : int
         How many the gait is the best of.
     others : tuple of Alternative
-        Distinct gaits they led to, the one of this solution first; empty for a single start.
+        Distinct gaits they led to, the best first, of any size; empty for a single start.
     shrunk : Solution, optional
-        A better gait that is as small as the bound on the shape speed allows, which nobody could build; saved by itself.
+        A better gait that is so small that nobody sees it move; saved by itself.
     interrupted : bool
         Whether the search ended early, by Ctrl-C or because its time was over.
 
@@ -228,8 +228,10 @@ class Solution:
             return ["none: the gait was given"]
         if self.starts == 1 or not self.others:
             return ["local optimum, from one start"]
-        best, *others = self.others
-        lines = [f"local optimum, best of {self.starts} starts, {best.starts} of which met it"]
+        # others are as a coarse mesh sees them, and one that shrank may be better
+        this = min(self.others, key=lambda other: abs(other.value - self.answer.value))
+        others = [other for other in self.others if other is not this]
+        lines = [f"local optimum, best of {self.starts} starts, {this.starts} of which met it"]
         if others:
             lines.append("also met, on a coarse mesh: " + "; ".join(map(str, others[:_MOST_OTHERS])))
         return lines

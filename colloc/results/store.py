@@ -162,6 +162,7 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
         if field.name not in _APART:
             put_attribute(group, field.name, getattr(answer, field.name))
     put_attribute(group, "panels", answer.problem.body.panels)
+    put_attribute(group, "smallest_shape_speed", answer.problem.smallest_shape_speed)
     for field in dataclasses.fields(SecondOrder):
         put_attribute(group, f"second_order_{field.name}", getattr(answer.second_order, field.name))
     steps = file.create_group("history")
@@ -179,6 +180,8 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         problem = problem.with_(body=problem.body.on_panels(panels))
     if plain["delta"] < problem.delta:  # lowered for a small gait
         problem = problem.with_(delta=plain["delta"])
+    if "smallest_shape_speed" in group.attrs:  # raised for a gait that would shrink
+        problem = problem.with_(smallest_shape_speed=attribute(group, "smallest_shape_speed"))
     second = SecondOrder(**{f.name: attribute(group, f"second_order_{f.name}") for f in dataclasses.fields(SecondOrder)})
     steps = child(file, "history")
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}

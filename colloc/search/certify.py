@@ -9,7 +9,7 @@ import numpy as np
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import on_speed_floor
+from colloc.gaits.starts import is_visible
 from colloc.mechanics.chain import BALANCED
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
@@ -52,8 +52,8 @@ class Certified(NamedTuple):
 
     @property
     def is_finite(self) -> bool:
-        """Whether the gait has a size of its own."""
-        return not on_speed_floor(self.answer.problem, self.answer.gait)
+        """Whether a person sees the gait move."""
+        return is_visible(self.answer.gait)
 
 
 def is_trivial(answer: Answer) -> bool:

@@ -1,8 +1,8 @@
 """Which of several certified gaits is the answer, and what is said of it.
 
 A gait may shrink as far as the problem lets it: with dry friction small cycles may go farthest for their work. Nobody can
-build those, so the best gait of finite size is the answer, unless the problem asks otherwise; a better one that shrank stands
-beside it.
+build those, so the best gait of finite size, one that a person sees move, is the answer, unless the problem asks otherwise; a
+better one that shrank stands beside it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def choose(problem: Problem, found: Sequence[Certified]) -> Solution:
     -------
     Solution
         Its answer is the best gait of finite size whose certificate holds (of any size, if the problem asks for that, or there
-        is no other); `shrunk` is a better one as small as the problem allows.
+        is no other); `shrunk` is a better one that nobody sees move.
     """
     held = [each for each in found if each.holds]
     finite = [each for each in held if each.is_finite or problem.shrinking]
@@ -56,7 +56,7 @@ def choose(problem: Problem, found: Sequence[Certified]) -> Solution:
     if finite and smaller and not problem.shrinking:
         solution.shrunk = solution_of(problem, max(smaller, key=lambda each: each.answer.value))
         value = solution.shrunk.certificate.value
-        text = f"Smaller gaits do better still: {value:.6f} where one shrank to smallest_shape_speed, kept beside this one."
+        text = f"Smaller gaits do better still: {value:.6f} where one shrank until nobody sees it move, kept beside this one."
         solution.message = f"{solution.message} {text}".strip()
     return solution
 
@@ -97,6 +97,12 @@ def _message(problem: Problem, answer: Answer, certificate: Certificate, failure
             f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: the gait shrinks as far "
             f"as it may, smaller ones are {better} still. For a gait that a robot can make raise the bound; to see how far "
             "smaller ones go, lower it (and delta with it)."
+        )
+    elif problem.gait.free and on_speed_floor(answer.problem, answer.gait):
+        text = (
+            "Gaits that become smaller become better here, so the search kept them large: it met no better gait with a shape "
+            f"speed of {answer.problem.smallest_shape_speed:.2g} or more. For another size state smallest_shape_speed, or the "
+            'distance, at_least={"distance": 0.1}.'
         )
     return f"{text} {lowered}".strip()
 

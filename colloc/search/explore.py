@@ -22,7 +22,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import ellipse
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links
+from colloc.gaits.starts import is_visible, laid_into, latin_hypercube_gait, on_speed_floor, over_links
 from colloc.mechanics.chain import Chain
 from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative
@@ -50,6 +50,8 @@ _HOP = 0.4
 """How far hops from the best gait known go [rad], in turn half as far, as far and twice as far; half as many as usual starts
 take turns with as many hops. At 0.2 a hop mostly falls back, at 0.8 it lands where any start would; which of them leads on
 differs from problem to problem. What start k is depends on what came before alone: more starts go wherever fewer do."""
+_SIZE = 0.5
+"""Least root-mean-square shape speed searched where no optimum is of finite size: five joints that swing by 18 degrees."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction: without them one harmonic of other bodies is missed at
 times, as that of `problems/purcell.py`."""
@@ -134,6 +136,9 @@ def _at_the_end(problem: Problem, gait: AnyGait) -> Optimum | None:
 def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], bool] = lambda: True) -> Exploration:
     """The best gaits of a problem's class that many starts lead to.
 
+    Where they shrink until nobody sees them move, the search begins anew among gaits that are as large as the best optimum of
+    finite size, at least (`smallest_shape_speed`). What is better there than that one is among the gaits returned.
+
     Parameters
     ----------
     problem : Problem
@@ -161,10 +166,42 @@ def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], b
     0.26
     """
     with helping(problem) as helpers:
-        known, tried = candidates(problem, starts, goes_on, helpers)
-        if not known:
-            raise NotConvergedError("no start led to any gait of the class; give a guess.")
-        ends = _followed_to_the_end(problem, known, goes_on, helpers)
+        found = _explored(problem, starts, goes_on, helpers)
+        if problem.shrinking or is_finite(found.optima[0]) or not goes_on():
+            return found
+        finite = next((optimum for optimum in found.optima if is_finite(optimum)), None)
+        try:
+            large = _explored(_as_large(problem, finite), starts, goes_on, helpers)
+        except CollocError:
+            return found  # nothing moves as much
+    # the first one has a size of its own, which counts for something
+    enough = (1 + CLOSE) * finite.objective if finite else 0.0
+    better = [optimum for optimum in large.optima if is_finite(optimum) and optimum.objective < enough]
+    optima = sorted([*found.optima, *better], key=lambda optimum: optimum.objective)
+    known = [(other.value, fourier_series(problem, other.gait)) for other in found.others]
+    others = list(found.others)
+    for other in large.others:
+        here = other.value, fourier_series(problem, other.gait)
+        if not any(are_one(one, here, problem.body, problem.law) for one in known):
+            others.append(other)
+    others.sort(key=lambda other: -other.value)
+    return Exploration(tuple(optima), found.starts + large.starts, tuple(others), found.left)
+
+
+def _as_large(problem: Problem, finite: Optimum | None) -> Problem:
+    """The problem among gaits as large as one of finite size; without one, as large as is usual, or the usual first gait is."""
+    if finite is None:
+        usual = problem.with_(guess=None)
+        return usual.with_(smallest_shape_speed=max(min(_SIZE, usual.guess.shape_speed), problem.smallest_shape_speed))
+    return problem.with_(smallest_shape_speed=finite.gait.shape_speed, guess=finite.gait)
+
+
+def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool], helpers: Helpers) -> Exploration:
+    """What starts lead to, of whatever size."""
+    known, tried = candidates(problem, starts, goes_on, helpers)
+    if not known:
+        raise NotConvergedError("no start led to any gait of the class; give a guess.")
+    ends = _followed_to_the_end(problem, known, goes_on, helpers)
     distinct: list[tuple[Optimum, Candidate]] = []
     for optimum, candidate in sorted(ends, key=lambda end: end[0].objective):
         twin = next((led for other, led in distinct if same_gait(problem, other, optimum)), None)
@@ -298,11 +335,11 @@ def _is_new(start: int) -> bool:
 
 def sketched(coarse: Problem, gait: AnyGait, is_new: bool, deltas: list[float]) -> None:
     """What a start comes through, for the run that keeps it; as far as no earlier one of this process has come through it."""
-    _sketch(coarse, gait, is_new, deltas, _met_here(tuple(deltas)))
+    _sketch(coarse, gait, is_new, deltas, _met_here(coarse.smallest_shape_speed, *deltas))
 
 
 @lru_cache(maxsize=1)
-def _met_here(deltas: tuple[float, ...]) -> list[list[Candidate]]:
+def _met_here(smallest: float, *deltas: float) -> list[list[Candidate]]:
     return [[] for _ in deltas]
 
 
@@ -348,8 +385,8 @@ def _is_member(found: Optimum) -> bool:
 
 
 def is_finite(optimum: Optimum) -> bool:
-    """Whether the gait has a size of its own, and did not shrink as far as the problem lets it."""
-    return not on_speed_floor(optimum.problem, optimum.gait)
+    """Whether a person sees the gait move, and it did not shrink."""
+    return is_visible(optimum.gait)
 
 
 def _followed_to_the_end(

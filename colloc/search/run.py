@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from colloc.gaits import gait_fields
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import on_speed_floor
+from colloc.gaits.starts import is_visible
 from colloc.reduced.given import Given
 from colloc.results.answer import Answer, SecondOrder, Step
 from colloc.results.checks import Certificate, Check
@@ -216,8 +216,7 @@ class Run:
 
 def _counts(optimum: Optimum) -> bool:
     """Whether a gait may be the answer, though others that are less good are known."""
-    problem = optimum.problem
-    return problem.shrinking or problem.gait.mixes or not on_speed_floor(problem, optimum.gait)
+    return optimum.problem.shrinking or is_visible(optimum.gait)
 
 
 _CURRENT: ContextVar[Run] = ContextVar("run")

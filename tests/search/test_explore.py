@@ -43,6 +43,46 @@ def test_the_answer_is_the_best_gait_of_finite_size_and_a_better_one_that_shrank
     assert max(finite) == pytest.approx(solution.value, rel=1e-3)
 
 
+FOUR = (22 / 104, 30 / 104, 30 / 104, 22 / 104)
+WITHIN = {"joint_limit": np.radians(85)}
+
+
+def swing(gait):
+    """Of the joint that swings farthest, to either side [degrees]."""
+    return np.degrees(np.ptp(gait.angles(np.linspace(0.0, 1.0, 501)), axis=1).max()) / 2
+
+
+@pytest.mark.parametrize(
+    ("body", "symmetry"),
+    [(Chain(FOUR), "none"), (Chain(FOUR, feet=1), "bilateral")],
+    ids=["all gaits met shrink", "one does not, and is not the best of its size"],
+)
+def test_where_gaits_shrink_the_search_goes_on_among_those_that_a_person_sees_move(body, symmetry):
+    problem = Problem("robot", body=body, gait=Harmonic(2, symmetry), delta=1e-3, intervals=12, **WITHIN)
+    optima = explore.explore(problem, 1).optima
+    assert swing(optima[0].gait) < 9
+    large = [optimum for optimum in optima if swing(optimum.gait) >= 9]
+    assert large
+    kept_large = large[0].problem.smallest_shape_speed
+    assert large[0].gait.shape_speed == pytest.approx(kept_large, rel=1e-3)
+    assert kept_large == pytest.approx(min((other.gait.shape_speed for other in large[1:]), default=0.5), rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("feet", "least"), [(1, 1.666), (0, 1.192)], ids=["feet", "lying"])
+def test_four_links_whose_twitch_is_best_get_a_gait_that_one_sees_and_that_is_as_good_as_other_known_ones(feet, least):
+    """On feet the best bilateral gait, which the class contains, has 1.666; lying the fastest for its path has 1.192."""
+    friction = Friction(0.3, 0.3, 0.3)
+    solution = solve(Problem("robot", body=Chain(FOUR, feet=feet), friction=friction, gait=Harmonic(2, "none"), **WITHIN))
+    assert solution.status == "solved"
+    assert solution.value > least
+    assert solution.distance > 0.02
+    assert swing(solution.gait) > 9 > swing(solution.shrunk.gait)
+    assert solution.shrunk.value > solution.value
+    met = min(solution.others, key=lambda other: abs(other.value - solution.value))
+    assert f"{met.starts} of which met it" in solution.standing[0]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "starts"),
