@@ -64,7 +64,15 @@ def random_case(seed: int, number: int) -> Case:
     gait = Fourier(rng.normal(0.0, 0.3, n - 1), cos, sin, theta=float(rng.uniform(-np.pi, np.pi)))
     delta, froude, tolerance = 10.0 ** rng.uniform([-3.5, -3.0, -6.0], [-1.5, 2.0, -3.0])
     grade = rng.uniform(0.02, 0.6) * float(mu.min())
-    return Case(Chain(tuple(lengths)), Friction(*map(float, mu)), gait, delta, froude, grade, tolerance)
+    return Case(
+        Chain(tuple(lengths)),
+        Friction(**dict(zip(("mu_t", "mu_f", "mu_b"), map(float, mu), strict=True))),
+        gait,
+        delta,
+        froude,
+        grade,
+        tolerance,
+    )
 
 
 def _row(values: Any, errors: Any, true: Any) -> Row:

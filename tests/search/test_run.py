@@ -332,7 +332,9 @@ def test_progress_is_told_from_the_first_moment_on_stage_by_stage():
 
 def test_the_best_gait_told_of_is_one_of_finite_size_and_stages_come_in_their_order():
     """Here small loops are better from the first start on, and one of the gaits that lead the sketches shrinks on its way."""
-    problem = Problem("three", body=Chain((0.4, 0.2, 0.4)), friction=Friction(2, 1, 1.4), gait=Harmonic(1), delta=1e-3)
+    problem = Problem(
+        "three", body=Chain((0.4, 0.2, 0.4)), friction=Friction(mu_t=2, mu_f=1, mu_b=1.4), gait=Harmonic(1), delta=1e-3
+    )
     seen = []
     solution = solve(problem, 2, progress=seen.append)
     assert solution.shrunk.value > 1.1 * solution.value

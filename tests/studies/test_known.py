@@ -127,7 +127,7 @@ def test_two_that_are_taken_in_at_once_are_both_there(best, tmp_path, monkeypatc
         return main(["referee", "--table", str(table), "--add", str(result), "--by", "colloc solve quick.py"])
 
     monkeypatch.setattr("colloc.studies.known.save_known", after_both_have_read)
-    other = colloc.solve(PROBLEM.with_(name="other", friction=colloc.Friction(2, 1, 1)), starts=1)
+    other = colloc.solve(PROBLEM.with_(name="other", friction=colloc.Friction(mu_t=2, mu_f=1, mu_b=1)), starts=1)
     with ThreadPoolExecutor(2) as threads:
         assert list(threads.map(take_in, [best, other])) == [0, 0]
     assert {row.statement["name"] for row in known(table)} == {"quick", "other"}
