@@ -163,9 +163,9 @@ _WORDS = {
 
 
 def _words(kind: Any) -> str:
-    kind = get_origin(kind) or kind
+    kind, items = get_origin(kind) or kind, get_args(kind)
     if kind in _SEQUENCES:
-        return "a sequence"
+        return "a sequence of numbers" if float in items else "a sequence"
     return _WORDS.get(kind) or f"a {kind.__name__.removeprefix('PathLike') or 'path'}"
 
 

@@ -144,7 +144,7 @@ def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, coun
     def follow(problem, gait, deltas, known, *, hop=False):
         number = next(numbers)
         if number in better:
-            found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0)
+            found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem)
             known[-1].append(explore.Candidate(found))
 
     monkeypatch.setattr(explore, "_follow", follow)
@@ -162,7 +162,8 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
     def follow(problem, gait, deltas, known, *, hop=False):
         number = len(begun)
         begun[number] = (gait, len(deltas))
-        found = SimpleNamespace(objective=-1.0 if number == 0 else -2.0, gait=ellipse(0, 1.0, 0.1 * number), delta=1.0)
+        gait = ellipse(0, 1.0, 0.1 * number)
+        found = SimpleNamespace(objective=-1.0 if number == 0 else -2.0, gait=gait, delta=1.0, problem=problem)
         known[-1].append(explore.Candidate(found))
 
     monkeypatch.setattr(explore, "_follow", follow)
@@ -207,7 +208,8 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(monkeypatc
 
     def follow(problem, gait, deltas, known, *, hop=False):
         if not known[-1]:
-            known[-1].append(explore.Candidate(SimpleNamespace(objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0)))
+            found = SimpleNamespace(objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem)
+            known[-1].append(explore.Candidate(found))
         if next(numbers) in meeting:
             known[-1][0].joined(hop=hop)
 

@@ -10,12 +10,14 @@ from colloc.commands.main import main as colloc_main
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.converge import converged
 from colloc.search.effort import SKETCH
-from colloc.search.prescribed import realised
+from colloc.search.prescribed import as_it_is
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 from colloc.smooth.concertina import Concertina
@@ -122,7 +124,9 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     problem = Problem(
         "paper", guess, body=body, friction=Friction(), gait=Polygon(8, "antipodal"), delta=1e-3, delta_start=1e-3
     )
-    solution = Solution(problem, replace(realised(problem, guess, ()), program="guess"))
+    mesh = Mesh(scheme(problem.scheme), guess.phases)
+    answer = as_it_is(problem, mesh, guess, guess.vertices.ravel(order="F"), "guess")
+    solution = Solution(problem, replace(answer, knots=guess.phases, history=(answer.step,)))
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
         ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps", "5", "--periods", "1")),
