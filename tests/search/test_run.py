@@ -344,9 +344,7 @@ def test_the_best_gait_told_of_is_one_of_finite_size_and_stages_come_in_their_or
     assert len(dry) > len(seen) / 3
     came = [(news.round, STAGES.index(news.stage), news.done) for news in seen]
     assert came == sorted(came)
-    assert str(seen[-1]).startswith(
-        "round 3, certify, 0 of 1; best d/W = 0.25"
-    )
+    assert str(seen[-1]).startswith("round 3, certify, 0 of 1; best d/W = 0.25")
 
 
 def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess():
