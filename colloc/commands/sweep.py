@@ -61,7 +61,7 @@ def _executor(options: argparse.Namespace) -> tuple[Callable[[int], Executor] | 
 def _run(study: Study, source: str, options: argparse.Namespace) -> int:
     # heavy imports only now: a bad study is refused at once
     from colloc.studies.run import StudyRun
-    from colloc.system.file_lock import locked
+    from colloc.system.replaced_file import locked
 
     out = output_folder(options.output)
     folder, quiet = out / f"{study.name}.study", options.quiet or options.json

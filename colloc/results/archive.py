@@ -30,12 +30,12 @@ from colloc.results.distinct_optima import basins, fourier_series
 from colloc.results.outcome import UNITS, Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.file_lock import locked
+from colloc.system.replaced_file import locked
 from colloc.system.row_file import put_rows, read_rows
 from colloc.system.store_file import mark, new_file, put, put_attribute
 
 KIND, VERSION = "colloc archive", 4
-ROWS = "colloc starts 1"
+ROWS = "colloc starts 2"
 _PROBLEM = "problem"
 _MOST_NAMED = 12
 _COLUMNS = {"status": "text", "message": "text", **UNITS, "iterations": "1", "cpu_seconds": "s"}

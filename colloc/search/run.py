@@ -31,7 +31,7 @@ from colloc.system.plain_values import Codec, Own
 from colloc.system.row_file import put_rows, read_rows
 
 Value = TypeVar("Value")
-ROWS = "colloc run 1"
+ROWS = "colloc run 2"
 EVERY = 2.0
 """Seconds between writes: as much may have to be computed again after a crash. Short solves write nothing."""
 _PROBLEM = "problem"

@@ -14,7 +14,7 @@ from colloc.studies.cell import Attempt
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.row_file import put_rows, read_rows
 
-KIND, NAME = "colloc journal 1", "journal.sqlite"
+KIND, NAME = "colloc journal 2", "journal.sqlite"
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
+import h5py
 import numpy as np
 import pytest
 
@@ -32,7 +33,6 @@ from colloc.studies.journal import read_journal
 from colloc.studies.store import load_study
 from colloc.system import task_pool
 from colloc.system.row_file import read_rows
-from colloc.system.sealed_file import check_seal
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="forks and kills")]
 CYCLES = 120
@@ -113,7 +113,8 @@ def kept(kind, folder):
         found = open_archive(read_problem_file(folder / "p.py").problem, folder / "tiny.starts.h5")
         assert found.damaged == ()
         if (folder / "tiny.starts.h5").exists():
-            check_seal(folder / "tiny.starts.h5", 10**7, "archive")
+            with h5py.File(folder / "tiny.starts.h5") as file:
+                assert file["start"].size <= len(found.outcomes)
         return start_facts(found.outcomes)
     if (folder / "tiny.nc").exists():
         load_study(folder / "tiny.nc")

@@ -22,8 +22,7 @@ from colloc.commands import sweep as sweep_study
 from colloc.results.archive import StartName, archive_at, open_archive
 from colloc.studies.journal import append_records, read_journal
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.file_lock import locked
-from colloc.system.replaced_file import replaced_file
+from colloc.system.replaced_file import alone_in, locked, replaced_file
 from colloc.system.row_file import CACHE, put_rows, read_rows
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits and processes")
@@ -128,7 +127,7 @@ def test_an_archive_is_read_where_nothing_can_be_written_and_its_damaged_rows_ar
     kept = open_archive(problem(), folder / "a.h5")
     kept.add({StartName("sobol", 3, k): outcome(k, (4 + k) / 8) for k in range(4)})
     rows = folder / "a.sqlite"
-    rows.write_bytes(rows.read_bytes().replace(b"0.75,", b"0.76,"))
+    rows.write_bytes(rows.read_bytes().replace(b": 0.75,", b": ;.75,"))
     folder.chmod(0o755)
     before = sorted(p.name for p in folder.iterdir())
 
@@ -203,9 +202,10 @@ def test_a_file_system_without_locks_stops_nobody(tmp_path, monkeypatch, failure
 
     monkeypatch.setattr("fcntl.flock", refuse)
     ran = []
-    with locked(tmp_path / "lock"):
-        ran.append(failure)
-    assert ran == [failure]
+    for hold in (locked(tmp_path / "lock"), alone_in(tmp_path)):
+        with hold:
+            ran.append(failure)
+    assert ran == [failure] * 2
 
 
 def _write_many(kind, folder, who, count):
@@ -267,28 +267,17 @@ def die_while_writing(path):
         os._exit(9)
 
 
-def test_what_a_killed_process_left_is_swept_by_the_next_that_writes_there_and_what_another_writes_is_not(tmp_path):
-    killed, mine, under_way = tmp_path / "x[1].h5", tmp_path / "y.h5", tmp_path / "z.h5"
+def test_what_a_killed_process_left_is_swept_after_an_hour_and_what_others_write_is_not(tmp_path):
+    killed, foreign = tmp_path / "x[1].h5", tmp_path / ".movie.mp4.part"
     assert in_child(die_while_writing, killed) == 9
-    assert len(unfinished(killed)) == 1
-    with replaced_file(under_way) as other:
-        with replaced_file(mine) as name:
+    (left,) = unfinished(killed)
+    foreign.write_bytes(b"not ours")
+    os.utime(foreign, (0, 0))
+    for age, there in ((3590, [".movie.mp4.part", left.name, "y.h5"]), (3605, [".movie.mp4.part", "y.h5"])):
+        os.utime(left, (time.time() - age,) * 2)
+        with replaced_file(tmp_path / "y.h5") as name:
             Path(name).write_bytes(b"whole")
-        assert unfinished(killed) == []
-        assert unfinished(under_way) == [Path(other)]
-        Path(other).write_bytes(b"whole too")
-    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == {"y.h5": b"whole", "z.h5": b"whole too"}
-
-
-def test_what_processes_elsewhere_left_is_swept_after_an_hour_and_what_is_not_ours_never(tmp_path):
-    elsewhere = {age: tmp_path / f".x.h5.00000000-{os.getpid()}-0000{age}.part" for age in ("0a", "0b")}
-    foreign = tmp_path / ".movie.mp4.part"
-    for path, age in ((elsewhere["0a"], 3605), (elsewhere["0b"], 3590), (foreign, 1e6)):
-        path.write_bytes(b"left")
-        os.utime(path, (time.time() - age,) * 2)
-    with replaced_file(tmp_path / "x.h5") as name:
-        Path(name).write_bytes(b"whole")
-    assert [p.exists() for p in (*elsewhere.values(), foreign)] == [False, True, True]
+        assert sorted(p.name for p in tmp_path.iterdir()) == there
 
 
 @pytest.mark.parametrize("moment", ["close", "fsync", "replace"])
