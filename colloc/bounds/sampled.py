@@ -214,7 +214,7 @@ def known_bound(
 ) -> Bound | None:
     """The bound that an earlier run left in the cache, or None; arguments as for `efficiency_bound`."""
     key = bound_key(Domain(body, friction, float(joint_limit)), budget or usual_budget(body))
-    entry = read_rows(Path(cache), CACHE).values.get(key)
+    entry = read_rows(Path(cache), CACHE).get(key)
     if entry is None:
         return None
     try:

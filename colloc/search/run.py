@@ -117,7 +117,7 @@ class Run:
         if self.path is None:
             return
         try:
-            rows = read_rows(self.path, ROWS).values
+            rows = read_rows(self.path, ROWS)
         except StoreError as error:
             raise StoreError(f"{error} It was left by an interrupted run; remove it to begin again (solve --fresh).") from None
         if rows.pop(_PROBLEM, self.problem.hash) != self.problem.hash:

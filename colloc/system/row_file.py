@@ -10,8 +10,7 @@ import json
 import os
 import sqlite3
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,14 +21,6 @@ from colloc.system.replaced_file import NO_LOCKS
 CACHE = "colloc cache 2"
 _PATIENCE = 60.0
 """Seconds to wait for other writers, each of which takes milliseconds."""
-
-
-@dataclass(frozen=True)
-class Rows:
-    """What was read: values by key in the order in which the keys came, and the keys of rows that cannot be read."""
-
-    values: dict[str, Any] = field(default_factory=dict)
-    damaged: tuple[str, ...] = ()
 
 
 @lru_cache
@@ -53,13 +44,12 @@ def _opened(path: Path, kind: str, begin: str) -> Iterator[tuple[sqlite3.Connect
     locking = "" if _has_locks(path.parent) else "&vfs=unix-dotfile"
     address = f"{path.absolute().as_uri()}?mode=rw{locking}"
     with contextlib.closing(sqlite3.connect(address, uri=True, timeout=_PATIENCE, isolation_level=None)) as connection:
-        connection.text_factory = bytes
         connection.execute("PRAGMA synchronous = EXTRA")  # the end of a transaction survives a power cut, too
         connection.execute(begin)
         found = connection.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 2").fetchall()
         if not found and path.stat().st_size > 0:
             raise sqlite3.DatabaseError("it is no database, or its table is missing")
-        if found and found != [(_table(kind).encode(),)]:
+        if found and found != [(_table(kind),)]:
             raise StoreError(f"{path} is not a {kind}: another version of colloc wrote it, or another program; move it away.")
         yield connection, bool(found)
 
@@ -68,25 +58,19 @@ def _table(kind: str) -> str:
     return f'CREATE TABLE "{kind}" (key TEXT PRIMARY KEY, value TEXT)'
 
 
-def read_rows(path: Path, kind: str) -> Rows:
-    """All rows of a file; none if there is no such file. `StoreError` if the file cannot be read, is damaged or of another
-    kind."""
-    values: dict[str, Any] = {}
-    damaged: list[str] = []
+def read_rows(path: Path, kind: str) -> dict[str, Any]:
+    """Values by key, in the order in which the keys came; none if there is no such file. `StoreError` if the file cannot be
+    read, is damaged or of another kind."""
+    if not path.exists():
+        return {}
     try:
-        if not path.exists():
-            return Rows()
         with _opened(path, kind, "BEGIN") as (connection, filled):
-            for key, text in connection.execute(f'SELECT key, value FROM "{kind}" ORDER BY rowid') if filled else ():
-                try:
-                    values[key.decode()] = json.loads(text)
-                except (AttributeError, TypeError, ValueError, RecursionError):
-                    damaged.append(key.decode("utf-8", "replace") if isinstance(key, bytes) else "a row without a key")
+            rows = connection.execute(f'SELECT key, value FROM "{kind}" ORDER BY rowid') if filled else ()
+            return {key: json.loads(text) for key, text in rows}
     except StoreError:
         raise
-    except (sqlite3.Error, OSError, UnicodeDecodeError) as error:  # the last one: of a message of SQLite's
+    except (sqlite3.Error, OSError, TypeError, ValueError, RecursionError) as error:
         raise StoreError(f"{path} cannot be read as a {kind} ({error}); move it away, or have sqlite3 recover it.") from None
-    return Rows(values, tuple(damaged))
 
 
 def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:
@@ -114,12 +98,3 @@ def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:
             f"cannot write {path}: {why}. What was finished before is kept; make room or choose another --output, and give the "
             "same command again."
         ) from None
-
-
-def cached(path: Path, key: str, compute: Callable[[], Any]) -> Any:
-    """The value of a key in a cache file, computed and put there if it is missing. Raises as `read_rows` and `put_rows`."""
-    known = read_rows(path, CACHE).values
-    if key not in known:
-        put_rows(path, CACHE, {key: compute()})
-        known = read_rows(path, CACHE).values
-    return known[key]

@@ -316,14 +316,6 @@ def test_files_have_the_permissions_that_the_user_asked_for(mask, three_link, tm
         assert written.stat().st_mode & 0o777 == 0o666 & ~mask
 
 
-@pytest.mark.parametrize("cut", [1, 1000, 100_000])
-def test_a_result_without_its_end_is_refused(cut, result, capsys):
-    content = result.read_bytes()
-    result.write_bytes(content[:-cut])
-    assert colloc(["verify", str(result)]) == 2
-    assert "is not a readable colloc solution" in capsys.readouterr().err
-
-
 def test_a_command_that_was_interrupted_says_so_whatever_became_of_the_interruption():
     """CasADi's wrappers turn a KeyboardInterrupt into errors of other kinds."""
 

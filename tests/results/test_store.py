@@ -1,7 +1,5 @@
 """Results files: round trip, plain h5py, and damage."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -35,35 +33,20 @@ def test_plain_h5py_reads_the_motion_with_units(three_link, tmp_path):
         assert file["history/delta"][0] == three_link.history[0].delta
 
 
-def test_nothing_is_left_behind_and_a_failed_write_keeps_the_old_file(three_link, tmp_path, monkeypatch):
-    path = save(three_link, tmp_path / "x.h5")
-    before = path.read_bytes()
-
-    def broken(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("colloc.results.store._write_motion", broken)
-    with pytest.raises(StoreError, match="No space left"):
-        save(three_link, path)
-    assert path.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
-
-
-@pytest.mark.parametrize("name", ["distance", "work_error", "value_at_zero_delta"])
-def test_a_certificate_without_one_of_its_numbers_is_refused(name, three_link, tmp_path):
-    path = save(three_link, tmp_path / "x.h5")
+@pytest.mark.parametrize("name", ["distance", "work_error", "value_at_zero_delta", "value"])
+def test_a_certificate_without_one_of_its_numbers_or_with_several_for_one_is_refused(name, three_link, tmp_path):
+    path, said = save(three_link, tmp_path / "x.h5"), f"attribute {name} of /certificate is missing"
     with h5py.File(path, "a") as file:
         del file["certificate"].attrs[name]
-    with pytest.raises(StoreError, match=f"attribute {name} of /certificate is missing"):
+        if name == "value":
+            file["certificate"].attrs[name], said = [0.26, 0.27], "TypeError"
+    with pytest.raises(StoreError, match=f"not a readable colloc solution: {said}"):
         load(path)
 
 
 def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
     with pytest.raises(StoreError, match="there is no file"):
         load(tmp_path / "none.h5")
-    (tmp_path / "text.h5").write_text("hello")
-    with pytest.raises(StoreError, match="not a readable"):
-        load(tmp_path / "text.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = [1.0]
     with pytest.raises(StoreError, match="not a readable colloc solution: attribute format of / is missing"):
@@ -78,27 +61,6 @@ def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
         file["problem"] = '{"name": "x"}'
     with pytest.raises(StoreError, match=r"good.h5 is not a readable colloc solution: not the description of a problem"):
         load(good)
-
-
-def test_a_certificate_of_arrays_is_none(three_link, tmp_path):
-    path = save(three_link, tmp_path / "x.h5")
-    with h5py.File(path, "a") as file:
-        file["certificate"].attrs["value"] = [0.26, 0.27]
-    with pytest.raises(StoreError, match="not a readable colloc solution"):
-        load(path)
-
-
-def test_a_body_of_ten_thousand_links_is_refused_before_memory_is_taken(three_link, tmp_path):
-    """Every link is held against every other at thousands of phases: gigabytes."""
-    stated = three_link.problem.to_dict()
-    stated["body"] = {"kind": "Chain", "lengths": [1e-4] * 10_000}
-    stated["guess"] = {"kind": "Fourier", "mean": [0.0] * 9_999, "cos": [[1e-3]] * 9_999, "sin": [[1e-3]] * 9_999}
-    path = save(three_link, tmp_path / "links.h5")
-    with h5py.File(path, "a") as file:
-        del file["problem"]
-        file["problem"] = json.dumps(stated)
-    with pytest.raises(StoreError, match="the body has 9999 joints, and 100 are allowed"):
-        load(path)
 
 
 def test_xarray_opens_every_group_of_a_solution_with_named_dimensions(three_link, tmp_path):

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from colloc import Friction, Harmonic, Problem, load, save, solve
-from colloc.commands.main import main
 from colloc.gaits.starts import latin_hypercube_gait
 from colloc.results.kept import save_result
 from colloc.search import run as run_module
@@ -37,14 +36,6 @@ def test_a_result_to_which_somebody_added_something_is_not_lost_when_the_problem
         assert place not in file or "remark" not in file[place].attrs
     (again,) = save_result(quick, path)
     assert again.former is None
-
-
-def test_numbers_that_were_changed_by_hand_are_found_by_verify(quick, tmp_path, capsys):
-    path = save(quick, tmp_path / "quick.h5")
-    with h5py.File(path, "a") as file:
-        file["certificate"].attrs["distance"] = 0.123
-    assert main(["verify", str(path)]) == 4
-    assert "the file certifies an efficiency of" in capsys.readouterr().out
 
 
 def test_bounds_for_dry_friction_are_read_again_with_a_result(quick, tmp_path):
@@ -81,7 +72,7 @@ def test_rows_that_the_disk_refused_are_written_when_it_takes_them_again(tmp_pat
             run.write()
         run.kept("stage", (2.0,), lambda: 20.0)
     run.write()
-    assert sorted(value for key, value in read_rows(path, ROWS).values.items() if key != "problem") == [10.0, 20.0]
+    assert sorted(value for key, value in read_rows(path, ROWS).items() if key != "problem") == [10.0, 20.0]
     again = Run(path, QUICK)
     assert [again.kept("stage", (x,), lambda: None) for x in (1.0, 2.0)] == [10.0, 20.0]
 
