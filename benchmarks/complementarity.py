@@ -25,11 +25,10 @@ import casadi as ca
 import numpy as np
 
 import colloc
-from benchmarks.tables import markdown_table
+from benchmarks.tables import cached, markdown_table
 from colloc import Chain, Fourier, Harmonic, Problem
 from colloc.commands.ending import OK, run
 from colloc.mechanics.contact import smooth_minimum
-from colloc.system.row_file import cached
 
 INTERVALS, DEGREE, LENGTH = 40, 2, 1 / 3
 RELAXED = [10.0**-k for k in range(2, 9)]

@@ -20,12 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.tables import cached
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
 from colloc.gaits.control_problem import control_problem
 from colloc.results.solution import Solution
 from colloc.search.explore import begin_at
 from colloc.search.solve import confirmed
-from colloc.system.row_file import cached
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replay
 

@@ -1,11 +1,15 @@
-"""What all measurements share: processor time, medians of interleaved runs, Markdown tables."""
+"""What all measurements share: processor time, medians of interleaved runs, values kept in files, Markdown tables."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from colloc.system.row_file import CACHE, put_rows, read_rows
 
 
 def cpu_seconds(work: Callable[[], object], at_least: float = 0.05) -> float:
@@ -26,6 +30,13 @@ def interleaved_seconds(works: dict[str, Callable[[], object]], rounds: int = 3,
         for name, work in works.items():
             spent[name].append(cpu_seconds(work, at_least))
     return {name: float(np.median(values)) for name, values in spent.items()}
+
+
+def cached(path: Path, key: str, compute: Callable[[], Any]) -> Any:
+    """The value of a key in a file of rows, computed and put there if it is missing."""
+    if key not in read_rows(path, CACHE):
+        put_rows(path, CACHE, {key: compute()})
+    return read_rows(path, CACHE)[key]
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

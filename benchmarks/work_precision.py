@@ -19,12 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.tables import cached
 from colloc import FreePath, Harmonic, Problem, certify, ellipse
 from colloc.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled, subplots
 from colloc.results.solution import Solution
 from colloc.search.explore import begin_at
 from colloc.search.solve import confirmed
-from colloc.system.row_file import cached
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 _MARKERS = "osD^vPX"

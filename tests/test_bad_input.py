@@ -213,6 +213,10 @@ SENTENCES = {
     "a billion points": (lambda: colloc.pareto_front(PROBLEM, points=10**9), "2 to 1000 points"),
     "a word that Python keeps": (lambda: Quantity("lambda", "sum(rate**2)"), "a name of its own that is a word"),
     "a motion that is nothing": (lambda: Problem("x", motion=[]), "motion must be"),
+    "more links than memory can compare": (
+        lambda: Problem.from_dict({**PROBLEM.to_dict(), "body": {"kind": "Chain", "lengths": [1e-4] * 10_000}}),
+        "the body has 9999 joints, and 100 are allowed",
+    ),
     "a link that is nothing": (lambda: Chain((1e-12, 0.5 - 1e-12, 0.5)), "no link may be shorter than 1e-06"),
     "a joint limit of no dimension": (lambda: Problem("x", joint_limit=np.array(9.0)), "joint_limit must lie"),
 }  # fmt: skip

@@ -25,11 +25,10 @@ import numpy as np
 import colloc
 from benchmarks.engines import players
 from benchmarks.engines.task import Task, on_feet
-from benchmarks.tables import markdown_table
+from benchmarks.tables import cached, markdown_table
 from colloc.commands.ending import OK, run
 from colloc.mechanics.inertia import GRAVITY
 from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, save, styled, subplots
-from colloc.system.row_file import cached
 
 GAITS = "three_link", "three_link_two_harmonics", "three_link_feet", "five_link", "serpenoid_snake", "wheeled_snake"
 FROUDE = 0.002, 0.05

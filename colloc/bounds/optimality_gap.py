@@ -13,7 +13,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import rate_independent
-from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
+from colloc.system.errors import ProblemError, ReadOnlyRunWarning, StoreError
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
@@ -42,7 +42,7 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
 
     None where there can be none (`refusal`), unless it is asked for: that is a `ProblemError`. A cache that cannot be read or
-    written is left as it is, with a `ChangedFileWarning`: no result depends on it.
+    written is left as it is, with a `ReadOnlyRunWarning`: no result depends on it.
     """
     if why := refusal(problem):
         if compute:
@@ -57,7 +57,7 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
     try:
         return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
     except StoreError as error:
-        warnings.warn(f"{error} No bound is taken from it.", ChangedFileWarning, stacklevel=2)
+        warnings.warn(f"{error} No bound is taken from it.", ReadOnlyRunWarning, stacklevel=2)
         return efficiency_bound(*domain) if compute else None
 
 

@@ -25,7 +25,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.numerics.spline import TensorSpline
-from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
+from colloc.system.errors import ProblemError, ReadOnlyRunWarning, StoreError
 from colloc.system.row_file import CACHE, put_rows, read_rows
 
 VERSION = 6
@@ -214,7 +214,7 @@ def known_bound(
 ) -> Bound | None:
     """The bound that an earlier run left in the cache, or None; arguments as for `efficiency_bound`."""
     key = bound_key(Domain(body, friction, float(joint_limit)), budget or usual_budget(body))
-    entry = read_rows(Path(cache), CACHE).values.get(key)
+    entry = read_rows(Path(cache), CACHE).get(key)
     if entry is None:
         return None
     try:
@@ -253,7 +253,7 @@ def efficiency_bound(
         For a joint limit outside (0, pi], more than five links, even harmonics with mu_b = mu_f, or feet under a law that is
         not associated.
     StoreError
-        If the cache cannot be read. One that cannot be written costs a `ChangedFileWarning`.
+        If the cache cannot be read. One that cannot be written costs a `ReadOnlyRunWarning`.
     """
     if not 0 < joint_limit <= np.pi + 1e-12:
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
@@ -273,5 +273,5 @@ def efficiency_bound(
         try:
             put_rows(Path(cache), CACHE, {bound_key(domain, budget): asdict(bound)})
         except StoreError as error:
-            warnings.warn(f"{error} The bound is not kept.", ChangedFileWarning, stacklevel=2)
+            warnings.warn(f"{error} The bound is not kept.", ReadOnlyRunWarning, stacklevel=2)
     return bound

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TextIO
 
 from colloc.system.early_interruption import INTERRUPTED
-from colloc.system.errors import ChangedFileWarning, CollocError, OrderWarning, ReadOnlyRunWarning, SlowWarning
+from colloc.system.errors import CollocError, OrderWarning, ReadOnlyRunWarning, SlowWarning
 from colloc.system.interruption import interruptible
 
 OK, BAD_PROBLEM, NONE_FOUND, FAILED, UNREAD = 0, 2, 3, 4, 141  # the last as shells report SIGPIPE
@@ -156,12 +156,11 @@ def _notes() -> Iterator[None]:
         before = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
-            if issubclass(category, (ChangedFileWarning, OrderWarning, ReadOnlyRunWarning, SlowWarning)):
+            if issubclass(category, (OrderWarning, ReadOnlyRunWarning, SlowWarning)):
                 print(f"colloc: {message}", file=sys.stderr)
             else:
                 before(message, category, *where, **more)
 
-        warnings.simplefilter("always", ChangedFileWarning)
         warnings.simplefilter("always", ReadOnlyRunWarning)
         warnings.simplefilter("once", OrderWarning)
         warnings.simplefilter("once", SlowWarning)

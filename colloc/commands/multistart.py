@@ -137,8 +137,6 @@ def main(options: argparse.Namespace) -> int:
     to_go = options.starts - len(done)
     if not quiet:
         print(f"{len(done)} starts done already, {to_go} to go", flush=True)
-        if archive.damaged:
-            print(f"  {archive.loss}; these starts are solved again", flush=True)
         print(OUTCOME_HEADER, flush=True)
     begin = time.perf_counter()
     interrupted = False

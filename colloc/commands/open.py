@@ -48,15 +48,13 @@ def main(options: argparse.Namespace) -> int:
     if options.start is None:
         shown = list(archive.outcomes.values())
         found = basins(problem, shown)
-        facts = {**summary_dict(problem, shown, found, archive.path), "damaged": list(archive.damaged)}
-        tell(options, facts, [*summary_lines(problem, shown, found), *([f"  {archive.loss}"] if archive.loss else [])])
+        tell(options, summary_dict(problem, shown, found, archive.path), summary_lines(problem, shown, found))
         return OK if found else NONE_FOUND
     if options.start not in outcomes:
         there = sorted({f"{name.sampler} seed {name.seed}" for name in archive.outcomes})
         raise ProblemError(
             f"{options.archive} holds no start {options.start} of {options.sampler} seed {options.seed}; "
-            f"it holds {len(archive.outcomes)} starts of {', '.join(there) or 'no sampler'}"
-            f"{'; ' if archive.loss else ''}{archive.loss}."
+            f"it holds {len(archive.outcomes)} starts of {', '.join(there) or 'no sampler'}."
         )
     name = f"{problem.name}.start-{options.start}"
     path = output_path(options.output, Path(options.archive).with_name(f"{name}.h5"))

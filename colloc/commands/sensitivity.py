@@ -9,7 +9,6 @@ import argparse
 
 from colloc.commands.ending import OK, command
 from colloc.commands.options import add_printing, add_result, new_parser, tell
-from colloc.commands.verify import check_trusted
 from colloc.results.store import load
 from colloc.system.progress import StatusLine
 
@@ -32,7 +31,6 @@ def _parser() -> argparse.ArgumentParser:
 @command(_parser)
 def main(options: argparse.Namespace) -> int:
     solution = load(options.result)
-    check_trusted(solution, options.result)
     with StatusLine(enabled=options.again and not (options.quiet or options.json)) as line:
         line.say(f"{solution.problem.name}: seeking the best gaits again")
         found = solution.sensitivity(resolve=options.again)

@@ -61,7 +61,7 @@ def _executor(options: argparse.Namespace) -> tuple[Callable[[int], Executor] | 
 def _run(study: Study, source: str, options: argparse.Namespace) -> int:
     # heavy imports only now: a bad study is refused at once
     from colloc.studies.run import StudyRun
-    from colloc.system.file_lock import locked
+    from colloc.system.replaced_file import locked
 
     out = output_folder(options.output)
     folder, quiet = out / f"{study.name}.study", options.quiet or options.json
@@ -74,7 +74,7 @@ def _run(study: Study, source: str, options: argparse.Namespace) -> int:
     with locked(folder / "lock"):
         run = StudyRun(study, folder, retry=options.retry)
         if not quiet:
-            _announce(run, folder)
+            _announce(run)
         try:
             interrupted = _work(run, options, quiet, lambda: _save(run, out, source, options.command))
         except CollocError:
@@ -88,11 +88,9 @@ def _run(study: Study, source: str, options: argparse.Namespace) -> int:
     return OK if all(state.best for state in run.cells.values()) else NONE_FOUND
 
 
-def _announce(run, folder: Path) -> None:
+def _announce(run) -> None:
     todo, total = len(run.missing), len(run.cells)
     print(f"{run.study.name}: {total} cells, {total - todo} done already or without a problem, {todo} to go", flush=True)
-    if run.damaged:
-        print(f"  {run.damaged} damaged records in {folder} were left out; their cells are solved again", flush=True)
 
 
 def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path]) -> bool:

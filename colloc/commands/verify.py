@@ -99,12 +99,6 @@ def _dry_disagreement(recorded: tuple[float, float] | None, now: tuple[float, fl
     return f"the file certifies between {recorded[0]:.8f} and {recorded[1]:.8f} under dry friction, which is not what is found."
 
 
-def check_trusted(solution: Solution, file: str) -> None:
-    """A `ProblemError` for a result that another program changed, unless its certificate still says what a new replay does."""
-    if solution.changed and (why := disagreement(solution.certificate, rechecked(solution).certificate)):
-        raise ProblemError(f"{file} was changed after colloc wrote it, and cannot be trusted: {why}")
-
-
 def rechecked(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
     """The solution with a new certificate, on other instants than before; first- and second-order conditions are those that the
     answer states."""
@@ -127,7 +121,7 @@ def main(options: argparse.Namespace) -> int:
     good = certificate.passed and not complaint and solution.success
     facts = {
         "file": options.result, "objective": solution.problem.objective.name, "name": solution.problem.name,
-        "certified": good, "complaint": complaint, "changed": solution.changed,
+        "certified": good, "complaint": complaint,
     }  # fmt: skip
     dry = solution.dry() if options.dry or solution.certificate.dry is not None else None
     if dry is not None:
@@ -144,8 +138,6 @@ def main(options: argparse.Namespace) -> int:
         lines.append(f"  in the file     {recorded.value:.8f} +- {recorded.value_error:.0e} ({recorded.instants} instants)")
     if not options.quiet:
         lines += [f"  {check.line()}" for check in certificate.checks]
-    if solution.changed:
-        lines.append("  the file was changed after colloc wrote it; what is said here is of the file as it is now")
     if complaint:
         lines.append(f"  {complaint}")
     if solution.status != "solved" and certificate.passed:

@@ -14,9 +14,10 @@ from pathlib import Path
 from colloc.gaits.problem import Problem
 from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
-from colloc.system.sealed_file import LONGEST_TEXT
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
+LONGEST_TEXT = 2**20
+"""Bytes of a problem file, which results keep a copy of."""
 
 
 @named_arguments

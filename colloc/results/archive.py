@@ -23,21 +23,19 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 
-from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.distinct_optima import basins, fourier_series
 from colloc.results.outcome import UNITS, Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.file_lock import locked
+from colloc.system.replaced_file import locked
 from colloc.system.row_file import put_rows, read_rows
 from colloc.system.store_file import mark, new_file, put, put_attribute
 
 KIND, VERSION = "colloc archive", 4
-ROWS = "colloc starts 1"
+ROWS = "colloc starts 2"
 _PROBLEM = "problem"
-_MOST_NAMED = 12
 _COLUMNS = {"status": "text", "message": "text", **UNITS, "iterations": "1", "cpu_seconds": "s"}
 
 
@@ -51,26 +49,15 @@ class StartName(NamedTuple):
 
 @dataclass(eq=False)
 class Archive:
-    """The starts of a problem that ended so far, whoever asked for them; the rows of `damaged` ones were left out. See
-    `open_archive`."""
+    """The starts of a problem that ended so far, whoever asked for them; see `open_archive`."""
 
     problem: Problem
     path: Path
     outcomes: dict[StartName, Outcome] = field(default_factory=dict)
-    damaged: tuple[str, ...] = ()
 
     def of_search(self, sampler: str, seed: int) -> dict[int, Outcome]:
         """Outcomes of one sampler and seed, by start number."""
         return {name.number: self.outcomes[name] for name in sorted(self.outcomes) if name[:2] == (sampler, seed)}
-
-    @property
-    def loss(self) -> str:
-        """Which rows are damaged, in words; "" if none is."""
-        if not self.damaged:
-            return ""
-        named = ", ".join(f"start {key.rpartition(' ')[2]} ({key.rpartition(' ')[0]})" for key in self.damaged[:_MOST_NAMED])
-        more = ", ..." if len(self.damaged) > _MOST_NAMED else ""
-        return f"{len(self.damaged)} damaged rows of {row_path(self.path)} were left out: {named}{more}"
 
     def add(self, outcomes: Mapping[StartName, Outcome]) -> None:
         """Put starts that ended on the disk; StoreError if that is not possible."""
@@ -87,24 +74,24 @@ def _lock(path: Path) -> Path:
     return path.with_name(f".{path.name}.lock")
 
 
-def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], tuple[str, ...]] | None:
-    """Outcomes on the disk and the keys of damaged ones; None if nothing is there."""
+def _outcomes_at(problem: Problem, path: Path) -> dict[StartName, Outcome] | None:
+    """Outcomes on the disk; None if nothing is there."""
     rows = read_rows(row_path(path), ROWS)
-    stated = rows.values.pop(_PROBLEM, None)
+    stated = rows.pop(_PROBLEM, None)
     if stated is None:
-        if rows.values or rows.damaged:
+        if rows:
             raise StoreError(f"{row_path(path)} is damaged: it does not say what problem it is about; move it away.")
         return None
-    if problem.hash not in (statement_hash(stated), Problem.from_dict(stated).hash):  # older files write 1 where 1.0 is meant
+    if problem.hash != Problem.from_dict(stated).hash:
         raise StoreError(f"{row_path(path)} holds starts of another problem; choose another --output, or move it away.")
-    outcomes, damaged = {}, list(rows.damaged)
-    for key, value in rows.values.items():
+    outcomes = {}
+    for key, value in rows.items():
         try:
             (sampler, seed, number), entry = value
             outcomes[StartName(str(sampler), int(seed), int(number))] = outcome_from(entry)
         except (KeyError, TypeError, ValueError, OverflowError, CollocError):
-            damaged.append(key)
-    return outcomes, tuple(damaged)
+            raise StoreError(f"{row_path(path)} is damaged: {key} is no start; move it away.") from None
+    return outcomes
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
@@ -112,7 +99,7 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
     `StoreError` if what is there is damaged, of an older colloc or about another problem, or the folder cannot be written."""
     path = Path(path)
     with locked(_lock(path), wait=True):
-        found = _rows_of(problem, path)
+        found = _outcomes_at(problem, path)
         if found is None:
             if path.exists():
                 raise StoreError(
@@ -120,29 +107,29 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
                     "choose another --output, or move it away."
                 )
             put_rows(row_path(path), ROWS, {_PROBLEM: problem.to_dict()})
-    return Archive(problem, path, *(found or ()))
+    return Archive(problem, path, found or {})
 
 
 def archive_at(path: str | os.PathLike[str]) -> Archive:
     """The archive with this HDF5 file, whatever its problem is, to be read: nothing is written, and other runs may go on adding
     to it. `StoreError` if there is none, or it is damaged."""
     rows = row_path(path)
-    stated = read_rows(rows, ROWS).values.get(_PROBLEM) if rows.exists() else None
+    stated = read_rows(rows, ROWS).get(_PROBLEM) if rows.exists() else None
     if stated is None:
         what = f"there is no archive of starts at {path}"
         if os.path.isfile(path):
             what = f"{path} is no archive of starts, or {rows.name}, which holds its rows, is not beside it"
         raise StoreError(f"{what}; colloc multistart makes one.")
     problem, path = Problem.from_dict(stated), Path(path).with_suffix(".h5")
-    return Archive(problem, path, *(_rows_of(problem, path) or ()))
+    return Archive(problem, path, _outcomes_at(problem, path) or {})
 
 
 def save_archive(archive: Archive, command: str = "") -> Path:
     """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then holds as well. `StoreError`
     if the folder cannot be written; the file that was there before is left."""
     with locked(_lock(archive.path), wait=True):
-        found = _rows_of(archive.problem, archive.path)
-        archive.outcomes |= found[0] if found else {}
+        found = _outcomes_at(archive.problem, archive.path)
+        archive.outcomes |= found or {}
         with new_file(archive.path) as file:
             _write(file, archive, command)
     return archive.path

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -12,9 +11,9 @@ from pathlib import Path
 
 from colloc.results import store
 from colloc.results.solution import Solution
-from colloc.system.errors import ChangedFileWarning, StoreError
-from colloc.system.file_lock import alone_in
+from colloc.system.errors import StoreError
 from colloc.system.interruption import interruptible
+from colloc.system.replaced_file import alone_in
 from colloc.system.result_names import FAILED, INTERRUPTED, SHRUNK, beside, former
 
 _HOW = ("guess", "intervals", "scheme", "formulation", "mesh_tolerance", "delta_start")
@@ -44,8 +43,9 @@ def save_result(solution: Solution, path: Path) -> list[Saved]:
     """Save a solution at `path` (NAME.h5), or beside it if it failed (NAME.failed.h5) or was interrupted (NAME.interrupted.h5);
     and the better gait that shrank, if there is one, as NAME.shrunk.h5.
 
-    A result that is there already is replaced only by an answer to the same question that is as good. Else it is kept, with
-    its figures, under the first free name of NAME.former-1.h5, NAME.former-2.h5, ... Ctrl-C waits until all is saved.
+    A result that is there already is replaced only by an answer to the same question that is as good, and only if nobody added
+    anything to it. Else it is kept, with its figures, under the first free name of NAME.former-1.h5, NAME.former-2.h5, ...
+    Ctrl-C waits until all is saved.
 
     Returns
     -------
@@ -83,9 +83,7 @@ def _saved(solution: Solution, path: Path) -> Saved:
 def _solution_at(path: Path) -> Solution | None:
     """The result in a file; None if there is none that can be read."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ChangedFileWarning)
-            return store.load(path)
+        return store.load(path)
     except StoreError:
         return None
 
@@ -99,13 +97,11 @@ def _worth(there: Solution | None, new: Solution, path: Path) -> str:
     """What there is at a path that the new solution must not replace, in words; "" if there is no such thing."""
     if there is None:
         return "what was there and cannot be read" if path.exists() else ""
-    if there.changed:
-        return "the former result, which another program had changed,"
     if _question(there) != _question(new):
         return f"the former result, of another problem called {there.problem.name},"
     if there.success and not (new.success and _is_as_good(new, there)):
         return f"the former result, which is better ({there.certificate.value:.6g}, best of {there.starts} starts),"
-    return ""
+    return "the former result, which holds more than colloc wrote," if store.holds_more(path, there) else ""
 
 
 def _is_as_good(a: Solution, b: Solution) -> bool:

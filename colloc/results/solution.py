@@ -59,8 +59,6 @@ class Solution:
     message : str
         What went wrong and what to try, if something did.
     versions : dict
-    changed : bool
-        Whether another program changed the file that the result was loaded from; `colloc verify` decides what it is worth.
     starts : int
         How many the gait is the best of.
     others : tuple of Alternative
@@ -89,7 +87,6 @@ class Solution:
     source: str = ""
     message: str = ""
     versions: dict[str, str] = field(default_factory=lambda: versions())
-    changed: bool = False
     starts: int = 1
     others: tuple[Alternative, ...] = ()
     shrunk: Solution | None = None

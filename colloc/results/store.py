@@ -15,9 +15,9 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import os
-import warnings
 from pathlib import Path
 
 import h5py
@@ -25,27 +25,15 @@ import numpy as np
 
 from colloc.collocation.layout import layout_of
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
+from colloc.gaits.gait_fields import AnyGait, fields, gait_from
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.answer import Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
 from colloc.results.solution import Solution
-from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
-from colloc.system.store_file import (
-    BETWEEN_DIMS,
-    array,
-    attribute,
-    child,
-    mark,
-    new_file,
-    put,
-    put_attribute,
-    sealed_file,
-    text,
-    was_changed,
-)
+from colloc.system.errors import ProblemError, StoreError
+from colloc.system.store_file import BETWEEN_DIMS, array, attribute, child, mark, new_file, open_file, put, put_attribute
 
 FORMAT, FORMAT_VERSION = "colloc solution", 5
 _LAYOUT = "see colloc.collocation.layout"
@@ -103,8 +91,7 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
 def load(path: str | os.PathLike[str]) -> Solution:
     """The solution in a file that `save` wrote.
 
-    A file that another program has opened to write since then is read with a `ChangedFileWarning`, and the solution is marked
-    as ``changed``: `colloc verify` decides what it is worth.
+    What it holds is believed; `colloc verify` says whether a file is worth its numbers.
 
     Raises
     ------
@@ -118,19 +105,22 @@ def load(path: str | os.PathLike[str]) -> Solution:
     Traceback (most recent call last):
     colloc.system.errors.StoreError: there is no file nothing.h5.
     """
-    changed = was_changed(Path(path), FORMAT)
-    try:
-        with sealed_file(path, FORMAT, FORMAT_VERSION, unsealed=changed) as file:
-            solution = _read(file)
-    except StoreError as error:
-        if not changed:
-            raise
-        raise StoreError(f"{path} was changed after colloc wrote it, and cannot be read any more: {error}") from None
-    if changed:
-        solution.changed = True
-        message = f"{path} was changed after colloc wrote it; colloc verify {path} says what it is worth."
-        warnings.warn(message, ChangedFileWarning, stacklevel=2)
-    return solution
+    with open_file(path, FORMAT, FORMAT_VERSION) as file:
+        return _read(file)
+
+
+def holds_more(path: str | os.PathLike[str], solution: Solution) -> bool:
+    """Whether the file of a solution holds attributes or datasets that `save` does not write for it, such as remarks."""
+    with h5py.File(path, "r", locking=False) as file, h5py.File(io.BytesIO(), "w") as written:
+        _write(written, solution)
+        return not _names(file) <= _names(written)
+
+
+def _names(file: h5py.File) -> set[str]:
+    """Of all datasets, groups and attributes."""
+    names = {f"/@{name}" for name in file.attrs}
+    file.visititems(lambda place, item: names.update([place, *(f"{place}@{name}" for name in item.attrs)]))
+    return names
 
 
 def _write(file: h5py.File, solution: Solution) -> None:
@@ -180,8 +170,7 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         problem = problem.with_(body=problem.body.on_panels(panels))
     if plain["delta"] < problem.delta:  # lowered for a small gait
         problem = problem.with_(delta=plain["delta"])
-    if "smallest_shape_speed" in group.attrs:  # raised for a gait that would shrink
-        problem = problem.with_(smallest_shape_speed=attribute(group, "smallest_shape_speed"))
+    problem = problem.with_(smallest_shape_speed=attribute(group, "smallest_shape_speed"))  # raised if the gait would shrink
     second = SecondOrder(**{f.name: attribute(group, f"second_order_{f.name}") for f in dataclasses.fields(SecondOrder)})
     steps = child(file, "history")
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
@@ -189,7 +178,7 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     # by the variables, not by what the group gait says for other readers
     layout = layout_of(control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]), knots)
     if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
-        raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
+        raise StoreError("its variables do not fit its mesh.")
     parameters, meet = arrays["x"][layout.parameters[:, 0]], arrays["edges"] if knots is None else knots
     gait = problem.gait.member(parameters, problem.body.n_joint, meet)
     return Answer(problem, gait, knots=knots, **arrays, **plain, second_order=second, history=history)
@@ -244,10 +233,7 @@ def _read_certificate(group: h5py.Group) -> Certificate:
 
 
 def _read(file: h5py.File) -> Solution:
-    stated = json.loads(text(file, "problem"))
-    problem = Problem.from_dict(stated)
-    if statement_hash(stated) != attribute(file, "problem_hash"):
-        raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
+    problem = Problem.from_dict(json.loads(array(file, "problem")))
     answer = _read_answer(file, problem)
     certificate = UNCERTIFIED
     if "certificate" in file:
@@ -257,11 +243,11 @@ def _read(file: h5py.File) -> Solution:
         answer,
         certificate,
         float(attribute(file, "seconds")),
-        text(file, "source"),
+        array(file, "source"),
         str(attribute(file, "message")),
-        json.loads(text(file, "versions")),
+        json.loads(array(file, "versions")),
     )
-    others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(text(file, "others"))]
+    others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(array(file, "others"))]
     solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
     solution.interrupted = bool(attribute(file, "interrupted"))
     return solution

@@ -31,7 +31,7 @@ from colloc.system.plain_values import Codec, Own
 from colloc.system.row_file import put_rows, read_rows
 
 Value = TypeVar("Value")
-ROWS = "colloc run 1"
+ROWS = "colloc run 2"
 EVERY = 2.0
 """Seconds between writes: as much may have to be computed again after a crash. Short solves write nothing."""
 _PROBLEM = "problem"
@@ -117,7 +117,7 @@ class Run:
         if self.path is None:
             return
         try:
-            rows = read_rows(self.path, ROWS).values
+            rows = read_rows(self.path, ROWS)
         except StoreError as error:
             raise StoreError(f"{error} It was left by an interrupted run; remove it to begin again (solve --fresh).") from None
         if rows.pop(_PROBLEM, self.problem.hash) != self.problem.hash:

@@ -11,10 +11,10 @@ from typing import Any
 from colloc.gaits.gait_fields import statement_hash
 from colloc.results.outcome import outcome_fields, outcome_from
 from colloc.studies.cell import Attempt
-from colloc.system.errors import CollocError, StoreError
+from colloc.system.errors import ProblemError, StoreError
 from colloc.system.row_file import put_rows, read_rows
 
-KIND, NAME = "colloc journal 1", "journal.sqlite"
+KIND, NAME = "colloc journal 2", "journal.sqlite"
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +24,6 @@ class Record:
     problem_hash: str
     attempts: tuple[Attempt, ...]
     scores: dict[str, float] = field(default_factory=dict)
-
-
-@dataclass(eq=False)
-class Journal:
-    """What was read: records in order, and how many rows were damaged."""
-
-    records: list[Record] = field(default_factory=list)
-    damaged: int = 0
 
 
 def _record_fields(record: Record) -> dict[str, Any]:
@@ -47,20 +39,13 @@ def _record_from(entry: dict[str, Any]) -> Record:
     return Record(str(entry["problem"]), attempts, {str(key): float(score) for key, score in entry["scores"].items()})
 
 
-def read_journal(folder: Path) -> Journal:
-    """All records of a folder; none if there is no such folder. `StoreError` if the journal cannot be read, is damaged beyond
-    single rows, or was written by an older colloc."""
-    old = next(folder.glob("journal-*.jsonl"), None)
-    if old is not None:
-        raise StoreError(f"{old} was written by an older colloc, which this one does not read; choose another --output.")
-    rows = read_rows(folder / NAME, KIND)
-    found = Journal(damaged=len(rows.damaged))
-    for entry in rows.values.values():
-        try:
-            found.records.append(_record_from(entry))
-        except (KeyError, TypeError, ValueError, OverflowError, AttributeError, CollocError):
-            found.damaged += 1
-    return found
+def read_journal(folder: Path) -> list[Record]:
+    """All records of a folder, in order; none if there is no such folder. `StoreError` if the journal cannot be
+    read or is damaged."""
+    try:
+        return [_record_from(entry) for entry in read_rows(folder / NAME, KIND).values()]
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError, ProblemError):
+        raise StoreError(f"{folder / NAME} is damaged: it holds something else than records; move it away.") from None
 
 
 def append_records(folder: Path, records: Sequence[Record]) -> None:

@@ -75,11 +75,9 @@ class StudyRun:
 
     def __init__(self, study: Study, folder: Path, *, retry: bool = False) -> None:
         self.study, self.folder = study, folder
-        journal = read_journal(folder)
-        self.damaged = journal.damaged
         attempts: dict[str, list[Attempt]] = {}
         scores: dict[str, dict[str, float]] = {}
-        for record in journal.records:
+        for record in read_journal(folder):
             kept = [a for a in record.attempts if not (retry and a.outcome.status in RETRIED)]
             attempts.setdefault(record.problem_hash, []).extend(kept)
             scores.setdefault(record.problem_hash, {}).update(record.scores)

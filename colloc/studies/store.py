@@ -29,10 +29,9 @@ import numpy as np
 from colloc.results.solution import versions
 from colloc.studies.table import UNITS, StudyTable
 from colloc.system.errors import StoreError
-from colloc.system.store_file import BETWEEN_DIMS, array, attribute, mark, new_file, put, put_attribute, sealed_file
+from colloc.system.store_file import BETWEEN_DIMS, array, attribute, mark, new_file, open_file, put, put_attribute
 
 KIND, VERSION = "colloc study", 2
-_MOST_VARIABLES = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +70,8 @@ def _no_truth_values(values: np.ndarray) -> np.ndarray:
 
 
 def load_study(path: str | os.PathLike[str]) -> StudyFile:
-    """The result in a file that `save_study` wrote. `StoreError` if the file is missing, damaged, or not the result of a study.
-    Nothing in it is executed."""
-    with sealed_file(path, KIND, VERSION) as file:
-        if len(file) > _MOST_VARIABLES:
-            raise StoreError(f"{path} holds {len(file)} variables, where {_MOST_VARIABLES} are allowed.")
+    """The result in a file that `save_study` wrote. `StoreError` if it is missing, damaged, or not the result of a study."""
+    with open_file(path, KIND, VERSION) as file:
         found = {name: array(file, name) for name in file}
         dimensions = {name: tuple(attribute(file[name], "dims").split(BETWEEN_DIMS)) for name in file}
         attributes = {name: attribute(file, name) for name in file.attrs}

@@ -55,12 +55,8 @@ class StoreError(CollocError, OSError):
     """
 
 
-class ChangedFileWarning(UserWarning):
-    """A results file is not as colloc wrote it, and was read all the same."""
-
-
 class ReadOnlyRunWarning(UserWarning):
-    """What a solve has found so far cannot be kept on the disk; it goes on."""
+    """A file that saves work, such as what a solve has found so far, cannot be read or written; the work goes on without it."""
 
 
 class OrderWarning(UserWarning):

@@ -13,11 +13,9 @@ import numpy as np
 
 import colloc
 from colloc.system.errors import StoreError
-from colloc.system.store_file import array, attribute, mark, new_file, put, put_attribute, sealed_file
+from colloc.system.store_file import array, attribute, mark, new_file, open_file, put, put_attribute
 
 KIND, VERSION = "colloc arrays", 2
-_LARGEST = 2**31
-"""Bytes of a file, and of an array: velocity maps are large."""
 
 
 def write_arrays(
@@ -73,15 +71,15 @@ def read_arrays(path: Path) -> dict[str, Any]:
         if isinstance(item, h5py.Dataset):
             names.append(name)
 
-    with sealed_file(path, KIND, VERSION, largest=_LARGEST) as file:
+    with open_file(path, KIND, VERSION) as file:
         file.visititems(visit)
-        return {name: array(file, name, largest=_LARGEST) for name in names}
+        return {name: array(file, name) for name in names}
 
 
 def read_attribute(path: Path, name: str) -> Any:
     """One attribute of the file, or None if the file or the attribute is missing, or the file is damaged."""
     try:
-        with sealed_file(path, KIND, VERSION, largest=_LARGEST) as file:
+        with open_file(path, KIND, VERSION) as file:
             return attribute(file, name)
     except StoreError:
         return None

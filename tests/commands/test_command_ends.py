@@ -13,7 +13,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import pytest
 
 from colloc.bounds.optimality_gap import upper_bound
@@ -315,37 +314,6 @@ def test_files_have_the_permissions_that_the_user_asked_for(mask, three_link, tm
         os.umask(before)
     for written in (path, tmp_path / "x.sqlite"):
         assert written.stat().st_mode & 0o777 == 0o666 & ~mask
-
-
-def test_a_result_that_another_program_opened_is_read_and_verify_decides(result, capsys):
-    before = load(result)
-    with h5py.File(result, "r+"):
-        pass
-    with pytest.warns(UserWarning, match="was changed after colloc wrote it"):
-        again = load(result)
-    assert again.changed
-    assert not before.changed
-    assert again.answer.x.tobytes() == before.answer.x.tobytes()
-    assert colloc(["verify", str(result)]) == 0
-    printed = capsys.readouterr()
-    assert "the file was changed after colloc wrote it" in printed.out
-    assert printed.err.count("was changed") == 1
-    with h5py.File(result, "r+") as file:
-        file["certificate"].attrs["distance"] = 0.5
-    assert colloc(["verify", str(result), "--json"]) == 4
-    verdict = json.loads(capsys.readouterr().out)
-    assert verdict["changed"]
-    assert "the file certifies an efficiency of 0.48" in verdict["complaint"]
-
-
-@pytest.mark.parametrize("cut", [1, 1000, 100_000])
-def test_a_result_without_its_end_is_still_refused(cut, result, capsys):
-    with h5py.File(result, "r+"):
-        pass
-    content = result.read_bytes()
-    result.write_bytes(content[:-cut])
-    assert colloc(["verify", str(result)]) == 2
-    assert "it carries no checksum" in capsys.readouterr().err
 
 
 def test_a_command_that_was_interrupted_says_so_whatever_became_of_the_interruption():

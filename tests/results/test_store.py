@@ -6,7 +6,6 @@ import pytest
 
 from colloc.results.store import load, save
 from colloc.system.errors import StoreError
-from colloc.system.sealed_file import write_sealed
 
 
 def test_round_trip_keeps_everything(three_link, tmp_path):
@@ -34,53 +33,33 @@ def test_plain_h5py_reads_the_motion_with_units(three_link, tmp_path):
         assert file["history/delta"][0] == three_link.history[0].delta
 
 
-def test_nothing_is_left_behind_and_a_failed_write_keeps_the_old_file(three_link, tmp_path, monkeypatch):
-    path = save(three_link, tmp_path / "x.h5")
-    before = path.read_bytes()
-
-    def broken(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("colloc.results.store._write_motion", broken)
-    with pytest.raises(StoreError, match="No space left"):
-        save(three_link, path)
-    assert path.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
-
-
-@pytest.mark.parametrize("name", ["distance", "work_error", "value_at_zero_delta"])
-def test_a_certificate_without_one_of_its_numbers_is_refused(name, three_link, tmp_path):
-    path = save(three_link, tmp_path / "x.h5")
+@pytest.mark.parametrize("name", ["distance", "work_error", "value_at_zero_delta", "value"])
+def test_a_certificate_without_one_of_its_numbers_or_with_several_for_one_is_refused(name, three_link, tmp_path):
+    path, said = save(three_link, tmp_path / "x.h5"), f"attribute {name} of /certificate is missing"
     with h5py.File(path, "a") as file:
         del file["certificate"].attrs[name]
-    with pytest.raises(StoreError, match=f"attribute {name} of /certificate is missing"):
+        if name == "value":
+            file["certificate"].attrs[name], said = [0.26, 0.27], "TypeError"
+    with pytest.raises(StoreError, match=f"not a readable colloc solution: {said}"):
         load(path)
 
 
 def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
     with pytest.raises(StoreError, match="there is no file"):
         load(tmp_path / "none.h5")
-    (tmp_path / "text.h5").write_text("hello")
-    with pytest.raises(StoreError, match="not a readable"):
-        load(tmp_path / "text.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = [1.0]
-    with pytest.raises(StoreError, match="carries no checksum"):
-        load(tmp_path / "other.h5")
-    write_sealed(tmp_path / "other.h5", (tmp_path / "other.h5").read_bytes())
-    with pytest.raises(StoreError, match="not a colloc solution"):
+    with pytest.raises(StoreError, match="not a readable colloc solution: attribute format of / is missing"):
         load(tmp_path / "other.h5")
     good = save(three_link, tmp_path / "good.h5")
     data = good.read_bytes()
     (tmp_path / "cut.h5").write_bytes(data[: len(data) // 2])
-    with pytest.raises(StoreError):
+    with pytest.raises(StoreError, match=r"not a readable colloc solution: OSError: .*truncated"):
         load(tmp_path / "cut.h5")
     with h5py.File(good, "a") as file:
         del file["problem"]
         file["problem"] = '{"name": "x"}'
-    with pytest.raises(
-        StoreError, match=r"good.h5 was changed after colloc wrote it, and cannot be read any more: /problem holds"
-    ):
+    with pytest.raises(StoreError, match=r"good.h5 is not a readable colloc solution: not the description of a problem"):
         load(good)
 
 

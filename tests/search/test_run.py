@@ -77,7 +77,7 @@ def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(undisturb
     assert "best gait so far" in first.message
     assert load(path.with_suffix(".interrupted.h5")).status == "interrupted"
     assert not path.exists()
-    assert len(read_rows(run_file(path), ROWS).values) >= number
+    assert len(read_rows(run_file(path), ROWS)) >= number
     assert colloc.solve(file, starts=4, output=path).status == "solved"
     assert contents(path) == wanted
     assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
@@ -125,7 +125,7 @@ def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path
         pass
     assert len(stops) > 3
     np.testing.assert_array_equal(found.answer.x, wanted.answer.x)
-    rows = [key.split(" ")[0] for key in read_rows(path, ROWS).values]
+    rows = [key.split(" ")[0] for key in read_rows(path, ROWS)]
     for stage in ("converged", "confirm", "certify"):
         assert computed.count(stage) == rows.count(stage) > 0
 
@@ -180,7 +180,7 @@ def test_a_kept_value_that_was_damaged_is_found_anew(tmp_path):
     first = Run(path, QUICK)
     first.kept("stage", (1,), lambda: (np.arange(3.0), QUICK))
     first.write()
-    (key,) = (key for key in read_rows(path, ROWS).values if key != "problem")
+    (key,) = (key for key in read_rows(path, ROWS) if key != "problem")
     for wrong in ({"kind": "Stranger", "of": {}}, {"array": "AAAA", "type": "<f8", "shape": [3]}):
         put_rows(path, ROWS, {key: wrong})
         again = Run(path, QUICK)
@@ -216,7 +216,7 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
     second = Run(path, problem)
     with second.under_way(np.inf):
         again = descend(begin_at(problem, problem.guess))
-    assert second.found_again == len(read_rows(path, ROWS).values) - 1 > 0
+    assert second.found_again == len(read_rows(path, ROWS)) - 1 > 0
     np.testing.assert_array_equal(again.v, found.v)
     assert (again.objective, again.kkt_error, again.history) == (found.objective, found.kkt_error, found.history)
     # its space is made anew, and its program says the same
@@ -266,7 +266,7 @@ def test_a_run_that_cannot_be_written_is_told_once_and_is_written_at_the_end_if_
         solution = solve(QUICK, 2, keep=path)
     assert solution.certificate.replayed
     assert (len(told), len(tries)) == (1, 2)
-    assert len(read_rows(path, ROWS).values) > 5
+    assert len(read_rows(path, ROWS)) > 5
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits")

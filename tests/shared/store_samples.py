@@ -86,14 +86,12 @@ class Samples:
             return found.seconds, found.problem.hash, found.answer.x.tobytes(), found.certificate
         if kind == "archive":
             found = open_archive(problem(), path.with_suffix(".h5"))
-            return {name: o.efficiency for name, o in found.outcomes.items()}, len(found.damaged)
+            return {name: o.efficiency for name, o in found.outcomes.items()}
         if kind == "arrays":
             return {k: np.asarray(v).tolist() for k, v in read_arrays(path).items()}
         if kind == "study":
             found = load_study(path)
             return found.attributes, {name: repr(values.tolist()) for name, values in found.variables.items()}
         if kind == "journal":
-            text = read_journal(path.parent)
-            return sorted(a.key for r in text.records for a in r.attempts), text.damaged
-        found = read_rows(path, CACHE)
-        return found.values, len(found.damaged)
+            return sorted(a.key for r in read_journal(path.parent) for a in r.attempts)
+        return read_rows(path, CACHE)

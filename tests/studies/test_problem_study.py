@@ -259,7 +259,7 @@ def test_a_run_that_is_left_goes_on_where_it_stopped_and_solves_nothing_twice(fa
     assert set(rest) | set(seen) == set(again.cells)
     assert not set(rest) & set(seen)
     assert finished(StudyRun(grid(), tmp_path)) == []
-    keys = [(r.problem_hash, a.key) for r in read_journal(tmp_path).records for a in r.attempts]
+    keys = [(r.problem_hash, a.key) for r in read_journal(tmp_path) for a in r.attempts]
     assert len(keys) == len(set(keys))
 
 
@@ -339,7 +339,7 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
 
 def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
     append_records(tmp_path, [Record("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})])
-    (kept,) = read_journal(tmp_path).records
+    (kept,) = read_journal(tmp_path)
     assert kept.scores == {"known": 0.2}
 
 

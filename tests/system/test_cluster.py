@@ -105,7 +105,7 @@ def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
     journal = tmp_path / "out" / "tiny.study"
 
     def finished():
-        return len(read_journal(journal).records) if journal.exists() else 0
+        return len(read_journal(journal)) if journal.exists() else 0
 
     def until(number):
         for _ in range(1200):
@@ -132,7 +132,7 @@ def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
     assert 7 <= kept < cells
     done = subprocess.run([*command, "--json"], capture_output=True, text=True)
     assert json.loads(done.stdout)["counts"] == {"solved": cells}
-    keys = [(record.problem_hash, attempt.key) for record in read_journal(journal).records for attempt in record.attempts]
+    keys = [(record.problem_hash, attempt.key) for record in read_journal(journal) for attempt in record.attempts]
     assert len(keys) == len(set(keys))  # nothing was solved twice
 
 
