@@ -6,49 +6,30 @@ import argparse
 import json
 from pathlib import Path
 
-import numpy as np
-
 from colloc.commands.ending import OK, command
 from colloc.commands.options import add_printing, new_parser, tell
 from colloc.gaits.objective import EFFICIENCY
-from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE
+from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE, distance, fourier_series
 from colloc.results.solution import Solution
 from colloc.results.store import load
 
 DIFFERENT = 1
 _EPILOG = """\
-Paths in shape space are compared as sets of shapes: start phase, pacing and direction do not count, nor do mirror image
-and the body read from its other end. Exit codes: 0 the same optimum; 1 different; 2 bad file.
+Joint angles are compared at the start phase, and in the mirror image, where they are nearest; of a symmetric body also named
+from the other end, under friction that is the same both ways also run backwards. Exit codes: 0 the same optimum; 1 different;
+2 bad file.
 
   colloc compare results/a.h5 results/b.h5"""
-_PHASES = 800
-
-
-def path_distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Largest distance [rad] from a point of one closed polygon of shapes to the other, both ways; vertices ``(n_joint,
-    n_time)``, of which the first and the last are joined."""
-    return max(_farthest(a, b), _farthest(b, a))
-
-
-def _farthest(points: np.ndarray, polygon: np.ndarray) -> float:
-    start, edge = polygon, np.roll(polygon, -1, axis=1) - polygon
-    length2 = np.maximum((edge**2).sum(axis=0), 1e-300)
-    worst = 0.0
-    for point in points.T:
-        away = point[:, None] - start
-        along = np.clip((away * edge).sum(axis=0) / length2, 0.0, 1.0)
-        worst = max(worst, float(((away - along * edge) ** 2).sum(axis=0).min()))
-    return worst**0.5
 
 
 def gait_distance(a: Solution, b: Solution) -> float | None:
-    """Distance [rad] of two gaits as paths, modulo mirror image and naming from the other end; None for other bodies."""
+    """Root-mean-square distance [rad] of the joint angles of two gaits, where start phase and the symmetries of body and
+    friction bring them nearest; None for other bodies."""
     if a.problem.body != b.problem.body:
         return None
-    t = np.arange(_PHASES) / _PHASES
-    p, q = (solution.gait.angles(t) for solution in (a, b))
-    images = [q, -q] + ([q[::-1], -q[::-1]] if a.problem.body.symmetric else [])
-    return min(path_distance(p, image) for image in images)
+    law = b.problem.law if a.problem.law.reversible else a.problem.law
+    first, second = (fourier_series(each.problem, each.gait) for each in (a, b))
+    return distance(first, second, a.problem.body, law)
 
 
 def changed_fields(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
@@ -98,8 +79,8 @@ def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
     apart, named = gait_distance(a, b), "efficiencies" if what == EFFICIENCY else f"values of {what.name}"
     if apart is None:
         return False, f"other bodies; {named} differ by {100 * difference:.3g} %."
-    text = f"{named} differ by {100 * difference:.3g} %, paths by at most {apart:.3g} rad"
-    same = difference <= SAME_VALUE and apart <= 2 * SAME_GAIT
+    text = f"{named} differ by {100 * difference:.3g} %, joint angles by {apart:.3g} rad (root mean square)"
+    same = difference <= SAME_VALUE and apart < SAME_GAIT
     return same, f"{'the same optimum' if same else 'different'}: {text}."
 
 

@@ -14,9 +14,7 @@ from colloc.commands.options import add_printing, add_verbose, new_parser, outpu
 from colloc.commands.solve import EXIT
 from colloc.commands.summary import kept_facts, kept_lines, summary_dict, summary_lines
 from colloc.gaits.problem_file import read_problem_file
-from colloc.results.gait_difference import gait_difference
 from colloc.results.kept import save_result
-from colloc.results.store import load
 
 _EPILOG = """\
 The file has a line for each instant: its time, then the angle of each joint. Columns are known by their names (joint_1 at the
@@ -24,8 +22,8 @@ tail, joint_2, ...; units as _deg, [deg], time_ms), in any order; without names 
 commas, comments and other columns are seen to, and one line says what was taken. Angles are radians unless names or --degrees
 say otherwise. What colloc export writes can be read. Errors hold what the samples are off by, with two standard deviations.
 
-  colloc evaluate problems/three_link.py mine.csv                                    results/mine-evaluated.h5
-  colloc evaluate problems/three_link.py mine.csv --best results/three_link.h5       and by what it differs from that
+  colloc evaluate problems/three_link.py mine.csv                          results/mine-evaluated.h5
+  colloc compare results/mine-evaluated.h5 results/three_link.h5
   colloc animate results/mine-evaluated.h5"""
 
 
@@ -33,7 +31,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("evaluate", "What a gait of your own achieves: replayed, certified, saved as a result.", _EPILOG)
     parser.add_argument("problem", help="a Python file that states PROBLEM: body, friction and limits are meant")
     parser.add_argument("gait", metavar="GAIT.csv", help="times and joint angles")
-    parser.add_argument("--best", metavar="FILE.h5", help="a result to hold the gait against")
     parser.add_argument("--period", type=float, metavar="T", help="in the file's unit of time (default: as it repeats itself)")
     parser.add_argument("--harmonics", type=int, metavar="N", help="of the fit (default: as many as the samples are worth)")
     parser.add_argument("--degrees", action="store_true", help="angles are degrees where names do not say what they are")
@@ -48,21 +45,13 @@ def main(options: argparse.Namespace) -> int:
     from colloc.search.evaluate import evaluate
 
     stated = read_problem_file(options.problem)
-    best = None if options.best is None else load(options.best)
     given = {"period": options.period, "harmonics": options.harmonics, "degrees": options.degrees}
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", Path(options.gait).stem)  # of letters that a problem's name may have
     default = Path("results") / f"{name}-evaluated.h5"  # not where the result is that it was exported from
     solution = evaluate(stated.problem.with_(name=default.stem), options.gait, **given)
-    difference = None if best is None else gait_difference(solution, best)
     path = output_path(options.output, default)
     saved = save_result(solution, path)
     facts = {**summary_dict(solution, saved[0].path, None, None), "kept": kept_facts(saved)}
     lines = summary_lines(solution, None, verbose=options.verbose)
-    if best is not None and difference is not None:
-        facts["best"] = {"file": options.best, "value": best.value, **difference._asdict()}
-        lines.append(
-            f"  yours {solution.value:.4g}, best {best.value:.4g}; the largest difference is {difference.largest} "
-            f"({max(difference):.2g} of {difference.total:.2g} rad r.m.s.)"
-        )
     tell(options, facts, [*lines, f"  saved {saved[0].path}", *kept_lines(saved)])
     return EXIT[solution.status]

@@ -1,4 +1,4 @@
-"""Laws of friction that are stated as formulas: forces, derivatives, traits and C follow from the text."""
+"""Laws of friction that are stated as formulas: forces, derivatives and traits follow from the text."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.laws.c_formula import own_law_header
 from colloc.mechanics.friction import regularised_speed
-from colloc.mechanics.law import KernelLaw, Matrix
+from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array
 from colloc.numerics.expression import Dual, Formula, formula
 
@@ -19,6 +18,8 @@ _SAME, _LEAST = 1e-10, 1e-12
 
 class FormulaLaw:
     """A law by its `formulas`, its name and its units; what it knows better than samples tell, it may say itself."""
+
+    kernel_numbers = ()
 
     @property
     def associated(self) -> bool:
@@ -76,13 +77,6 @@ class FormulaLaw:
     @property
     def largest(self) -> float:
         return float(self._at_unit_speed[1].max())
-
-    @cached_property
-    def kernel(self) -> KernelLaw:
-        """Largest force, degree, units of force and speed, and whether there is a potential, and a reversal."""
-        degree = np.nan if self.degree is None else self.degree
-        numbers = self.largest, degree, self.unit, self.speed_unit, float(self.associated), float(self.reversible)
-        return KernelLaw(numbers, own_law_header(*self.formulas))
 
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         fs, fn = (each(self._at(vs, vn, delta)) / self.unit for each in self._read[:2])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from colloc.mechanics.law import KernelLaw, Matrix
+from colloc.mechanics.law import Matrix
 from colloc.mechanics.line_integrals import LineIntegrals, line_integrals
 from colloc.mechanics.link_friction import LinkForce, power
 from colloc.numerics.arrays import Array
@@ -41,7 +41,7 @@ class Viscous:
     degree = 1.0
     reversible = associated = True
     regularised = False
-    kernel = KernelLaw()
+    kernel_numbers = ()
 
     def __post_init__(self) -> None:
         check_positive(self, "normal", "tangential", of="friction.")

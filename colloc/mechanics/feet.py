@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.law import KernelLaw, Law
+from colloc.mechanics.law import Law
 from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments, shown
 from colloc.system.errors import ProblemError
 
@@ -270,7 +270,7 @@ class FeetLaw:
     def __post_init__(self) -> None:
         object.__setattr__(self, "laws", tuple(self.laws))
 
-    kernel = KernelLaw()
+    kernel_numbers = ()
     density = density_jacobian = density_secant = density_potential = staticmethod(_of_each_foot)
 
     @property

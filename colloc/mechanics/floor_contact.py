@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from colloc.mechanics.feet import FeetLaw, Foot
-from colloc.mechanics.law import KernelLaw, Law, Matrix
+from colloc.mechanics.law import Law, Matrix
 from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
@@ -271,28 +271,19 @@ class FloorContact:
         return np.hypot(vs, np.maximum(vn - 0.5 * self.length * w, 0.0)) if self.law(friction).reversible else vs
 
     @cached_property
-    def _of_kernel(self) -> dict[Law, KernelLaw]:
+    def _kernel_numbers(self) -> dict[Law, tuple[float, ...]]:
         return {}
 
-    def kernel_law(self, friction: Law) -> KernelLaw:
-        """The law of all that touches, for the compiled kernel: parts under Coulomb's law or the elliptic one, each its own, or
-        all under one law that is stated as formulas."""
-        if friction not in self._of_kernel:
-            self._of_kernel[friction] = self._in_the_kernel(self.law(friction))
-        return self._of_kernel[friction]
-
-    def _in_the_kernel(self, law: Law) -> KernelLaw:
-        own = self._each(law)
-        stated = own[0].kernel
-        alike = all(each.kernel.own_law == stated.own_law for each in own) and (not stated.own_law or len(set(own)) == 1)
-        if not alike or not all(each.kernel.numbers for each in own):
-            return KernelLaw()
-        numbers = [each.kernel.numbers[:5] for each in own]
-        degree, unit, speed_unit = numbers[0][1:4]  # of a law that is stated as formulas
-        first = np.searchsorted(self.links, np.arange(len(self._scatter) + 1))
-        parts = np.hstack([self.along, self.offset, self.cos, self.sin, self.length, self.pressure, numbers])
-        head = len(self._scatter), len(self.parts), law.largest, float(law.associated), degree, unit, speed_unit
-        return KernelLaw((*head, *first, *parts.ravel()), stated.own_law)
+    def kernel_numbers(self, friction: Law) -> tuple[float, ...]:
+        """All that touches and its laws, for the compiled kernel; empty where one of them is neither Coulomb's nor elliptic."""
+        if friction not in self._kernel_numbers:
+            law = self.law(friction)
+            numbers = [each.kernel_numbers[:5] for each in self._each(law)]
+            first = np.searchsorted(self.links, np.arange(len(self._scatter) + 1))
+            head = len(self._scatter), len(self.parts), law.largest, float(law.associated), *first
+            places = self.along, self.offset, self.cos, self.sin, self.length, self.pressure
+            self._kernel_numbers[friction] = (*head, *np.hstack([*places, numbers]).ravel()) if all(numbers) else ()
+        return self._kernel_numbers[friction]
 
     def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
         """Of what is drawn as sticking or sliding, and what it is called: of the middles of links; of feet, and of pads where

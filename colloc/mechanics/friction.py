@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics import link_friction
-from colloc.mechanics.law import KernelLaw, Matrix
+from colloc.mechanics.law import Matrix
 from colloc.mechanics.line_integrals import LineIntegrals, line_integrals
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
@@ -89,10 +89,10 @@ class Friction(Coefficients):
             raise ProblemError(f"friction holds more than {_LARGEST:g} times what presses: no floor does.")
 
     @property
-    def kernel(self) -> KernelLaw:
+    def kernel_numbers(self) -> tuple[float, ...]:
         """Coefficients, stretches of the tangential velocity forwards and backwards, and whether there is a potential."""
         stretches = [float(self.stretch(np.array(side))) for side in (1.0, -1.0)]
-        return KernelLaw((self.mu_t, self.mu_f, self.mu_b, *stretches, float(self.associated)))
+        return self.mu_t, self.mu_f, self.mu_b, *stretches, float(self.associated)
 
     @property
     def label(self) -> str:

@@ -8,21 +8,12 @@ Everything else, from the balance to the report, asks only these questions; what
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from colloc.numerics.arrays import Array
 
 Matrix = tuple[tuple[Any, ...], ...]
 """2 x 2 of a point or 3 x 3 of a link, of arrays."""
-
-
-class KernelLaw(NamedTuple):
-    """The law of what touches the floor as the compiled kernel takes it."""
-
-    numbers: tuple[float, ...] = ()
-    """Empty where it does not know the law."""
-    own_law: str = ""
-    """C of the law (own_law.h); empty where the kernel has the law in closed form."""
 
 
 @runtime_checkable
@@ -83,8 +74,8 @@ class Law(Protocol):
         """The function whose gradient is minus the force; of associated laws only."""
 
     @property
-    def kernel(self) -> KernelLaw:
-        """The law as the compiled kernel takes it."""
+    def kernel_numbers(self) -> tuple[float, ...]:
+        """The law as the compiled kernel takes it; empty where that does not have it in closed form."""
 
 
 def rate_independent(law: Law) -> bool:

@@ -1,8 +1,8 @@
 """The compiled kernel of chains: C sources of this package as a shared library, or none, and its calls. No CasADi.
 
-The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are built with the package (setup.py). A
-kernel with the law of a user, and one that was not built or whose sources were changed since, is compiled for the process that
-needs it, in half a second. Without a compiler everything is done by NumPy, the reference (docs/developers/kernel.md).
+The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are built with the package (setup.py). If
+that could not be, or they were changed since, everything is done by NumPy, the reference (docs/developers/kernel.md), and so
+are laws of friction that the kernel does not have in closed form.
 Calls release the interpreter's lock, so that large batches are shared by threads; an instant's answer depends on
 nothing but its own data, so it is the same in any batch and on any number of threads.
 """
@@ -29,13 +29,10 @@ from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
-from colloc.numerics.c_compiler import compiled_library
-from colloc.system.errors import SlowWarning, StoreError
+from colloc.system.errors import SlowWarning
 from colloc.system.processors import available_threads
 
 SOURCES = resources.files("colloc.mechanics") / "native"
-FLAGS = tuple((SOURCES / "flags.txt").read_text("ascii").split())
-"""Nothing that reorders arithmetic. -O3 takes three times as long to compile and gains 5 to 10 %."""
 _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
 
@@ -51,7 +48,10 @@ _SIGNATURES = {
     ),
     "colloc_momenta": (*BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, _ARRAY, ctypes.c_int, _ARRAY, _ARRAY),
 }
-
+_SLOW = (
+    "the balance is solved by NumPy, 10 to 60 times more slowly: the compiled kernel was not built, or its sources changed "
+    "since; install colloc again with a C compiler on the PATH."
+)
 
 _ANY, _USUAL = Links(), Friction()
 _switched_off = False
@@ -59,8 +59,7 @@ _switched_off = False
 
 def native_kernel(body: Links = _ANY, friction: Law = _USUAL) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
-    law = body.contact.kernel_law(friction)
-    return library(law.own_law) if body.in_series and law.numbers and not _switched_off else None
+    return library() if not _switched_off and body.in_series and body.contact.kernel_numbers(friction) else None
 
 
 @contextlib.contextmanager
@@ -75,23 +74,17 @@ def numpy_instead() -> Iterator[None]:
 
 
 @cache
-def library(own_law: str = "") -> ctypes.CDLL | None:
-    """The kernel as it was built, or else compiled now, by itself or with a law's own C; None, with a `SlowWarning`, if that
-    cannot be."""
-    try:
-        with resources.as_file(SOURCES) as sources:
-            found = None if own_law else built_kernel(sources)
-            if found is None:
-                own = {"own_law.h": own_law} if own_law else {}
-                found = compiled_library(sources / "kernel.c", [*FLAGS, *(["-DOWN_LAW"] if own else [])], own)
-    except (OSError, StoreError) as error:
+def library() -> ctypes.CDLL | None:
+    """The kernel as it was built, or None, with a `SlowWarning`, if there is none of these sources."""
+    with resources.as_file(SOURCES) as sources:
+        built = built_kernel(sources)
+    if built is None:
         if multiprocessing.parent_process() is None:  # workers leave it to their parent
-            slow = f"the balance is solved by NumPy, 10 to 60 times more slowly: {str(error).rstrip('.')}."
-            warnings.warn(slow, SlowWarning, stacklevel=2)
+            warnings.warn(_SLOW, SlowWarning, stacklevel=2)
         return None
     for name, arguments in _SIGNATURES.items():
-        getattr(found, name).argtypes = arguments
-    return found
+        getattr(built, name).argtypes = arguments
+    return built
 
 
 def built_kernel(sources: Path) -> ctypes.CDLL | None:
@@ -138,7 +131,7 @@ def call_for_all(
 @lru_cache(maxsize=64)
 def _stated(body: Links, friction: Law) -> tuple[tuple[int, ...], tuple[np.ndarray, ...]]:
     """A chain and its law as calls are told them: how many links, and where the numbers are, which come with it."""
-    law = np.array(body.contact.kernel_law(friction).numbers, dtype=float)
+    law = np.array(body.contact.kernel_numbers(friction), dtype=float)
     numbers = np.array(body.lengths), body.pressure_column().ravel(), body.mass_column().ravel(), law
     return (body.n_link, *map(address, numbers)), numbers
 

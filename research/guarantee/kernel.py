@@ -15,9 +15,11 @@ from colloc.mechanics import native_kernel
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 from colloc.mechanics.native_kernel import BODY, address, call_for_all
-from colloc.numerics.c_compiler import c_compiler, compiled_library
+from research.guarantee.c_compiler import c_compiler, compiled_library
 
 SOURCES = Path(__file__).with_name("native")
+FLAGS = tuple((native_kernel.SOURCES / "flags.txt").read_text("ascii").split())
+"""Those of the library's C: nothing that reorders arithmetic."""
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
 _SIGNATURES = {
     "colloc_loaded": (*BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
@@ -42,8 +44,8 @@ def proofs() -> ctypes.CDLL:
 
 
 def proof_flags() -> list[str]:
-    """Those of the library's C, for C++: nothing that reorders arithmetic."""
-    return ["-std=c++17", "-fno-exceptions", "-fno-rtti", *(flag for flag in native_kernel.FLAGS if "-std" not in flag)]
+    """The same for C++."""
+    return ["-std=c++17", "-fno-exceptions", "-fno-rtti", *(flag for flag in FLAGS if "-std" not in flag)]
 
 
 def call(name: str, *arguments: np.ndarray | float) -> None:
@@ -61,7 +63,7 @@ def _with_signatures(library: ctypes.CDLL, signatures: dict) -> ctypes.CDLL:
 @cache
 def _library() -> ctypes.CDLL:
     headers = {each.name: each.read_text("ascii") for each in native_kernel.SOURCES.iterdir() if each.name.endswith(".h")}
-    return _with_signatures(compiled_library(SOURCES / "guarantee.c", native_kernel.FLAGS, headers), _SIGNATURES)
+    return _with_signatures(compiled_library(SOURCES / "guarantee.c", FLAGS, headers), _SIGNATURES)
 
 
 def compiled_loaded(

@@ -50,9 +50,9 @@ def loaded_balance(
     Raises
     ------
     ProblemError
-        Without a C compiler.
+        Without a C compiler, or the kernel that is built with the package.
     """
     library = guarantee_kernel(body)
     if library is None:
-        raise ProblemError("a guaranteed bound needs a C compiler (cc, gcc or clang): none was found.")
+        raise ProblemError("a guaranteed bound needs a C compiler (cc, gcc or clang), and colloc installed with one.")
     return Loaded(*compiled_loaded(library, body, friction, angles, rates, load, start, delta, steps))

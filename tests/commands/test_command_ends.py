@@ -469,9 +469,9 @@ def test_a_pipe_that_is_closed_early_is_one_sentence_and_a_code_of_its_own(resul
 def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_path):
     """An installation without a compiler has no extension module."""
     shutil.copytree(Path(ending.__file__).parents[1], tmp_path / "colloc", ignore=shutil.ignore_patterns("_kernel.*"))
-    environment = {**os.environ, "CC": "", "PATH": "", "PYTHONPATH": str(tmp_path)}
+    environment = {**os.environ, "PATH": "", "PYTHONPATH": str(tmp_path)}
     words = "multistart", quick, "--starts", "2", "--workers", "2", "--quiet", "--output", f"{tmp_path}/"
     done = command(*words, env=environment, cwd=tmp_path)
     assert done.returncode in (0, 3)
-    why = "there is no C compiler (cc, gcc or clang, or $CC)."
-    assert done.stderr.decode() == f"colloc: the balance is solved by NumPy, 10 to 60 times more slowly: {why}\n"
+    assert done.stderr.decode().startswith("colloc: the balance is solved by NumPy, 10 to 60 times more slowly: the compiled")
+    assert done.stderr.decode().count("\n") == 1

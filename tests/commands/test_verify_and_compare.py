@@ -14,7 +14,9 @@ from colloc.commands import compare, export
 from colloc.commands import verify as recheck
 from colloc.commands.main import SUBCOMMANDS, main
 from colloc.gaits.harmonic import Fourier
+from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.friction import Friction
 from colloc.results import checks
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
@@ -114,37 +116,33 @@ def test_verify_refuses_what_is_no_result(tmp_path, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_path_distance_of_circles_and_insensitivity_to_start_pacing_and_direction():
-    t = np.arange(400) / 400
+@pytest.mark.parametrize(
+    ("friction", "lengths", "alike"),
+    [
+        (Friction(), (1 / 3, 1 / 3, 1 / 3), {"turned", "backwards", "both"}),
+        (Friction(mu_t=1, mu_f=1, mu_b=1.5), (1 / 3, 1 / 3, 1 / 3), {"both"}),
+        (Friction(), (0.2, 0.5, 0.3), {"backwards"}),
+    ],
+)
+def test_gaits_are_compared_where_start_phase_and_the_symmetries_of_body_and_friction_bring_them_nearest(
+    friction, lengths, alike
+):
+    mean, cos, sin = np.array([0.3, -0.1]), np.array([[1.0], [0.2]]), np.array([[0.1], [0.8]])
+    problem = Problem("p", body=Chain(lengths), friction=friction)
 
-    def circle(radius, phase, count=1.0, x=0.0):
-        return np.stack([x + radius * np.cos(2 * np.pi * phase), radius * np.sin(2 * np.pi * phase)])
+    def found(*parts):
+        return SimpleNamespace(problem=problem, gait=Fourier(*parts))
 
-    assert compare.path_distance(circle(1.0, t), circle(1.5, t)) == pytest.approx(0.5, abs=1e-3)
-    assert compare.path_distance(circle(1.0, t), circle(1.0, t, x=0.3)) == pytest.approx(0.3, abs=1e-3)
-    other = circle(1.0, 0.3 - t + 0.1 * np.sin(2 * np.pi * t))
-    assert compare.path_distance(circle(1.0, t), other) < 1e-4
-
-
-def test_a_path_that_lies_on_a_part_of_another_is_not_the_same_whichever_is_named_first():
-    short, long = (np.array([[0.0, reach], [0.0, 0.0]]) for reach in (1.0, 3.0))
-    assert compare.path_distance(short, long) == compare.path_distance(long, short) == pytest.approx(2.0)
+    gait, later = found(mean, cos, sin), found(-mean, -sin, cos)  # the mirror image, begun elsewhere
+    assert compare.gait_distance(gait, later) < 1e-9
+    turned = -mean[::-1], -cos[::-1], -sin[::-1]
+    others = {"turned": turned, "backwards": (mean, cos, -sin), "both": (*turned[:2], -turned[2])}
+    assert {name for name, other in others.items() if compare.gait_distance(gait, found(*other)) < 1e-9} == alike
 
 
-def test_gaits_are_compared_modulo_mirror_and_the_end_that_is_named_first():
-    gait, uneven = Fourier([0.3, -0.1], [[1.0], [0.2]], [[0.1], [0.8]]), Chain((0.2, 0.5, 0.3))
-
-    def found(body, *parts):
-        return SimpleNamespace(problem=SimpleNamespace(body=body), gait=Fourier(*parts))
-
-    parts = gait.mean, gait.cos, gait.sin
-    for sign in (1, -1):
-        for order in (1, -1):
-            image = [sign * part[::order] for part in parts]
-            assert compare.gait_distance(found(Chain(), *parts), found(Chain(), *image)) < 1e-4
-            apart = compare.gait_distance(found(uneven, *parts), found(uneven, *image))
-            assert (apart < 1e-4) == (order == 1)
-    assert compare.gait_distance(found(Chain(), *parts), found(uneven, *parts)) is None
+def test_gaits_of_other_bodies_are_not_compared(three_link):
+    other = SimpleNamespace(problem=Problem("p", body=Chain((0.2, 0.5, 0.3))))
+    assert compare.gait_distance(three_link, other) is None
 
 
 def test_the_same_gait_found_for_another_objective_is_not_the_same_optimum(three_link):

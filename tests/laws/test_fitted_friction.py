@@ -67,8 +67,9 @@ def test_metres_and_seconds_are_the_same_law():
     np.testing.assert_allclose(forces(metres, SPEED, 0.7), forces(own, SPEED, 0.7), rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_it_is_a_law_like_any_other(tmp_path):
-    """NumPy, CasADi, compiled kernel, certificate and file, from a file of samples."""
+    """NumPy, CasADi, certificate and file, from a file of samples."""
     path = tmp_path / "floor.csv"
     values = table(stribeck(0.7, -0.2, 0.5), stribeck(1.4, -0.4, 0.5))
     np.savetxt(path, values[:, [0, 2, 1]], delimiter=",", header="speed,sideways,forward", comments="")

@@ -4,8 +4,6 @@ import pickle
 
 import numpy as np
 import pytest
-from shared.instants import random_instants
-from shared.kernels import by_both
 
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
@@ -14,7 +12,6 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.native_kernel import native_kernel
 from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 
@@ -90,29 +87,3 @@ def test_a_law_of_ones_own_goes_to_other_processes():
     one, delta = np.array([[0.3]]), np.array([[1e-3]])
     again = pickle.loads(pickle.dumps(law))
     assert again.density(one, one, delta) == law.density(one, one, delta)
-
-
-COMPILED = {
-    "weakening": OwnLaw("-where(vs > 0, 1, 1.5) * vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))"),
-    "every function": OwnLaw(
-        "-where(vs <= 0, 1.5, 1) * vs/speed * (1 + tanh(speed)**2/3) - 0.1*vs*exp(-abs(vs))",
-        "-2*vn/speed * log(2 + sqrt(speed)) - vn*delta",
-        unit=3.0,
-        speed_unit=0.5,
-    ),
-    "power": PowerLaw(0.4, mu_t=2.0, mu_f=1.0, mu_b=1.5),
-    "power with a potential": PowerLaw(1.6, 2.0, 2.0, 2.0),
-}
-
-
-@pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
-@pytest.mark.parametrize("case", COMPILED)
-def test_a_law_compiled_from_its_formulas_is_the_law(case):
-    law, body, (angles, rates) = COMPILED[case], Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)), random_instants(60)
-    assert native_kernel(body, law) is not None
-    rates[:, ::2] *= 1e-3  # links of some instants hardly turn
-    (z, motion, slopes), (same_z, same, reference) = by_both(body, law, angles, rates, 1e-3)
-    np.testing.assert_allclose(z, same_z, atol=1e-8)
-    np.testing.assert_allclose(motion.power, same.power, rtol=1e-9)
-    np.testing.assert_allclose(motion.actuator_power, motion.power, rtol=1e-7)
-    np.testing.assert_allclose(slopes, reference, atol=1e-8)

@@ -282,19 +282,6 @@ def test_feet_nearly_on_a_line_are_balanced_where_the_residual_must_rise_before_
         solve_balance(*at[:2], *(a[:, ::20] for a in at[2:4]), 5e-6).require()
 
 
-@pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
-@pytest.mark.parametrize("law", LAWS[4:], ids=["power", "own"])
-def test_laws_that_are_stated_as_formulas_are_compiled_for_feet_that_share_them(law):
-    body, (angles, rates) = Chain(LENGTHS, feet=PAIR), random_instants(20)
-    assert native_kernel(body, law) is not None
-    (z, motion, slopes), (same_z, known, reference) = by_both(body, law, angles, rates, 1e-2)
-    np.testing.assert_allclose(same_z, z, atol=1e-8)
-    np.testing.assert_allclose(motion.power, known.power, rtol=1e-9)
-    np.testing.assert_allclose(slopes, reference, atol=1e-8)
-    half = law.in_units_of(2.0)
-    np.testing.assert_allclose(body.solve(half, angles, rates, 1e-2).z, z, atol=1e-8)
-
-
 def test_laws_that_the_kernel_does_not_know_at_points_are_left_to_numpy():
     for body, law in ((Chain(feet=1), Viscous()), (Chain(feet=(*WHEELS[:2], Foot(2, 0.4))), PowerLaw(0.5))):
         assert native_kernel(body, body.law(law)) is None

@@ -140,17 +140,6 @@ def test_compiled_balances_and_slopes_on_pads_are_those_of_numpy(law, feet):
     np.testing.assert_allclose(slopes, reference, atol=1e-8 * np.abs(reference).max())
 
 
-@pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
-@pytest.mark.parametrize("law", LAWS[4:], **names)
-def test_laws_that_are_stated_as_formulas_are_compiled_for_pads_and_feet(law):
-    body, (angles, rates) = Chain(LENGTHS, feet=(*PADS[:3], Foot(2, 0.2))), random_instants(20)
-    assert native_kernel(body, law) is not None
-    (z, motion, slopes), (same_z, known, reference) = by_both(body, law, angles, rates, 1e-2)
-    np.testing.assert_allclose(same_z, z, atol=1e-8)
-    np.testing.assert_allclose(motion.power, known.power, rtol=1e-9)
-    np.testing.assert_allclose(slopes, reference, atol=1e-8 * np.abs(reference).max())
-
-
 @pytest.mark.parametrize(
     ("pad", "sentence"),
     [

@@ -78,7 +78,7 @@ def laws_of_friction():
         if law.associated:
             found += [law.density_potential(vs, vn, 0.1), on_links.potential(vs, vn, w, length, 0.1)]
         found += [law.smallest, law.largest, law.degree, law.regularised, law.reversible, law.label, law.describe()]
-        found += [on_links.largest_forces(length), law.kernel.numbers, law.in_units_of(2.0), law.in_speeds_of(2.0)]
+        found += [on_links.largest_forces(length), law.kernel_numbers, law.in_units_of(2.0), law.in_speeds_of(2.0)]
     return found
 
 

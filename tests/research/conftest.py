@@ -5,7 +5,7 @@ from functools import cache
 
 import pytest
 
-from colloc.numerics.c_compiler import c_compiler
+from research.guarantee.c_compiler import c_compiler
 
 
 @cache

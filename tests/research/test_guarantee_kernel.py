@@ -10,12 +10,11 @@ pytestmark = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 WITHIN_ITS_ARRAYS = """
 import numpy as np
 from colloc import Chain, Friction
-from colloc.mechanics import native_kernel
+from research.guarantee import kernel
 from research.guarantee.enclosure import CORNERS, Cells, ReferencePoint, by_convexity, corner_motions
 from research.guarantee.loaded_balance import loaded_balance
 
-native_kernel.FLAGS += ("-O1", "-fsanitize=address")
-native_kernel.built_kernel = lambda sources: None
+kernel.FLAGS += ("-O1", "-fsanitize=address")
 rng = np.random.default_rng(0)
 for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
     body, n = Chain(lengths), len(lengths) - 1

@@ -11,8 +11,8 @@ from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.numerics.c_compiler import compiled_library
 from research.guarantee import kernel
+from research.guarantee.c_compiler import compiled_library
 from research.guarantee.enclosure import DELTA, states
 
 pytestmark = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")

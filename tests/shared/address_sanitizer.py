@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from colloc.numerics.c_compiler import c_compiler
+from research.guarantee.c_compiler import c_compiler
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -29,7 +29,6 @@ typedef struct {
     Sliding *now, *trial;
     int anchor;
     Vector3 velocity;
-    double largest_rate;
     double residual;
     long long iterations;
 } State;
@@ -88,7 +87,7 @@ static inline void iterate(const int n, State *s, double delta, double tolerance
     const bool far = law->associated || method == NATURAL;
     const double *shrink = far ? BACKTRACKING : SHORT_BACKTRACKING;
     const size_t tries = far ? sizeof BACKTRACKING / sizeof *shrink : sizeof SHORT_BACKTRACKING / sizeof *shrink;
-    const double unit = unit_of_force(law, delta, s->largest_rate);
+    const double unit = law->largest / hypot(1.0, delta);
     long long iterations = 0, fixed_point_due = method == FIXED_POINT ? -1 : 0;
     double *z = s->velocity;
     find_midpoints(n, s->link, s->anchor);

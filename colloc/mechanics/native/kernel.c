@@ -35,9 +35,8 @@ static inline void balance_instants(
     double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     for (ptrdiff_t t = first; t < last; ++t) {
-        const double largest = largest_rate_of(n, rates + t, n_time, load ? delta : 0.0), speed = speed_unit_of(largest);
+        const double speed = largest_rate_of(n, rates + t, n_time, load ? delta : 0.0);
         Vector3 tail;
-        s->largest_rate = largest;
         find_directions(n, s->link, length, pressure, mass, angles + t, rates + t, speed, n_time);
         if (load)
             find_loads(n, s->link, load + t, n_time);
@@ -109,7 +108,7 @@ int colloc_motion(
     Matrix3 *K = malloc((size_t)n * sizeof *K);
     Change *d = malloc((size_t)n * sizeof *d);
     for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {
-        const double speed = speed_unit_of(largest_rate_of(n, rates + t, n_time, load ? delta : 0.0)), own_delta = scaled_delta_of(delta, speed);
+        const double speed = largest_rate_of(n, rates + t, n_time, load ? delta : 0.0), own_delta = scaled_delta_of(delta, speed);
         const int a = (int)anchor[t];
         double value[ROWS], change[DIFFERENTIATED_ROWS];
         Vector3 z, net, dz;

@@ -42,10 +42,9 @@ static inline double h_series(double q)
 }
 
 /* Fill in a2 to h from vs, vn, w. */
-static inline void pad_roots(PartSliding *k, const Law *law, const Part *p, double delta)
+static inline void pad_roots(PartSliding *k, const Part *p, double delta)
 {
     const double length = p->length;
-    (void)law;
     const double vs = k->stretched = stretch(p, k->vs) * k->vs;
     const double a2 = vs * vs + delta * delta, half = 0.5 * length * k->w;
     const double y0 = k->vn - half, y1 = k->vn + half;
@@ -65,10 +64,9 @@ static inline void pad_roots(PartSliding *k, const Law *law, const Part *p, doub
 }
 
 /* Friction on the pad from a2 to h; its pressure multiplies it, here and below. */
-static inline void pad_force(PartSliding *k, const Law *law, const Part *p)
+static inline void pad_force(PartSliding *k, const Part *p)
 {
     const double length = p->length, pressure = p->pressure;
-    (void)law;
     const double per_S = 1.0 / k->S, l3 = length * length * length, mu_t = pressure * p->mu_t;
     k->fs = -pressure * tangential(p, k->vs) * k->stretched * 2.0 * length * k->g * per_S;
     k->fn = -mu_t * 2.0 * k->vn * length * per_S;
@@ -76,16 +74,14 @@ static inline void pad_force(PartSliding *k, const Law *law, const Part *p)
 }
 
 /* Dissipation potential of the pad: mu times the integral of r. */
-static inline double pad_dissipation(const PartSliding *k, const Law *law, const Part *p)
+static inline double pad_dissipation(const PartSliding *k, const Part *p)
 {
-    (void)law;
     return p->pressure * (p->mu_t * p->length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g));
 }
 
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w). */
-static inline void pad_slopes(const PartSliding *k, const Law *law, const Part *p, double delta, Matrix3 slopes)
+static inline void pad_slopes(const PartSliding *k, const Part *p, double delta, Matrix3 slopes)
 {
-    (void)law;
     const double vs = k->stretched, vn = k->vn, w = k->w, length = p->length, pressure = p->pressure;
     const double mu_s = pressure * tangential(p, k->vs), mu_t = pressure * p->mu_t, more = stretch(p, k->vs);
     const double l3 = length * length * length, per_S = 1.0 / k->S, per_r = 1.0 / k->r0r1;
@@ -102,13 +98,12 @@ static inline void pad_slopes(const PartSliding *k, const Law *law, const Part *
 }
 
 /* Minus force over velocity with r frozen: the law of the paper's fixed point. */
-static inline void pad_secants(const PartSliding *k, const Law *law, const Part *p, double delta, Matrix3 secants)
+static inline void pad_secants(const PartSliding *k, const Part *p, Matrix3 secants)
 {
     const double length = p->length, pressure = p->pressure;
     const double mu_s = pressure * tangential(p, k->vs), mu_t = pressure * p->mu_t, S = k->S, l3 = length * length * length;
     const double I0 = 2.0 * length * k->g / S, I1 = -2.0 * k->vn * k->w * l3 * k->h / (S * S * S);
     const double I2 = l3 / S * (0.5 * k->Q + (2.0 * k->vn * k->vn - k->a2) * k->h / (S * S));
-    (void)law, (void)delta;
     secants[0][0] = stretch(p, k->vs) * mu_s * I0, secants[0][1] = 0.0, secants[0][2] = 0.0;
     secants[1][0] = 0.0, secants[1][1] = mu_t * I0, secants[1][2] = mu_t * I1;
     secants[2][0] = 0.0, secants[2][1] = mu_t * I1, secants[2][2] = mu_t * I2;

@@ -1,5 +1,5 @@
 /* Friction on one link at its feet and pads: what colloc/mechanics/floor_contact.py states for arrays, under the law of Coulomb or
-   the elliptic one (colloc/mechanics/friction.py), each part's own, or all under one that is stated as formulas (own_law.h). */
+   the elliptic one (colloc/mechanics/friction.py), each part's own. */
 
 #pragma once
 
@@ -7,7 +7,7 @@
 #include <stdbool.h>
 
 /* Where it is, seen from the link's midpoint; the direction it is turned to; its length, 0 of a foot; its weight, of a pad per
-   length; and its own law if that is Coulomb's. */
+   length; and its law. */
 typedef struct {
     double along, offset, cos, sin, length, pressure;
     double mu_t, mu_f, mu_b, stretch_f, stretch_b;
@@ -15,18 +15,13 @@ typedef struct {
 
 typedef struct {
     int n_part;
-    double largest, degree, unit, speed_unit; /* the last two of a law that is stated as formulas: own_units.h */
+    double largest;
     bool associated;
     const double *first; /* number of the first part of every link, and of all parts */
     const Part *part;
 } Law;
 
-#ifdef OWN_LAW
-#include "link_quadrature.h"
-#include "own_units.h"
-#else
 #include "link_friction.h"
-#endif
 
 /* Velocities of the link, then the friction on it; and all parts of the body. */
 typedef struct {
@@ -37,12 +32,12 @@ typedef struct {
 
 typedef double Matrix2[2][2];
 
-/* Of `FloorContact.kernel_law` in colloc/mechanics/floor_contact.py. */
+/* Of `FloorContact.kernel_numbers` in colloc/mechanics/floor_contact.py. */
 static Law law_of(const double *number)
 {
     const int n_link = (int)number[0], n_part = (int)number[1];
-    const Part *part = (const Part *)(number + 8 + n_link);
-    Law law = {n_part, number[2], number[4], number[5], number[6], number[3] != 0, number + 7, part};
+    const Part *part = (const Part *)(number + 5 + n_link);
+    Law law = {n_part, number[2], number[3] != 0, number + 4, part};
     return law;
 }
 
@@ -56,48 +51,6 @@ static Sliding *new_slidings(const int n, const int copies, const Law *law)
     return k;
 }
 
-#ifdef OWN_LAW
-static inline void point_force(const Law *law, const Part *f, const PartSliding *v, double delta, double force[2])
-{
-    const double s = law->speed_unit;
-    (void)f;
-    density(s * v->vs, s * v->vn, s * delta, force);
-    force[0] /= law->unit, force[1] /= law->unit;
-}
-
-static inline double point_potential(const Law *law, const Part *f, const PartSliding *v, double delta)
-{
-    const double s = law->speed_unit;
-    (void)f;
-    return potential(s * v->vs, s * v->vn, s * delta) / (s * law->unit);
-}
-
-/* Minus the derivative of the force; or, where `steep`, a multiple of 1 in its place that is no less: the trace. */
-static inline void point_slopes(const Law *law, const Part *f, const PartSliding *v, double delta, bool steep, Matrix2 K)
-{
-    const double s = law->speed_unit;
-    double d[2][2];
-    (void)f;
-    density_slopes(s * v->vs, s * v->vn, s * delta, d);
-    if (steep) {
-        d[0][0] = d[1][1] = -hypot(d[0][0] + d[1][1], 1e-12);
-        d[0][1] = d[1][0] = 0.0;
-    }
-    for (int j = 0; j < 4; ++j)
-        K[j / 2][j % 2] = -s * d[j / 2][j % 2] / law->unit;
-}
-#else
-static inline double speed_unit_of(double largest_rate)
-{
-    return largest_rate;
-}
-
-static inline double unit_of_force(const Law *law, double delta, double largest_rate)
-{
-    (void)largest_rate;
-    return law->largest / hypot(1.0, delta);
-}
-
 /* The speed r, in which the velocity along the foot counts as it is stretched. */
 static inline double speed(const Part *f, const PartSliding *v, double delta)
 {
@@ -105,30 +58,26 @@ static inline double speed(const Part *f, const PartSliding *v, double delta)
     return sqrt(along * along + v->vn * v->vn + delta * delta);
 }
 
-static inline void point_force(const Law *law, const Part *f, const PartSliding *v, double delta, double force[2])
+static inline void point_force(const Part *f, const PartSliding *v, double delta, double force[2])
 {
     const double r = speed(f, v, delta);
-    (void)law;
     force[0] = -tangential(f, v->vs) * stretch(f, v->vs) * v->vs / r;
     force[1] = -f->mu_t * v->vn / r;
 }
 
-static inline double point_potential(const Law *law, const Part *f, const PartSliding *v, double delta)
+static inline double point_potential(const Part *f, const PartSliding *v, double delta)
 {
-    (void)law;
     return f->mu_t * speed(f, v, delta);
 }
 
 /* Minus the derivative of the force; or, where `steep`, force over velocity with r frozen. */
-static inline void point_slopes(const Law *law, const Part *f, const PartSliding *v, double delta, bool steep, Matrix2 K)
+static inline void point_slopes(const Part *f, const PartSliding *v, double delta, bool steep, Matrix2 K)
 {
     const double more = stretch(f, v->vs), r = speed(f, v, delta), mu_s = tangential(f, v->vs);
     const double es = steep ? 0.0 : more * v->vs / r, en = steep ? 0.0 : v->vn / r, ed = steep ? 1.0 : delta / r;
-    (void)law;
     K[0][0] = more * mu_s * (en * en + ed * ed) / r, K[0][1] = -mu_s * es * en / r;
     K[1][0] = -more * f->mu_t * es * en / r, K[1][1] = f->mu_t * (es * es + ed * ed) / r;
 }
-#endif
 
 static inline int first_part(const Law *law, const Link *link)
 {
@@ -150,7 +99,7 @@ static inline void find_roots(Sliding *k, const Law *law, const Link *link, doub
         const double vs = k->vs - f->offset * k->w, vn = k->vn + f->along * k->w;
         own->vs = f->cos * vs + f->sin * vn, own->vn = f->cos * vn - f->sin * vs, own->w = k->w;
         if (f->length > 0)
-            pad_roots(own, law, f, delta);
+            pad_roots(own, f, delta);
     }
 }
 
@@ -161,10 +110,10 @@ static inline void find_force(Sliding *k, const Law *law, const Link *link)
         const Part *f = &law->part[i];
         PartSliding *own = &k->part[i];
         if (f->length > 0)
-            pad_force(own, law, f);
+            pad_force(own, f);
         else {
             double force[2];
-            point_force(law, f, own, k->delta, force);
+            point_force(f, own, k->delta, force);
             own->fs = f->pressure * force[0], own->fn = f->pressure * force[1], own->couple = 0.0;
         }
         const double fs = f->cos * own->fs - f->sin * own->fn, fn = f->sin * own->fs + f->cos * own->fn;
@@ -191,7 +140,7 @@ static inline double dissipation(const Sliding *k, const Law *law, const Link *l
     for (int i = first_part(law, link); i < last_part(law, link); ++i) {
         const Part *f = &law->part[i];
         const PartSliding *own = &k->part[i];
-        total += f->length > 0 ? pad_dissipation(own, law, f) : f->pressure * point_potential(law, f, own, k->delta);
+        total += f->length > 0 ? pad_dissipation(own, f) : f->pressure * point_potential(f, own, k->delta);
     }
     return total;
 }
@@ -210,12 +159,12 @@ static inline void add_slopes(const Sliding *k, const Law *law, const Link *link
             {0.0, 0.0, 1.0}};
         Matrix3 K = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
         if (f->length > 0 && steep)
-            pad_secants(own, law, f, delta, K);
+            pad_secants(own, f, K);
         else if (f->length > 0)
-            pad_slopes(own, law, f, delta, K);
+            pad_slopes(own, f, delta, K);
         else {
             Matrix2 point;
-            point_slopes(law, f, own, delta, steep, point);
+            point_slopes(f, own, delta, steep, point);
             for (int j = 0; j < 4; ++j)
                 K[j / 2][j % 2] = f->pressure * point[j / 2][j % 2];
         }

@@ -1,4 +1,4 @@
-"""C compiled while a program runs, by the system's compiler, for this process alone. No CasADi."""
+"""C compiled while a program runs, by the system's compiler, for this process alone."""
 
 from __future__ import annotations
 
