@@ -42,7 +42,10 @@ def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
     assert any(line.startswith(f"  {len(good)} checks hold (largest: ") for line in lines)
 
 
-def told_of_limits(gait=ellipse(0.0, 1.2, 0.8), **limits):
+LOOP = ellipse(0.0, 1.2, 0.8)
+
+
+def told_of_limits(gait=LOOP, **limits):
     """What the summary says of the limits of a gait, usually one whose joints bend by 1.2 and 0.8 rad at two phases."""
     stated = Problem("limited", gait=Harmonic(1), delta=1e-2, **limits)
     found = evaluate(stated, gait)
@@ -85,7 +88,8 @@ def test_a_limit_of_all_joints_matters_if_it_does_to_one_and_one_of_each_is_name
     assert summary_dict(found, None, None, None)["limits"]["torque"] * 0.1 > 0.02
     assert not lines[1:]
     _, lines = told_of_limits(wave, body=body, torque_limit=(0.1, 0.1, 0.01))
-    assert lines[1:] == ["torque_limit 0.1 of joint 1 cannot matter: no gait needs more than 0.02 weight x body length, its unit"]
+    assert len(lines) == 2
+    assert lines[1].startswith("torque_limit 0.1 of joint 1 cannot matter: no gait needs more than 0.02 weight")
 
 
 def test_a_speed_that_decides_says_how_far_joints_can_swing():
