@@ -23,9 +23,9 @@ from __future__ import annotations
 import ast
 import functools
 import importlib
-import inspect
 from collections.abc import Callable
 from pathlib import Path
+from types import FunctionType
 
 from colloc.system.late_binding import bind
 from colloc.system.versions import version_of
@@ -84,7 +84,7 @@ def __getattr__(name: str) -> object:
     """Import a public name when it is first used, so that the NumPy part never loads CasADi."""
     if name in _HOME:
         found = getattr(importlib.import_module(_HOME[name]), name)
-        return _checked(found) if inspect.isfunction(found) else found
+        return _checked(found) if isinstance(found, FunctionType) else found
     if name == "__version__":
         return version_of("colloc")
     if name in _GONE:

@@ -3,7 +3,21 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Concertina, CrawlerBody, Friction, ModalBody, PowerLaw, ProblemError, Wave, ellipse, replay
+from colloc import (
+    ArcPath,
+    Chain,
+    Concertina,
+    Corners,
+    CrawlerBody,
+    Fourier,
+    Friction,
+    ModalBody,
+    PowerLaw,
+    ProblemError,
+    Wave,
+    ellipse,
+    replay,
+)
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.smooth.motion import Motion
 from colloc.verification.slope import checked_chain
@@ -84,3 +98,12 @@ def test_what_lies_beyond_is_refused(case):
     made, arguments = case
     with pytest.raises(ProblemError):
         made(**arguments)
+
+
+@pytest.mark.parametrize("made", [Corners, ArcPath, Fourier])
+def test_a_gait_that_lacks_a_part_or_is_given_one_of_another_kind_is_refused_in_a_sentence(made):
+    for given in ((), (np.eye(2), np.eye(2)), (1,) * 9):
+        with pytest.raises(ProblemError):
+            made(*given)
+    with pytest.raises(ProblemError, match="has no argument 'corner'"):
+        made(corner=np.eye(2))

@@ -15,7 +15,7 @@ import colloc
 from colloc.gaits.fitted_gait import fitted_gait
 
 ROOT = Path(__file__).resolve().parents[1]
-HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy")
+HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy", "inspect")
 
 
 def test_importing_colloc_loads_nothing_heavy_and_shows_every_public_name():

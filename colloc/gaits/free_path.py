@@ -28,6 +28,7 @@ JOINS, CURVATURE = 1e-8, 1e-6
 """Largest jump [rad] and relative excess of the curvature that a certificate allows."""
 
 
+@named_arguments
 @dataclass(frozen=True, eq=False, repr=False)
 class ArcPath(UnitSpeedGait):
     """A closed path of circular arcs that join smoothly.

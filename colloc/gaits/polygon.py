@@ -20,6 +20,7 @@ _MOST_TOLD = 64
 """Vertices of a polygon that are told one by one."""
 
 
+@named_arguments
 @dataclass(frozen=True, eq=False, repr=False)
 class Corners(UnitSpeedGait):
     """A closed polygon.

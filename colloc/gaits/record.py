@@ -25,6 +25,8 @@ _ANGLES = {
     "degree": np.pi / 180, "degrees": np.pi / 180, "grad": np.pi / 180, "°": np.pi / 180,
 }  # fmt: skip
 """Units of angles [rad]; Grad is German for degrees."""
+_NOT_READ = {"rev", "revs", "revolutions", "turn", "turns", "gon", "gons", "tick", "ticks", "counts"}
+"""Words of names that say another unit."""
 _TIMES = {
     "s": 1.0, "sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "millis": 1e-3,
     "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "usec": 1e-6, "micros": 1e-6, "microseconds": 1e-6, "ns": 1e-9, "nsec": 1e-9,
@@ -324,6 +326,8 @@ def _even_steps(time: np.ndarray) -> tuple[np.ndarray, str]:
 
 def _radians(path: Path, table: Table, joints: list[_Column], rows: np.ndarray, degrees: bool) -> tuple[np.ndarray, np.ndarray]:
     """Angles in radians ``(n_joint, n_time)``, and which were degrees. `ProblemError` if they are something else."""
+    for name, word in ((column.name, word) for column in joints for word in column.words if word in _NOT_READ):
+        raise ProblemError(f"{path}: the column {name} holds {word}: write degrees or radians, and say so in its name.")
     stated = [next((_ANGLES[word] for word in reversed(c.words) if word in _ANGLES), 0.0) for c in joints]
     if degrees and 1.0 in stated:
         raise ProblemError(

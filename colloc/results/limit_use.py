@@ -67,10 +67,14 @@ def _beyond_any_gait(problem: Problem) -> Iterator[str]:
         speed = 2 * math.pi * gait.harmonics * _half_ranges(problem)
     most = torque * np.minimum(speed, problem.largest_speeds or np.inf)
     for (field, unit), bound in zip(UNITS.values(), (speed, torque, most), strict=True):
-        stated = of_each(getattr(problem, field), n)
+        limit = getattr(problem, field)
+        if not isinstance(limit, tuple):  # of all joints: it matters if it does to one of them
+            bound = bound.max(keepdims=True)
+        stated = of_each(limit, bound.size)
         if stated and (np.array(stated) > _SURELY * bound).any():
             joint = int(np.argmax(stated / bound))
-            yield f"{field} {stated[joint]:g} cannot matter: no gait needs more than {bound[joint]:.3g} {unit}, its unit"
+            of = f" of joint {joint + 1}" * isinstance(limit, tuple)
+            yield f"{field} {stated[joint]:g}{of} cannot matter: no gait needs more than {bound[joint]:.3g} {unit}, its unit"
 
 
 def _short_swings(problem: Problem, used: dict[str, float]) -> Iterator[str]:

@@ -425,7 +425,7 @@ class Robot:
             does = f"Inertia {'takes' if lost >= 0 else 'adds'} {share} of the efficiency {pace}"
             said[-1] = f"All this includes inertia. {does}{more}"
             if abs(turns := math.degrees(f["rotation_by_inertia_rad"])) > _TURNS:
-                said.append(f"Inertia also turns the robot by {turns:.2g}° a period: its way is an arc")
+                said[-1] += f". It also turns the robot by {turns:.2g}° a period: its way is an arc"
         slowly = self.solution.distance * self.length / self.period
         said[-1] += f". At this period slow motion would be {slowly:.4g} m/s."
         return said

@@ -153,6 +153,7 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
             put_attribute(group, field.name, getattr(answer, field.name))
     put_attribute(group, "panels", answer.problem.body.panels)
     put_attribute(group, "smallest_shape_speed", answer.problem.smallest_shape_speed)
+    put(group, "guess", json.dumps(fields(answer.problem.guess)))
     for field in dataclasses.fields(SecondOrder):
         put_attribute(group, f"second_order_{field.name}", getattr(answer.second_order, field.name))
     steps = file.create_group("history")
@@ -170,7 +171,9 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         problem = problem.with_(body=problem.body.on_panels(panels))
     if plain["delta"] < problem.delta:  # lowered for a small gait
         problem = problem.with_(delta=plain["delta"])
-    problem = problem.with_(smallest_shape_speed=attribute(group, "smallest_shape_speed"))  # raised if the gait would shrink
+    if "guess" in group:  # the least speed was raised for a gait that would shrink
+        guess = gait_from(json.loads(text(group, "guess")))
+        problem = problem.with_(smallest_shape_speed=attribute(group, "smallest_shape_speed"), guess=guess)
     second = SecondOrder(**{f.name: attribute(group, f"second_order_{f.name}") for f in dataclasses.fields(SecondOrder)})
     steps = child(file, "history")
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}

@@ -6,11 +6,11 @@ So a lower package can offer what it must not import; the face of the library sa
 from __future__ import annotations
 
 import importlib
-import inspect
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from types import FunctionType
 from typing import Any
 
 from colloc.system.errors import CollocError
@@ -31,7 +31,7 @@ def bound(name: str) -> Callable[..., Any]:
     module, _, function = _WHERE[name].partition(":")
     with _whatever_backend():
         found = getattr(importlib.import_module(module), function)
-    return checked_arguments(found) if inspect.isfunction(found) and not name.startswith("plot") else found
+    return checked_arguments(found) if isinstance(found, FunctionType) and not name.startswith("plot") else found
 
 
 @contextmanager

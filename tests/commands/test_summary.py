@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colloc import Harmonic, Problem, ellipse, evaluate
+from colloc import Chain, Fourier, Harmonic, Problem, ellipse, evaluate
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_dict, summary_lines
 from colloc.results.checks import Check
@@ -42,10 +42,13 @@ def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
     assert any(line.startswith(f"  {len(good)} checks hold (largest: ") for line in lines)
 
 
-def told_of_limits(**limits):
-    """What the summary says of the limits of a gait whose joints bend by 1.2 and 0.8 rad at two phases."""
+LOOP = ellipse(0.0, 1.2, 0.8)
+
+
+def told_of_limits(gait=LOOP, **limits):
+    """What the summary says of the limits of a gait, usually one whose joints bend by 1.2 and 0.8 rad at two phases."""
     stated = Problem("limited", gait=Harmonic(1), delta=1e-2, **limits)
-    found = evaluate(stated, ellipse(0.0, 1.2, 0.8))
+    found = evaluate(stated, gait)
     return found, [line[18:] for line in summary_lines(found, None) if line.startswith("  limits ")]
 
 
@@ -76,6 +79,17 @@ def test_limits_that_no_gait_could_reach_are_named_with_what_it_could_need():
         "torque_limit 1.5 cannot matter: no gait needs more than 0.0556 weight x body length, its unit",
         "power_limit 2 cannot matter: no gait needs more than 0.698 weight x body length per period, its unit",
     ]
+
+
+def test_a_limit_of_all_joints_matters_if_it_does_to_one_and_one_of_each_is_named_by_its_joint():
+    """The outer joints of four links with short ends need 0.02 at most, the inner one more than that."""
+    body, wave = Chain((0.2, 0.3, 0.3, 0.2)), Fourier(np.zeros(3), [[0.2], [0.9], [0.2]], [[0.5], [0.0], [-0.5]])
+    found, lines = told_of_limits(wave, body=body, torque_limit=0.1)
+    assert summary_dict(found, None, None, None)["limits"]["torque"] * 0.1 > 0.02
+    assert not lines[1:]
+    _, lines = told_of_limits(wave, body=body, torque_limit=(0.1, 0.1, 0.01))
+    assert len(lines) == 2
+    assert lines[1].startswith("torque_limit 0.1 of joint 1 cannot matter: no gait needs more than 0.02 weight")
 
 
 def test_a_speed_that_decides_says_how_far_joints_can_swing():

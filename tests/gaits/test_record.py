@@ -136,6 +136,8 @@ REFUSED = {
         "m1 goes up to .* like ticks .* of a servo",
     ),
     "pulses": ("millis,s1,s2,s3\n" + table(1000 * SECONDS, *np.round(1500 + DEGREES / 0.09)), r"\(microseconds - 1500\)"),
+    "turns": ("t,q1_rev,q2_rev,q3_rev\n" + table(SECONDS, *DEGREES / 360), "q1_rev holds rev: write degrees or radians"),
+    "few ticks": ("t,q1_ticks,q2_ticks,q3_ticks\n" + table(SECONDS, *DEGREES * 1023 / 300), "q1_ticks holds ticks"),
     "directions of links": ("t,theta1,theta2,theta3,theta4\n" + table(SECONDS, T, A, B, C), "if they are directions of links"),
     "positions": ("t,x0,y0,x1,y1,x2,y2\n" + table(SECONDS, A, B, C, A, B, C), "look like positions of points"),
     "leader and follower": ("t,j1,j2,j3,l_j1,l_j2,l_j3\n" + table(SECONDS, A, B, C, A, B, C), "j1 ... j3, and l_j1 ... l_j3"),

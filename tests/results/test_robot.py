@@ -138,6 +138,8 @@ def test_motors_share_what_inertia_asks_of_coupled_joints():
     robot = colloc.evaluate(colloc.Problem("belts", body=body, gait=colloc.Harmonic(1), delta=1e-2), gait).robot(1.0, 1.0, 1.0)
     powers = robot.columns["joint_powers"].values.sum(axis=0)
     assert abs(robot.facts["inertia_takes"]) > 0.05
+    assert abs(robot.facts["rotation_by_inertia_rad"]) > 0.005  # and every sentence of the sheet ends, that one's too
+    assert all(sentence.endswith(".") for sentence in robot.sentences())
     assert powers[:-1].mean() == pytest.approx(robot.facts["work_per_period_J"], rel=1e-3)
 
 

@@ -1,5 +1,7 @@
 """Results files: round trip, plain h5py, and damage."""
 
+import dataclasses
+
 import h5py
 import numpy as np
 import pytest
@@ -20,6 +22,17 @@ def test_round_trip_keeps_everything(three_link, tmp_path):
     np.testing.assert_array_equal(again.answer.x, three_link.answer.x)
     t = np.linspace(0, 2, 11)
     np.testing.assert_array_equal(again.sample(t).tail, three_link.sample(t).tail)
+
+
+def test_an_answer_met_among_gaits_larger_than_the_problems_own_guess_is_read_back(three_link, tmp_path):
+    """Four links on feet: the search goes on among gaits as fast as a finite one, and the usual first guess is slower."""
+    gait = three_link.gait
+    larger = three_link.answer.problem.with_(smallest_shape_speed=gait.shape_speed, guess=gait)
+    answer = dataclasses.replace(three_link.answer, problem=larger)
+    small = three_link.problem.with_(guess=gait.scaled(0.5))
+    again = load(save(dataclasses.replace(three_link, problem=small, answer=answer), tmp_path / "x.h5"))
+    assert again.answer.problem.hash == larger.hash
+    assert again.problem.hash == small.hash
 
 
 def test_plain_h5py_reads_the_motion_with_units(three_link, tmp_path):
