@@ -172,7 +172,7 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     if plain["delta"] < problem.delta:  # lowered for a small gait
         problem = problem.with_(delta=plain["delta"])
     if "guess" in group:  # the least speed was raised for a gait that would shrink
-        guess = gait_from(json.loads(text(group, "guess")))
+        guess = gait_from(json.loads(array(group, "guess")))
         problem = problem.with_(smallest_shape_speed=attribute(group, "smallest_shape_speed"), guess=guess)
     second = SecondOrder(**{f.name: attribute(group, f"second_order_{f.name}") for f in dataclasses.fields(SecondOrder)})
     steps = child(file, "history")
