@@ -108,7 +108,7 @@ def test_bodies_whose_feet_differ_from_both_ends_are_not_taken_for_symmetric():
     assert Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2, 0.9))).symmetric
     for feet in (
         (Foot(0, 0.1), Foot(1), Foot(2, 0.8)),
-        (Foot(0, 0.1), Foot(1, friction=EASY_AHEAD), Foot(2, 0.9, friction=Friction(3))),
+        (Foot(0, 0.1), Foot(1, friction=EASY_AHEAD), Foot(2, 0.9, friction=Friction(mu_t=3))),
         (Pad(0, 0.0, 0.5), Pad(1), Pad(2, 0.4, 1.0)),
     ):
         assert not Chain(feet=feet).symmetric
