@@ -49,6 +49,10 @@ READ = {
         "t,joint_1_rad,joint_2_deg,joint_3_rad\n" + table(SECONDS, A, E, C),
         r"radians \(but joint_2_deg degrees\)",
     ),
+    "the joint at the tail in degrees": (
+        "t,joint_1_deg,joint_2_rad,joint_3_rad\n" + table(SECONDS, D, B, C),
+        r"radians \(but joint_1_deg degrees\)",
+    ),
     "units in a row": (
         "time,joint_1,joint_2,joint_3,current_1\ns,deg,deg,deg,mA\n" + table(SECONDS, D, E, F, T),
         "degrees; time in s; left out: current_1 mA",

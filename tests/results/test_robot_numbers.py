@@ -109,3 +109,13 @@ def test_on_a_slope_less_than_the_weight_presses_and_transport_is_paid_by_the_wh
     assert facts["work_per_period_J"] == pytest.approx(MASS * presses * LENGTH * towards_left.work)
     assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (MASS * 9.81 * way))
     assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 20.0**2))
+
+
+def test_an_export_with_inertia_on_a_slope_is_of_the_robot_that_is_pressed_down_as_much(unsolved, tmp_path):
+    """By the cosine of the inclination: a shorter robot than on the level has that pace."""
+    leaning = Fourier([0.0, 0.0], [[1.2], [0.0]], [[0.0], [0.8]], theta=0.3)
+    stated = Problem("steep", leaning, gait=Harmonic(1), delta=1e-2, froude=0.05, grade=0.75)
+    solution, length = unsolved(stated), 0.05 * 0.8 * 9.81 * 2.0**2
+    facts = solution.export(tmp_path / "x.csv", period=2.0, ramp=False)
+    assert f"of a robot of {length:.3g} m in this period" in facts["pace"]
+    assert solution.robot(length, MASS, 2.0).froude == pytest.approx(0.05)

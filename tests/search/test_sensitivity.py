@@ -1,5 +1,7 @@
 """What a wrong floor costs: derivatives of best values obey identities, and are those of optima that are sought again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -86,6 +88,16 @@ def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(solved, of):
     for effect, finer in zip(rough.sensitivity().effects, fine.sensitivity().effects, strict=True):
         assert abs(effect.slope - finer.slope) <= effect.error + finer.error, effect.name
         assert effect.error < 5e-3 * abs(effect.slope), effect.name
+
+
+def test_a_slope_that_changes_with_the_step_of_differences_is_off_by_no_more_than_its_error(three_link, monkeypatch):
+    """As where something else begins within a few steps: the derivative at the number itself is that of friction sideways."""
+    plain = next(each for each in parameters(three_link.problem) if each.name == "friction sideways")
+    bent = replace(plain, name="bent", changed=lambda step: plain.changed(step + 1e8 * step**3))
+    monkeypatch.setattr("colloc.search.sensitivity.parameters", lambda problem: [plain, bent])
+    true, found = three_link.sensitivity().effects
+    assert abs(found.slope - true.slope) > 2 * true.error
+    assert abs(found.slope - true.slope) <= found.error
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """Gaits played with inertia: against a program of dense points and Newton's law, limits, symmetries, conservation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -127,6 +129,13 @@ def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
     rough, fine = (colloc.inertial_motion(*at, tolerance=tolerance) for tolerance in (1e-4, 1e-6))
     assert np.abs(rough.multipliers).max() > 0.96
     assert abs(rough.distance - fine.distance) < rough.errors["distance"] < 1e-4 * rough.distance
+
+
+def test_a_motion_is_stable_where_no_small_change_grows():
+    played = colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.1, tolerance=1e-3)
+    assert played.stable
+    for grows in (1.1, -1.1, 0.8 + 0.8j):
+        assert not replace(played, multipliers=np.array([0.2, grows, 0.5])).stable
 
 
 def test_slow_motion_is_the_limit():
