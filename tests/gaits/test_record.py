@@ -40,6 +40,7 @@ TOPIC = "/joint_states/joint_"
 READ = {
     "tail last": ("time_s,joint_3_rad,joint_2_rad,joint_1_rad\n" + table(SECONDS, C, B, A), "by name from joint_1_rad"),
     "from zero": ("t,q2,q0,q1\n" + table(SECONDS, C, A, B), "from q0 ... q2, radians; time from t"),
+    "numbers of one digit and two": ("t,q11,q9,q10\n" + table(SECONDS, C, A, B), "from q9 ... q11"),
     "letters": ("ElapsedTime, Axis_B, Axis_A, Axis_C\n" + table(SECONDS, B, A, C), "from Axis_A ... Axis_C"),
     "units in brackets": (
         "Time [ms],Joint 3 [deg],Joint 1 [deg],Joint 2 [deg]\n" + table(1000 * SECONDS, F, D, E),
