@@ -104,11 +104,12 @@ def test_an_arc_of_any_angle_has_the_radius_of_its_circle_and_goes_the_shorter_w
 
 
 def test_on_a_slope_less_than_the_weight_presses_and_transport_is_paid_by_the_whole_of_it(towards_left):
-    robot, presses = towards_left.robot(LENGTH, MASS, 20.0), 9.81 * math.cos(math.atan(0.1))
+    """Played slowly."""
+    robot, presses = towards_left.robot(LENGTH, MASS, 2000.0), 9.81 * math.cos(math.atan(0.1))
     facts, way = robot.facts, LENGTH * towards_left.distance
-    assert facts["work_per_period_J"] == pytest.approx(MASS * presses * LENGTH * towards_left.work)
-    assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (MASS * 9.81 * way))
-    assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 20.0**2))
+    assert facts["work_per_period_J"] == pytest.approx(MASS * presses * LENGTH * towards_left.work, rel=1e-4)
+    assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (MASS * 9.81 * way), rel=1e-4)
+    assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 2000.0**2))
 
 
 def test_an_export_with_inertia_on_a_slope_is_of_the_robot_that_is_pressed_down_as_much(unsolved, tmp_path):
