@@ -96,7 +96,7 @@ def test_what_is_wrong_is_named_without_words_of_programmers(place, capsys):
         ("solve problem.py --mesh x", "--mesh must be a whole number, not 'x'"),
         ("solve problem.py --delta x", "--delta must be a number, not 'x'"),
         ("export good.h5 --format x", "--format must be one of 'csv', 'json', 'mjcf', 'urdf', not 'x'"),
-        ("evaluate problem.py good.h5", "good.h5 is no text in UTF-8: a CSV file is read here"),
+        ("evaluate problem.py good.h5", "good.h5 is no text of numbers in UTF-8: a CSV file is read here"),
         ("open good.h5", "good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not beside it"),
     ):
         assert colloc(words.split()) == 2

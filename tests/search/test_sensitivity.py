@@ -7,7 +7,7 @@ import pytest
 
 import colloc
 from colloc.gaits.parameters import parameters
-from colloc.search.sensitivity import sensitivity
+from colloc.search.sensitivity import Effect, Sensitivity, sensitivity
 
 WAYS = ("sideways", "forwards", "backwards")
 MIRRORED = (colloc.Foot(0, 0.2), colloc.Foot(1), colloc.Foot(2, 0.8))
@@ -44,6 +44,12 @@ def test_only_what_holds_the_gait_back_has_a_price(found, three_link):
     assert found["smallest shape speed"].slope == 0
     assert np.abs(three_link.gait.angles(np.linspace(0, 1, 2001))).max() == pytest.approx(np.pi, abs=1e-4)
     assert found["joint limit"].slope > 10 * found["joint limit"].error
+
+
+def test_a_table_says_the_value_where_a_number_is_a_tenth_smaller_and_where_it_is_a_tenth_larger():
+    both, less = Effect("mu", 1.0, True, -0.5, 0.0), Effect("limit", 3.0, True, 0.2, 0.0, (-1,))
+    table = Sensitivity("x", "d/W", 1.0, 0.0, (both, less))
+    assert (table.beside(both), table.beside(less)) == (["1.0500", "0.9500"], ["0.9800", "-"])
 
 
 def differences(solution, parameter, step):
