@@ -222,7 +222,7 @@ def test_bad_files_are_refused_in_a_sentence(text, tmp_path):
         (GAIT.angles(T), {"harmonics": 40}, "60 samples determine 1 to 28 harmonics"),
         (0.01 * GAIT.angles(T), {}, "hardly moves"),
         ("nowhere.csv", {}, "cannot read nowhere.csv"),
-        ({"a": 1}, {}, "must be joint angles"),
+        ({"a": 1}, {}, "gait must be a Fourier, numbers, text, a path or a function"),
     ],
 )
 def test_what_is_no_gait_is_refused_in_a_sentence(given, settings, complaint):
