@@ -200,6 +200,16 @@ def test_the_period_of_a_record_that_holds_several_is_found(periods, noise, tmp_
     assert f"of {found.periods:.3g} periods of" in found.describe()
 
 
+def test_where_a_period_is_told_from_a_wave_its_phase_at_the_start_is_known_half_as_well(tmp_path):
+    """The bound of Cramer and Rao (Rife & Boorstyn, 1974): a period that is off by a little turns the start most."""
+    t, rng, path = np.arange(240) / 60, np.random.default_rng(3), tmp_path / "wave.csv"
+    path.write_text("t,q1\n" + table(t, np.cos(2 * np.pi * t) + 0.01 * rng.normal(size=t.size)))
+    told, given = (fitted_gait(path, 1, harmonics=1, period=period) for period in (None, 1.0))
+    assert told.period == pytest.approx(1.0, rel=1e-3)
+    off = [np.linalg.norm(found.uncertainty.directions[:, 0, 2]) for found in (told, given)]  # of the sine
+    assert off[0] / off[1] == pytest.approx(2.0, rel=0.1)
+
+
 def test_bursts_of_samples_with_one_stamp_are_read_as_well_as_the_stamps_are(tmp_path):
     t = np.sort(np.random.default_rng(0).uniform(0, 3, 600))
     t[200:] += 0.6
