@@ -136,7 +136,7 @@ def test_a_period_that_does_not_close_is_off_by_no_more_than_is_stated():
     gait = GaitWithInertia(CHAIN, colloc.Friction(0.1, 0.1, 0.1), LEANING, 1e-2, froude=1.0)
     closed = gait.closed_from(None)
     exact = gait.periodic_run(closed.momenta, 1e-6, closed.slopes)
-    start = exact.momenta + [3e-4, -2e-4, 1e-4]
+    start = exact.momenta + np.array([3e-4, -2e-4, 1e-4])
     left_open = PeriodicRun(gait.run(start, 1e-6), start, 1e-6)
     stated, true = gait.errors(left_open, left_open, closed.slopes), gait.passed(exact.ends)
     off = {name: abs(value - true[name]) for name, value in gait.passed(left_open.ends).items()}
