@@ -8,7 +8,8 @@ from colloc.search.run import Run
 
 FILE = """
 from colloc import *
-PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-3)
+LAW = Friction(mu_t=4, mu_f=1, mu_b=1)
+PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=LAW, delta=1e-2, mesh_tolerance=1e-3)
 """
 COMMANDS = {"steer": ["--turn", "10"], "pareto": ["--points", "2"]}
 
