@@ -133,6 +133,28 @@ def test_an_export_leads_from_straight_at_rest_into_the_gait_within_speed_limits
     assert np.abs(angles).max() <= np.abs(angles[:, first:]).max() + 1e-6
 
 
+def test_the_way_into_a_gait_keeps_the_speed_limit_of_its_problem(unsolved, tmp_path):
+    """Stated in rad a period, and so a quarter of that in rad/s at 4 s."""
+    bent = Fourier([1.0, -1.0], [[0.3], [0.0]], [[0.0], [0.3]])
+    stated = Problem("limited", bent, gait=Harmonic(1), delta=1e-2, speed_limit=2.1)
+    unsolved(stated).export(tmp_path / "x.csv", period=4.0, rate=100.0)
+    time, _, speeds = written(tmp_path / "x.csv")
+    assert np.abs(speeds[:, time >= 0]).max() < 0.95 * 2.1 / 4.0
+    assert np.abs(speeds).max() == pytest.approx(2.1 / 4.0, rel=1e-3)
+
+
+def test_torques_on_the_way_into_a_gait_come_to_be_those_of_the_gait(unsolved, tmp_path):
+    """Also where they depend on speeds: in a medium that drags."""
+    drag = {"friction": Viscous(normal=2, tangential=1), "objective": "towing"}
+    solution = unsolved(Problem("drag", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **drag))
+    solution.export(tmp_path / "x.csv", period=4.0, rate=50.0, length=1.2, mass=3.0)
+    columns = pandas.read_csv(tmp_path / "x.csv", comment="#")
+    torques = columns[["joint_1_N_m", "joint_2_N_m"]].to_numpy().T
+    first = np.flatnonzero(columns["time_s"] >= 0)[0]
+    jump = 2 * torques[:, first - 1] - torques[:, first - 2] - torques[:, first]
+    assert np.abs(jump).max() < 0.1 * np.abs(torques[:, first]).max()
+
+
 def test_a_way_on_which_the_body_crosses_itself_is_refused(three_link, tmp_path, monkeypatch):
     monkeypatch.setattr(Chain, "crossing_depth", lambda body, angles: np.full(angles.shape[1], 0.01))
     with pytest.raises(ProblemError, match="crosses itself on the way from straight"):

@@ -40,6 +40,7 @@ TOPIC = "/joint_states/joint_"
 READ = {
     "tail last": ("time_s,joint_3_rad,joint_2_rad,joint_1_rad\n" + table(SECONDS, C, B, A), "by name from joint_1_rad"),
     "from zero": ("t,q2,q0,q1\n" + table(SECONDS, C, A, B), "from q0 ... q2, radians; time from t"),
+    "numbers of one digit and two": ("t,q11,q9,q10\n" + table(SECONDS, C, A, B), "from q9 ... q11"),
     "letters": ("ElapsedTime, Axis_B, Axis_A, Axis_C\n" + table(SECONDS, B, A, C), "from Axis_A ... Axis_C"),
     "units in brackets": (
         "Time [ms],Joint 3 [deg],Joint 1 [deg],Joint 2 [deg]\n" + table(1000 * SECONDS, F, D, E),
@@ -48,6 +49,10 @@ READ = {
     "one column of degrees": (
         "t,joint_1_rad,joint_2_deg,joint_3_rad\n" + table(SECONDS, A, E, C),
         r"radians \(but joint_2_deg degrees\)",
+    ),
+    "the joint at the tail in degrees": (
+        "t,joint_1_deg,joint_2_rad,joint_3_rad\n" + table(SECONDS, D, B, C),
+        r"radians \(but joint_1_deg degrees\)",
     ),
     "units in a row": (
         "time,joint_1,joint_2,joint_3,current_1\ns,deg,deg,deg,mA\n" + table(SECONDS, D, E, F, T),
@@ -195,6 +200,16 @@ def test_the_period_of_a_record_that_holds_several_is_found(periods, noise, tmp_
     assert found.period == pytest.approx(4, rel=1e-7 if noise == 0 else 5e-3)
     np.testing.assert_allclose(found.gait.angles(T - t[0]), ANGLES, atol=1e-6 + 0.8 * noise)
     assert f"of {found.periods:.3g} periods of" in found.describe()
+
+
+def test_where_a_period_is_told_from_a_wave_its_phase_at_the_start_is_known_half_as_well(tmp_path):
+    """The bound of Cramer and Rao (Rife & Boorstyn, 1974): a period that is off by a little turns the start most."""
+    t, rng, path = np.arange(240) / 60, np.random.default_rng(3), tmp_path / "wave.csv"
+    path.write_text("t,q1\n" + table(t, np.cos(2 * np.pi * t) + 0.01 * rng.normal(size=t.size)))
+    told, given = (fitted_gait(path, 1, harmonics=1, period=period) for period in (None, 1.0))
+    assert told.period == pytest.approx(1.0, rel=1e-3)
+    off = [np.linalg.norm(found.uncertainty.directions[:, 0, 2]) for found in (told, given)]  # of the sine
+    assert off[0] / off[1] == pytest.approx(2.0, rel=0.1)
 
 
 def test_bursts_of_samples_with_one_stamp_are_read_as_well_as_the_stamps_are(tmp_path):

@@ -45,6 +45,13 @@ def test_the_chain_plays_the_joint_angles_to_the_same_distance_and_work(broken):
     assert (played.distance, played.work) == pytest.approx((broken.distance, broken.work), rel=1e-6)
 
 
+def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_backwards():
+    body, gait = Coupled(Chain((0.2,) * 5), gears=((1, 0), (-0.5, 0), (0.3, -1), (0, 1))), colloc.ellipse(0.1, 0.7, 0.6)
+    joints, t, h = body.joint_path(gait), np.linspace(0.0, 1.0, 20), 1e-5
+    np.testing.assert_allclose(joints(t)[1], (joints(t + h)[0] - joints(t - h)[0]) / (2 * h), atol=1e-7)
+    np.testing.assert_allclose(joints(t)[0][1], -0.5 * gait(t)[0][0], atol=1e-12)
+
+
 def test_slopes_are_those_of_differences():
     body, h = Coupled(Chain((0.2,) * 5), gears=((1, 0), (0.5, 0), (0, 0), (0.3, 1)), stuck={2: -0.3}), 1e-6
     y = np.array([0.7, -0.4, 1.0, 2.0])[:, None]

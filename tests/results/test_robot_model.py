@@ -129,7 +129,15 @@ def test_a_urdf_is_a_tree_of_links_with_efforts_and_speeds_that_suffice(uneven):
     for k, limit in enumerate(joint.find("limit") for joint in joints):
         assert float(limit.get("effort")) >= robot.facts["peak_torque_N_m"][k]
         assert float(limit.get("velocity")) >= robot.facts["peak_speed_rad_per_s"][k]
+    assert [float(joint.find("limit").get(end)) for joint in joints for end in ("lower", "upper")] == [-1, 2, -1.5, 1.5]
+    np.testing.assert_allclose([numbers(joint.find("origin").get("xyz")) for joint in joints], [[0.24, 0, 0], [0.6, 0, 0]])
     assert len(root.findall("link/collision/geometry/sphere")) == 4
+    feet = [numbers(shape.find("origin").get("xyz")) for shape in root.findall("link/collision")]
+    places = [[0.2 * 0.24, 0, 0], [0.5 * 0.6, 0, 0], [0.7 * 0.36, 0.024, 0], [0.7 * 0.36, -0.024, 0]]
+    np.testing.assert_allclose(sorted(feet), sorted(places), atol=1e-9)
+    np.testing.assert_allclose([float(mass.get("value")) for mass in root.iter("mass")], 3 * np.array(MASSES))
+    upright = [float(each.get("izz")) for each in root.iter("inertia")]
+    np.testing.assert_allclose(upright, 3 * 1.2**2 * np.array(INERTIAS), rtol=1e-6)
     inertia = [[float(i.get(name)) for name in ("ixx", "iyy", "izz")] for i in root.iter("inertia")]
     for a, b, c in inertia:  # a body in space can have them
         assert a + b >= c * (1 - 1e-9)

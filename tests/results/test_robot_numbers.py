@@ -7,7 +7,7 @@ import numpy as np
 import pandas
 import pytest
 
-from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate, slope_motion, solve
+from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate, inertial_motion, slope_motion, solve
 from colloc.results.arc import Arc, arc
 
 LENGTH, MASS, FROUDE = 1.2, 3.0, 1.0
@@ -104,10 +104,28 @@ def test_an_arc_of_any_angle_has_the_radius_of_its_circle_and_goes_the_shorter_w
 
 
 def test_on_a_slope_less_than_the_weight_presses_and_transport_is_paid_by_the_whole_of_it(towards_left):
-    robot, presses = towards_left.robot(LENGTH, MASS, 20.0), 9.81 * math.cos(math.atan(0.1))
+    """Played slowly."""
+    robot, presses = towards_left.robot(LENGTH, MASS, 2000.0), 9.81 * math.cos(math.atan(0.1))
     facts, way = robot.facts, LENGTH * towards_left.distance
-    assert facts["work_per_period_J"] == pytest.approx(
-        MASS * presses * LENGTH * towards_left.work, rel=1e-3
-    )  # hardly any inertia
-    assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (MASS * 9.81 * way), rel=1e-3)
-    assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 20.0**2))
+    assert facts["work_per_period_J"] == pytest.approx(MASS * presses * LENGTH * towards_left.work, rel=1e-4)
+    assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (MASS * 9.81 * way), rel=1e-4)
+    assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 2000.0**2))
+
+
+def test_an_export_with_inertia_on_a_slope_is_of_the_robot_that_is_pressed_down_as_much(unsolved, tmp_path):
+    """By the cosine of the inclination: a shorter robot than on the level has that pace."""
+    leaning = Fourier([0.0, 0.0], [[1.2], [0.0]], [[0.0], [0.8]], theta=0.3)
+    stated = Problem("steep", leaning, gait=Harmonic(1), delta=1e-2, froude=0.05, grade=0.75)
+    solution, length = unsolved(stated), 0.05 * 0.8 * 9.81 * 2.0**2
+    facts = solution.export(tmp_path / "x.csv", period=2.0, ramp=False)
+    assert f"of a robot of {length:.3g} m in this period" in facts["pace"]
+    assert solution.robot(length, MASS, 2.0).froude == pytest.approx(0.05)
+
+
+def test_what_inertia_turns_is_what_it_adds_to_the_turn_of_slow_motion():
+    skew = Fourier([0.3, -0.5], [[0.4], [0.9]], [[1.1], [-0.2]])
+    solution = evaluate(Problem("skew", gait=Harmonic(1), rotation=None, delta=1e-1, mesh_tolerance=1e-2), skew)
+    robot, problem = solution.robot(LENGTH, MASS, 1.5), solution.problem
+    played = inertial_motion(problem.body, problem.friction, skew, 1e-1, robot.froude, tolerance=1e-4)
+    assert abs(solution.rotation) > 0.01
+    assert robot.facts["rotation_by_inertia_rad"] == pytest.approx(played.rotation - solution.rotation, abs=1e-4)

@@ -26,6 +26,15 @@ from colloc.search.solve import solve
 from colloc.verification.replay import replay
 
 ROOT = Path(__file__).resolve().parents[2]
+SKEW = Fourier([0.3, -0.5], [[0.4], [0.9]], [[1.1], [-0.2]])
+
+
+def test_a_turn_is_said_to_the_side_to_which_the_tail_link_turns():
+    for gait in (SKEW, SKEW.mirrored):
+        found = evaluate(Problem("t", gait=Harmonic(1), rotation=None, delta=1e-1, mesh_tolerance=1e-2), gait)
+        before, after = found.sample(np.array([0.0, 1.0])).theta
+        side = "counter-clockwise" if after > before else "clockwise"
+        assert f"° {side}," in found.turning
 
 
 def test_a_deliberately_poor_guess_reaches_the_paper_s_optimum(three_link):

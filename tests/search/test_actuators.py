@@ -131,6 +131,19 @@ def test_limits_that_nothing_reaches_change_nothing(free):
     assert same.efficiency == pytest.approx(free.efficiency, rel=1e-8)
 
 
+def test_motors_may_brake_harder_than_they_may_drive_but_turn_no_harder_either_way():
+    angles, rates = random_instants(200)
+    now = Instants(BODY, LAW, angles, rates, 1e-3, z=BODY.solve(LAW, angles, rates, 1e-3).z)
+    joint, instant = np.unravel_index(now.power.argmin(), now.power.shape)
+    brakes = now.chosen(np.array([instant]))
+    power, torque = np.full(2, 100.0), np.full(2, 100.0)
+    power[joint], torque[joint] = -0.5 * brakes.power[joint, 0], 0.5 * abs(brakes.moment[joint, 0])
+    for limit, share in (({"power_limit": tuple(power)}, 1.0), ({"torque_limit": tuple(torque)}, 2.0)):
+        limits = Problem("brakes", body=BODY, gait=Harmonic(1), **limit).path_limits
+        most = limits.sizes(limits.at(brakes)).max()
+        assert most == pytest.approx(share) if share > 1 else most < share, limit
+
+
 def test_weak_motors_cost_efficiency_and_keep_their_limit_between_the_nodes(free, weak):
     assert weak.status == "solved"
     assert weak.answer.program == "full"

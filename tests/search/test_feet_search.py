@@ -7,14 +7,14 @@ import pytest
 from scipy.optimize import root
 from shared.instants import random_instants
 
-from colloc import Chain, Elliptic, Foot, Friction, Harmonic, Problem, ProblemError, Wheel, load, save, solve_balance
+from colloc import Chain, Elliptic, Foot, Friction, Harmonic, Polygon, Problem, ProblemError, Wheel, load, save, solve_balance
 from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.harmonic import Fourier, ellipse
 from colloc.pictures.motion_frames import frames
 from colloc.search.solve import solve
 from colloc.verification.dry_balance import dry_balance
@@ -201,3 +201,15 @@ def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, th
     np.testing.assert_array_equal(on_feet.holding(motion), used < 3 / np.sqrt(10))
     assert three_link.share_held.size == 0
     assert not any("feet hold" in line for line in summary_lines(three_link, None))
+
+
+def test_along_a_path_too_a_foot_holds_where_friction_is_less_than_3_over_root_10_of_the_most():
+    """There the speed delta is stated for paths run through at unit speed, and a period is many times that."""
+    path = Problem("path", ellipse(0.0, 0.8, 0.6), body=Chain(feet=1), gait=Polygon(3, "bilateral"), delta=1e-2)
+    found = solve(path, 1, seconds=1e-3)
+    assert found.delta_per_period > 2 * found.answer.delta
+    body, motion = path.body, found.sample(np.linspace(0, 1, 300))
+    at = path.law, motion.angles, motion.rates, found.delta_per_period, motion.z
+    used = np.hypot(*body.rubbing(*at)[1]) / np.array([foot.weight for foot in body.standing_on])[:, None]
+    assert 0 < (used < 3 / np.sqrt(10)).mean() < 1
+    np.testing.assert_array_equal(found.holding(motion), used < 3 / np.sqrt(10))

@@ -1,5 +1,7 @@
 """The pace of a gait sought with it, where time is worth something: against fixed paces, and what cannot be asked."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -78,6 +80,18 @@ def test_it_is_certified_kept_and_told(tmp_path):
     told = "\n".join(summary_lines(kept, None, verbose=True))
     assert "best Froude number from 0.01 to 1" in told
     assert f"Froude number {found.froude:.4g}" in told
+
+
+def test_a_gait_is_played_at_the_pace_whose_period_it_says():
+    """In units of sqrt(L/g): Fr = 1/T^2."""
+    gait, stated = replace(ROUND, log_period=0.8), problem(colloc.Free(0.01, 1.0))
+    assert stated.regime.at(gait).froude == pytest.approx(np.exp(-1.6))
+    space, v = space_near(stated, gait)
+    free = ReducedProgram(space, 1e-2).period(v)
+    space, v = space_near(problem(np.exp(-1.6)), ROUND)
+    fixed = ReducedProgram(space, 1e-2).period(v)
+    assert free["period"] == pytest.approx(np.exp(0.8))
+    assert (free["distance"], free["work"]) == pytest.approx((fixed["distance"], fixed["work"]), rel=1e-9)
 
 
 def test_a_range_of_one_pace_is_that_pace():

@@ -1,11 +1,13 @@
 """What a wrong floor costs: derivatives of best values obey identities, and are those of optima that are sought again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import colloc
 from colloc.gaits.parameters import parameters
-from colloc.search.sensitivity import sensitivity
+from colloc.search.sensitivity import Effect, Sensitivity, sensitivity
 
 WAYS = ("sideways", "forwards", "backwards")
 MIRRORED = (colloc.Foot(0, 0.2), colloc.Foot(1), colloc.Foot(2, 0.8))
@@ -42,6 +44,12 @@ def test_only_what_holds_the_gait_back_has_a_price(found, three_link):
     assert found["smallest shape speed"].slope == 0
     assert np.abs(three_link.gait.angles(np.linspace(0, 1, 2001))).max() == pytest.approx(np.pi, abs=1e-4)
     assert found["joint limit"].slope > 10 * found["joint limit"].error
+
+
+def test_a_table_says_the_value_where_a_number_is_a_tenth_smaller_and_where_it_is_a_tenth_larger():
+    both, less = Effect("mu", 1.0, True, -0.5, 0.0), Effect("limit", 3.0, True, 0.2, 0.0, (-1,))
+    table = Sensitivity("x", "d/W", 1.0, 0.0, (both, less))
+    assert (table.beside(both), table.beside(less)) == (["1.0500", "0.9500"], ["0.9800", "-"])
 
 
 def differences(solution, parameter, step):
@@ -86,6 +94,16 @@ def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(solved, of):
     for effect, finer in zip(rough.sensitivity().effects, fine.sensitivity().effects, strict=True):
         assert abs(effect.slope - finer.slope) <= effect.error + finer.error, effect.name
         assert effect.error < 5e-3 * abs(effect.slope), effect.name
+
+
+def test_a_slope_that_changes_with_the_step_of_differences_is_off_by_no_more_than_its_error(three_link, monkeypatch):
+    """As where something else begins within a few steps: the derivative at the number itself is that of friction sideways."""
+    plain = next(each for each in parameters(three_link.problem) if each.name == "friction sideways")
+    bent = replace(plain, name="bent", changed=lambda step: plain.changed(step + 1e8 * step**3))
+    monkeypatch.setattr("colloc.search.sensitivity.parameters", lambda problem: [plain, bent])
+    true, found = three_link.sensitivity().effects
+    assert abs(found.slope - true.slope) > 2 * true.error
+    assert abs(found.slope - true.slope) <= found.error
 
 
 @pytest.mark.slow

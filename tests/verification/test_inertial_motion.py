@@ -1,5 +1,7 @@
 """Gaits played with inertia: against a program of dense points and Newton's law, limits, symmetries, conservation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from colloc.mechanics.inertia import moment_of_inertia, momenta, momentum_rates,
 from colloc.motion.slow_enough import SCHEME, GaitOnMesh
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.verification.inertial_motion import GaitWithInertia
+from colloc.verification.inertial_motion import GaitWithInertia, PeriodicRun
 
 GAIT = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
@@ -127,6 +129,26 @@ def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
     rough, fine = (colloc.inertial_motion(*at, tolerance=tolerance) for tolerance in (1e-4, 1e-6))
     assert np.abs(rough.multipliers).max() > 0.96
     assert abs(rough.distance - fine.distance) < rough.errors["distance"] < 1e-4 * rough.distance
+
+
+def test_a_period_that_does_not_close_is_off_by_no_more_than_is_stated():
+    """However small its steps are: what is left open leads away from the motion in which all periods are alike."""
+    gait = GaitWithInertia(CHAIN, colloc.Friction(0.1, 0.1, 0.1), LEANING, 1e-2, froude=1.0)
+    closed = gait.closed_from(None)
+    exact = gait.periodic_run(closed.momenta, 1e-6, closed.slopes)
+    start = exact.momenta + np.array([3e-4, -2e-4, 1e-4])
+    left_open = PeriodicRun(gait.run(start, 1e-6), start, 1e-6)
+    stated, true = gait.errors(left_open, left_open, closed.slopes), gait.passed(exact.ends)
+    off = {name: abs(value - true[name]) for name, value in gait.passed(left_open.ends).items()}
+    assert off["distance"] > 2e-5
+    assert all(off[name] <= stated[name] for name in off)
+
+
+def test_a_motion_is_stable_where_no_small_change_grows():
+    played = colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.1, tolerance=1e-3)
+    assert played.stable
+    for grows in (1.1, -1.1, 0.8 + 0.8j):
+        assert not replace(played, multipliers=np.array([0.2, grows, 0.5])).stable
 
 
 def test_slow_motion_is_the_limit():
