@@ -97,7 +97,7 @@ def _stored(value: Any) -> np.ndarray:
     value = np.asarray(value)
     if value.dtype.kind not in "UO":
         return value
-    encoded = [each.encode("utf-8", "replace") for each in value.flat]
+    encoded = [str.encode(each, "utf-8", "replace") for each in value.flat]
     # HDF5 knows no length 0, and h5netcdf takes length 1 for a single byte, no text
     length = max(2, max(map(len, encoded), default=0))
     return np.array(encoded, dtype=h5py.string_dtype("utf-8", length)).reshape(value.shape)
