@@ -98,9 +98,9 @@ def test_torques_of_a_robot_lift_its_weight_too(which, request):
     power = (joint_torques(solution, t) * solution.gait(t)[1]).sum(axis=0)
     assert power.mean() == pytest.approx(solution.work, rel=1e-3)
     grade, cosine = solution.problem.grade, np.cos(np.arctan(solution.problem.grade))
-    pace = solution.froude or 0.01
+    pace = solution.froude or 1e-6  # so slow that inertia takes nothing
     robot = solution.robot(length=1.0, mass=2.0, period=(1.0 / (9.81 * cosine * pace)) ** 0.5)
-    assert robot.facts["work_per_period_J"] == pytest.approx(2.0 * 9.81 * cosine * solution.work)
+    assert robot.facts["work_per_period_J"] == pytest.approx(2.0 * 9.81 * cosine * solution.work, rel=1e-4)
     x, y, z = (float(part) for part in mjcf(robot).split('gravity="')[1].split('"')[0].split())
     assert np.hypot(x, y) / abs(z) == pytest.approx(grade)
     assert np.hypot(np.hypot(x, y), z) == pytest.approx(9.81)
