@@ -1,4 +1,5 @@
-"""The compiled kernel (colloc/mechanics/native), a plain library that knows nothing of Python. Without it NumPy serves."""
+"""The compiled kernel (colloc/mechanics/native), a plain library that knows nothing of Python.
+Without it NumPy serves."""
 
 import hashlib
 from pathlib import Path

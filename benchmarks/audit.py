@@ -1,17 +1,20 @@
-"""Is a certificate ever false? Random problems are solved from one guess, and what is certified is played by another program.
+"""Is a certificate ever false? Random problems are solved from one guess, and what is certified is
+played by another program.
 
     python -m benchmarks.audit --problems 1000 [--seconds 600] [--again]
 
-Three links, of equal or other lengths, with one harmonic and a symmetry or none; mu_t from 0.1 to 30, mu_b up to five times
-mu_f; joints within pi, 2.5 or 2. Nothing of colloc is used in the judgement (`benchmarks.independent_replay`, and a few lines
-here):
+Three links, of equal or other lengths, with one harmonic and a symmetry or none; mu_t from 0.1 to
+30, mu_b up to five times mu_f; joints within pi, 2.5 or 2. Nothing of colloc is used in the
+judgement (`benchmarks.independent_replay`, and a few lines here):
 
 - efficiency, distance and work lie within the stated errors,
-- the claimed efficiency is that of the motion, up to what a certificate lets pass (1e-4, and other balanced motions),
+- the claimed efficiency is that of the motion, up to what a certificate lets pass (1e-4, and other
+  balanced motions),
 - the body does not turn, joints stay within their limit and links apart, no gait exceeds 1/min(mu).
 
-What the record has is not done again. With --again the gaits of the record are measured anew as a certificate measures them,
-and their numbers and errors held against what the other program found then.
+What the record has is not done again. With --again the gaits of the record are measured anew as a
+certificate measures them, and their numbers and errors held against what the other program found
+then.
 """
 
 from __future__ import annotations
@@ -36,12 +39,14 @@ BATCH = 25
 STATED = ("efficiency", "distance", "work")
 ACCURACY = 1e-7
 GAP, TURN, EXCESS = 1e-4, 1e-4, 1e-6
-"""What a certificate lets pass: of the efficiency, of rotation times length over distance, of angles [rad]."""
+"""What a certificate lets pass: of the efficiency, of rotation times length over distance, of
+angles [rad]."""
 _PHASES = np.linspace(0, 1, 2001)
 
 
 def random_problem(number: int) -> tuple[Problem, tuple[float, ...], tuple[float, float, float]]:
-    """Problem `number`, which depends on that number alone; its lengths of links and coefficients."""
+    """Problem `number`, which depends on that number alone; its lengths of links and
+    coefficients."""
     rng = np.random.default_rng([SEED, number])
     symmetry = str(rng.choice(["bilateral", "antipodal", "none"]))
     lengths = np.ones(3) if rng.random() < 0.3 else rng.uniform(0.5, 1.5, 3)
@@ -53,18 +58,31 @@ def random_problem(number: int) -> tuple[Problem, tuple[float, ...], tuple[float
     mu_b = 1.0 if rng.random() < 0.6 else float(rng.uniform(1, 5))
     limit = float(rng.choice([np.pi, 2.5, 2.0]))
     law, kind = Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), Harmonic(1, symmetry)
-    problem = Problem(f"audit-{number}", body=Chain(links), friction=law, gait=kind, joint_limit=limit)
-    return problem.with_(guess=start_gait(problem, LATIN_HYPERCUBE, SEED, number)), links, (mu_t, 1.0, mu_b)
+    problem = Problem(
+        f"audit-{number}", body=Chain(links), friction=law, gait=kind, joint_limit=limit
+    )
+    return (
+        problem.with_(guess=start_gait(problem, LATIN_HYPERCUBE, SEED, number)),
+        links,
+        (mu_t, 1.0, mu_b),
+    )
 
 
 def solved(number: int) -> dict[str, Any]:
-    """What a search from the problem's guess says; with the gait and its certificate if there is one."""
+    """What a search from the problem's guess says; with the gait and its certificate if there is
+    one."""
     begin = time.process_time()
     problem, _, _ = random_problem(number)
     solution = solve(problem, 1)
-    row: dict[str, Any] = {"number": number, "status": solution.status, "seconds": time.process_time() - begin}
+    row: dict[str, Any] = {
+        "number": number,
+        "status": solution.status,
+        "seconds": time.process_time() - begin,
+    }
     if solution.status != SOLVED:
-        return row | {"fails": [check.name for check in solution.certificate.failures] or solution.message}
+        return row | {
+            "fails": [check.name for check in solution.certificate.failures] or solution.message
+        }
     gait, certificate = solution.gait, solution.certificate
     ambiguity = next(check.value for check in certificate.checks if check.name == "one motion")
     return row | {
@@ -96,18 +114,23 @@ def crossing(lengths: tuple[float, ...], angles: np.ndarray) -> np.ndarray:
     for angle in angles:
         along.append(along[-1] * np.exp(1j * angle))
     a, b = lengths[0] * along[0], lengths[2] * along[2]
-    between = lengths[1] * along[1]  # tail link from -a to 0, head link from `between` to between + b
+    # tail link from -a to 0, head link from `between` to between + b
+    between = lengths[1] * along[1]
 
     def side(p: np.ndarray, q: np.ndarray) -> np.ndarray:
         return (p.conj() * q).imag
 
-    first = side(a, between) * side(a, between + b) < 0  # ends of the head link on both sides of the tail link
+    # ends of the head link on both sides of the tail link
+    first = side(a, between) * side(a, between + b) < 0
     return first & (side(b, -between) * side(b, -between - a) < 0)
 
 
 def outside(row: dict[str, Any]) -> dict[str, float]:
     """Which stated errors are too small, with by how many times."""
-    off = {f"error of {name}": abs(row[name][0] - row["played"][name]) / row[name][1] for name in STATED}
+    off = {
+        f"error of {name}": abs(row[name][0] - row["played"][name]) / row[name][1]
+        for name in STATED
+    }
     return {name: size for name, size in off.items() if size > 1}
 
 
@@ -138,7 +161,9 @@ def wrong(row: dict[str, Any], played: Played) -> dict[str, float]:
         "self-contact": (float(crossing(links, angles * (1 - 1e-5)).any()), 0.5),
         "1/min(mu)": (played.efficiency * min(coefficients), 1 + EXCESS),
     }
-    return outside(row) | {name: float(value) for name, (value, allowed) in statements.items() if not value <= allowed}
+    return outside(row) | {
+        name: float(value) for name, (value, allowed) in statements.items() if not value <= allowed
+    }
 
 
 def judged(rows: list[dict[str, Any]]) -> None:
@@ -157,8 +182,10 @@ def summary(rows: list[dict[str, Any]]) -> str:
     compared = [row for row in certified if row["wrong"] is not None]
     lines = [
         f"{len(rows)} problems: {dict(Counter(row['status'] for row in rows))}",
-        f"{len(compared)} certificates compared; the other program found no balance for {len(certified) - len(compared)}",
-        f"statements that are not so: {dict(Counter(name for row in compared for name in row['wrong']))}",
+        f"{len(compared)} certificates compared; the other program found no balance for "
+        f"{len(certified) - len(compared)}",
+        f"statements that are not so: "
+        f"{dict(Counter(name for row in compared for name in row['wrong']))}",
     ]
     for name in STATED:
         stated = np.array([row[name][1] for row in compared])
@@ -166,27 +193,51 @@ def summary(rows: list[dict[str, Any]]) -> str:
         size = np.array([row["played"][name] for row in compared])
         ratio = f"stated / true error, median {np.median(stated / np.maximum(true, 1e-300)):.1f}"
         lines.append(
-            f"{name}: within its error {np.mean(true <= stated):.2%}; {ratio}; largest relative {max(true / size):.1e}"
+            f"{name}: within its error {np.mean(true <= stated):.2%}; {ratio}; largest relative "
+            f"{max(true / size):.1e}"
         )
     lines += [f"  {row['number']}: {row['wrong']}" for row in compared if row["wrong"]]
     return "\n".join(lines)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--problems", type=int, default=1000, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
-    parser.add_argument("--record", type=Path, default=Path("results/audit.jsonl"), help="what it has is not done again")
-    parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
-    parser.add_argument("--again", action="store_true", help="measure the gaits of the record anew, and no others")
+    parser.add_argument(
+        "--record",
+        type=Path,
+        default=Path("results/audit.jsonl"),
+        help="what it has is not done again",
+    )
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=1e9,
+        metavar="S",
+        help="processor time after which none is begun",
+    )
+    parser.add_argument(
+        "--again", action="store_true", help="measure the gaits of the record anew, and no others"
+    )
     options = parser.parse_args()
     rows: dict[int, dict[str, Any]] = {}
     if options.record.exists():
-        rows = {row["number"]: row for row in map(json.loads, options.record.read_text(encoding="utf-8").splitlines())}
+        rows = {
+            row["number"]: row
+            for row in map(json.loads, options.record.read_text(encoding="utf-8").splitlines())
+        }
     options.record.parent.mkdir(parents=True, exist_ok=True)
     if options.again:
-        rows = {number: measured_again(row) if row.get("wrong") is not None else row for number, row in rows.items()}
-        options.record.write_text("".join(json.dumps(row) + "\n" for row in rows.values()), encoding="utf-8")
+        rows = {
+            number: measured_again(row) if row.get("wrong") is not None else row
+            for number, row in rows.items()
+        }
+        options.record.write_text(
+            "".join(json.dumps(row) + "\n" for row in rows.values()), encoding="utf-8"
+        )
         options.problems = 0
     todo = [number for number in range(options.first, options.problems) if number not in rows]
     while todo and time.process_time() < options.seconds:

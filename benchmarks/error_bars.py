@@ -1,13 +1,16 @@
-"""Do the stated errors hold? Certified numbers of random gaits against `benchmarks.independent_replay`.
+"""Do the stated errors hold? Certified numbers of random gaits against
+`benchmarks.independent_replay`.
 
-    python -m benchmarks.error_bars --gaits 300 [--own] [--again] [--solved 20] [--record results/error_bars.jsonl]
+    python -m benchmarks.error_bars --gaits 300 [--own] [--again] [--solved 20] [--record
+    results/error_bars.jsonl]
 
-Random bodies of 3 to 6 links, laws of friction and gaits of 1 to 4 harmonics with the symmetries of the zoo, which close their
-rotation; and, with --solved, gaits that a search of the zoo's problems ended at. For efficiency, distance, work, and the
-efficiency for delta -> 0: how often the stated error covers the true one, and how many times too large it is in the median.
-The other program takes seconds a gait. With --own the reference is colloc's replay to 1e-9, a hundred times faster, after as
-many as time allows have shown that both agree. With --again the random gaits of the record are measured anew, and held against
-the references that it has.
+Random bodies of 3 to 6 links, laws of friction and gaits of 1 to 4 harmonics with the symmetries of
+the zoo, which close their rotation; and, with --solved, gaits that a search of the zoo's problems
+ended at. For efficiency, distance, work, and the efficiency for delta -> 0: how often the stated
+error covers the true one, and how many times too large it is in the median. The other program takes
+seconds a gait. With --own the reference is colloc's replay to 1e-9, a hundred times faster, after
+as many as time allows have shown that both agree. With --again the random gaits of the record are
+measured anew, and held against the references that it has.
 """
 
 from __future__ import annotations
@@ -34,7 +37,8 @@ from colloc.verification.replay import replay
 
 DELTA = 1e-4
 LIMIT = 1e-3
-"""The reference's part of delta for the limit: what is left of it is far below the stated errors."""
+"""The reference's part of delta for the limit: what is left of it is far below the stated
+errors."""
 OWN, OTHER = 1e-9, 1e-7
 """Accuracies asked of the references; what the other reaches is a hundred times better."""
 QUANTITIES = ("efficiency", "distance", "work", "limit")
@@ -52,10 +56,16 @@ def random_gait(number: int) -> tuple[Chain, Friction, GaitPath]:
     lengths = lengths / lengths.sum()
     body = Chain((*lengths[:-1], 1.0 - lengths[:-1].sum()))
     isotropic = rng.random() < 0.3
-    mu_t, mu_b = (1.0, 1.0) if isotropic else (float(np.exp(rng.uniform(np.log(0.1), np.log(30)))), float(rng.choice([1, 3])))
+    mu_t, mu_b = (
+        (1.0, 1.0)
+        if isotropic
+        else (float(np.exp(rng.uniform(np.log(0.1), np.log(30)))), float(rng.choice([1, 3])))
+    )
     kind = harmonics_within(int(rng.integers(1, 5)), symmetry)
     size = kind.size(body.n_joint)
-    gait = kind.fourier(rng.normal(0, rng.uniform(0.2, 1.0), size) / np.sqrt(size / 3), body.n_joint)
+    gait = kind.fourier(
+        rng.normal(0, rng.uniform(0.2, 1.0), size) / np.sqrt(size / 3), body.n_joint
+    )
     return body, Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), gait
 
 
@@ -67,7 +77,8 @@ def compared(
     breaks: np.ndarray | tuple[float, ...] = (),
     own: bool = False,
 ) -> dict[str, list[float]]:
-    """For each quantity: stated value, stated error and the reference's value; and the part of the period left open."""
+    """For each quantity: stated value, stated error and the reference's value; and the part of the
+    period left open."""
     crawler = Crawler(body.lengths, (friction.mu_t, friction.mu_f, friction.mu_b))
     here, limit = (
         replay(body, friction, path, part * delta, tolerance=OWN, breaks=breaks)
@@ -85,7 +96,9 @@ def against(references: Sequence[float], known: Measured) -> dict[str, list[floa
     values = (fine.efficiency, fine.distance, fine.work, limit.value)
     errors = (known.efficiency.error, known.errors["distance"], known.errors["work"], limit.error)
     rows = zip(QUANTITIES, values, errors, references, strict=True)
-    return {name: [value, error, reference] for name, value, error, reference in rows} | {"open": [fine.several]}
+    return {name: [value, error, reference] for name, value, error, reference in rows} | {
+        "open": [fine.several]
+    }
 
 
 def measured_again(entry: dict) -> dict:
@@ -112,7 +125,8 @@ def solved_gait(number: int, own: bool) -> dict[str, list[float]] | None:
 def summary(rows: list[dict[str, list[float]]]) -> str:
     """A table of coverage and of stated over true errors."""
     lines = [
-        "| quantity | gaits | covered | median stated | median true | stated / true, median | worst true / stated |",
+        "| quantity | gaits | covered | median stated | median true | stated / true, median | "
+        "worst true / stated |",
         "|---|---|---|---|---|---|---|",
     ]
     for name in QUANTITIES:
@@ -122,36 +136,64 @@ def summary(rows: list[dict[str, list[float]]]) -> str:
         ratio = np.median(stated / np.maximum(wrong, 1e-300))
         medians = f"{np.median(stated / size):.1e} | {np.median(wrong / size):.1e}"
         share = f"{covered.sum()} ({100 * covered.mean():.1f} %)"
-        lines.append(f"| {name} | {len(rows)} | {share} | {medians} | {ratio:.1f} | {np.max(wrong / stated):.2f} |")
+        lines.append(
+            f"| {name} | {len(rows)} | {share} | {medians} | {ratio:.1f} | "
+            f"{np.max(wrong / stated):.2f} |"
+        )
     several = sum(row["open"][0] > 0 for row in rows)
-    return "\n".join(lines) + f"\n\n{several} of them run through shapes at which several motions are balanced.\n"
+    return (
+        "\n".join(lines)
+        + f"\n\n{several} of them run through shapes at which several motions are balanced.\n"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--gaits", type=int, default=300, metavar="N")
-    parser.add_argument("--own", action="store_true", help="colloc's own replay, to 1e-9, as the reference")
-    parser.add_argument("--again", action="store_true", help="measure the gaits of the record anew, and no others")
+    parser.add_argument(
+        "--own", action="store_true", help="colloc's own replay, to 1e-9, as the reference"
+    )
+    parser.add_argument(
+        "--again", action="store_true", help="measure the gaits of the record anew, and no others"
+    )
     parser.add_argument("--solved", type=int, default=0, metavar="N", help="problems of the zoo")
-    parser.add_argument("--record", type=Path, default=Path("results/error_bars.jsonl"), help="what it has is not done again")
-    parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="begin no other after so long")
+    parser.add_argument(
+        "--record",
+        type=Path,
+        default=Path("results/error_bars.jsonl"),
+        help="what it has is not done again",
+    )
+    parser.add_argument(
+        "--seconds", type=float, default=1e9, metavar="S", help="begin no other after so long"
+    )
     options = parser.parse_args()
     begin, done = time.monotonic(), {}
     if options.record.exists():
-        done = {entry["name"]: entry for entry in map(json.loads, options.record.read_text(encoding="utf-8").splitlines())}
+        done = {
+            entry["name"]: entry
+            for entry in map(json.loads, options.record.read_text(encoding="utf-8").splitlines())
+        }
     options.record.parent.mkdir(parents=True, exist_ok=True)
     if options.again:
         done = {name: measured_again(entry) for name, entry in done.items()}
-        options.record.write_text("".join(json.dumps(entry) + "\n" for entry in done.values()), encoding="utf-8")
+        options.record.write_text(
+            "".join(json.dumps(entry) + "\n" for entry in done.values()), encoding="utf-8"
+        )
         options.gaits = options.solved = 0
-    todo = [("random", k) for k in range(options.gaits)] + [("zoo", k) for k in range(options.solved)]
+    todo = [("random", k) for k in range(options.gaits)] + [
+        ("zoo", k) for k in range(options.solved)
+    ]
     for kind, number in todo:
         name = f"{kind}-{number}"
         if name in done or time.monotonic() - begin > options.seconds:
             continue
         try:
             row = (
-                compared(*random_gait(number), DELTA, own=options.own) if kind == "random" else solved_gait(number, options.own)
+                compared(*random_gait(number), DELTA, own=options.own)
+                if kind == "random"
+                else solved_gait(number, options.own)
             )
         except (ArithmeticError, NotConvergedError) as error:  # the reference gives up, and says so
             row = None
@@ -159,9 +201,16 @@ def main() -> None:
         done[name] = {"name": name, "row": row}
         with options.record.open("a", encoding="utf-8") as record:
             record.write(json.dumps(done[name]) + "\n")
-    print(f"the reference or the search gave up on {sum(entry['row'] is None for entry in done.values())} of {len(done)}\n")
+    print(
+        f"the reference or the search gave up on "
+        f"{sum(entry['row'] is None for entry in done.values())} of {len(done)}\n"
+    )
     for kind in ("random", "zoo"):
-        rows = [entry["row"] for entry in done.values() if entry["row"] is not None and entry["name"].startswith(kind)]
+        rows = [
+            entry["row"]
+            for entry in done.values()
+            if entry["row"] is not None and entry["name"].startswith(kind)
+        ]
         if rows:
             print(f"{kind}:\n\n{summary(rows)}")
 

@@ -1,14 +1,16 @@
 """Whether the error estimate of a mesh bounds the true error: python -m benchmarks.error_control
 
-Problems with various bodies, frictions, deltas, gaits, schemes and meshes are solved, and each estimate
-(`colloc.verification.mesh_error`) is held against two references that are much finer:
+Problems with various bodies, frictions, deltas, gaits, schemes and meshes are solved, and each
+estimate (`colloc.verification.mesh_error`) is held against two references that are much finer:
 
-- the *replay* of the same gait to 1e-9, which shares neither scheme nor mesh nor panels with collocation;
-- the *optimum* that a refined solve of higher order finds from there (mesh tolerance 1e-7), by its own replay: this
-  contains the error of the search, since a coarse mesh has its optimum elsewhere.
+- the *replay* of the same gait to 1e-9, which shares neither scheme nor mesh nor panels with
+  collocation;
+- the *optimum* that a refined solve of higher order finds from there (mesh tolerance 1e-7), by its
+  own replay: this contains the error of the search, since a coarse mesh has its optimum elsewhere.
 
-An estimate may be pessimistic, but not below half the true error. Outcomes are kept in results/error_control.json, so an
-interrupted run goes on where it stopped. Writes results/error_control.md.
+An estimate may be pessimistic, but not below half the true error. Outcomes are kept in
+results/error_control.json, so an interrupted run goes on where it stopped. Writes
+results/error_control.md.
 """
 
 from __future__ import annotations
@@ -41,7 +43,11 @@ def one_harmonic(cos: list[float], sin: list[float]) -> Fourier:
 
 
 FOUR = one_harmonic([1.2, 0.3, -1.2], [0.6, 0.6, 0.6])
-SMALL_LOOP = Fourier(np.array([1.8, -1.8]), np.array([[0.3, -0.1], [-0.3, 0.1]]), np.array([[-0.4, -0.1], [-0.4, -0.1]]))
+SMALL_LOOP = Fourier(
+    np.array([1.8, -1.8]),
+    np.array([[0.3, -0.1], [-0.3, 0.1]]),
+    np.array([[-0.4, -0.1], [-0.4, -0.1]]),
+)
 FIVE = one_harmonic([-0.6, 0.8, -0.8, 0.6], [-1.0, 1.2, 1.2, -1.0])
 WAVE = one_harmonic([0.8, 0.0, -0.8], [0.0, 0.8, 0.0])
 BILATERAL, ANTIPODAL = Harmonic(1, "bilateral"), Harmonic(1, "antipodal")
@@ -50,34 +56,53 @@ UNEQUAL = Chain((0.25, 0.45, 0.3))
 # name, body, friction, gait class, guess, delta, scheme, intervals, mesh tolerance
 # fmt: off
 CASES = (
-    ("isotropic, coarse", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-3", 10, 0.0),
+    ("isotropic, coarse", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-3", 10,
+    0.0),
     ("isotropic", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-3", 24, 0.0),
-    ("isotropic, smooth", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-1, "gauss-3", 24, 0.0),
-    ("isotropic, 1e-2", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-2, "gauss-2", 20, 0.0),
-    ("isotropic, 1e-3", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-3, "radau-3", 20, 0.0),
-    ("isotropic, 1e-6", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-6, "gauss-3", 24, 0.0),
+    ("isotropic, smooth", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-1, "gauss-3", 24,
+    0.0),
+    ("isotropic, 1e-2", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-2, "gauss-2", 20,
+    0.0),
+    ("isotropic, 1e-3", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-3, "radau-3", 20,
+    0.0),
+    ("isotropic, 1e-6", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-6, "gauss-3", 24,
+    0.0),
     ("trapezoid", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-3, "trapezoid", 80, 0.0),
-    ("hermite-simpson", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "hermite-simpson", 30, 0.0),
+    ("hermite-simpson", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4,
+    "hermite-simpson", 30, 0.0),
     ("gauss-5", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-5", 12, 0.0),
     ("gauss-1", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-3, "gauss-1", 80, 0.0),
-    ("second optimum", Chain(), (1, 1, 1), BILATERAL, ellipse(1.1, 0.66, 1.1), 1e-4, "gauss-3", 16, 0.0),
-    ("two harmonics", Chain(), (1, 1, 1), Harmonic(2, "bilateral"), SMALL_LOOP, 1e-4, "gauss-3", 24, 0.0),
-    ("three harmonics", Chain(), (1, 1, 1), Harmonic(3, "bilateral"), ellipse(0, 2.6, 1.2), 1e-4, "radau-5", 20, 0.0),
-    ("no symmetry", Chain(), (1, 1, 1), Harmonic(1), ellipse(0, 2.8, 1.25), 1e-3, "gauss-3", 30, 0.0),
+    ("second optimum", Chain(), (1, 1, 1), BILATERAL, ellipse(1.1, 0.66, 1.1), 1e-4, "gauss-3", 16,
+    0.0),
+    ("two harmonics", Chain(), (1, 1, 1), Harmonic(2, "bilateral"), SMALL_LOOP, 1e-4, "gauss-3",
+    24, 0.0),
+    ("three harmonics", Chain(), (1, 1, 1), Harmonic(3, "bilateral"), ellipse(0, 2.6, 1.2), 1e-4,
+    "radau-5", 20, 0.0),
+    ("no symmetry", Chain(), (1, 1, 1), Harmonic(1), ellipse(0, 2.8, 1.25), 1e-3, "gauss-3", 30,
+    0.0),
     ("antipodal", Chain(), (3, 1, 1), ANTIPODAL, ellipse(0, 1.5, 1.0), 1e-4, "gauss-2", 24, 0.0),
-    ("(1.7, 1, 1.3)", Chain(), (1.7, 1, 1.3), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-3", 24, 0.0),
-    ("(1.7, 1, 1.3) lobatto", Chain(), (1.7, 1, 1.3), BILATERAL, ellipse(0, 2.8, 1.2), 1e-3, "hermite-simpson", 20, 0.0),
+    ("(1.7, 1, 1.3)", Chain(), (1.7, 1, 1.3), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-3", 24,
+    0.0),
+    ("(1.7, 1, 1.3) lobatto", Chain(), (1.7, 1, 1.3), BILATERAL, ellipse(0, 2.8, 1.2), 1e-3,
+    "hermite-simpson", 20, 0.0),
     ("(10, 1, 1)", Chain(), (10, 1, 1), BILATERAL, ellipse(0, 1.0, 1.0), 1e-4, "gauss-4", 14, 0.0),
-    ("(0.5, 1, 5)", Chain(), (0.5, 1, 5), BILATERAL, ellipse(0.3, 1.0, 0.5), 1e-3, "gauss-3", 20, 0.0),
-    ("two links", Chain((0.5, 0.5)), (1, 1, 5), ANTIPODAL, one_harmonic([1.0], [0.0]), 1e-4, "gauss-2", 10, 0.0),
-    ("unequal links", UNEQUAL, (3, 1, 1), ANTIPODAL, ellipse(0, 1.5, 1.0), 1e-3, "radau-2", 30, 0.0),
+    ("(0.5, 1, 5)", Chain(), (0.5, 1, 5), BILATERAL, ellipse(0.3, 1.0, 0.5), 1e-3, "gauss-3", 20,
+    0.0),
+    ("two links", Chain((0.5, 0.5)), (1, 1, 5), ANTIPODAL, one_harmonic([1.0], [0.0]), 1e-4,
+    "gauss-2", 10, 0.0),
+    ("unequal links", UNEQUAL, (3, 1, 1), ANTIPODAL, ellipse(0, 1.5, 1.0), 1e-3, "radau-2", 30,
+    0.0),
     ("four links", Chain((0.25,) * 4), (1, 1, 1), BILATERAL, FOUR, 1e-4, "gauss-3", 16, 0.0),
     ("four-link wave", Chain((0.25,) * 4), (10, 1, 1), ANTIPODAL, WAVE, 1e-4, "gauss-3", 12, 0.0),
     ("five links", Chain((0.2,) * 5), (1, 1, 1), BILATERAL, FIVE, 1e-4, "gauss-3", 20, 0.0),
-    ("refined to 1e-4", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-2", 20, 1e-4),
-    ("refined to 1e-6", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-3", 20, 1e-6),
-    ("refined, anisotropic", Chain(), (1.7, 1, 1.3), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "radau-3", 20, 1e-5),
-    ("refined, two harmonics", Chain(), (1, 1, 1), Harmonic(2, "bilateral"), SMALL_LOOP, 1e-4, "gauss-3", 24, 1e-5),
+    ("refined to 1e-4", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-2", 20,
+    1e-4),
+    ("refined to 1e-6", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-3", 20,
+    1e-6),
+    ("refined, anisotropic", Chain(), (1.7, 1, 1.3), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4,
+    "radau-3", 20, 1e-5),
+    ("refined, two harmonics", Chain(), (1, 1, 1), Harmonic(2, "bilateral"), SMALL_LOOP, 1e-4,
+    "gauss-3", 24, 1e-5),
 )  # fmt: skip
 
 
@@ -104,16 +129,23 @@ def outcome(problem: Problem) -> dict:
     if not solution.answer.optimal or solution.answer.delta != problem.delta:
         return {"optimal": False, "message": solution.message}
     gait, delta = solution.gait, problem.delta
-    error = mesh_error(control_problem(problem), solution.mesh, gait, delta, max(problem.mesh_tolerance, 1e-6))
+    error = mesh_error(
+        control_problem(problem), solution.mesh, gait, delta, max(problem.mesh_tolerance, 1e-6)
+    )
     fine = replay(problem.body, problem.friction, gait, delta, tolerance=1e-9, most_instants=51200)
     seconds = time.process_time() - begin
     finer = problem.with_(
-        guess=gait, delta_start=delta, scheme="gauss-5", intervals=max(problem.intervals, 24), mesh_tolerance=1e-7
+        guess=gait,
+        delta_start=delta,
+        scheme="gauss-5",
+        intervals=max(problem.intervals, 24),
+        mesh_tolerance=1e-7,
     )
     reference = Solution(finer, confirmed(begin_at(finer, finer.guess)))
     certificate = certify(reference.answer, tolerance=1e-8) if reference.answer.optimal else None
     if certificate is not None and certificate.efficiency < (1.0 - FLOOR) * fine.efficiency:
-        certificate = None  # below the gait it started from: an optimum of another basin, not the reference of this one
+        # below the gait it started from: an optimum of another basin, not the reference of this one
+        certificate = None
     return {
         "optimal": True,
         "scheme": solution.mesh.scheme.name,
@@ -122,7 +154,9 @@ def outcome(problem: Problem) -> dict:
         "estimate": error.estimate,
         "expected": error.total,
         "against replay": solution.efficiency / fine.efficiency - 1,
-        "against optimum": None if certificate is None else solution.efficiency / certificate.efficiency - 1,
+        "against optimum": None
+        if certificate is None
+        else solution.efficiency / certificate.efficiency - 1,
         "seconds": seconds,
     }
 
@@ -139,10 +173,16 @@ def row(index: int, result: dict) -> str:
         return f"| {name} | not solved: {result['message']} |" + " |" * 9
     optimum = result["against optimum"]
     ratio = result["estimate"] / max(abs(result["against replay"]), FLOOR)
-    last = "not found |" if optimum is None else f"{optimum:+.1e} | {result['estimate'] / max(abs(optimum), FLOOR):.1f}"
+    last = (
+        "not found |"
+        if optimum is None
+        else f"{optimum:+.1e} | {result['estimate'] / max(abs(optimum), FLOOR):.1f}"
+    )
     return (
-        f"| {name} | ({', '.join(f'{mu:g}' for mu in friction)}) | {gait.harmonics} {gait.symmetry} | {delta:.0e} "
-        f"| {result['scheme']} x {result['intervals']} | {result['estimate']:.1e} | {result['expected']:+.1e} "
+        f"| {name} | ({', '.join(f'{mu:g}' for mu in friction)}) | {gait.harmonics} "
+        f"{gait.symmetry} | {delta:.0e} "
+        f"| {result['scheme']} x {result['intervals']} | {result['estimate']:.1e} | "
+        f"{result['expected']:+.1e} "
         f"| {result['against replay']:+.1e} | {ratio:.1f} | {last} |"
     )
 
@@ -159,7 +199,9 @@ collocated efficiency against a replay of the same gait. *Optimum*: against the 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Estimated against true errors; see the top of this file.")
+    parser = argparse.ArgumentParser(
+        description="Estimated against true errors; see the top of this file."
+    )
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
@@ -169,9 +211,19 @@ def main() -> None:
         results.append(cached(cache, problem.hash, partial(outcome, problem)))
         lines.append(row(index, results[-1]))
         print(lines[-1], flush=True)
-    judged = [(r, a) for r in results if r["optimal"] for a in ("against replay", "against optimum") if r[a] is not None]
+    judged = [
+        (r, a)
+        for r in results
+        if r["optimal"]
+        for a in ("against replay", "against optimum")
+        if r[a] is not None
+    ]
     failed = sum(not held(*pair) for pair in judged)
-    lines += ["", f"{len(judged)} comparisons over {len(CASES)} cases; optimistic by more than a factor 2: {failed}."]
+    lines += [
+        "",
+        f"{len(judged)} comparisons over {len(CASES)} cases; optimistic by more than a factor 2: "
+        f"{failed}.",
+    ]
     (options.output / "error_control.md").write_text("\n".join(lines) + "\n")
 
 

@@ -1,7 +1,7 @@
 """The compiled kernel beside NumPy in the same run: python -m benchmarks.kernel [--quick]
 
-Instants, certified starts, ellipse gaits and bounds, each by the kernel and by NumPy in turn: processor time, as a ratio, and
-its distance to a floor that is stated with it.
+Instants, certified starts, ellipse gaits and bounds, each by the kernel and by NumPy in turn:
+processor time, as a ratio, and its distance to a floor that is stated with it.
 """
 
 from __future__ import annotations
@@ -33,8 +33,12 @@ from scripts.models.sweep import Route, performance
 BODY, ISOTROPIC = Chain(), Friction()
 LAWS = (ISOTROPIC, Friction(mu_t=2.5, mu_f=1, mu_b=1.6))
 START_FLOOR = 0.1
-"""Processor time of a certified start below which what is not the balance would have to be rewritten as well [s]."""
-WAYS: dict[str, Callable[[], contextlib.AbstractContextManager]] = {"kernel": contextlib.nullcontext, "NumPy": numpy_instead}
+"""Processor time of a certified start below which what is not the balance would have to be
+rewritten as well [s]."""
+WAYS: dict[str, Callable[[], contextlib.AbstractContextManager]] = {
+    "kernel": contextlib.nullcontext,
+    "NumPy": numpy_instead,
+}
 
 
 def random_instants(count: int, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
@@ -54,25 +58,49 @@ def by_both(work: Callable[[], object], rounds: int = 3) -> dict[str, float]:
 
         return run
 
-    return interleaved_seconds({name: done(way) for name, way in WAYS.items()}, rounds, at_least=0.2)
+    return interleaved_seconds(
+        {name: done(way) for name, way in WAYS.items()}, rounds, at_least=0.2
+    )
 
 
 def instants(quick: bool) -> str:
-    """Instants a second and core, from rest, for three links; the floor is one bare evaluation of the forces a step."""
+    """Instants a second and core, from rest, for three links; the floor is one bare evaluation of
+    the forces a step."""
     rows: list[list[object]] = []
     many = random_instants(10_000)
     for law in LAWS[: 1 if quick else 2]:
         for delta in (1e-4,) if quick else (1e-2, 1e-4, 1e-8):
             steps = solve_balance(BODY, law, *many, delta).iterations.mean()
-            bare = interleaved_seconds({"": partial(solve_balance, BODY, law, *many, delta, tolerance=1e300)})[""]
+            bare = interleaved_seconds(
+                {"": partial(solve_balance, BODY, law, *many, delta, tolerance=1e300)}
+            )[""]
             for count in (60, 10_000):
                 seconds = by_both(partial(solve_balance, BODY, law, *random_instants(count), delta))
                 each = {name: value / count for name, value in seconds.items()}
-                row = [dataclasses.astuple(law), f"{delta:.0e}", count, *(f"{1 / each[way]:,.0f}" for way in WAYS)]
-                rows.append([*row, each["NumPy"] / each["kernel"], each["kernel"] / (steps + 1) / bare * 10_000])
-    head = ["friction (t, f, b)", "delta", "at once", *(f"{w}, a second" for w in WAYS), "ratio", "times the floor"]
-    return "Instants of three links, residual 1e-11 (floor: one evaluation of the forces a step).\n\n" + markdown_table(
-        head, rows
+                row = [
+                    dataclasses.astuple(law),
+                    f"{delta:.0e}",
+                    count,
+                    *(f"{1 / each[way]:,.0f}" for way in WAYS),
+                ]
+                rows.append(
+                    [
+                        *row,
+                        each["NumPy"] / each["kernel"],
+                        each["kernel"] / (steps + 1) / bare * 10_000,
+                    ]
+                )
+    head = [
+        "friction (t, f, b)",
+        "delta",
+        "at once",
+        *(f"{w}, a second" for w in WAYS),
+        "ratio",
+        "times the floor",
+    ]
+    return (
+        "Instants of three links, residual 1e-11 (floor: one evaluation of the forces a step).\n\n"
+        + markdown_table(head, rows)
     )
 
 
@@ -96,8 +124,14 @@ def starts(count: int) -> str:
             furthest = max(furthest, abs(found["kernel"].efficiency - found["NumPy"].efficiency))
         each = {name: spent[name] / max(certified[name], 1) for name in WAYS}
         shares = ", ".join(f"{certified[name]}" for name in WAYS)
-        rows.append([dataclasses.astuple(law), f"{shares} of {count}", each["kernel"], each["NumPy"]])
-        rows[-1] += [each["NumPy"] / each["kernel"], each["kernel"] / START_FLOOR, f"{furthest:.0e}"]
+        rows.append(
+            [dataclasses.astuple(law), f"{shares} of {count}", each["kernel"], each["NumPy"]]
+        )
+        rows[-1] += [
+            each["NumPy"] / each["kernel"],
+            each["kernel"] / START_FLOOR,
+            f"{furthest:.0e}",
+        ]
     head = [
         "friction (t, f, b)",
         "certified",
@@ -116,12 +150,26 @@ def sweep(quick: bool) -> str:
     route = Route(BODY, ISOTROPIC, 1e-4)
     seconds = by_both(partial(performance, route, gaits, instants=100), 1 if quick else 3)
     angles, rates = random_instants(10_000)
-    alone = interleaved_seconds({"": partial(solve_balance, BODY, ISOTROPIC, angles, rates, 1e-4, tolerance=1e-8)})[""]
+    alone = interleaved_seconds(
+        {"": partial(solve_balance, BODY, ISOTROPIC, angles, rates, 1e-4, tolerance=1e-8)}
+    )[""]
     floor = 50 * alone / 10_000
     each = {name: value / gaits.shape[1] for name, value in seconds.items()}
-    row = [*(f"{1 / each[w]:,.0f}" for w in WAYS), each["NumPy"] / each["kernel"], each["kernel"] / floor, 1e5 * each["kernel"]]
-    head = [*(f"{w}, gaits a second" for w in WAYS), "ratio", "times the floor", "100,000 gaits, s of one core"]
-    return "Ellipse gaits at 100 instants (floor: the balance alone).\n\n" + markdown_table(head, [row])
+    row = [
+        *(f"{1 / each[w]:,.0f}" for w in WAYS),
+        each["NumPy"] / each["kernel"],
+        each["kernel"] / floor,
+        1e5 * each["kernel"],
+    ]
+    head = [
+        *(f"{w}, gaits a second" for w in WAYS),
+        "ratio",
+        "times the floor",
+        "100,000 gaits, s of one core",
+    ]
+    return "Ellipse gaits at 100 instants (floor: the balance alone).\n\n" + markdown_table(
+        head, [row]
+    )
 
 
 class _Timed:
@@ -139,7 +187,8 @@ class _Timed:
 
 
 def bounds(quick: bool) -> str:
-    """The sampled bound; floors are the balances and the programs. A guarantee has no NumPy to be compared with."""
+    """The sampled bound; floors are the balances and the programs. A guarantee has no NumPy to be
+    compared with."""
     domain = sampling.Domain(BODY, ISOTROPIC, float(np.pi))
     budget = dataclasses.replace(QUICK, intervals=5, shapes=10, rounds=3) if quick else QUICK
     seconds, values, floor = {}, {}, 0.0
@@ -155,15 +204,31 @@ def bounds(quick: bool) -> str:
             seconds[way] = time.process_time() - begin
         if way == "kernel":
             floor = balances.seconds + programs.seconds
-    row: list[Any] = [f"sampled, {budget.intervals} x {budget.intervals}", f"{values['kernel']:.4f}, {values['NumPy']:.4f}"]
-    row += [seconds["kernel"], seconds["NumPy"], seconds["NumPy"] / seconds["kernel"], floor, seconds["kernel"] / floor]
+    row: list[Any] = [
+        f"sampled, {budget.intervals} x {budget.intervals}",
+        f"{values['kernel']:.4f}, {values['NumPy']:.4f}",
+    ]
+    row += [
+        seconds["kernel"],
+        seconds["NumPy"],
+        seconds["NumPy"] / seconds["kernel"],
+        floor,
+        seconds["kernel"] / floor,
+    ]
     head = ["bound", "values", *(f"{w}, s" for w in WAYS), "ratio", "floor, s", "times the floor"]
-    return "Bounds (floor: the kernel's balances and the programs of the exchange alone).\n\n" + markdown_table(head, [row])
+    return (
+        "Bounds (floor: the kernel's balances and the programs of the exchange alone).\n\n"
+        + markdown_table(head, [row])
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer sizes and repetitions: two minutes")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer sizes and repetitions: two minutes"
+    )
     quick = parser.parse_args().quick
     if native_kernel() is None:
         parser.error("no C compiler on this machine, so there is nothing to compare.")

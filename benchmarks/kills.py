@@ -1,10 +1,12 @@
-"""Does an interrupt lose anything? Solves are stopped at random moments; the same command again must leave the same file.
+"""Does an interrupt lose anything? Solves are stopped at random moments; the same command again
+must leave the same file.
 
     python -m benchmarks.kills --moments 100 [problems/three_link.py ...]
 
-Each problem is solved once undisturbed. Then `python -m colloc solve` is stopped by SIGINT or SIGKILL, in turn, at a random
-moment of that time (seed 0), and called again with the same arguments, until it has gone to its end. What it leaves is held
-against the undisturbed file: every number and every text to the last bit, times aside, and no other file beside it.
+Each problem is solved once undisturbed. Then `python -m colloc solve` is stopped by SIGINT or
+SIGKILL, in turn, at a random moment of that time (seed 0), and called again with the same
+arguments, until it has gone to its end. What it leaves is held against the undisturbed file: every
+number and every text to the last bit, times aside, and no other file beside it.
 """
 
 from __future__ import annotations
@@ -21,7 +23,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-DEFAULT = ("three_link", "three_link_feet", "three_link_turning", "three_link_uphill", "wave_sine", "four_link")
+DEFAULT = (
+    "three_link",
+    "three_link_feet",
+    "three_link_turning",
+    "three_link_uphill",
+    "wave_sine",
+    "four_link",
+)
 STARTS = 4
 ALL = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
 """The environment of a command that uses all processors."""
@@ -50,7 +59,9 @@ def command(problem: Path, folder: Path) -> list[str]:
 
 def stopped(problem: Path, folder: Path, asked: signal.Signals, seconds: float) -> bool:
     """Whether the command was stopped after so many seconds, before its end."""
-    process = subprocess.Popen(command(problem, folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ALL)
+    process = subprocess.Popen(
+        command(problem, folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ALL
+    )
     try:
         process.wait(seconds)
     except subprocess.TimeoutExpired:
@@ -59,8 +70,15 @@ def stopped(problem: Path, folder: Path, asked: signal.Signals, seconds: float) 
 
 
 def lost(problem: Path, folder: Path, wanted: dict[str, bytes]) -> str:
-    """What a solve that is taken up again in a folder leaves otherwise than an undisturbed one; empty if nothing."""
-    subprocess.run(command(problem, folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ALL, check=False)
+    """What a solve that is taken up again in a folder leaves otherwise than an undisturbed one;
+    empty if nothing."""
+    subprocess.run(
+        command(problem, folder),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=ALL,
+        check=False,
+    )
     left = sorted(path.name for path in folder.iterdir())
     if len(left) != 1:
         return f"the files are {', '.join(left) or 'none'}"
@@ -78,11 +96,20 @@ def undisturbed(problem: Path) -> tuple[dict[str, bytes], float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("problems", nargs="*", type=Path, default=[Path("problems") / f"{name}.py" for name in DEFAULT])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "problems",
+        nargs="*",
+        type=Path,
+        default=[Path("problems") / f"{name}.py" for name in DEFAULT],
+    )
     parser.add_argument("--moments", type=int, default=100)
     arguments = parser.parse_args()
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell; what is started would ignore it too
+    if (
+        signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    ):  # in the background of a shell; what is started would ignore it too
         signal.signal(signal.SIGINT, signal.default_int_handler)
     rng, failed = np.random.default_rng(0), 0
     whole = {problem: undisturbed(problem) for problem in arguments.problems}
@@ -96,10 +123,14 @@ def main() -> None:
             said = lost(problem, Path(name), wanted)
         failed += bool(said)
         print(
-            f"{k:3d} {problem.stem:20} {asked.name:7} {early} by {after:5.2f} of {seconds:5.2f} s: {said or 'the same file'}",
+            f"{k:3d} {problem.stem:20} {asked.name:7} {early} by {after:5.2f} of {seconds:5.2f} s: "
+            f"{said or 'the same file'}",
             flush=True,
         )
-    print(f"{arguments.moments - failed} of {arguments.moments} left the file of an undisturbed solve.")
+    print(
+        f"{arguments.moments - failed} of {arguments.moments} left the file of an undisturbed "
+        f"solve."
+    )
 
 
 if __name__ == "__main__":

@@ -1,12 +1,14 @@
-"""What every number of the search trades: each divided by three and multiplied, and the zoo solved with it.
+"""What every number of the search trades: each divided by three and multiplied, and the zoo solved
+with it.
 
     python -m benchmarks.numbers
     python -m benchmarks.numbers --stages explore refine --problems 4 6 7 12 14 21 22 24
 
-A number is what a module of `colloc/search` states by name in capitals, each entry of a tuple or of an `Effort` for itself,
-unless it stands in another module already.
-Printed for both: how many problems are still solved, the worst loss of value and of time over what the stated number gives. One
-that changes nothing either way, on problems that use its stage, is no number that anyone needs to set.
+A number is what a module of `colloc/search` states by name in capitals, each entry of a tuple or of
+an `Effort` for itself, unless it stands in another module already.
+Printed for both: how many problems are still solved, the worst loss of value and of time over what
+the stated number gives. One that changes nothing either way, on problems that use its stage, is no
+number that anyone needs to set.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ def modules(stages: list[str]) -> list[ModuleType]:
 
 
 def numbers(module: ModuleType) -> Iterator[tuple[str, str, Callable[[float], Any]]]:
-    """Every number of a module: what it is called, the name it stands in, and what that holds with the number so many times."""
+    """Every number of a module: what it is called, the name it stands in, and what that holds with
+    the number so many times."""
     names = _stated(module)
     others = [value for name, value in vars(module).items() if name.isupper() and name not in names]
     for name in names:
@@ -58,7 +61,11 @@ def numbers(module: ModuleType) -> Iterator[tuple[str, str, Callable[[float], An
         for key, entry in parts:
             elsewhere = isinstance(entry, float) and any(entry is other for other in others)
             if _is_number(entry) and not elsewhere and str(key)[:1] != "_":
-                yield f"{name}[{key}]" if key != "" else name, name, partial(_with_part, value, key, entry)
+                yield (
+                    f"{name}[{key}]" if key != "" else name,
+                    name,
+                    partial(_with_part, value, key, entry),
+                )
 
 
 def _with_part(value: Any, key: Any, entry: float, factor: float) -> Any:
@@ -68,7 +75,9 @@ def _with_part(value: Any, key: Any, entry: float, factor: float) -> Any:
         return (*value[:key], scaled, *value[key + 1 :])
     if isinstance(value, dict):
         return {**value, key: scaled}
-    return dataclasses.replace(value, **{key: scaled}) if dataclasses.is_dataclass(value) else scaled  # type: ignore[type-var]
+    return (
+        dataclasses.replace(value, **{key: scaled}) if dataclasses.is_dataclass(value) else scaled  # type: ignore[type-var]
+    )
 
 
 def _is_number(entry: Any) -> bool:
@@ -76,7 +85,11 @@ def _is_number(entry: Any) -> bool:
 
 
 def _holders(name: str, value: Any) -> list[ModuleType]:
-    return [m for key, m in sys.modules.items() if key.startswith("colloc.") and vars(m).get(name) is value]
+    return [
+        m
+        for key, m in sys.modules.items()
+        if key.startswith("colloc.") and vars(m).get(name) is value
+    ]
 
 
 def _stated(module: ModuleType) -> list[str]:
@@ -84,9 +97,18 @@ def _stated(module: ModuleType) -> list[str]:
     found = []
     for node in ast.parse(Path(module.__file__ or "").read_text(encoding="utf-8")).body:
         if isinstance(node, ast.Assign):
-            names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+            names = [
+                name.id
+                for target in node.targets
+                for name in ast.walk(target)
+                if isinstance(name, ast.Name)
+            ]
             found += [name for name in names if name.isupper()]
-        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.target.id.isupper():
+        elif (
+            isinstance(node, ast.AnnAssign)
+            and isinstance(node.target, ast.Name)
+            and node.target.id.isupper()
+        ):
             found.append(node.target.id)
     return sorted(found)
 
@@ -106,14 +128,21 @@ def results(problems: list[int]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.numbers", description="What every number of the search trades.")
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.numbers", description="What every number of the search trades."
+    )
     parser.add_argument("--stages", nargs="*", default=[])
     parser.add_argument("--problems", nargs="*", type=int, default=list(PROBLEMS))
     asked = parser.parse_args()
     results(asked.problems[:1])  # what is loaded once
     stated, usual = results(asked.problems)
-    print(f"{len(asked.problems)} problems, {np.isfinite(stated).sum()} solved, {usual.sum():.1f} s of processor time\n")
-    print(f"{'number':44} {'a third: solved, loss, time':>30} {'three times: solved, loss, time':>30}")
+    print(
+        f"{len(asked.problems)} problems, {np.isfinite(stated).sum()} solved, {usual.sum():.1f} s "
+        f"of processor time\n"
+    )
+    print(
+        f"{'number':44} {'a third: solved, loss, time':>30} {'three times: solved, loss, time':>30}"
+    )
     for module in modules(asked.stages):
         for label, name, scaled in numbers(module):
             line = f"{module.__name__.removeprefix('colloc.search.') + '.' + label:44}"
@@ -125,7 +154,9 @@ def main() -> None:
                 for holder in held:
                     setattr(holder, name, value)
                 loss = np.nanmax(1 - found / stated, initial=-np.inf)
-                line += f"{np.isfinite(found).sum():12d} {loss:9.1e} {seconds.sum() / usual.sum():7.2f}"
+                line += (
+                    f"{np.isfinite(found).sum():12d} {loss:9.1e} {seconds.sum() / usual.sum():7.2f}"
+                )
             print(line, flush=True)
 
 

@@ -1,19 +1,22 @@
 """General tools and optimisers of SciPy on the same problem: python -m benchmarks.peer_table
 
-The problem: isotropic three-link body, one bilateral harmonic, delta from 0.1 to 1e-4, 24 intervals of three Radau points on
-half a period, the same random starts. Every tool has the best options that were found for it. Those that solve the full
-program (rockit, YAPSS) use IPOPT with MUMPS and a tolerance of 1e-9, and start every level from a motion that colloc's NumPy
-solver of the balance makes feasible; SLSQP works on colloc's reduced functions; Nelder-Mead solves balances by `solve_balance`
-at the last delta only.
+The problem: isotropic three-link body, one bilateral harmonic, delta from 0.1 to 1e-4, 24 intervals
+of three Radau points on half a period, the same random starts. Every tool has the best options that
+were found for it. Those that solve the full program (rockit, YAPSS) use IPOPT with MUMPS and a
+tolerance of 1e-9, and start every level from a motion that colloc's NumPy solver of the balance
+makes feasible; SLSQP works on colloc's reduced functions; Nelder-Mead solves balances by
+`solve_balance` at the last delta only.
 
-Every tool is a script under benchmarks/peers, written after that tool's own examples; the other tools run in an environment
-of their own (benchmarks/peers/requirements.txt). All take turns, start by start:
+Every tool is a script under benchmarks/peers, written after that tool's own examples; the other
+tools run in an environment of their own (benchmarks/peers/requirements.txt). All take turns, start
+by start:
 
     python -m benchmarks.peers.interleave --peers peers-venv/bin/python
 
-What that has not written to results/peers is taken from results/curated/benchmarks/peers. A start succeeds if the replay of its
-gait reaches one of the two certified optima to 1e-3. Joint limits that hold at nodes only, as general tools impose them, are
-exceeded between nodes by some 3e-4 rad at the best optimum; up to 2e-3 rad is forgiven here, not by colloc's certificate.
+What that has not written to results/peers is taken from results/curated/benchmarks/peers. A start
+succeeds if the replay of its gait reaches one of the two certified optima to 1e-3. Joint limits
+that hold at nodes only, as general tools impose them, are exceeded between nodes by some 3e-4 rad
+at the best optimum; up to 2e-3 rad is forgiven here, not by colloc's certificate.
 """
 
 from __future__ import annotations
@@ -57,11 +60,15 @@ OTHERS = {
     "YAPSS, tuned IPOPT": Tool("yapss-tuned.jsonl", [_YAPSS, "--tuned"]),
 }
 RECORDED_ONCE = ("rockit, default IPOPT", "YAPSS, default IPOPT")
-"""Not run by `benchmarks.peers.interleave` unless asked for: most starts fail, each after its time limit."""
+"""Not run by `benchmarks.peers.interleave` unless asked for: most starts fail, each after its time
+limit."""
 _WORDS = (
-    "Processor seconds, transcription and compiling included (first start). The ratio is to the certified solve, "
-    f'"{CERTIFIED}"; the rows of that name alone have refinement and a certificate. All rows with a ratio were run in turns, '
-    "start by start (A B C A B C ...), one thread each, on a machine that others used: ratios count, seconds do not. SLSQP and "
+    "Processor seconds, transcription and compiling included (first start). The ratio is to the "
+    "certified solve, "
+    f'"{CERTIFIED}"; the rows of that name alone have refinement and a certificate. All rows with '
+    f"a ratio were run in turns, "
+    "start by start (A B C A B C ...), one thread each, on a machine that others used: ratios "
+    "count, seconds do not. SLSQP and "
     "Nelder-Mead use colloc's functions."
 )
 FOLDER = Path("results/peers")
@@ -72,12 +79,15 @@ def recorded(name: str) -> list[dict]:
     """The runs in a file of results/peers, or its curated copy; none if there is neither."""
     for place in _PLACES:
         if (place / name).exists():
-            return [json.loads(line) for line in (place / name).read_text(encoding="utf-8").splitlines()]
+            return [
+                json.loads(line) for line in (place / name).read_text(encoding="utf-8").splitlines()
+            ]
     return []
 
 
 def judged(run: dict) -> tuple[bool, float, float]:
-    """Whether a run found an optimum, its claim over its replay less 1, and its replay over the nearest optimum less 1."""
+    """Whether a run found an optimum, its claim over its replay less 1, and its replay over the
+    nearest optimum less 1."""
     if "gait" not in run or not admissible(Chain(), np.array(run["gait"])[:, None], slack=2e-3)[0]:
         return False, np.nan, np.nan
     gait = ellipse(*run["gait"])
@@ -109,13 +119,21 @@ def row(name: str, tally: Tally, unit: float) -> list[object]:
         return [*cells, "-", "-", "-", "-"]
     claim, short = (float(np.median([abs(tally.verdicts[k][i]) for k in good])) for i in (1, 2))
     seconds = tally.seconds_an_optimum
-    return [*cells, seconds, f"{seconds / unit:.2f}" if name not in RECORDED_ONCE else "(other day)", claim, short]
+    return [
+        *cells,
+        seconds,
+        f"{seconds / unit:.2f}" if name not in RECORDED_ONCE else "(other day)",
+        claim,
+        short,
+    ]
 
 
 def table() -> str:
     """The table; ratios are those of processor seconds an optimum to colloc's certified solve."""
     runs = {name: recorded(tool.file) for name, tool in {**OWN, **OTHERS}.items()}
-    tallies = {name: Tally(found, [judged(run) for run in found]) for name, found in runs.items() if found}
+    tallies = {
+        name: Tally(found, [judged(run) for run in found]) for name, found in runs.items() if found
+    }
     unit = tallies[CERTIFIED].seconds_an_optimum
     rows = [row(name, tally, unit) for name, tally in tallies.items()]
     header = ["tool", "starts", "optima found", "median s a start", "s an optimum", "ratio"]
@@ -127,7 +145,9 @@ def table() -> str:
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     print(table())
 
 

@@ -1,7 +1,9 @@
-"""References at any precision, in mpmath: textbook antiderivatives and plain Newton, nothing shared with colloc.
+"""References at any precision, in mpmath: textbook antiderivatives and plain Newton, nothing shared
+with colloc.
 
-The closed forms of `colloc.mechanics.link_friction` are arranged to lose no digits; these are not: they are what an integral
-table says (asinh), and digits are bought with precision instead. `quadrature_moments` checks them by quadrature.
+The closed forms of `colloc.mechanics.link_friction` are arranged to lose no digits; these are not:
+they are what an integral table says (asinh), and digits are bought with precision instead.
+`quadrature_moments` checks them by quadrature.
 """
 
 from __future__ import annotations
@@ -14,8 +16,11 @@ import mpmath as mp
 DIGITS = 60
 
 
-def link_moments(vs: float, vn: float, w: float, length: float, delta: float) -> tuple[mp.mpf, mp.mpf, mp.mpf]:
-    """Integrals of sigma^j / sqrt(vs^2 + (vn + w sigma)^2 + delta^2) over a link, j = 0, 1, 2, to about 30 digits."""
+def link_moments(
+    vs: float, vn: float, w: float, length: float, delta: float
+) -> tuple[mp.mpf, mp.mpf, mp.mpf]:
+    """Integrals of sigma^j / sqrt(vs^2 + (vn + w sigma)^2 + delta^2) over a link, j = 0, 1, 2, to
+    about 30 digits."""
     with mp.workdps(_digits(vs, vn, w, delta)):
         vs, vn, w, length, delta = (mp.mpf(value) for value in (vs, vn, w, length, delta))
         a2 = vs * vs + delta * delta
@@ -31,16 +36,27 @@ def link_moments(vs: float, vn: float, w: float, length: float, delta: float) ->
         return k0 / w, (k1 - vn * k0) / w**2, (k2 - 2 * vn * k1 + vn * vn * k0) / w**3
 
 
-def quadrature_moments(vs: float, vn: float, w: float, length: float, delta: float) -> tuple[mp.mpf, ...]:
-    """The same by tanh-sinh quadrature on panels that halve towards the slowest point of the link."""
+def quadrature_moments(
+    vs: float, vn: float, w: float, length: float, delta: float
+) -> tuple[mp.mpf, ...]:
+    """The same by tanh-sinh quadrature on panels that halve towards the slowest point of the
+    link."""
     with mp.workdps(30):
         half = mp.mpf(length) / 2
         slowest = min(max(-mp.mpf(vn) / mp.mpf(w), -half), half) if w else mp.mpf(0)
         steps = [half * 2 * mp.mpf(2) ** -k for k in range(0, 60, 2)]
-        edges = sorted({-half, half, slowest} | {e for s in steps for e in (slowest - s, slowest + s) if -half < e < half})
+        edges = sorted(
+            {-half, half, slowest}
+            | {e for s in steps for e in (slowest - s, slowest + s) if -half < e < half}
+        )
 
         def integral(order: int) -> mp.mpf:
-            return mp.quad(lambda s: s**order / mp.sqrt(mp.mpf(vs) ** 2 + (vn + w * s) ** 2 + mp.mpf(delta) ** 2), edges)
+            return mp.quad(
+                lambda s: (
+                    s**order / mp.sqrt(mp.mpf(vs) ** 2 + (vn + w * s) ** 2 + mp.mpf(delta) ** 2)
+                ),
+                edges,
+            )
 
         return tuple(integral(order) for order in range(3))
 
@@ -61,7 +77,8 @@ def net_force(
     delta: float,
     anchor: int,
 ) -> list[mp.mpf]:
-    """Force and torque about the midpoint of link `anchor`, which moves with z = (vx, vy, w), in body-frame axes.
+    """Force and torque about the midpoint of link `anchor`, which moves with z = (vx, vy, w), in
+    body-frame axes.
 
     Links one after the other, each by `link_moments`; coefficients are (mu_t, mu_f, mu_b).
     """
@@ -108,10 +125,11 @@ def balanced_velocity(
     start: Sequence[float],
     digits: int | None = None,
 ) -> list[mp.mpf]:
-    """Velocity of the midpoint of link `anchor` that balances the body: damped Newton with difference quotients.
+    """Velocity of the midpoint of link `anchor` that balances the body: damped Newton with
+    difference quotients.
 
-    With equal coefficients the balance has one solution, so any root found is the answer; otherwise it is the root that
-    Newton reaches from `start`. Raises ArithmeticError if it does not converge.
+    With equal coefficients the balance has one solution, so any root found is the answer; otherwise
+    it is the root that Newton reaches from `start`. Raises ArithmeticError if it does not converge.
     """
     # slow stretches lose the square of delta to cancellation
     digits = digits or 40 + 2 * max(0, round(-math.log10(delta)))
@@ -140,4 +158,6 @@ def balanced_velocity(
                     break
                 factor /= 2
             z, force = trial, new
-        raise ArithmeticError(f"no balance found at delta = {delta:g}, residual {mp.nstr(mp.norm(force), 3)}")
+        raise ArithmeticError(
+            f"no balance found at delta = {delta:g}, residual {mp.nstr(mp.norm(force), 3)}"
+        )

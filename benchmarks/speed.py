@@ -1,9 +1,12 @@
-"""What takes how long, as ratios to a fixed load, and how it grows: python -m benchmarks.speed [--quick]
+"""What takes how long, as ratios to a fixed load, and how it grows: python -m benchmarks.speed
+[--quick]
 
-The load is Python and small NumPy calls, as a search is, and is measured before and after every work: a busy or slow machine
-changes both. Every work runs in a process of its own, forked from this one, whose memory is the least that is seen.
-Error over processor time: python -m benchmarks.work_precision. What it calls is public, so the same file measures an earlier
-colloc too: in its tree, python -m benchmarks.speed with this file in place of its own. What that has not yet is nan.
+The load is Python and small NumPy calls, as a search is, and is measured before and after every
+work: a busy or slow machine changes both. Every work runs in a process of its own, forked from this
+one, whose memory is the least that is seen. Error over processor time: python -m
+benchmarks.work_precision. What it calls is public, so the same file measures an earlier colloc too:
+in its tree, python -m benchmarks.speed with this file in place of its own. What that has not yet is
+nan.
 """
 
 from __future__ import annotations
@@ -44,7 +47,8 @@ def load() -> float:
 
 
 def in_a_process(work: Callable[[], object]) -> tuple[float, float]:
-    """Processor time of a work [s] and the largest memory of its process [MB]. `ChildProcessError` if it fails."""
+    """Processor time of a work [s] and the largest memory of its process [MB]. `ChildProcessError`
+    if it fails."""
     process = os.fork()
     if process == 0:
         with open(os.devnull, "w") as nowhere:
@@ -60,7 +64,8 @@ def in_a_process(work: Callable[[], object]) -> tuple[float, float]:
 
 
 def measured(work: Callable[[], object], rounds: int = 1) -> tuple[float, float, float]:
-    """Median over rounds of processor time over that of the load, seconds, and memory; nan where the work fails."""
+    """Median over rounds of processor time over that of the load, seconds, and memory; nan where
+    the work fails."""
     found = []
     for _ in range(rounds):
         before = load()
@@ -80,14 +85,20 @@ def works(rounds: int, zoo: int) -> str:
     rows: list[Sequence[object]] = []
     with TemporaryDirectory() as place:
         os.chdir(place)
-        ordinary = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}  # as users have it: modules are compiled once
+        # as users have it: modules are compiled once
+        ordinary = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
         for name, words in SHELL.items():
             command = partial(os.execve, sys.executable, [sys.executable, *words], ordinary)
             in_a_process(command)
             rows.append((name, *measured(command, rounds)))
     rows.append(("solve, loaded before", *measured(partial(colloc.solve, problem), rounds)))
     rows.append(("solve from the answer", *measured(partial(colloc.solve, warm, 1), rounds)))
-    rows.append(("certificate of its gait alone", *measured(lambda: colloc.evaluate(problem, known.gait), rounds)))
+    rows.append(
+        (
+            "certificate of its gait alone",
+            *measured(lambda: colloc.evaluate(problem, known.gait), rounds),
+        )
+    )
     each = [measured(partial(colloc.solve, zoo_problem(number))) for number in range(zoo)]
     rows.append((f"median of the zoo's first {zoo}", *np.median(each, axis=0)))
     rows.append(("ten links, one harmonic", *measured(partial(colloc.solve, grown(links=10)))))
@@ -95,22 +106,37 @@ def works(rounds: int, zoo: int) -> str:
 
 
 def grown(links: int = 3, harmonics: int = 1, intervals: int = 24, feet: int = 0) -> colloc.Problem:
-    """A problem of some size. Two links get nowhere where friction forward and backward is alike."""
-    body = colloc.Chain((1 / links,) * links, feet=feet) if feet else colloc.Chain((1 / links,) * links)
-    friction, kind = colloc.Friction(mu_t=2, mu_f=1, mu_b=2 if links == 2 else 1), colloc.Harmonic(harmonics, "bilateral")
-    return colloc.Problem("grown", body=body, friction=friction, gait=kind, intervals=intervals, delta=1e-3)
+    """A problem of some size. Two links get nowhere where friction forward and backward is
+    alike."""
+    body = (
+        colloc.Chain((1 / links,) * links, feet=feet)
+        if feet
+        else colloc.Chain((1 / links,) * links)
+    )
+    friction, kind = (
+        colloc.Friction(mu_t=2, mu_f=1, mu_b=2 if links == 2 else 1),
+        colloc.Harmonic(harmonics, "bilateral"),
+    )
+    return colloc.Problem(
+        "grown", body=body, friction=friction, gait=kind, intervals=intervals, delta=1e-3
+    )
 
 
 def swept(cells: int) -> object:
     """A study of so many coefficients of friction."""
     axis = colloc.Axis("mu_t", tuple(np.geomspace(0.5, 8.0, cells)))
     return colloc.sweep(
-        colloc.Study("grown", (axis,), lambda mu_t: grown().with_(friction=colloc.Friction(mu_t=mu_t, mu_f=1, mu_b=1)))
+        colloc.Study(
+            "grown",
+            (axis,),
+            lambda mu_t: grown().with_(friction=colloc.Friction(mu_t=mu_t, mu_f=1, mu_b=1)),
+        )
     )
 
 
 def growth(quick: bool) -> str:
-    """One start, or more, or a sweep against sizes: the largest tried, and the exponent between the last two."""
+    """One start, or more, or a sweep against sizes: the largest tried, and the exponent between the
+    last two."""
     sizes = {
         "links": (2, 3, 5, 10) if quick else (2, 3, 5, 10, 20, 40),
         "harmonics": (1, 4) if quick else (1, 4, 8, 16),
@@ -123,20 +149,30 @@ def growth(quick: bool) -> str:
     for name, tried in sizes.items():
         found = np.array([measured(_sized(name, size)) for size in tried])
         powers = np.log(found[-1] / found[-2]) / np.log(tried[-1] / tried[-2])
-        each = ", ".join(f"{size}: {ratio:.3g}" for size, ratio in zip(tried, found[:, 0], strict=True))
+        each = ", ".join(
+            f"{size}: {ratio:.3g}" for size, ratio in zip(tried, found[:, 0], strict=True)
+        )
         rows.append((name, each, powers[0], found[-1, 2], powers[2]))
-    return markdown_table(("of", "size: times the load", "exponent", "MB at the largest", "its exponent"), rows)
+    return markdown_table(
+        ("of", "size: times the load", "exponent", "MB at the largest", "its exponent"), rows
+    )
 
 
 def _sized(name: str, size: int) -> Callable[[], object]:
     if name == "cells":
         return partial(swept, size)
-    return lambda: colloc.solve(grown(), size) if name == "starts" else colloc.solve(grown(**{name: size}), 1)
+    return lambda: (
+        colloc.solve(grown(), size) if name == "starts" else colloc.solve(grown(**{name: size}), 1)
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer sizes and repetitions: two minutes")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer sizes and repetitions: two minutes"
+    )
     quick = parser.parse_args().quick
     print(f"The load takes {load():.3f} s of processor time now.", end="\n\n", flush=True)
     print(works(1 if quick else 5, 3 if quick else 25), end="\n\n", flush=True)

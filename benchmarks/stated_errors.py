@@ -1,11 +1,13 @@
 """Do the stated errors of motions with inertia and of replays on slopes hold?
 
-    python -m benchmarks.stated_errors --number 100 --seed 1 [--kind motions | slopes | certificates]
+    python -m benchmarks.stated_errors --number 100 --seed 1 [--kind motions | slopes |
+    certificates]
 
-Random chains of 2 to 5 links, frictions, paces and smooth gaits, to random tolerances: played with inertia as
-`colloc.inertial_motion` does, on slopes as a replay does, and measured with inertia as a certificate does, at 1e-6. For
-distance, work, rotation and efficiency: how often the true error is larger than the stated one, and how many times at most.
-The references are runs whose steps may err a hundred times less than the least of these errors; they state none themselves.
+Random chains of 2 to 5 links, frictions, paces and smooth gaits, to random tolerances: played with
+inertia as `colloc.inertial_motion` does, on slopes as a replay does, and measured with inertia as a
+certificate does, at 1e-6. For distance, work, rotation and efficiency: how often the true error is
+larger than the stated one, and how many times at most. The references are runs whose steps may err
+a hundred times less than the least of these errors; they state none themselves.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from colloc.verification.replayer import replayer
 from colloc.verification.slope import gait_on_slope
 
 FINER, LEAST = 1e-2, 1e-11
-"""Error of the references' steps over the least of the errors that are stated, and the least: rounding is larger."""
+"""Error of the references' steps over the least of the errors that are stated, and the least:
+rounding is larger."""
 QUANTITIES = "distance", "work", "rotation", "efficiency"
 
 
@@ -44,7 +47,8 @@ class Case(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What is stated of the quantities, by how much it may be wrong, and what is true; ``(4,)`` each."""
+    """What is stated of the quantities, by how much it may be wrong, and what is true; ``(4,)``
+    each."""
 
     values: np.ndarray
     errors: np.ndarray
@@ -79,7 +83,10 @@ def _row(values: Any, errors: Any, true: Any) -> Row:
     def four(period: Any) -> np.ndarray:
         return np.array([*(period[name] for name in QUANTITIES[:-1]), EFFICIENCY(period)])
 
-    stated = [*(errors[name] for name in QUANTITIES[:-1]), EFFICIENCY.relative_error(values, errors) * abs(EFFICIENCY(values))]
+    stated = [
+        *(errors[name] for name in QUANTITIES[:-1]),
+        EFFICIENCY.relative_error(values, errors) * abs(EFFICIENCY(values)),
+    ]
     return Row(four(values), np.array(stated), four(true))
 
 
@@ -112,7 +119,11 @@ def slope(case: Case) -> Row:
     ran = replayer(Slope(case.grade))(*case[:4], tolerance=case.tolerance)
     states = on.followed(np.array([case.gait.theta]), _finer(ran.errors), 1e-3).states
     theta, climb, _, spent, *_ = states[:, -1] - states[:, 0]
-    return _row(ran.values, ran.errors, {"distance": climb, "work": spent + case.grade * climb, "rotation": theta})
+    return _row(
+        ran.values,
+        ran.errors,
+        {"distance": climb, "work": spent + case.grade * climb, "rotation": theta},
+    )
 
 
 def certificate(case: Case) -> Row:
@@ -121,30 +132,47 @@ def certificate(case: Case) -> Row:
     known = measured(*level[:4], rotation=None, run=replayer(Paced(case.froude)))
     played = gait_with_inertia(*level[:4], froude=case.froude, breaks=())
     start = played.momenta(known.fine.tail_velocity(np.zeros(1)))
-    return _row(known.fine.values, {**known.fine.errors, **known.errors}, _true_motion(level, start, _finer(known.fine.errors)))
+    return _row(
+        known.fine.values,
+        {**known.fine.errors, **known.errors},
+        _true_motion(level, start, _finer(known.fine.errors)),
+    )
 
 
-KINDS: dict[str, Callable[[Case], Row]] = {"motions": motion, "slopes": slope, "certificates": certificate}
+KINDS: dict[str, Callable[[Case], Row]] = {
+    "motions": motion,
+    "slopes": slope,
+    "certificates": certificate,
+}
 
 
 def summary(rows: list[Row]) -> str:
-    """A table of how often errors are exceeded, how many times at most, and stated over true ones in the median."""
+    """A table of how often errors are exceeded, how many times at most, and stated over true ones
+    in the median."""
     values, errors, true = (np.array(part) for part in zip(*rows, strict=True))
     off = np.abs(values - true)
     with np.errstate(divide="ignore"):
         times = off / errors
     table = [
-        [name, str(len(rows)), str((times[:, k] > 1).sum()), f"{times[:, k].max():.2g}", f"{1 / np.median(times[:, k]):.2g}"]
+        [
+            name,
+            str(len(rows)),
+            str((times[:, k] > 1).sum()),
+            f"{times[:, k].max():.2g}",
+            f"{1 / np.median(times[:, k]):.2g}",
+        ]
         for k, name in enumerate(QUANTITIES)
     ]
     some = int((times > 1).any(axis=1).sum())
-    return markdown_table(["quantity", "cases", "exceeded", "worst true / stated", "stated / true, median"], table) + (
-        f"\nany of them: {some} of {len(rows)}\n"
-    )
+    return markdown_table(
+        ["quantity", "cases", "exceeded", "worst true / stated", "stated / true, median"], table
+    ) + (f"\nany of them: {some} of {len(rows)}\n")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--number", type=int, default=100, metavar="N", help="cases of each kind")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
     parser.add_argument("--seed", type=int, default=1, metavar="S")

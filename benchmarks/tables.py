@@ -1,4 +1,5 @@
-"""What all measurements share: processor time, medians of interleaved runs, values kept in files, Markdown tables."""
+"""What all measurements share: processor time, medians of interleaved runs, values kept in files,
+Markdown tables."""
 
 from __future__ import annotations
 
@@ -23,8 +24,11 @@ def cpu_seconds(work: Callable[[], object], at_least: float = 0.05) -> float:
             return spent / calls
 
 
-def interleaved_seconds(works: dict[str, Callable[[], object]], rounds: int = 3, at_least: float = 0.05) -> dict[str, float]:
-    """Median processor time of each call over `rounds` rounds in turn, so that disturbances fall on all alike."""
+def interleaved_seconds(
+    works: dict[str, Callable[[], object]], rounds: int = 3, at_least: float = 0.05
+) -> dict[str, float]:
+    """Median processor time of each call over `rounds` rounds in turn, so that disturbances fall on
+    all alike."""
     spent: dict[str, list[float]] = {name: [] for name in works}
     for _ in range(rounds):
         for name, work in works.items():

@@ -1,10 +1,12 @@
-"""The same gaits by other ways of computing them: compiled kernel and NumPy, Gauss and Radau collocation.
+"""The same gaits by other ways of computing them: compiled kernel and NumPy, Gauss and Radau
+collocation.
 
     python -m benchmarks.ways [problems/three_link.py ...]
 
-Each problem is solved from eight starts. Every way begins with that gait, finds its own optimum and certifies it. Last
-columns: the largest relative difference of two values, and of two joint angles at the same phase [rad]. A value is of its own
-optimum, so it may differ by what a mesh is asked to keep to (`Problem.mesh_tolerance`), beyond the stated error of its replay.
+Each problem is solved from eight starts. Every way begins with that gait, finds its own optimum and
+certifies it. Last columns: the largest relative difference of two values, and of two joint angles
+at the same phase [rad]. A value is of its own optimum, so it may differ by what a mesh is asked to
+keep to (`Problem.mesh_tolerance`), beyond the stated error of its replay.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ WAYS = {
     "gauss-5, kernel": ("gauss-5", False),
 }
 PROBLEMS = (
-    "three_link", "three_link_two_harmonics", "three_link_wheels", "three_link_feet", "three_link_fast", "three_link_uphill",
+    "three_link", "three_link_two_harmonics", "three_link_wheels", "three_link_feet",
+    "three_link_fast", "three_link_uphill",
     "three_link_offset", "four_link", "serpenoid_snake",
 )  # fmt: skip
 
@@ -49,15 +52,28 @@ def row(path: Path) -> list[object]:
 
 def _value(solution: colloc.Solution) -> str:
     certificate = solution.certificate
-    return f"{solution.value:.8f} ± {certificate.value_error:.0e}" + ("" if certificate.passed else " (not certified)")
+    return f"{solution.value:.8f} ± {certificate.value_error:.0e}" + (
+        "" if certificate.passed else " (not certified)"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("problems", nargs="*", type=Path, default=[Path("problems", f"{name}.py") for name in PROBLEMS])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "problems",
+        nargs="*",
+        type=Path,
+        default=[Path("problems", f"{name}.py") for name in PROBLEMS],
+    )
     header = ["problem", *WAYS, "values", "angles"]
     for number, path in enumerate(parser.parse_args().problems):
-        print(*markdown_table(header, [row(path)]).splitlines()[2 if number else 0 :], sep="\n", flush=True)
+        print(
+            *markdown_table(header, [row(path)]).splitlines()[2 if number else 0 :],
+            sep="\n",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -1,12 +1,15 @@
-"""Work and precision of schemes, on uniform and on refined meshes: python -m benchmarks.work_precision [--path]
+"""Work and precision of schemes, on uniform and on refined meshes: python -m
+benchmarks.work_precision [--path]
 
-The isotropic one-harmonic three-link optimum at delta = 1e-4, from a good guess. Every solve is held
-against the optimum itself, as the finest refined solve finds it by independent replay, and against a replay of its own
-gait. Outcomes are kept in results/work_precision.json, so an interrupted run goes on where it stopped. Writes
-results/work_precision.md and results/work_precision.png and .pdf.
+The isotropic one-harmonic three-link optimum at delta = 1e-4, from a good guess. Every solve is
+held against the optimum itself, as the finest refined solve finds it by independent replay, and
+against a replay of its own gait. Outcomes are kept in results/work_precision.json, so an
+interrupted run goes on where it stopped. Writes results/work_precision.md and
+results/work_precision.png and .pdf.
 
-With --path the free path of curvature 8 instead, from an ellipse; into work_precision_path.md, .png and .pdf. There every
-mesh has a class of paths of its own, so errors are those against a replay of the same path.
+With --path the free path of curvature 8 instead, from an ellipse; into work_precision_path.md, .png
+and .pdf. There every mesh has a class of paths of its own, so errors are those against a replay of
+the same path.
 """
 
 from __future__ import annotations
@@ -21,7 +24,18 @@ import numpy as np
 
 from benchmarks.tables import cached
 from colloc import FreePath, Harmonic, Problem, certify, ellipse
-from colloc.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled, subplots
+from colloc.pictures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    save,
+    styled,
+    subplots,
+)
 from colloc.results.solution import Solution
 from colloc.search.explore import begin_at
 from colloc.search.solve import confirmed
@@ -37,7 +51,8 @@ REFERENCE = ("gauss-5", 20, 1e-7)
 
 
 class Picture(NamedTuple):
-    """What is solved for one picture: schemes, uniform meshes, and tolerances to refine a mesh of `first` intervals to."""
+    """What is solved for one picture: schemes, uniform meshes, and tolerances to refine a mesh of
+    `first` intervals to."""
 
     name: str
     title: str
@@ -49,7 +64,11 @@ class Picture(NamedTuple):
 
     def meshes(self, refine: bool) -> list[tuple[int, float]]:
         """Intervals and mesh tolerance of each solve; 0 for a uniform mesh."""
-        return [(self.first, tolerance) for tolerance in self.refined] if refine else [(n, 0.0) for n in self.uniform]
+        return (
+            [(self.first, tolerance) for tolerance in self.refined]
+            if refine
+            else [(n, 0.0) for n in self.uniform]
+        )
 
 
 def run_problem(scheme: str, intervals: int, tolerance: float) -> Problem:
@@ -120,21 +139,32 @@ def kept(cache: Path, problem: Problem) -> dict:
     return cached(cache, problem.hash, lambda: outcome(problem))
 
 
-def save_work_precision(folder: Path, name: str, uniform: Series, refined: Series, title: str) -> list[Path]:
-    """Errors on uniform and on refined meshes against processor time, one colour a scheme; PNG and PDF."""
+def save_work_precision(
+    folder: Path, name: str, uniform: Series, refined: Series, title: str
+) -> list[Path]:
+    """Errors on uniform and on refined meshes against processor time, one colour a scheme; PNG and
+    PDF."""
     with styled():
         figure, axes = subplots(figsize=(6.6, 4.4))
         for index, scheme in enumerate(uniform):
-            style = {"color": _COLOURS[index % len(_COLOURS)], "marker": _MARKERS[index % len(_MARKERS)], "ms": 5}
+            style = {
+                "color": _COLOURS[index % len(_COLOURS)],
+                "marker": _MARKERS[index % len(_MARKERS)],
+                "ms": 5,
+            }
             axes.loglog(*uniform[scheme], ls=":", mfc="white", **style)
             if scheme in refined:
                 axes.loglog(*refined[scheme], ls="-", label=scheme, **style)
         axes.plot([], [], ":", color=BLACK, marker="o", mfc="white", label="uniform meshes")
         axes.plot([], [], "-", color=BLACK, marker="o", label="refined")
-        axes.set(xlabel="processor time [s]", ylabel="relative error of the efficiency", title=title)
+        axes.set(
+            xlabel="processor time [s]", ylabel="relative error of the efficiency", title=title
+        )
         ticks = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50]
         low, high = axes.get_xlim()
-        axes.set_xticks([t for t in ticks if low <= t <= high], [f"{t:g}" for t in ticks if low <= t <= high])
+        axes.set_xticks(
+            [t for t in ticks if low <= t <= high], [f"{t:g}" for t in ticks if low <= t <= high]
+        )
         axes.set_xticks([], minor=True)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.grid(alpha=0.25)
@@ -163,7 +193,9 @@ that other work shared. Error: collocated efficiency over that of a replay of th
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--path", action="store_true", help="the free path instead of one harmonic")
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()
@@ -184,10 +216,16 @@ def main() -> None:
                 error = own if options.path else result["efficiency"] / reference - 1
                 mesh = f"to {tolerance:.0e}" if refine else "uniform"
                 note = "" if result["optimal"] else " (not converged)"
-                errors = f"{result['replayed']:.7f} | {own:+.1e}" if options.path else f"{error:+.1e} | {own:+.1e}"
+                errors = (
+                    f"{result['replayed']:.7f} | {own:+.1e}"
+                    if options.path
+                    else f"{error:+.1e} | {own:+.1e}"
+                )
                 lines.append(
-                    f"| {scheme} | {mesh}{note} | {result['scheme']} x {result['intervals']} | {result['points']} "
-                    f"| {result['efficiency']:.7f} | {errors} | {result['iterations']} | {result['seconds']:.1f} |"
+                    f"| {scheme} | {mesh}{note} | {result['scheme']} x {result['intervals']} | "
+                    f"{result['points']} "
+                    f"| {result['efficiency']:.7f} | {errors} | {result['iterations']} | "
+                    f"{result['seconds']:.1f} |"
                 )
                 print(lines[-1], flush=True)
                 if result["optimal"]:

@@ -6,14 +6,16 @@
     python -m benchmarks.zoo --paced --problems 20
     python -m benchmarks.zoo --feet --problems 100
 
-Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1 to 4 harmonics, free paths
-and polygons; every symmetry that the body has; joints within pi, 2.5 or 2. With --laws another family: elliptic, viscous, power
-and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power, slopes. With --modes a
-third: smooth bodies of 2 to 6 bending modes, under the friction of the first. With --paced a fourth: bodies of 2 to 5 links,
-a third of them on feet, played at Froude numbers from 0.001 to 1. With --feet a fifth: bodies of 2 to 6 links on one to three
-feet or wheels a link, with weights of any share. For each: whether it is solved, its value over
-the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates), and the processor time.
-Failures are printed with the reason.
+Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1
+to 4 harmonics, free paths and polygons; every symmetry that the body has; joints within pi, 2.5 or
+2. With --laws another family: elliptic, viscous, power and own laws beside Coulomb's, other
+objectives, links of different weights, motors of limited power, slopes. With --modes a third:
+smooth bodies of 2 to 6 bending modes, under the friction of the first. With --paced a fourth:
+bodies of 2 to 5 links, a third of them on feet, played at Froude numbers from 0.001 to 1. With
+--feet a fifth: bodies of 2 to 6 links on one to three feet or wheels a link, with weights of any
+share. For each: whether it is solved, its value over the best ever found for that problem (in
+benchmarks/zoo_best.json, which a better answer updates), and the processor time. Failures are
+printed with the reason.
 """
 
 from __future__ import annotations
@@ -56,8 +58,13 @@ def zoo_problem(number: int) -> Problem:
     """Problem `number` of the zoo; it depends on that number alone."""
     rng = np.random.default_rng([SEED, number])
     body = _drawn_body(rng)
-    mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))), float(rng.choice([1.0, rng.uniform(1.0, 5.0)]))
-    symmetry = str(rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"]))
+    mu_t, mu_b = (
+        float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))),
+        float(rng.choice([1.0, rng.uniform(1.0, 5.0)])),
+    )
+    symmetry = str(
+        rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"])
+    )
     kind, limit = rng.random(), float(rng.choice([np.pi, 2.5, 2.0]))
     gait: Harmonic | FreePath | Polygon
     if kind < 0.7:
@@ -66,7 +73,13 @@ def zoo_problem(number: int) -> Problem:
         gait = FreePath(float(rng.choice([1.0, 2.0, 4.0])), symmetry)
     else:
         gait = Polygon(2 * int(rng.integers(2, 5)), symmetry)
-    return Problem(f"zoo-{number}", body=body, friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), gait=gait, joint_limit=limit)
+    return Problem(
+        f"zoo-{number}",
+        body=body,
+        friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b),
+        gait=gait,
+        joint_limit=limit,
+    )
 
 
 def _drawn_body(rng: np.random.Generator, most: int = 6) -> Chain:
@@ -83,13 +96,20 @@ def _parts(sizes: np.ndarray) -> tuple[float, ...]:
 
 
 def law_problem(number: int) -> Problem:
-    """Problem `number` of the family of other laws, objectives and limits; it depends on that number alone."""
+    """Problem `number` of the family of other laws, objectives and limits; it depends on that
+    number alone."""
     rng = np.random.default_rng([SEED + 1, number])
     body = _drawn_body(rng, 4)
     if rng.random() < 0.4:
         weights = rng.uniform(0.5, 1.5, body.n_link)
-        body = Chain(body.lengths, weights=_parts(weights + weights[::-1] if body.symmetric else weights))
-    mu_t, mu_b, power = np.exp(rng.uniform(np.log(0.5), np.log(5.0))), rng.choice([1.0, 1.5, 3.0]), rng.uniform(0.2, 1.6)
+        body = Chain(
+            body.lengths, weights=_parts(weights + weights[::-1] if body.symmetric else weights)
+        )
+    mu_t, mu_b, power = (
+        np.exp(rng.uniform(np.log(0.5), np.log(5.0))),
+        rng.choice([1.0, 1.5, 3.0]),
+        rng.uniform(0.2, 1.6),
+    )
     mu = {"mu_t": round(float(mu_t), 3), "mu_f": 1.0, "mu_b": float(mu_b)}
     along, across = f"where(vs > 0, 1, {mu['mu_b']}) * vs/speed", f"{mu['mu_t']} * vn/speed"
     weakening = "(1 + 0.5*exp(-speed))"
@@ -98,24 +118,47 @@ def law_problem(number: int) -> Problem:
         (Viscous(normal=1.0 + mu["mu_t"], tangential=1.0), "towing"),
         (PowerLaw(round(float(power), 2), **mu), f"distance ** {round(1 + power, 2)} / work"),
         (OwnLaw(f"-{along} * {weakening}", f"-{across} * {weakening}"), "efficiency"),
-        (Friction(**mu), str(rng.choice(["speed", "driven efficiency", "distance / (work + 0.1 * length)"]))),
+        (
+            Friction(**mu),
+            str(rng.choice(["speed", "driven efficiency", "distance / (work + 0.1 * length)"])),
+        ),
     ]
     law, objective = laws[number % len(laws)]
     if number % len(laws) == 1:
         body = Chain(body.lengths)  # drag does not ask for the weight
-    symmetry = str(rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"]))
-    limited = {"power_limit": round(float(rng.uniform(0.3, 0.8)), 2)} if rng.random() < 0.3 and rate_independent(law) else {}
+    symmetry = str(
+        rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"])
+    )
+    limited = (
+        {"power_limit": round(float(rng.uniform(0.3, 0.8)), 2)}
+        if rng.random() < 0.3 and rate_independent(law)
+        else {}
+    )
     gait = harmonics_within(int(rng.integers(1, 4)), symmetry)
     if number % 10 == 9:  # on a slope that most gaits of the level still climb
-        objective, limited = "efficiency", {"grade": round(float(rng.uniform(0.02, 0.2)) * min(mu.values()), 3)}
-    return Problem(f"zoo-laws-{number}", body=body, friction=law, gait=gait, objective=objective, **limited)  # type: ignore[arg-type]
+        objective, limited = (
+            "efficiency",
+            {"grade": round(float(rng.uniform(0.02, 0.2)) * min(mu.values()), 3)},
+        )
+    return Problem(
+        f"zoo-laws-{number}",
+        body=body,
+        friction=law,
+        gait=gait,
+        objective=objective,  # type: ignore[arg-type]
+        **limited,  # type: ignore[arg-type]
+    )
 
 
 def modal_problem(number: int) -> Problem:
-    """Problem `number` of the family of smooth bodies with a few bending modes; it depends on that number alone."""
+    """Problem `number` of the family of smooth bodies with a few bending modes; it depends on that
+    number alone."""
     rng = np.random.default_rng([SEED + 2, number])
     gait = harmonics_within(int(rng.integers(1, 3)), str(rng.choice(["none", "antipodal"])))
-    mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))), float(rng.choice([1.0, rng.uniform(1.0, 5.0)]))
+    mu_t, mu_b = (
+        float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))),
+        float(rng.choice([1.0, rng.uniform(1.0, 5.0)])),
+    )
     return Problem(
         f"zoo-modes-{number}",
         body=ModalBody(int(rng.integers(2, 7))),
@@ -131,46 +174,72 @@ def paced_problem(number: int) -> Problem:
     if rng.random() < 0.2:
         body = Chain((0.5, 0.5))
     body = Chain(body.lengths, feet=1) if rng.random() < 1 / 3 else body
-    mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(5.0)))), float(rng.choice([1.0, rng.uniform(1.0, 3.0)]))
+    mu_t, mu_b = (
+        float(np.exp(rng.uniform(np.log(0.3), np.log(5.0)))),
+        float(rng.choice([1.0, rng.uniform(1.0, 3.0)])),
+    )
     count, symmetry = int(rng.integers(1, 4)), str(rng.choice(["none", "antipodal"]))
     stays = body.n_link == 2 and mu_b == 1.0  # whatever its antipodal gait
     gait = harmonics_within(count, "none" if stays else symmetry)
     froude = float(f"{np.exp(rng.uniform(np.log(1e-3), 0.0)):.3g}")
     return Problem(
-        f"zoo-paced-{number}", body=body, friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), gait=gait, froude=froude
+        f"zoo-paced-{number}",
+        body=body,
+        friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b),
+        gait=gait,
+        froude=froude,
     )
 
 
 def feet_problem(number: int) -> Problem:
-    """Problem `number` of the family of bodies on feet and wheels; it depends on that number alone."""
+    """Problem `number` of the family of bodies on feet and wheels; it depends on that number
+    alone."""
     rng = np.random.default_rng([SEED + 4, number])
     body = _drawn_body(rng, 6)
     if rng.random() < 0.15:
         body = Chain((0.5, 0.5))
-    mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))), float(rng.choice([1.0, rng.uniform(1.0, 5.0)]))
+    mu_t, mu_b = (
+        float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))),
+        float(rng.choice([1.0, rng.uniform(1.0, 5.0)])),
+    )
     if body.n_link == 2 and mu_b == 1.0:
         mu_b = float(rng.uniform(2.0, 5.0))  # else no gait of one joint goes anywhere
     body = Chain(body.lengths, feet=_drawn_feet(rng, body))
-    symmetry = str(rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"]))
+    symmetry = str(
+        rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"])
+    )
     gait: Harmonic | FreePath = harmonics_within(int(rng.integers(1, 4)), symmetry)
     if body.n_link > 2 and rng.random() < 0.15:
         gait = FreePath(float(rng.choice([1.0, 2.0, 4.0])), symmetry)
     limit = float(rng.choice([np.pi, 2.5, 2.0]))
     return Problem(
-        f"zoo-feet-{number}", body=body, friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), gait=gait, joint_limit=limit
+        f"zoo-feet-{number}",
+        body=body,
+        friction=Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b),
+        gait=gait,
+        joint_limit=limit,
     )
 
 
 def _drawn_feet(rng: np.random.Generator, body: Chain) -> tuple[Foot, ...]:
-    """One to three a link, feet or wheels, anywhere on it or evenly spread, the same on mirrored links of symmetric bodies."""
-    kind, spread, each, feet = rng.random(), rng.random() < 0.5, int(rng.integers(1, 4)), list[Foot]()
-    kind = 1.0 if body.n_link == 2 else kind  # on wheels, the same either way, one joint leads nowhere
+    """One to three a link, feet or wheels, anywhere on it or evenly spread, the same on mirrored
+    links of symmetric bodies."""
+    kind, spread, each, feet = (
+        rng.random(),
+        rng.random() < 0.5,
+        int(rng.integers(1, 4)),
+        list[Foot](),
+    )
+    # on wheels, the same either way, one joint leads nowhere
+    kind = 1.0 if body.n_link == 2 else kind
     shares = rng.uniform(0.5, 1.5, body.n_link)
     shares = shares + shares[::-1] if body.symmetric else shares
     for link in range(body.n_link):
         mirrored = body.symmetric and link > (body.n_link - 1) / 2
         if mirrored:
-            feet += [foot.from_head(body.n_link) for foot in feet if foot.link == body.n_link - 1 - link]
+            feet += [
+                foot.from_head(body.n_link) for foot in feet if foot.link == body.n_link - 1 - link
+            ]
             continue
         places = (np.arange(each) + 0.5) / each if spread else np.sort(rng.uniform(0.0, 1.0, each))
         if body.symmetric and 2 * link == body.n_link - 1:
@@ -178,14 +247,19 @@ def _drawn_feet(rng: np.random.Generator, body: Chain) -> tuple[Foot, ...]:
         wheeled = kind < 0.25 or (kind < 0.4 and rng.random() < 0.5)
         rolling = round(float(np.exp(rng.uniform(np.log(0.01), np.log(0.5)))), 3)
         for place in places:
-            foot = Wheel(link, float(place), rolling=rolling) if wheeled else Foot(link, float(place))
+            foot = (
+                Wheel(link, float(place), rolling=rolling) if wheeled else Foot(link, float(place))
+            )
             feet.append(replace(foot, weight=shares[link] / shares.sum() / each))
     return tuple(feet)
 
 
 def described(problem: Problem) -> str:
     """In one line."""
-    law, best = problem.friction.label, "" if problem.objective == EFFICIENCY else f"best {problem.objective.name}, "
+    law, best = (
+        problem.friction.label,
+        "" if problem.objective == EFFICIENCY else f"best {problem.objective.name}, ",
+    )
     limit = f", power within {problem.power_limit:g}" if problem.power_limit else ""
     slope = f", on a slope of {problem.grade:g}" if problem.grade else ""
     paced = f", Fr = {problem.froude:g}" if problem.froude else ""
@@ -200,17 +274,37 @@ def known_bests() -> dict[str, float]:
 
 def main() -> None:
     """Run the zoo and print what came out."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--problems", type=int, default=100, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
     parser.add_argument("--starts", type=int, metavar="N", help="more look for better answers")
     family = parser.add_mutually_exclusive_group()
-    family.add_argument("--laws", dest="of", action="store_const", const=law_problem, help="other laws, objectives and limits")
     family.add_argument(
-        "--modes", dest="of", action="store_const", const=modal_problem, help="smooth bodies of a few bending modes"
+        "--laws",
+        dest="of",
+        action="store_const",
+        const=law_problem,
+        help="other laws, objectives and limits",
     )
-    family.add_argument("--paced", dest="of", action="store_const", const=paced_problem, help="bodies with inertia")
-    family.add_argument("--feet", dest="of", action="store_const", const=feet_problem, help="bodies on feet and wheels")
+    family.add_argument(
+        "--modes",
+        dest="of",
+        action="store_const",
+        const=modal_problem,
+        help="smooth bodies of a few bending modes",
+    )
+    family.add_argument(
+        "--paced", dest="of", action="store_const", const=paced_problem, help="bodies with inertia"
+    )
+    family.add_argument(
+        "--feet",
+        dest="of",
+        action="store_const",
+        const=feet_problem,
+        help="bodies on feet and wheels",
+    )
     parser.set_defaults(of=zoo_problem)
     options = parser.parse_args()
     best = known_bests()
@@ -220,7 +314,8 @@ def main() -> None:
         begin = time.process_time()
         try:
             solution = solve(problem, options.starts)
-            best_of_both = solution.shrunk or solution  # the best ever found may be as small as its bound allows
+            # the best ever found may be as small as its bound allows
+            best_of_both = solution.shrunk or solution
             status, value, message = solution.status, best_of_both.value, solution.message
         except Exception as error:  # whatever goes wrong is what this is looking for
             status, value, message = "error", np.nan, f"{type(error).__name__}: {error}"
@@ -230,10 +325,16 @@ def main() -> None:
             best = {**known_bests(), problem.name: value}  # another run may have written meanwhile
             BEST.write_text(json.dumps(best, indent=1, sort_keys=True) + "\n", encoding="utf-8")
         quality.append(value / best[problem.name] if solved[-1] else 0.0)
-        line = f"{number:4d} {status:18s} {value:9.6f} {quality[-1]:7.4f} {seconds[-1]:7.2f} s  {described(problem)}"
+        line = (
+            f"{number:4d} {status:18s} {value:9.6f} {quality[-1]:7.4f} {seconds[-1]:7.2f} s  "
+            f"{described(problem)}"
+        )
         print(line + (f"\n     {message}" if message else ""), flush=True)
     n = len(solved)
-    print(f"{sum(solved)} of {n} solved; {sum(q > GOOD for q in quality)} within 1 % of the best known")
+    print(
+        f"{sum(solved)} of {n} solved; {sum(q > GOOD for q in quality)} within 1 % of the "
+        f"best known"
+    )
     print(f"processor time: median {np.median(seconds):.2f} s, largest {max(seconds):.2f} s")
 
 

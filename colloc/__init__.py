@@ -2,18 +2,22 @@
 
 Conventions, stated once
 ------------------------
-Units: body length 1, mass 1, period 1 unless a gait states otherwise; forces in units of the weight, so friction
-coefficients are forces per weight, work is in weight x length, speeds in lengths per period, angles in radians.
+Units: body length 1, mass 1, period 1 unless a gait states otherwise; forces in units of the
+weight, so friction coefficients are forces per weight, work is in weight x length, speeds in
+lengths per period, angles in radians.
 
-Frames: the *body frame* has the tail at its origin and the tail link along +x. ``(u, v, omega)`` is the velocity of the
-tail in that frame. The *lab frame* is fixed; ``theta`` is the angle of the tail link in it.
+Frames: the *body frame* has the tail at its origin and the tail link along +x. ``(u, v, omega)`` is
+the velocity of the tail in that frame. The *lab frame* is fixed; ``theta`` is the angle of the tail
+link in it.
 
-Order: links and joints are counted from tail to head. Joint angles are the paper's Delta-theta: each link's tangent
-angle less that of the link behind it, positive counter-clockwise. Arrays are ``(n_body, n_time)``.
+Order: links and joints are counted from tail to head. Joint angles are the paper's Delta-theta:
+each link's tangent angle less that of the link behind it, positive counter-clockwise. Arrays are
+``(n_body, n_time)``.
 
-Names: ``s`` arc length, ``t`` time, ``delta`` regularisation speed of friction, ``epsilon`` half-width of the bump of a
-concertina crawler, ``mu_t, mu_f, mu_b`` transverse, forward and backward friction coefficient, ``d`` distance per
-period, ``W`` work per period against friction, ``efficiency`` = d/W (lambda in the paper).
+Names: ``s`` arc length, ``t`` time, ``delta`` regularisation speed of friction, ``epsilon``
+half-width of the bump of a concertina crawler, ``mu_t, mu_f, mu_b`` transverse, forward and
+backward friction coefficient, ``d`` distance per period, ``W`` work per period against friction,
+``efficiency`` = d/W (lambda in the paper).
 
 The paper: S. Alben, "Efficient sliding locomotion with isotropic friction" (2019).
 """
@@ -39,8 +43,10 @@ _HOME = {
 """Public name to the module where it lives, as the stub beside this file states it."""
 __all__ = sorted(_HOME)
 _GONE = {
-    "Relaxed": "take Polygon(n) with many corners, which come as near as one likes (docs/known.md).",
-    "heading_map": "colloc.slope_motion and a root finder find headings that last (docs/howto/slopes.md).",
+    "Relaxed": "take Polygon(n) with many corners, which come as near as one likes "
+    "(docs/known.md).",
+    "heading_map": "colloc.slope_motion and a root finder find headings that last "
+    "(docs/howto/slopes.md).",
 }
 """Public names there were, and what to write instead."""
 
@@ -67,7 +73,8 @@ bind(
 
 @functools.cache
 def _checked(function: Callable[..., object]) -> Callable[..., object]:
-    """A public function that checks its arguments, and is found here where other processes ask for it."""
+    """A public function that checks its arguments, and is found here where other processes ask for
+    it."""
     from colloc.system.arguments import checked_arguments
 
     checked = checked_arguments(function)
@@ -76,7 +83,8 @@ def _checked(function: Callable[..., object]) -> Callable[..., object]:
 
 
 def __dir__() -> list[str]:
-    """The public names, also those that nobody has used yet, and no others but those with two underscores."""
+    """The public names, also those that nobody has used yet, and no others but those with two
+    underscores."""
     return sorted({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})
 
 

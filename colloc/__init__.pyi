@@ -1,4 +1,5 @@
-# The one table of public names and where they live, in the order of use: for type checkers, and for colloc itself.
+# The one table of public names and where they live, in the order of use: for type checkers,
+# and for colloc itself.
 __version__: str
 _HOME: dict[str, str]
 
@@ -19,7 +20,10 @@ from colloc.laws.elliptic import Elliptic as Elliptic
 from colloc.laws.viscous import Viscous as Viscous
 from colloc.laws.power_law import PowerLaw as PowerLaw
 from colloc.laws.own_law import OwnLaw as OwnLaw
-from colloc.laws.fitted_friction import fitted_friction as fitted_friction, FittedFriction as FittedFriction
+from colloc.laws.fitted_friction import (
+    fitted_friction as fitted_friction,
+    FittedFriction as FittedFriction,
+)
 from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
 from colloc.gaits.inertia import Free as Free
@@ -27,7 +31,12 @@ from colloc.gaits.bspline import BSpline as BSpline
 from colloc.gaits.columns import Basis as Basis
 from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath
 from colloc.gaits.polygon import Polygon as Polygon, Corners as Corners
-from colloc.studies.calls import solve as solve, multistart as multistart, Starts as Starts, sweep as sweep
+from colloc.studies.calls import (
+    solve as solve,
+    multistart as multistart,
+    Starts as Starts,
+    sweep as sweep,
+)
 from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.pareto import pareto_front as pareto_front
 from colloc.studies.steering import steer as steer

@@ -1,7 +1,7 @@
 """``python -m colloc.solve problems/three_link.py``: the same as ``colloc solve``.
 
-Importing this module makes it the attribute ``solve`` of the package, where `colloc.solve(problem)` is expected. So it can be
-called, and is that function.
+Importing this module makes it the attribute ``solve`` of the package, where `colloc.solve(problem)`
+is expected. So it can be called, and is that function.
 """
 
 import sys

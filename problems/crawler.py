@@ -1,8 +1,10 @@
-"""Concertina crawler whose bump is free: the paper's, in a region of half-width 0.1, with the best place and profile.
+"""Concertina crawler whose bump is free: the paper's, in a region of half-width 0.1, with the best
+place and profile.
 
-The paper's crawler (figure 13A to D, problems/concertina.py) lets a bump of one profile grow at the rear, travel and flatten
-at the front. Here the profile has four amplitudes, and the half period is a polygon of six sides in them and the bump's place.
-A part at rest that begins to slip costs much of the distance at once, so the search begins at the last delta, at that crawler.
+The paper's crawler (figure 13A to D, problems/concertina.py) lets a bump of one profile grow at the
+rear, travel and flatten at the front. Here the profile has four amplitudes, and the half period is
+a polygon of six sides in them and the bump's place. A part at rest that begins to slip costs much
+of the distance at once, so the search begins at the last delta, at that crawler.
 """
 
 from colloc import Corners, CrawlerBody, Friction, Polygon, Problem

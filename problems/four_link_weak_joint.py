@@ -1,7 +1,8 @@
 """The isotropic four-link crawler with a weak motor in its middle joint.
 
-The gait of problems/four_link.py needs a torque of 0.0655 weight x length there; this motor has 0.045. The limit is kept
-at all instants, also between the nodes, and checked by the replay (docs/howto/motors.md).
+The gait of problems/four_link.py needs a torque of 0.0655 weight x length there; this motor has
+0.045. The limit is kept at all instants, also between the nodes, and checked by the replay
+(docs/howto/motors.md).
 """
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem

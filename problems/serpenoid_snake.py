@@ -1,7 +1,8 @@
-"""An eight-link serpenoid snake: the gait of most snake robots, one wave with an amplitude and a lag.
+"""An eight-link serpenoid snake: the gait of most snake robots, one wave with an amplitude and a
+lag.
 
-Friction across the links is ten times that along them, as of passive wheels or scales. The class has two parameters, whatever
-the number of joints.
+Friction across the links is ten times that along them, as of passive wheels or scales. The class
+has two parameters, whatever the number of joints.
 """
 
 from colloc import Chain, Friction, Problem, Serpenoid

@@ -1,7 +1,7 @@
 """Smooth body with two bending modes and equal friction in all directions: which gait is best?
 
-A point of the body is at rest at nearly every instant, which takes more panels than a body has at first; they are doubled until
-they no longer matter.
+A point of the body is at rest at nearly every instant, which takes more panels than a body has at
+first; they are doubled until they no longer matter.
 """
 
 from colloc import Friction, Harmonic, ModalBody, Problem

@@ -1,6 +1,8 @@
-"""Smooth body with six bending modes, friction much larger sideways than along (paper, figure 5B): which gait is best?
+"""Smooth body with six bending modes, friction much larger sideways than along (paper, figure 5B):
+which gait is best?
 
-The paper's wave, Theta = sin(2 pi (s + t)), reaches 0.737. The usual guess is that wave, a little smaller.
+The paper's wave, Theta = sin(2 pi (s + t)), reaches 0.737. The usual guess is that wave, a little
+smaller.
 """
 
 from colloc import Friction, Harmonic, ModalBody, Problem

@@ -1,4 +1,5 @@
-"""The best gait for the pace at hand: three equal links, one metre long on a floor of mu = 0.5, two seconds a period.
+"""The best gait for the pace at hand: three equal links, one metre long on a floor of mu = 0.5, two
+seconds a period.
 
     python -m colloc.solve problems/three_link_fast.py
 
@@ -10,4 +11,6 @@ from colloc import Harmonic, Problem
 LENGTH, PERIOD, MU, GRAVITY = 1.0, 2.0, 0.5, 9.81
 """[m], [s], the friction of the floor where the problem says 1, and [m/s^2]."""
 
-PROBLEM = Problem(name="three_link_fast", gait=Harmonic(1), froude=LENGTH / (GRAVITY * PERIOD**2) / MU)
+PROBLEM = Problem(
+    name="three_link_fast", gait=Harmonic(1), froude=LENGTH / (GRAVITY * PERIOD**2) / MU
+)

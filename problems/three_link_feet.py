@@ -1,7 +1,8 @@
-"""Three equal links that stand on a foot each, in its middle: the same friction in all directions, one harmonic.
+"""Three equal links that stand on a foot each, in its middle: the same friction in all directions,
+one harmonic.
 
-What touches the floor matters more than the gait: lying on its links this body gets 0.26, on feet 0.77. One foot holds while
-the other two are swung ahead.
+What touches the floor matters more than the gait: lying on its links this body gets 0.26, on feet
+0.77. One foot holds while the other two are swung ahead.
 """
 
 from colloc import Chain, Friction, Harmonic, Problem

@@ -1,8 +1,10 @@
-"""The paper's third optimum of the isotropic three-link crawler: 0.094 at A0 = 2.5 (section V, not shown there).
+"""The paper's third optimum of the isotropic three-link crawler: 0.094 at A0 = 2.5 (section V, not
+shown there).
 
-It lies where joint 1 just reaches its limit pi, A0 + sqrt(A1^2 + B1^2) = pi, a corner that a grid meets only by luck:
-converged, the maximum is 0.103 at A0 = 2.59, A1 = 0.35, B1 = 0.43. Speeds are low there, so the continuation has to
-start at a smaller delta than elsewhere: at delta = 0.01 this optimum does not exist yet.
+It lies where joint 1 just reaches its limit pi, A0 + sqrt(A1^2 + B1^2) = pi, a corner that a grid
+meets only by luck: converged, the maximum is 0.103 at A0 = 2.59, A1 = 0.35, B1 = 0.43. Speeds are
+low there, so the continuation has to start at a smaller delta than elsewhere: at delta = 0.01 this
+optimum does not exist yet.
 """
 
 from colloc import Friction, Harmonic, Problem, Reference, ellipse
@@ -17,6 +19,12 @@ PROBLEM = Problem(
     intervals=24,
 )
 
-REFERENCE = Reference(0.094, 0.01, "S. Alben (2019), section V: 'the third local optimum has A0 = 2.5, efficiency 0.094'")
+REFERENCE = Reference(
+    0.094,
+    0.01,
+    "S. Alben (2019), section V: 'the third local optimum has A0 = 2.5, efficiency 0.094'",
+)
 
-STARTS = 1  # the optimum that this guess leads to: the best gait of the class is that of three_link.py
+STARTS = (
+    1  # the optimum that this guess leads to: the best gait of the class is that of three_link.py
+)

@@ -1,8 +1,10 @@
-"""The isotropic three-link crawler on a free path of bounded curvature, symmetric about angle 1 = -angle 2.
+"""The isotropic three-link crawler on a free path of bounded curvature, symmetric about angle 1 =
+-angle 2.
 
-The path in the plane of the two joint angles is a state of the problem: q' = (cos psi, sin psi) and psi' = kappa in its own
-arc length, |kappa| <= 8 per rad, closed up to the symmetry, of any length. delta is measured at unit shape speed. The guess
-is the paper's best ellipse, of efficiency 0.260; paths that may bend more do far better (docs/gait_classes.md).
+The path in the plane of the two joint angles is a state of the problem: q' = (cos psi, sin psi) and
+psi' = kappa in its own arc length, |kappa| <= 8 per rad, closed up to the symmetry, of any length.
+delta is measured at unit shape speed. The guess is the paper's best ellipse, of efficiency 0.260;
+paths that may bend more do far better (docs/gait_classes.md).
 """
 
 from colloc import FreePath, Friction, Problem, Reference, ellipse
@@ -16,4 +18,6 @@ PROBLEM = Problem(
     intervals=60,
 )
 
-REFERENCE = Reference(0.380, 0.01, "design notes, section 5: 0.380 on a coarse mesh; a finer one gives a little more")
+REFERENCE = Reference(
+    0.380, 0.01, "design notes, section 5: 0.380 on a coarse mesh; a finer one gives a little more"
+)

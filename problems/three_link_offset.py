@@ -1,4 +1,5 @@
-"""The paper's second optimum of the isotropic three-link crawler: 0.207 at A0 = 1.1 (section V, figure 12 F)."""
+"""The paper's second optimum of the isotropic three-link crawler: 0.207 at A0 = 1.1 (section V,
+figure 12 F)."""
 
 from colloc import Friction, Harmonic, Problem, Reference, ellipse
 
@@ -13,4 +14,6 @@ PROBLEM = Problem(
 
 REFERENCE = Reference(0.207, 0.0015, "S. Alben (2019), section V: 'A0 = 1.1, has efficiency 0.207'")
 
-STARTS = 1  # the optimum that this guess leads to: the best gait of the class is that of three_link.py
+STARTS = (
+    1  # the optimum that this guess leads to: the best gait of the class is that of three_link.py
+)

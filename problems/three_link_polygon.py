@@ -1,8 +1,10 @@
-"""The isotropic three-link crawler on a polygon of free corners, symmetric about angle 1 = -angle 2.
+"""The isotropic three-link crawler on a polygon of free corners, symmetric about angle 1 = -angle
+2.
 
-The joints move at constant rates from corner to corner in the plane of the two joint angles. delta is measured at unit
-shape speed. Small triangles reach 2/5 in the limit of no size (docs/gait_classes.md): the lower bound on the path length,
-2 pi smallest_shape_speed, is part of the answer.
+The joints move at constant rates from corner to corner in the plane of the two joint angles. delta
+is measured at unit shape speed. Small triangles reach 2/5 in the limit of no size
+(docs/gait_classes.md): the lower bound on the path length, 2 pi smallest_shape_speed, is part of
+the answer.
 """
 
 import numpy as np

@@ -1,6 +1,7 @@
 """The gait of a three-link crawler that turns it by 30 degrees a period with the least work.
 
-No symmetry closes the rotation here; the certificate compares the rotation of an independent replay with what is asked for.
+No symmetry closes the rotation here; the certificate compares the rotation of an independent replay
+with what is asked for.
 """
 
 import numpy as np

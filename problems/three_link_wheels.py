@@ -1,8 +1,9 @@
 """The fastest gait of a three-link crawler on sideways wheels: distance per path in shape space.
 
-A robot whose joints turn at a bounded rate goes fastest by the gait of most distance per path. Friction across the links is ten
-times that along them. The most efficient gait of the class goes 0.0482 body lengths per radian, and saves 4 % of work;
-`colloc pareto problems/three_link_wheels.py` finds the certified gaits between.
+A robot whose joints turn at a bounded rate goes fastest by the gait of most distance per path.
+Friction across the links is ten times that along them. The most efficient gait of the class goes
+0.0482 body lengths per radian, and saves 4 % of work; `colloc pareto problems/three_link_wheels.py`
+finds the certified gaits between.
 """
 
 from colloc import Friction, Harmonic, Problem

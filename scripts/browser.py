@@ -1,8 +1,9 @@
 """Look at pages in a headless browser: python -m scripts.browser FOLDER [--axe axe.min.js]
 
-Opens every page of a folder at the widths of a phone, a tablet and a desk, where the reader's system is light and where it is
-dark. Prints what is wrong: a page wider than its window, a light page on a dark system, a search that finds nothing, and with
-axe-core (`npm pack axe-core`) what it calls serious. Needs chromium or google-chrome.
+Opens every page of a folder at the widths of a phone, a tablet and a desk, where the reader's
+system is light and where it is dark. Prints what is wrong: a page wider than its window, a light
+page on a dark system, a search that finds nothing, and with axe-core (`npm pack axe-core`) what it
+calls serious. Needs chromium or google-chrome.
 """
 
 from __future__ import annotations
@@ -115,8 +116,8 @@ class _Server(ThreadingHTTPServer):
 
 
 def complaints(program: str, folder: Path, axe: str = "", *, dark: bool = False) -> list[str]:
-    """What is wrong with the pages of a folder, in words; `axe` is the text of axe-core. `TimeoutError` if the browser does not
-    answer."""
+    """What is wrong with the pages of a folder, in words; `axe` is the text of axe-core.
+    `TimeoutError` if the browser does not answer."""
     pages = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.html"))]
     searched = "index.html" if (folder / "search").exists() else ""
     asked = {
@@ -126,12 +127,23 @@ def complaints(program: str, folder: Path, axe: str = "", *, dark: bool = False)
         "searched": searched,
         "axe": axe,
     }
-    with _Server(folder) as server, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+    with (
+        _Server(folder) as server,
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile,
+    ):
         server.look = _LOOK.replace("ASKED", json.dumps(asked).replace("</", "<\\/")).encode()
         threading.Thread(target=server.serve_forever, daemon=True).start()
         address = f"http://127.0.0.1:{server.server_address[1]}/look"
-        command = [program, *OPTIONS, *([DARK] if dark else []), f"--user-data-dir={profile}", "--remote-debugging-port=0"]
-        opened = subprocess.Popen([*command, address], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        command = [
+            program,
+            *OPTIONS,
+            *([DARK] if dark else []),
+            f"--user-data-dir={profile}",
+            "--remote-debugging-port=0",
+        ]
+        opened = subprocess.Popen(
+            [*command, address], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
         try:
             if not server.ended.wait(_PATIENCE):
                 raise TimeoutError(f"{program} has not answered in {_PATIENCE:g} s")
@@ -143,7 +155,9 @@ def complaints(program: str, folder: Path, axe: str = "", *, dark: bool = False)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--axe", type=Path, help="the file axe.min.js of axe-core")
     options = parser.parse_args()
@@ -152,8 +166,15 @@ def main() -> int:
         print(f"no browser: install one of {', '.join(BROWSERS)}.", file=sys.stderr)
         return 2
     axe = options.axe.read_text(encoding="utf-8") if options.axe else ""
-    said = [line for dark in (False, True) for line in complaints(program, options.folder, axe, dark=dark)]
-    print("\n".join(said) or f"nothing is wrong at {', '.join(map(str, WIDTHS))} pixels, light and dark")
+    said = [
+        line
+        for dark in (False, True)
+        for line in complaints(program, options.folder, axe, dark=dark)
+    ]
+    print(
+        "\n".join(said)
+        or f"nothing is wrong at {', '.join(map(str, WIDTHS))} pixels, light and dark"
+    )
     return 1 if said else 0
 
 

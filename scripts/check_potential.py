@@ -1,8 +1,10 @@
-"""What kept potentials say: python -m scripts.check_potential [FILE] [--seed 0] [--shapes 60] [--directions 120] [--random N]
+"""What kept potentials say: python -m scripts.check_potential [FILE] [--seed 0] [--shapes 60]
+[--directions 120] [--random N]
 
-A sampled bound is a potential over shape and heading; `results/curated/potentials.json` keeps the best that are known, for
-three links. The largest ratio of gain to power is looked for on lattices and by climbs that know nothing of how it
-was found, or at random motions: no ratio may exceed what is guaranteed.
+A sampled bound is a potential over shape and heading; `results/curated/potentials.json` keeps the
+best that are known, for three links. The largest ratio of gain to power is looked for on lattices
+and by climbs that know nothing of how it was found, or at random motions: no ratio may exceed what
+is guaranteed.
 """
 
 from __future__ import annotations
@@ -42,7 +44,9 @@ def potentials(path: Path = KEPT) -> list[Kept]:
     """Those in a file."""
     found = []
     for kept in json.loads(path.read_text()):
-        domain = Domain(Chain(tuple(kept["lengths"])), LAWS[kept["law"]](*kept["mu"]), kept["joint_limit"])
+        domain = Domain(
+            Chain(tuple(kept["lengths"])), LAWS[kept["law"]](*kept["mu"]), kept["joint_limit"]
+        )
         spline = TensorSpline(2, domain.joint_limit, len(kept["graded"]) + 1, tuple(kept["graded"]))
         space = PotentialSpace(spline, tuple(kept["harmonics"]), swaps_ends(domain.body))
         found.append(Kept(domain, space, np.array(kept["coefficients"]), kept["program"]))
@@ -67,32 +71,56 @@ def keep(found: Kept, path: Path = KEPT) -> None:
 
 def add_domain(parser: argparse.ArgumentParser, limit: float) -> None:
     """Options that say which body, law and joint limit a bound is for; see `domain_of`."""
-    parser.add_argument("--lengths", type=float, nargs=3, default=list(Chain().lengths), metavar="L", help="of the links")
-    parser.add_argument("--friction", type=float, nargs=3, default=[1.0, 1.0, 1.0], metavar=("MU_T", "MU_F", "MU_B"))
-    parser.add_argument("--law", choices=LAWS, default="Friction", help="Coulomb friction, or the associated elliptic law")
+    parser.add_argument(
+        "--lengths",
+        type=float,
+        nargs=3,
+        default=list(Chain().lengths),
+        metavar="L",
+        help="of the links",
+    )
+    parser.add_argument(
+        "--friction", type=float, nargs=3, default=[1.0, 1.0, 1.0], metavar=("MU_T", "MU_F", "MU_B")
+    )
+    parser.add_argument(
+        "--law",
+        choices=LAWS,
+        default="Friction",
+        help="Coulomb friction, or the associated elliptic law",
+    )
     parser.add_argument("--limit", type=float, default=limit, help="of the joint angles")
 
 
 def domain_of(options: argparse.Namespace) -> Domain:
     """What was asked for."""
     mu_t, mu_f, mu_b = options.friction
-    return Domain(Chain(tuple(options.lengths)), LAWS[options.law](mu_t=mu_t, mu_f=mu_f, mu_b=mu_b), options.limit)
+    return Domain(
+        Chain(tuple(options.lengths)),
+        LAWS[options.law](mu_t=mu_t, mu_f=mu_f, mu_b=mu_b),
+        options.limit,
+    )
 
 
 def largest_random_ratio(kept: Kept, count: int, seed: int) -> float:
-    """Largest ratio of so many random motions, of all shapes without crossing links and all directions alike."""
+    """Largest ratio of so many random motions, of all shapes without crossing links and all
+    directions alike."""
     rng, top, left = np.random.default_rng(seed), 0.0, count
     while left > 0:
         angles = rng.uniform(-kept.domain.joint_limit, kept.domain.joint_limit, (2, _AT_ONCE))
         angles = angles[:, kept.domain.holds(angles)][:, :left]
         way = rng.uniform(0.0, 2.0 * np.pi, angles[0].shape)
         motion, _ = kept.domain.solved(angles, np.stack([np.cos(way), np.sin(way)]))
-        top, left = max(top, largest_ratios(kept.space, kept.free, motion).max()), left - angles.shape[1]
+        top, left = (
+            max(top, largest_ratios(kept.space, kept.free, motion).max()),
+            left - angles.shape[1],
+        )
     return float(top)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("file", nargs="?", type=Path, default=KEPT)
     for name, usual in (("seed", 0), ("shapes", 60), ("directions", 120), ("starts", 1000)):
         parser.add_argument(f"--{name}", type=int, default=usual)
@@ -103,13 +131,20 @@ def main() -> None:
         domain, begin = kept.domain, time.process_time()
         lengths = ", ".join(f"{length:.4g}" for length in domain.body.lengths)
         if options.random:
-            found = f"{largest_random_ratio(kept, options.random, options.seed):.5f} of {options.random} random motions"
+            found = (
+                f"{largest_random_ratio(kept, options.random, options.seed):.5f} of "
+                f"{options.random} random motions"
+            )
         else:
             top, at = largest_ratio(domain, kept.space, kept.free, **settings)
-            found = f"{top:.5f} at angles {at.angles[:, 0].round(4)}, rates {at.rates[:, 0].round(4)}"
+            found = (
+                f"{top:.5f} at angles {at.angles[:, 0].round(4)}, rates {at.rates[:, 0].round(4)}"
+            )
         print(
-            f"links {lengths}, {domain.friction.label}, limit {domain.joint_limit:.4f}, {kept.space.size} unknowns, program "
-            f"{kept.program:.5f}: largest ratio {found}; {time.process_time() - begin:.0f} s of processor time",
+            f"links {lengths}, {domain.friction.label}, limit {domain.joint_limit:.4f}, "
+            f"{kept.space.size} unknowns, program "
+            f"{kept.program:.5f}: largest ratio {found}; {time.process_time() - begin:.0f} s of "
+            f"processor time",
             flush=True,
         )
 

@@ -1,6 +1,7 @@
 """The pictures of docs/concepts.md: python -m scripts.concepts [FOLDER]
 
-Each is drawn by one function into the axes it is given. Gaits and numbers are solved or replayed when the pictures are made.
+Each is drawn by one function into the axes it is given. Gaits and numbers are solved or replayed
+when the pictures are made.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ _ANGLE = 2.2
 
 
 def draw_chain(ax: Axes, ends: np.ndarray, colour: str = INK) -> None:
-    """Links between the points ``ends`` (2, n_link + 1), from tail to head; the disc is the head."""
+    """Links between the points ``ends`` (2, n_link + 1), from tail to head; the disc is the
+    head."""
     ax.plot(*ends, color=colour, lw=3, solid_capstyle="round", zorder=2)
     ax.plot(*ends[:, 1:-1], "o", color="white", mec=colour, ms=6, zorder=3)
     ax.plot(*ends[:, -1:], "o", color=colour, ms=9, zorder=3)
@@ -57,9 +59,15 @@ def body_and_friction(ax: Axes) -> Axes:
     y = float(ends[1].mean())
     draw_chain(ax, np.array([[left, left + 1 / 3], [y, y]]))
     centre = np.array([left + 1 / 6, y])
-    for step, label in ((np.array([0.36, 0]), "forwards: $\\mu_f$"), (np.array([-0.36, 0]), "backwards: $\\mu_b$")):
+    for step, label in (
+        (np.array([0.36, 0]), "forwards: $\\mu_f$"),
+        (np.array([-0.36, 0]), "backwards: $\\mu_b$"),
+    ):
         ax.annotate(
-            "", (*(centre + step),), (*(centre + 0.58 * step),), arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2}
+            "",
+            (*(centre + step),),
+            (*(centre + 0.58 * step),),
+            arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2},
         )
         ax.text(centre[0] + step[0], centre[1] - 0.05, label, ha="center", va="top", color=ORANGE)
     for side in (1, -1):
@@ -69,7 +77,9 @@ def body_and_friction(ax: Axes) -> Axes:
             (centre[0], centre[1]),
             arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2},
         )
-    ax.text(centre[0], centre[1] + 0.21, "sideways: $\\mu_t$", ha="center", va="bottom", color=ORANGE)
+    ax.text(
+        centre[0], centre[1] + 0.21, "sideways: $\\mu_t$", ha="center", va="bottom", color=ORANGE
+    )
     ax.set(aspect="equal", xlim=(ends[0, 0] - 0.12, left + 0.72), ylim=(y - 0.3, y + 0.34))
     ax.set_axis_off()
     return ax
@@ -88,14 +98,23 @@ def gaits_in_shape_space(ax: Axes, solutions: dict[str, Solution]) -> Axes:
 
 
 def bodies_of_a_gait(ax: Axes, solution: Solution, count: int = 6) -> Axes:
-    """One period as bodies, evenly spaced in time, each in the place of its own that its column gives it."""
+    """One period as bodies, evenly spaced in time, each in the place of its own that its column
+    gives it."""
     motion = solution.sample(np.linspace(0, 1, count))
     ends = lab_outline(solution.problem.body, motion.angles, motion.theta, motion.tail)
     for k in range(count):
         row = np.array([[0.0], [-0.62 * k]])
         draw_chain(ax, ends[:, :, k] + row, GREY if k in (0, count - 1) else INK)
-        ax.plot(motion.centre[0, k], motion.centre[1, k] + row[1, 0], "o", color=ORANGE, ms=5, zorder=4)
-        ax.text(ends[0].min() - 0.06, row[1, 0] + motion.centre[1, k], f"t = {k / (count - 1):.1f}", ha="right", va="center")
+        ax.plot(
+            motion.centre[0, k], motion.centre[1, k] + row[1, 0], "o", color=ORANGE, ms=5, zorder=4
+        )
+        ax.text(
+            ends[0].min() - 0.06,
+            row[1, 0] + motion.centre[1, k],
+            f"t = {k / (count - 1):.1f}",
+            ha="right",
+            va="center",
+        )
     for x in motion.centre[0, [0, -1]]:
         ax.axvline(x, color=ORANGE, lw=0.8, ls="--", zorder=1)
     ax.set_title(f"d = {solution.measured.distance:.3f} body lengths")
@@ -106,7 +125,8 @@ def bodies_of_a_gait(ax: Axes, solution: Solution, count: int = 6) -> Axes:
 
 
 def smoothed_friction(ax: Axes) -> Axes:
-    """Friction against the speed of sliding, for three values of delta; below its delta each is drag."""
+    """Friction against the speed of sliding, for three values of delta; below its delta each is
+    drag."""
     speed = np.linspace(-0.05, 0.05, 1001)
     for delta, colour in ((1e-2, VERMILION), (1e-3, ORANGE), (1e-4, BLUE)):
         ax.plot(speed, -speed / np.hypot(speed, delta), color=colour, label=f"δ = {delta:g}")
@@ -122,11 +142,15 @@ def triangle(size: float) -> colloc.Corners:
 
 
 def size_and_delta(ax: Axes) -> Axes:
-    """Efficiency of triangles of one shape and many sizes, at four values of delta: a smaller one moves more slowly."""
+    """Efficiency of triangles of one shape and many sizes, at four values of delta: a smaller one
+    moves more slowly."""
     body, friction = colloc.Chain(), colloc.Friction()
     for delta, colour in DELTAS.items():
         paths = [triangle(size) for size in SIZES]
-        replays = [colloc.replay(body, friction, path, delta, breaks=path.corner_phases, tolerance=1e-4) for path in paths]
+        replays = [
+            colloc.replay(body, friction, path, delta, breaks=path.corner_phases, tolerance=1e-4)
+            for path in paths
+        ]
         values = [replayed.efficiency for replayed in replays]
         ax.semilogx(SIZES, values, color=colour, label=f"δ = {delta:g}")
     ax.axhline(0.4, color=GREY, lw=0.8, ls="--")
@@ -137,13 +161,17 @@ def size_and_delta(ax: Axes) -> Axes:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "results/curated/concepts")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     solutions = {name: colloc.solve(ROOT / "problems" / f"{name}.py") for name in CLASSES}
     with styled():
-        body, gait, delta, size = (Picture(figsize=shape) for shape in ((6.6, 2.3), (6.6, 4.4), (4.6, 2.8), (5, 3.2)))
+        body, gait, delta, size = (
+            Picture(figsize=shape) for shape in ((6.6, 2.3), (6.6, 4.4), (4.6, 2.8), (5, 3.2))
+        )
         body_and_friction(body.subplots())
         left, right = gait.subplots(1, 2, width_ratios=(1, 2))
         bodies_of_a_gait(left, solutions["three_link"])

@@ -1,8 +1,10 @@
-"""Copy new results into results/curated and note what made them: python -m scripts.curate [folder of results]
+"""Copy new results into results/curated and note what made them: python -m scripts.curate [folder
+of results]
 
-`results/curated/manifest.json` is the list: of each file or folder the command that makes it, the commit that last changed it,
-and versions. What lies in the folder of results under the same name is copied, and what has changed is noted. A file that is
-`archived` is not made any more: its command is one of the commit given there. A new file needs a line with its command first.
+`results/curated/manifest.json` is the list: of each file or folder the command that makes it, the
+commit that last changed it, and versions. What lies in the folder of results under the same name is
+copied, and what has changed is noted. A file that is `archived` is not made any more: its command
+is one of the commit given there. A new file needs a line with its command first.
 """
 
 import argparse
@@ -23,8 +25,16 @@ def last_change(path: Path) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("source", nargs="?", type=Path, default=Path("results"), help="folder of results (default: results)")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "source",
+        nargs="?",
+        type=Path,
+        default=Path("results"),
+        help="folder of results (default: results)",
+    )
     source = parser.parse_args().source
     manifest = CURATED / "manifest.json"
     entries = json.loads(manifest.read_text(encoding="utf-8"))

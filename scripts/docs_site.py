@@ -1,12 +1,16 @@
-"""Hooks of the documentation (mkdocs.yml): the order of pages, generated pages, formulas, links out of docs/.
+"""Hooks of the documentation (mkdocs.yml): the order of pages, generated pages, formulas, links out
+of docs/.
 
-- Four parts, and before them where to start. Pages that `ORDER` does not name, such as those of docs/developers, are appended
-  under "For developers", so a new file in docs/ needs no other change.
-- Generated: the notebook with what it showed, the gallery (problems/ with results/curated/gallery.json), the commands (what
-  --help says), the API.
-- Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built: readers load no script.
-- Links to what a generated page shows, such as problems/, lead to that page (`SHOWN`). Links to other files of the repository
-  outside docs/ become their names; pictures and tables of results/curated are copied.
+- Four parts, and before them where to start. Pages that `ORDER` does not name, such as those of
+  docs/developers, are appended under "For developers", so a new file in docs/ needs no other
+  change.
+- Generated: the notebook with what it showed, the gallery (problems/ with
+  results/curated/gallery.json), the commands (what --help says), the API.
+- Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built:
+  readers load no script.
+- Links to what a generated page shows, such as problems/, lead to that page (`SHOWN`). Links to
+  other files of the repository outside docs/ become their names; pictures and tables of
+  results/curated are copied.
 
 `python -m scripts.docs_site PAGE` prints a generated page, to read without building the site.
 """
@@ -38,13 +42,40 @@ ORDER = (
     (
         "How to",
         (
-            *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "motors", "pace", "slopes", "laws", "steering")),
-            *(f"howto/{name}.md" for name in ("objectives", "check", "sensitivity", "starts", "studies", "cluster")),
+            *(
+                f"howto/{name}.md"
+                for name in (
+                    "scripts",
+                    "report",
+                    "robot",
+                    "motors",
+                    "pace",
+                    "slopes",
+                    "laws",
+                    "steering",
+                )
+            ),
+            *(
+                f"howto/{name}.md"
+                for name in ("objectives", "check", "sensitivity", "starts", "studies", "cluster")
+            ),
             *(f"howto/{name}.md" for name in ("own_body", "columns", "own_gait_class", "paper")),
             "troubleshooting.md",
         ),
     ),
-    ("Reference", ("reference.md", "known.md", "limits.md", "commands.md", "api.md", "modules.md", "changelog.md", "cite.md")),
+    (
+        "Reference",
+        (
+            "reference.md",
+            "known.md",
+            "limits.md",
+            "commands.md",
+            "api.md",
+            "modules.md",
+            "changelog.md",
+            "cite.md",
+        ),
+    ),
     (
         "Explanation",
         ("theory.md", "search.md", "gait_classes.md", "bound.md", "bodies.md", "smooth_bodies.md"),
@@ -54,7 +85,11 @@ PICTURES = (".png", ".gif")
 KEPT = (*PICTURES, ".md")
 _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _MATH_INLINE = re.compile(r"\$`([^`\n]+)`\$")
-SHOWN = {"problems": "gallery.md", "colloc/__init__.py": "api.md", "docs/notebook.ipynb": "notebook.md"}
+SHOWN = {
+    "problems": "gallery.md",
+    "colloc/__init__.py": "api.md",
+    "docs/notebook.ipynb": "notebook.md",
+}
 """What a code host shows, and the page that shows it here."""
 _SCROLLS = '<span style="display: block; overflow-x: auto">{}</span>'
 """On a phone a long formula, and not the page."""
@@ -63,9 +98,13 @@ _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^):#\s]+)(?:#[^)]*)?\)")
 
 def on_config(config: Any) -> Any:
     """The navigation: named pages in their order, then all others."""
-    present = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")} | set(GENERATED)
+    present = {
+        path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")
+    } | set(GENERATED)
     named = {page for _, pages in ORDER for page in pages}
-    nav: list[Any] = [{title: [page for page in pages if page in present]} for title, pages in ORDER]
+    nav: list[Any] = [
+        {title: [page for page in pages if page in present]} for title, pages in ORDER
+    ]
     rest = sorted(present - named)
     if rest:
         nav.append({"For developers": rest})
@@ -80,19 +119,30 @@ def on_files(files: Any, config: Any) -> Any:
     curated = ROOT / "results/curated"
     for path in sorted(path for path in curated.rglob("*") if path.suffix in KEPT):
         name = f"curated/{path.relative_to(curated).as_posix()}"
-        files.append(File.generated(config, name, content=path.read_bytes() if path.suffix in PICTURES else path.read_text()))
+        files.append(
+            File.generated(
+                config,
+                name,
+                content=path.read_bytes() if path.suffix in PICTURES else path.read_text(),
+            )
+        )
     return files
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
-    """Formulas become marks that `on_page_content` replaces, since Markdown would read underscores in them."""
+    """Formulas become marks that `on_page_content` replaces, since Markdown would read underscores
+    in them."""
     formulas: list[str] = []
 
     def mark(display: str) -> Any:
         def replaced(match: re.Match[str]) -> str:
             formula = convert(match[1].strip(), display=display)
             formulas.append(_SCROLLS.format(formula) if display == "block" else formula)
-            return f"\n\nFORMULA{len(formulas) - 1}END\n\n" if display == "block" else f"FORMULA{len(formulas) - 1}END"
+            return (
+                f"\n\nFORMULA{len(formulas) - 1}END\n\n"
+                if display == "block"
+                else f"FORMULA{len(formulas) - 1}END"
+            )
 
         return replaced
 
@@ -102,8 +152,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
 
 
 def site_link(match: re.Match[str], page: str) -> str:
-    """A link on a page as the site has it: pictures and tables of results/curated stay, other files outside docs/ become the
-    page that shows them, or else their name."""
+    """A link on a page as the site has it: pictures and tables of results/curated stay, other files
+    outside docs/ become the page that shows them, or else their name."""
     picture, text, target = match.groups()
     folder, back = posixpath.dirname(page), "../" * page.count("/")
     copied = page.startswith("curated/")
@@ -125,19 +175,26 @@ def on_page_content(html: str, page: Any, config: Any, files: Any) -> str:
 def on_post_page(output: str, page: Any, config: Any) -> str:
     """The search has a name for those who hear the page."""
     return output.replace(
-        'data-md-component="search" role="dialog"', 'data-md-component="search" role="dialog" aria-label="Search"'
+        'data-md-component="search" role="dialog"',
+        'data-md-component="search" role="dialog" aria-label="Search"',
     )
 
 
 def gallery_page() -> str:
-    """All pictures at a glance, then a section a problem file: its story, picture, numbers and source."""
+    """All pictures at a glance, then a section a problem file: its story, picture, numbers and
+    source."""
     table = json.loads((ROOT / "results/curated/gallery.json").read_text())
     files = sorted((ROOT / "problems").glob("[!_]*.py"))
-    shown = [path.stem for path in files if (ROOT / f"results/curated/gallery/{path.stem}.png").exists()]
-    cards = "\n".join(f"[![{name}](curated/gallery/{name}.png){{ width=49% }}](#{name})" for name in shown)
+    shown = [
+        path.stem for path in files if (ROOT / f"results/curated/gallery/{path.stem}.png").exists()
+    ]
+    cards = "\n".join(
+        f"[![{name}](curated/gallery/{name}.png){{ width=49% }}](#{name})" for name in shown
+    )
     parts = [
         "# Gallery",
-        "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest tests/commands/test_gallery.py` solves them "
+        "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest "
+        "tests/commands/test_gallery.py` solves them "
         "again and holds them against these numbers. Choose a picture for its story.",
         cards,
     ]
@@ -150,8 +207,10 @@ def gallery_page() -> str:
         row = table.get(path.stem)
         if row and "efficiency" in row:
             parts.append(
-                f"Efficiency **{row['efficiency']:.6f}** ± {row['error']:.0e}: d = {row['distance']:.5f} for "
-                f"W = {row['work']:.5f} at δ = {row['delta']:.0e}; {row['status']}, {row['cpu_seconds']:g} s of processor time."
+                f"Efficiency **{row['efficiency']:.6f}** ± {row['error']:.0e}: d = "
+                f"{row['distance']:.5f} for "
+                f"W = {row['work']:.5f} at δ = {row['delta']:.0e}; {row['status']}, "
+                f"{row['cpu_seconds']:g} s of processor time."
             )
         if rest.strip():
             parts.append(rest.strip("\n"))
@@ -181,7 +240,9 @@ def commands_page() -> str:
         text = io.StringIO()
         with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
             importlib.import_module(f"colloc.commands.{module}").main(["--help"])
-        parts.append(f"## colloc {name}\n\n{summary[:1].upper()}{summary[1:]}.\n\n```text\n{text.getvalue().rstrip()}\n```")
+        parts.append(
+            f"## colloc {name}\n\n{summary[:1].upper()}{summary[1:]}.\n\n```text\n{text.getvalue().rstrip()}\n```"
+        )
     return "\n\n".join(parts) + "\n"
 
 
@@ -189,7 +250,10 @@ def api_page() -> str:
     """The public names, each from its module's docstrings."""
     import colloc
 
-    parts = ["# Programming interface", "All of these are names of the package: `import colloc`, then `colloc.Problem`, ..."]
+    parts = [
+        "# Programming interface",
+        "All of these are names of the package: `import colloc`, then `colloc.Problem`, ...",
+    ]
     parts += [f"::: {module}.{name}" for name, module in colloc._HOME.items()]
     return "\n\n".join(parts) + "\n"
 
@@ -198,14 +262,17 @@ def modules_page() -> str:
     """First lines of all modules."""
     rows = ["| module | holds |", "|---|---|"]
     for path in sorted((ROOT / "colloc").glob("*/[!_]*.py")):
-        first = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
+        first = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition(
+            "\n"
+        )[0]
         rows.append(f"| `{path.parent.name}.{path.stem}` | {first.replace('|', chr(92) + '|')} |")
     text = "Imports point down from package to package; `tests/test_layering.py` holds the order."
     return "# Modules\n\n" + text + "\n\n" + "\n".join(rows) + "\n"
 
 
 def notebook_page() -> str:
-    """docs/notebook.ipynb as it was run last (`scripts.notebook`): texts, code, and what it printed and showed."""
+    """docs/notebook.ipynb as it was run last (`scripts.notebook`): texts, code, and what it printed
+    and showed."""
     parts = []
     for cell in json.loads((ROOT / "docs/notebook.ipynb").read_text(encoding="utf-8"))["cells"]:
         source = "".join(cell["source"])
@@ -240,7 +307,9 @@ GENERATED: dict[str, Callable[[], str]] = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("page", choices=GENERATED)
     print(GENERATED[parser.parse_args().page](), end="")
 

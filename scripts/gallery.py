@@ -1,7 +1,9 @@
-"""Solve every problem file for the gallery of the documentation: python -m scripts.gallery [NAME ...]
+"""Solve every problem file for the gallery of the documentation: python -m scripts.gallery [NAME
+...]
 
-Writes results/curated/gallery.json (numbers), gallery/NAME.png beside it (a picture each) and gallery.png (all of them).
-The test tests/commands/test_gallery.py solves the same files and holds them against these numbers and their own REFERENCE.
+Writes results/curated/gallery.json (numbers), gallery/NAME.png beside it (a picture each) and
+gallery.png (all of them). The test tests/commands/test_gallery.py solves the same files and holds
+them against these numbers and their own REFERENCE.
 """
 
 from __future__ import annotations
@@ -70,7 +72,8 @@ def solved_row(solution: Solution) -> dict[str, Any]:
 
 
 def picture(solution: Solution) -> Figure:
-    """A solution for the gallery: a period frame by frame, the paths in the lab, and the path or all angles beside them."""
+    """A solution for the gallery: a period frame by frame, the paths in the lab, and the path or
+    all angles beside them."""
     with styled():
         figure = Figure(figsize=_SIZE)
         grid = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 1.5))
@@ -93,7 +96,9 @@ def _save(example: Example, solution: Solution) -> None:
 
 
 def _quantised(image: Image.Image) -> Image.Image:
-    return image.convert("RGB").quantize(_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    return image.convert("RGB").quantize(
+        _COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
+    )
 
 
 def _sheet() -> None:
@@ -113,9 +118,16 @@ def _sheet() -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     known = [path.stem for path in _problem_files()]
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"files to solve (default: all): {', '.join(known)}")
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help=f"files to solve (default: all): {', '.join(known)}",
+    )
     names = parser.parse_args().names
     if unknown := set(names) - set(known):
         parser.error(f"no file in problems/ is called {', '.join(sorted(unknown))}.")
@@ -129,7 +141,10 @@ def main() -> None:
         row["cpu_seconds"] = round(time.process_time() - begin, 1)
         table[example.name] = row
         _save(example, solution)
-        print(f"{example.name:28} {row['status']:20} {row.get('efficiency', float('nan')):10.6f} {row['cpu_seconds']:7.1f} s")
+        print(
+            f"{example.name:28} {row['status']:20} {row.get('efficiency', float('nan')):10.6f} "
+            f"{row['cpu_seconds']:7.1f} s"
+        )
     table["versions"] = versions()
     _sheet()
     TABLE.write_text(json.dumps(table, indent=1, sort_keys=True) + "\n")

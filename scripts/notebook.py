@@ -1,7 +1,8 @@
-"""Run the notebook of the documentation, docs/notebook.ipynb, and keep what it shows: python -m scripts.notebook
+"""Run the notebook of the documentation, docs/notebook.ipynb, and keep what it shows: python -m
+scripts.notebook
 
-Needs the extra ``docs``. What depends on the machine or the time of day is left out, so that a run without a change of results
-changes the file little.
+Needs the extra ``docs``. What depends on the machine or the time of day is left out, so that a run
+without a change of results changes the file little.
 """
 
 from __future__ import annotations
@@ -21,17 +22,25 @@ def executed(path: Path, folder: Path) -> Any:
     from nbclient import NotebookClient
 
     notebook = nbformat.read(path, as_version=4)
-    options: dict[str, Any] = {"timeout": _SECONDS, "kernel_name": "python3", "resources": {"metadata": {"path": str(folder)}}}
+    options: dict[str, Any] = {
+        "timeout": _SECONDS,
+        "kernel_name": "python3",
+        "resources": {"metadata": {"path": str(folder)}},
+    }
     NotebookClient(notebook, **options).execute()
     for number, cell in enumerate(notebook.cells):
         cell["id"] = f"cell-{number}"
         cell.metadata.clear()
-    notebook.metadata = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
+    notebook.metadata = {
+        "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}
+    }
     return notebook
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     import nbformat
 
     with tempfile.TemporaryDirectory() as folder:

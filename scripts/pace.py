@@ -1,7 +1,9 @@
-"""What inertia does to a gait, and the best gait for each pace: python -m scripts.pace [--output results]
+"""What inertia does to a gait, and the best gait for each pace: python -m scripts.pace [--output
+results]
 
-Three equal links under equal friction: the best slow gait played at Froude numbers L/(g T^2) from 0.001 to 1, and the best gait
-for each of them, certified. A table, pace.md, and a figure, pace.png, with the gaits along it.
+Three equal links under equal friction: the best slow gait played at Froude numbers L/(g T^2) from
+0.001 to 1, and the best gait for each of them, certified. A table, pace.md, and a figure, pace.png,
+with the gaits along it.
 """
 
 from __future__ import annotations
@@ -27,13 +29,22 @@ STARTS = 8
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--output", type=Path, default=Path("results"), metavar="FOLDER")
     folder = parser.parse_args().output
     slow = solve(SLOW)
     best, played = [slow], []
-    lines = ["d/W of three equal links, friction (1, 1, 1), one harmonic, at delta 1e-4, by `python -m scripts.pace`.", ""]
-    lines += ["| Fr | s a period of a body of 1 m | slow gait played so fast | best gait for this pace | the same, slowly |"]
+    lines = [
+        "d/W of three equal links, friction (1, 1, 1), one harmonic, at delta 1e-4, by `python -m "
+        "scripts.pace`.",
+        "",
+    ]
+    lines += [
+        "| Fr | s a period of a body of 1 m | slow gait played so fast | best gait for this pace | "
+        "the same, slowly |"
+    ]
     lines += ["|---" * 5 + "|"]
     for froude in FROUDE:
         fast = inertial_motion(SLOW.body, SLOW.law, slow.gait, SLOW.delta, froude)
@@ -42,7 +53,10 @@ def main() -> None:
         best.append(found)
         value = f"{found.efficiency:.4f}" if found.success else f"[{found.efficiency:.4f}]"
         seconds = (9.81 * froude) ** -0.5
-        lines.append(f"| {froude:g} | {seconds:.2f} | {fast.efficiency:.4f} | {value} | {found.played_slowly:.4f} |")
+        lines.append(
+            f"| {froude:g} | {seconds:.2f} | {fast.efficiency:.4f} | {value} | "
+            f"{found.played_slowly:.4f} |"
+        )
         print(lines[-1], flush=True)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "pace.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -55,7 +69,13 @@ def figure(slow: Solution, played: list[float], best: list[Solution]) -> Picture
         made = Picture(figsize=(7.2, 5.2))
         grid = made.add_gridspec(2, len(DRAWN), height_ratios=(2, 1))
         axes = made.add_subplot(grid[0, :])
-        axes.semilogx(FROUDE, [found.efficiency for found in best], "o-", color=BLUE, label="the best gait for each pace")
+        axes.semilogx(
+            FROUDE,
+            [found.efficiency for found in best],
+            "o-",
+            color=BLUE,
+            label="the best gait for each pace",
+        )
         axes.semilogx(FROUDE, played, "s--", color=GREY, label="the best slow gait, played so fast")
         axes.axhline(slow.efficiency, color=GREY, linewidth=0.8, linestyle=":", label="slow")
         axes.set_xlabel("Froude number L / (g T²), over the coefficient of friction")

@@ -12,7 +12,9 @@ def letter(axes: Any, text: str) -> None:
     if axes.name == "3d":
         axes.text2D(-0.02, 1.0, text, transform=axes.transAxes, fontweight="bold", va="bottom")
     else:
-        axes.text(-0.02, 1.02, text, transform=axes.transAxes, fontweight="bold", va="bottom", ha="right")
+        axes.text(
+            -0.02, 1.02, text, transform=axes.transAxes, fontweight="bold", va="bottom", ha="right"
+        )
 
 
 def bare(axes: Any) -> None:
@@ -21,7 +23,15 @@ def bare(axes: Any) -> None:
     axes.set_axis_off()
 
 
-def arrows(axes: Any, x: np.ndarray, y: np.ndarray, vx: np.ndarray, vy: np.ndarray, scale: float, colour: str) -> None:
+def arrows(
+    axes: Any,
+    x: np.ndarray,
+    y: np.ndarray,
+    vx: np.ndarray,
+    vy: np.ndarray,
+    scale: float,
+    colour: str,
+) -> None:
     """Arrows of length `scale` times the vector, in data units."""
     axes.quiver(
         x, y, scale * vx, scale * vy, color=colour, angles="xy", scale_units="xy", scale=1,

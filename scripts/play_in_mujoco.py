@@ -1,13 +1,15 @@
-"""Play a gait in MuJoCo beside colloc's own motion: python -m scripts.play_in_mujoco results/three_link.h5 [--froude .002 .05]
+"""Play a gait in MuJoCo beside colloc's own motion: python -m scripts.play_in_mujoco
+results/three_link.h5 [--froude .002 .05]
 
-MuJoCo is the multibody mechanics: its mass matrix, bias forces and Jacobians, of the model that ``colloc export --format
-mjcf`` writes. Joints follow the gait exactly (their accelerations are given, the tail's are solved for), contacts are off,
-and the law of friction acts at points: Gauss points of every link, or its feet. The equations of motion are integrated by
-LSODA over periods until all are alike, in units of body length, mass and period. What colloc says of the same motion, with
-its own equations, friction in closed form and its own integrator, stands beside it.
+MuJoCo is the multibody mechanics: its mass matrix, bias forces and Jacobians, of the model that
+``colloc export --format mjcf`` writes. Joints follow the gait exactly (their accelerations are
+given, the tail's are solved for), contacts are off, and the law of friction acts at points: Gauss
+points of every link, or its feet. The equations of motion are integrated by LSODA over periods
+until all are alike, in units of body length, mass and period. What colloc says of the same motion,
+with its own equations, friction in closed form and its own integrator, stands beside it.
 
-``--contacts`` adds the file as it is exported: servos, gravity, and MuJoCo's contacts, whose friction is elliptic. ``--film``
-writes that as a GIF. Needs ``pip install colloc[engines]``.
+``--contacts`` adds the file as it is exported: servos, gravity, and MuJoCo's contacts, whose
+friction is elliptic. ``--film`` writes that as a GIF. Needs ``pip install colloc[engines]``.
 """
 
 from __future__ import annotations
@@ -38,18 +40,22 @@ try:
 except ImportError:
     sys.exit("colloc: this needs MuJoCo, which is not installed: pip install 'colloc[engines]'.")
 except AttributeError:
-    sys.exit("colloc: MuJoCo cannot draw with the OpenGL that MUJOCO_GL names: set another one, or none.")
+    sys.exit(
+        "colloc: MuJoCo cannot draw with the OpenGL that MUJOCO_GL names: set another one, or none."
+    )
 
 FROUDE = (0.002, 0.005, 0.02, 0.05, 0.15, 0.4)
 POINTS, DELTA, TOLERANCE, MOST_PERIODS, ALIKE = 100, 1e-2, 1e-8, 40, 1e-5
-"""Gauss points a link; regularisation, coarse enough for an explicit law at points; of the integrator; periods at most, and the
-relative change of a period's distance and work at which they count as alike."""
+"""Gauss points a link; regularisation, coarse enough for an explicit law at points; of the
+integrator; periods at most, and the relative change of a period's distance and work at which they
+count as alike."""
 SIZE, FRAMES, TURNS = (480, 640), 60, 4
 """Of the film in pixels; its frames a period; periods."""
 
 
 class _Points(NamedTuple):
-    """Points of a link at x along and y across it, ``(n, 1)`` each, that bear weights under one law, turned by an angle."""
+    """Points of a link at x along and y across it, ``(n, 1)`` each, that bear weights under one
+    law, turned by an angle."""
 
     link: int
     x: np.ndarray
@@ -62,9 +68,19 @@ class _Points(NamedTuple):
     def of_foot(cls, problem: Problem, body: Chain, foot: Foot) -> _Points:
         """It, or Gauss points of a pad."""
         nodes, weights = np.polynomial.legendre.leggauss(POINTS if foot.extent else 1)
-        along, law = foot.place + 0.5 * foot.extent * nodes[:, None], foot.friction or problem.friction
+        along, law = (
+            foot.place + 0.5 * foot.extent * nodes[:, None],
+            foot.friction or problem.friction,
+        )
         weight = 0.5 * weights[:, None] * float(foot.weight or 0.0)
-        return cls(foot.link, along * body.lengths[foot.link], foot.offset + 0 * along, weight, law, foot.angle)
+        return cls(
+            foot.link,
+            along * body.lengths[foot.link],
+            foot.offset + 0 * along,
+            weight,
+            law,
+            foot.angle,
+        )
 
     @classmethod
     def of_lines(cls, problem: Problem, body: Chain) -> list[_Points]:
@@ -72,9 +88,14 @@ class _Points(NamedTuple):
         nodes, weights = np.polynomial.legendre.leggauss(POINTS)
         along, shares = 0.5 * (nodes + 1)[:, None], 0.5 * weights[:, None]
         links = enumerate(zip(body.lengths, body.weight_column()[:, 0], strict=True))
-        return [cls(k, length * along, 0 * along, weight * shares, problem.friction) for k, (length, weight) in links]
+        return [
+            cls(k, length * along, 0 * along, weight * shares, problem.friction)
+            for k, (length, weight) in links
+        ]
 
-    def forces(self, vx: np.ndarray, vy: np.ndarray, delta: float) -> tuple[np.ndarray, np.ndarray, float]:
+    def forces(
+        self, vx: np.ndarray, vy: np.ndarray, delta: float
+    ) -> tuple[np.ndarray, np.ndarray, float]:
         """Along and across the link, ``(n, 1)`` each, and the power against them."""
         c, s = np.cos(self.angle), np.sin(self.angle)
         fs, fn = self.law.density(c * vx + s * vy, c * vy - s * vx, np.full(vx.shape, delta))
@@ -92,11 +113,15 @@ class Played:
         problem = solution.problem
         self.gait, self.delta, self.froude = solution.gait, delta, froude
         # a body length, mass and period of 1; weight is 1 / Fr
-        self.model = mujoco.MjModel.from_xml_string(mjcf(solution.robot(1.0, 1.0, 1.0), contacts=False))
+        self.model = mujoco.MjModel.from_xml_string(
+            mjcf(solution.robot(1.0, 1.0, 1.0), contacts=False)
+        )
         self.model.opt.gravity[:] = 0.0
         self.data = mujoco.MjData(self.model)
         body = checked_mass(problem.body)
-        self.points = [_Points.of_foot(problem, body, foot) for foot in body.standing_on] or _Points.of_lines(problem, body)
+        self.points = [
+            _Points.of_foot(problem, body, foot) for foot in body.standing_on
+        ] or _Points.of_lines(problem, body)
 
     def _times_mass(self, vector: np.ndarray) -> np.ndarray:
         found = np.zeros(self.model.nv)
@@ -104,14 +129,17 @@ class Played:
         return found
 
     def friction(self) -> tuple[np.ndarray, float]:
-        """Generalised force of the law at all points ``(nv,)``, and its power, at the state of MuJoCo's data."""
+        """Generalised force of the law at all points ``(nv,)``, and its power, at the state of
+        MuJoCo's data."""
         data, total, power = self.data, np.zeros(self.model.nv), 0.0
         way, turn = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         for at in self.points:
             mujoco.mj_jac(self.model, data, way, turn, data.xpos[at.link + 1], at.link + 1)
             frame = data.xmat[at.link + 1].reshape(3, 3)
             velocity, omega = frame.T @ (way @ data.qvel), (turn @ data.qvel)[2]
-            fx, fy, spent = at.forces(velocity[0] - omega * at.y, velocity[1] + omega * at.x, self.delta)
+            fx, fy, spent = at.forces(
+                velocity[0] - omega * at.y, velocity[1] + omega * at.x, self.delta
+            )
             push = frame @ np.array([fx.sum(), fy.sum(), 0.0])
             total += (way.T @ push + turn[2] * (at.x * fy - at.y * fx).sum()) / self.froude
             power += spent / self.froude
@@ -124,7 +152,10 @@ class Played:
         angles, rates = (a[:, 0] for a in self.gait(here))
         later, before = (self.gait.rates((here + step) % 1.0)[:, 0] for step in (h, -h))
         data, wanted = self.data, (later - before) / (2 * h)
-        data.qpos[:], data.qvel[:] = np.concatenate([state[:3], angles]), np.concatenate([state[3:6], rates])
+        data.qpos[:], data.qvel[:] = (
+            np.concatenate([state[:3], angles]),
+            np.concatenate([state[3:6], rates]),
+        )
         mujoco.mj_forward(self.model, data)
         mass = np.stack([self._times_mass(unit) for unit in np.eye(self.model.nv)])
         force, power = self.friction()
@@ -140,7 +171,15 @@ class Played:
 
     def period(self, start: np.ndarray) -> np.ndarray:
         """The state a period later."""
-        found = solve_ivp(self.rates, (0.0, 1.0), start, method="LSODA", rtol=TOLERANCE, atol=TOLERANCE, max_step=0.02)
+        found = solve_ivp(
+            self.rates,
+            (0.0, 1.0),
+            start,
+            method="LSODA",
+            rtol=TOLERANCE,
+            atol=TOLERANCE,
+            max_step=0.02,
+        )
         if not found.success:
             raise RuntimeError(found.message)
         return np.asarray(found.y[:, -1])
@@ -159,12 +198,19 @@ class Played:
 
 
 def compared(solution: Solution, froude: float, delta: float = DELTA) -> dict[str, float]:
-    """Distance and work of a period at a Froude number, of MuJoCo and of colloc, and how far they are apart, relative."""
+    """Distance and work of a period at a Froude number, of MuJoCo and of colloc, and how far they
+    are apart, relative."""
     problem = solution.problem
     distance, work = Played(solution, delta, froude).settled()
     own = colloc.inertial_motion(problem.body, problem.friction, solution.gait, delta, froude)
     apart = max(abs(distance / own.distance - 1), abs(work / own.work - 1))
-    return {"distance": distance, "work": work, "own_distance": own.distance, "own_work": own.work, "apart": apart}
+    return {
+        "distance": distance,
+        "work": work,
+        "own_distance": own.distance,
+        "own_work": own.work,
+        "apart": apart,
+    }
 
 
 def _renderer(model: mujoco.MjModel) -> mujoco.Renderer:
@@ -172,12 +218,16 @@ def _renderer(model: mujoco.MjModel) -> mujoco.Renderer:
         return mujoco.Renderer(model, *SIZE)
     except (AttributeError, ImportError, mujoco.FatalError):
         raise CollocError(
-            "MuJoCo finds no OpenGL to draw with: install EGL or OSMesa and set MUJOCO_GL=egl or osmesa, or leave --film out."
+            "MuJoCo finds no OpenGL to draw with: install EGL or OSMesa and set MUJOCO_GL=egl or "
+            "osmesa, or leave --film out."
         ) from None
 
 
-def with_contacts(solution: Solution, froude: float, film: Path | None = None) -> tuple[float, float]:
-    """Distance [body lengths] and work [weight x length] of the last period in MuJoCo's own contacts, of a robot of 1 m."""
+def with_contacts(
+    solution: Solution, froude: float, film: Path | None = None
+) -> tuple[float, float]:
+    """Distance [body lengths] and work [weight x length] of the last period in MuJoCo's own
+    contacts, of a robot of 1 m."""
     period = float(np.sqrt(1.0 / (9.81 * froude)))
     model = mujoco.MjModel.from_xml_string(mjcf(solution.robot(1.0, 1.0, period)))
     data, steps = mujoco.MjData(model), round(period / model.opt.timestep)
@@ -205,10 +255,16 @@ def with_contacts(solution: Solution, froude: float, film: Path | None = None) -
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description="Play a gait in MuJoCo beside colloc's own motion.")
+    parser = argparse.ArgumentParser(
+        description="Play a gait in MuJoCo beside colloc's own motion."
+    )
     parser.add_argument("result", help="a result file of a chain")
     parser.add_argument("--froude", type=float, nargs="+", default=FROUDE, metavar="FR")
-    parser.add_argument("--contacts", action="store_true", help="also MuJoCo's own contacts, at the last Froude number")
+    parser.add_argument(
+        "--contacts",
+        action="store_true",
+        help="also MuJoCo's own contacts, at the last Froude number",
+    )
     parser.add_argument("--film", type=Path, metavar="GIF", help="film of MuJoCo's own contacts")
     return run(parser, _play, arguments)
 
@@ -216,11 +272,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _play(options: argparse.Namespace) -> int:
     solution = colloc.load(options.result)
     print(f"{solution.problem.name}, delta = {DELTA:g}\n")
-    print("| Froude number | d MuJoCo | d colloc | W MuJoCo | W colloc | apart |\n|---|---|---|---|---|---|")
+    print(
+        "| Froude number | d MuJoCo | d colloc | W MuJoCo | W colloc | apart "
+        "|\n|---|---|---|---|---|---|"
+    )
     for froude in options.froude:
         f = compared(solution, froude)
         print(
-            f"| {froude:g} | {f['distance']:.5f} | {f['own_distance']:.5f} | {f['work']:.5f} | {f['own_work']:.5f} "
+            f"| {froude:g} | {f['distance']:.5f} | {f['own_distance']:.5f} | {f['work']:.5f} | "
+            f"{f['own_work']:.5f} "
             f"| {f['apart']:.1e} |",
             flush=True,
         )

@@ -1,7 +1,8 @@
 """Reproduce everything the paper computes: ``python -m scripts.reproduce_paper``.
 
-Writes results/paper/*.h5 (one file a part), figures as PNG and PDF, and results/paper.md, a table with one row for every
-number the paper prints. Parts whose inputs have not changed since they were computed are not computed again.
+Writes results/paper/*.h5 (one file a part), figures as PNG and PDF, and results/paper.md, a table
+with one row for every number the paper prints. Parts whose inputs have not changed since they were
+computed are not computed again.
 
 Source: S. Alben, "Efficient sliding locomotion with isotropic friction" (2019).
 """
@@ -39,12 +40,23 @@ PARTS = (
         settings={"delta": DELTA, "steps": 74, "instants": 100, "sample_every": 50},
         quick={"steps": 24, "sample_every": 20},
         needs=("connection",),
-        units={"A0": "rad", "A1": "rad", "B1": "rad", "distance_direct": "body lengths", "work_direct": "weight x length"},
+        units={
+            "A0": "rad",
+            "A1": "rad",
+            "B1": "rad",
+            "distance_direct": "body lengths",
+            "work_direct": "weight x length",
+        },
     ),
     Part(
         "pacing",
         pacing.pacing,
-        settings={"delta": DELTA, "sample_every": 10, "resolutions": [16, 32, 64], "relative": [1e-3, 1e-4, 1e-5, 1e-6]},
+        settings={
+            "delta": DELTA,
+            "sample_every": 10,
+            "resolutions": [16, 32, 64],
+            "relative": [1e-3, 1e-4, 1e-5, 1e-6],
+        },
         quick={"sample_every": 4, "resolutions": [16, 32], "relative": [1e-4, 1e-5]},
         needs=("connection", "sweep"),
     ),
@@ -59,10 +71,21 @@ PARTS = (
     Part(
         "optima",
         three_link.optima,
-        settings={"delta": DELTA, "instants": 800, "directions": 121, "fractions": 61, "named_A0": [0.0, 1.1, 2.5]},
+        settings={
+            "delta": DELTA,
+            "instants": 800,
+            "directions": 121,
+            "fractions": 61,
+            "named_A0": [0.0, 1.1, 2.5],
+        },
         quick={"instants": 400, "directions": 41, "fractions": 31},
         needs=("connection", "sweep"),
-        units={"gaits": "rad", "position_error": "rad", "distance": "body lengths", "work": "weight x length"},
+        units={
+            "gaits": "rad",
+            "position_error": "rad",
+            "distance": "body lengths",
+            "work": "weight x length",
+        },
     ),
     Part(
         "delta",
@@ -127,7 +150,14 @@ PARTS = (
             "mu_B": [30, 1000, 10000],
             "amplitude_B": [0.7, 0.9, 1.1],
         },
-        quick={"steepness": [10], "amplitude_A": [], "mu_A": [10], "coarse": [[25, 4]], "mu_B": [1000], "amplitude_B": [0.9]},
+        quick={
+            "steepness": [10],
+            "amplitude_A": [],
+            "mu_A": [10],
+            "coarse": [[25, 4]],
+            "mu_B": [1000],
+            "amplitude_B": [0.9],
+        },
     ),
     Part(
         "crawlers",
@@ -150,11 +180,29 @@ def study(folder: Path, *, quick: bool) -> PaperStudy:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m scripts.reproduce_paper", description=__doc__.split("\n")[0])
-    parser.add_argument("--only", nargs="+", metavar="PART", help=f"parts to compute: {', '.join(p.name for p in PARTS)}")
-    parser.add_argument("--quick", action="store_true", help="coarser grids, in about a minute; files go to paper-quick")
-    parser.add_argument("--output", type=Path, default=Path("results"), help="folder for results (default: results)")
-    parser.add_argument("--processes", type=int, default=available_processes(), help="processes (default: all processors)")
+    parser = argparse.ArgumentParser(
+        prog="python -m scripts.reproduce_paper", description=__doc__.split("\n")[0]
+    )
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        metavar="PART",
+        help=f"parts to compute: {', '.join(p.name for p in PARTS)}",
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="coarser grids, in about a minute; files go to paper-quick",
+    )
+    parser.add_argument(
+        "--output", type=Path, default=Path("results"), help="folder for results (default: results)"
+    )
+    parser.add_argument(
+        "--processes",
+        type=int,
+        default=available_processes(),
+        help="processes (default: all processors)",
+    )
     parser.add_argument("--force", action="store_true", help="compute even what is finished")
     parser.add_argument("--no-figures", action="store_true", help="leave the figures alone")
     options = parser.parse_args(arguments)

@@ -1,7 +1,8 @@
 """Photograph what people see, in a headless browser: python -m scripts.screens
 
-Solves the tutorial's problem, writes its report, builds the documentation, and renders the README as a code host would. Needs
-chromium or google-chrome, and the extra ``docs``. Writes results/curated/report.png and results/curated/screens/*.png.
+Solves the tutorial's problem, writes its report, builds the documentation, and renders the README
+as a code host would. Needs chromium or google-chrome, and the extra ``docs``. Writes
+results/curated/report.png and results/curated/screens/*.png.
 """
 
 from __future__ import annotations
@@ -46,14 +47,25 @@ class Screen(NamedTuple):
 def tutorial_problem() -> str:
     """The problem file of docs/tutorial.md."""
     text = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
-    return next(block for block in re.findall(r"^```python[^\n]*\n(.*?)^```", text, re.M | re.S) if "PROBLEM" in block)
+    return next(
+        block
+        for block in re.findall(r"^```python[^\n]*\n(.*?)^```", text, re.M | re.S)
+        if "PROBLEM" in block
+    )
 
 
 def photograph(program: str, screen: Screen, target: Path, folder: Path) -> None:
     """Write a picture of a page, cut where nothing follows."""
     shot = folder / "shot.png"
     size = f"--window-size={screen.window[0]},{screen.window[1]}"
-    command = [program, *_OPTIONS, *screen.options, f"--user-data-dir={folder / 'profile'}", size, f"--screenshot={shot}"]
+    command = [
+        program,
+        *_OPTIONS,
+        *screen.options,
+        f"--user-data-dir={folder / 'profile'}",
+        size,
+        f"--screenshot={shot}",
+    ]
     subprocess.run([*command, screen.page], check=True, capture_output=True)
     image = Image.open(shot).convert("RGB")
     pixels = np.asarray(image)
@@ -62,15 +74,21 @@ def photograph(program: str, screen: Screen, target: Path, folder: Path) -> None
     ]  # a window may be shorter than it says, the rest is black
     used = np.flatnonzero((pixels != pixels[-1, 0]).any(axis=(1, 2)))[-1] + 20
     image = image.crop((0, 0, image.width, min(int(used), len(pixels))))
-    image = image.resize((screen.width, round(image.height * screen.width / image.width)), Image.Resampling.LANCZOS)
+    image = image.resize(
+        (screen.width, round(image.height * screen.width / image.width)), Image.Resampling.LANCZOS
+    )
     target.parent.mkdir(exist_ok=True)
     # kmeans: without it the palest grey becomes blue
-    image.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE).save(target, optimize=True)
+    image.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE).save(
+        target, optimize=True
+    )
     print(f"saved {target.relative_to(ROOT)} ({target.stat().st_size / 1000:.0f} kB)")
 
 
 def main() -> int:
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     program = browser()
     if program is None:
         print(f"no browser: install one of {', '.join(BROWSERS)}.", file=sys.stderr)
@@ -84,8 +102,12 @@ def main() -> int:
         report([str(folder / "mine.h5"), "--quiet"])
         import markdown  # of the extra docs
 
-        body = markdown.markdown((ROOT / "README.md").read_text(encoding="utf-8"), extensions=["tables", "fenced_code"])
-        (folder / "readme.html").write_text(_HOST.format(base=f"file://{ROOT}/", body=body), encoding="utf-8")
+        body = markdown.markdown(
+            (ROOT / "README.md").read_text(encoding="utf-8"), extensions=["tables", "fenced_code"]
+        )
+        (folder / "readme.html").write_text(
+            _HOST.format(base=f"file://{ROOT}/", body=body), encoding="utf-8"
+        )
         page, site = f"file://{folder / 'mine.html'}#t=1.4", folder / "site"
         for target, screen in {
             "report": Screen(page, (1120, 4400), 900),
@@ -96,10 +118,16 @@ def main() -> int:
         }.items():
             photograph(program, screen, TARGET / f"{target}.png", folder)
         # with the pictures just made
-        subprocess.run([sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", site], check=True, cwd=ROOT)
+        subprocess.run(
+            [sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", site],
+            check=True,
+            cwd=ROOT,
+        )
         for name, height in (("index", 2400), ("gallery", 2400), ("known", 3200)):
             screen = Screen(f"file://{site / name}.html", (1280, height), 900)
-            photograph(program, screen, TARGET / f"screens/{name.replace('index', 'home')}.png", folder)
+            photograph(
+                program, screen, TARGET / f"screens/{name.replace('index', 'home')}.png", folder
+            )
     return 0
 
 

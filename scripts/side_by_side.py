@@ -1,9 +1,10 @@
 """Gaits crawling one above the other at the same work: python -m scripts.side_by_side [FILE.py ...]
 
-Every body spends work at the same rate, counted by the least friction that it meets: with so much work what is dragged
-where it slides best comes `WORK` body lengths far, which is the most that any gait can. Writes
-results/curated/side_by_side.gif; by default three links that lie on the floor (the paper's best gait), the same on feet, a
-snake on wheels, which are bars, and an inchworm. What holds is filled.
+Every body spends work at the same rate, counted by the least friction that it meets: with so much
+work what is dragged where it slides best comes `WORK` body lengths far, which is the most that any
+gait can. Writes results/curated/side_by_side.gif; by default three links that lie on the floor (the
+paper's best gait), the same on feet, a snake on wheels, which are bars, and an inchworm. What holds
+is filled.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ FILES = {
     "inchworm": "an inchworm on four feet",
 }
 WORK, PICTURES, FPS, REST = 5.0, 160, 12.5, 12
-"""Work spent [weight x body length x least friction], pictures of it, pictures a second, and pictures that the end stays."""
+"""Work spent [weight x body length x least friction], pictures of it, pictures a second, and
+pictures that the end stays."""
 _WIDTH, _LANE, _BEHIND = 640, 0.68, 0.42
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 _GRAIN = 4001
@@ -40,7 +42,8 @@ _GRAIN = 4001
 
 @dataclass(frozen=True)
 class Crawl:
-    """A gait in its own lane: the ends of its links ``(2, n_link + 1, n_picture)`` and its centre ``(2, n_picture)``."""
+    """A gait in its own lane: the ends of its links ``(2, n_link + 1, n_picture)`` and its centre
+    ``(2, n_picture)``."""
 
     label: str
     efficiency: float
@@ -54,7 +57,8 @@ class Crawl:
 
 
 def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
-    """The phase at which a gait has spent so much work: the inverse of the integral of its power."""
+    """The phase at which a gait has spent so much work: the inverse of the integral of its
+    power."""
     t = np.linspace(0.0, 1.0, _GRAIN)
     power = solution.power(solution.sample(t))
     spent = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(t))])
@@ -93,13 +97,24 @@ def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
         for row, (one, colour) in enumerate(zip(crawls, _COLOURS, strict=False)):
             y = -_LANE * (row + 0.58)
             label = f"{one.label}: {100 * one.efficiency:.0f} % of what friction allows"
-            axes.text(0.03 - _BEHIND, -_LANE * row - 0.02, label, va="top", color=colour, weight="bold")
+            axes.text(
+                0.03 - _BEHIND, -_LANE * row - 0.02, label, va="top", color=colour, weight="bold"
+            )
             (trail,) = axes.plot([], [], color=colour, lw=1.2, alpha=0.5)
-            (body,) = axes.plot([], [], color=INK, lw=4, solid_capstyle="round", solid_joinstyle="round")
+            (body,) = axes.plot(
+                [], [], color=INK, lw=4, solid_capstyle="round", solid_joinstyle="round"
+            )
             (joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
             (head,) = axes.plot([], [], "o", color=INK, ms=9)
             (centre,) = axes.plot([], [], "o", color=colour, ms=7)
-            drawn.append((one, np.array([[0.0], [y]]), (trail, body, joints, head, centre), FootMarks(axes, one.kinds, 6.0)))
+            drawn.append(
+                (
+                    one,
+                    np.array([[0.0], [y]]),
+                    (trail, body, joints, head, centre),
+                    FootMarks(axes, one.kinds, 6.0),
+                )
+            )
         for k in [*range(PICTURES), *[PICTURES - 1] * REST]:
             for one, lift, (trail, body, joints, head, centre), marks in drawn:
                 ends = one.ends[:, :, k] + lift
@@ -114,11 +129,18 @@ def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("files", nargs="*", type=Path, metavar="FILE.py", help="problem files, the best gait last")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "files", nargs="*", type=Path, metavar="FILE.py", help="problem files, the best gait last"
+    )
     parser.add_argument("--output", type=Path, default=ROOT / "results/curated/side_by_side.gif")
     options = parser.parse_args()
-    solutions = [colloc.solve(file) for file in options.files or [ROOT / "problems" / f"{name}.py" for name in FILES]]
+    solutions = [
+        colloc.solve(file)
+        for file in options.files or [ROOT / "problems" / f"{name}.py" for name in FILES]
+    ]
     for solution in solutions:
         print(solution)
     write_gif(options.output, pictures([crawl(solution) for solution in solutions]), FPS)

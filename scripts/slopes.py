@@ -1,8 +1,9 @@
 """How steep crawlers climb: python -m scripts.slopes [--starts 16] [--output results]
 
-For three equal links, bilateral gaits of one to three harmonics and grades up to where none is found: the gait of least work
-per climb, beside the most efficient one on the level put on the same slope. A table, slopes.md, and a figure, slopes.png, which
-also shows how an antipodal gait turns on a slope by itself.
+For three equal links, bilateral gaits of one to three harmonics and grades up to where none is
+found: the gait of least work per climb, beside the most efficient one on the level put on the same
+slope. A table, slopes.md, and a figure, slopes.png, which also shows how an antipodal gait turns on
+a slope by itself.
 """
 
 from __future__ import annotations
@@ -31,18 +32,31 @@ SCENES = (
 )
 TURNING = Fourier(np.zeros(2), np.array([[1.5], [0.0]]), np.array([[0.0], [1.0]]))
 HEAD = (
-    *("friction", "harmonics", "grade", "climb/work", "climb", "work of the joints", "heading [deg]"),
+    *(
+        "friction",
+        "harmonics",
+        "grade",
+        "climb/work",
+        "climb",
+        "work of the joints",
+        "heading [deg]",
+    ),
     *("climb/work of the gait that is best on the level", "checks"),
 )
 _PERIODS, _GRADE, _HEADINGS = 60, 0.05, np.pi * np.array([0.05, 0.3, 0.6, -0.2, -0.45, -0.8])
 
 
-def climbers(friction: Friction, harmonics: int, grades: tuple[float, ...], starts: int) -> list[Solution | None]:
-    """The best gait found for every grade, from the one before as a guess; None where none climbs."""
+def climbers(
+    friction: Friction, harmonics: int, grades: tuple[float, ...], starts: int
+) -> list[Solution | None]:
+    """The best gait found for every grade, from the one before as a guess; None where none
+    climbs."""
     found: list[Solution | None] = []
     guess = None
     for grade in grades:
-        problem = Problem("slope", guess, friction=friction, gait=Harmonic(harmonics, "bilateral"), grade=grade)
+        problem = Problem(
+            "slope", guess, friction=friction, gait=Harmonic(harmonics, "bilateral"), grade=grade
+        )
         best = None
         with suppress(NotConvergedError):
             best = solve(problem, starts)
@@ -55,7 +69,13 @@ def heading(best: Solution) -> float:
     """Direction in which a gait would go on the level, from straight uphill [deg]."""
     if best.problem.regime.slow_on_level:
         return 0.0
-    at = best.problem.body, best.problem.friction, best.gait, best.delta_per_period, best.problem.grade
+    at = (
+        best.problem.body,
+        best.problem.friction,
+        best.gait,
+        best.delta_per_period,
+        best.problem.grade,
+    )
     return float(np.degrees(np.angle(np.exp(1j * slope_motion(*at, tolerance=1e-4).headings[0]))))
 
 
@@ -65,8 +85,13 @@ def row(scene: str, harmonics: int, grade: float, best: Solution | None, level: 
     if best is None:
         return f"| {scene} | {harmonics} | {grade:g} | none found | | | | {plain} | |"
     found = best.certificate
-    verdict = "all hold" if found.passed else "not: " + ", ".join(check.name for check in found.failures)
-    numbers = f"{found.value:.4f} | {found.distance:.4f} | {found.work:.4f} | {round(heading(best)) + 0:d}"
+    verdict = (
+        "all hold" if found.passed else "not: " + ", ".join(check.name for check in found.failures)
+    )
+    numbers = (
+        f"{found.value:.4f} | {found.distance:.4f} | {found.work:.4f} | "
+        f"{round(heading(best)) + 0:d}"
+    )
     return f"| {scene} | {harmonics} | {grade:g} | {numbers} | {plain} | {verdict} |"
 
 
@@ -79,11 +104,20 @@ def figure(curves: list[Curve], path: Path) -> None:
     with styled():
         drawn, (left, right) = subplots(1, 2, figsize=(8.4, 3.6))
         for colour, (name, grades, found, levels) in zip(SERIES, curves, strict=False):
-            climbs = [(grade, best.certificate.value) for grade, best in zip(grades, found, strict=True) if best is not None]
+            climbs = [
+                (grade, best.certificate.value)
+                for grade, best in zip(grades, found, strict=True)
+                if best is not None
+            ]
             left.plot(*zip(*climbs, strict=True), "o-", color=colour, markersize=4, label=name)
-            plain: list[float] = [ran.climb[0] / ran.joint_work[0] if ran.joint_work[0] > 0 else np.nan for ran in levels]
+            plain: list[float] = [
+                ran.climb[0] / ran.joint_work[0] if ran.joint_work[0] > 0 else np.nan
+                for ran in levels
+            ]
             left.plot(grades, plain, ":", color=colour)
-        left.set(xlabel="grade", ylabel="climb / work of the joints", ylim=(0, None), xlim=(-0.02, 1.05))
+        left.set(
+            xlabel="grade", ylabel="climb / work of the joints", ylim=(0, None), xlim=(-0.02, 1.05)
+        )
         left.set_title("best for each slope (dotted: best on the level)")
         left.legend()
         for colour, heading in zip(SERIES, _HEADINGS, strict=False):
@@ -98,15 +132,23 @@ def figure(curves: list[Curve], path: Path) -> None:
                 tolerance=1e-4,
             )
             right.plot(
-                np.append(0, -np.cumsum(ran.aside)), np.append(0, np.cumsum(ran.climb)), ".-", color=colour, markersize=3
+                np.append(0, -np.cumsum(ran.aside)),
+                np.append(0, np.cumsum(ran.climb)),
+                ".-",
+                color=colour,
+                markersize=3,
             )
-        right.set(xlabel="across the slope [body lengths]", ylabel="uphill [body lengths]", aspect="equal")
+        right.set(
+            xlabel="across the slope [body lengths]", ylabel="uphill [body lengths]", aspect="equal"
+        )
         right.set_title(f"an antipodal gait turns downhill ({_PERIODS} periods)")
     save(drawn, path)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--starts", type=int, default=16, metavar="N", help="of every search")
     parser.add_argument("--output", type=Path, default=Path("results"), metavar="FOLDER")
     options = parser.parse_args()
@@ -115,11 +157,16 @@ def main() -> None:
         found = climbers(friction, harmonics, grades, options.starts)
         flat = found[0]
         assert flat is not None  # every class crawls on the level
-        levels = [slope_motion(Chain(), friction, flat.gait, 1e-4, grade, tolerance=1e-5) for grade in grades]
+        levels = [
+            slope_motion(Chain(), friction, flat.gait, 1e-4, grade, tolerance=1e-5)
+            for grade in grades
+        ]
         for grade, best, level in zip(grades, found, levels, strict=True):
             lines.append(row(scene, harmonics, grade, best, level))
             print(lines[-1], flush=True)
-        curves.append((f"{scene}, {harmonics} harmonic{'s' * (harmonics > 1)}", grades, found, levels))
+        curves.append(
+            (f"{scene}, {harmonics} harmonic{'s' * (harmonics > 1)}", grades, found, levels)
+        )
     options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "slopes.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     figure(curves, options.output / "slopes")

@@ -1,6 +1,8 @@
-"""How the lengths of the links of a symmetric three-link body decide its efficiency, for three laws of friction.
+"""How the lengths of the links of a symmetric three-link body decide its efficiency, for three laws
+of friction.
 
-``outer`` is the length of the first and of the last link; the middle one has the rest. One harmonic, bilateral.
+``outer`` is the length of the first and of the last link; the middle one has the rest. One
+harmonic, bilateral.
 """
 
 import numpy as np

@@ -1,8 +1,9 @@
 """The best one-harmonic gait of the three-link body over the plane of friction coefficients.
 
-The idea of the paper's figure 1 (left): across (mu_t/mu_f, mu_b/mu_f), which kind of gait is best, and how efficient is it?
-There for a smooth body with 45 modes; here for three equal links with one harmonic, every gait certified. Coefficients
-are given relative to mu_f = 1; exchanging head and tail exchanges mu_f and mu_b, so mu_b >= mu_f is all there is.
+The idea of the paper's figure 1 (left): across (mu_t/mu_f, mu_b/mu_f), which kind of gait is best,
+and how efficient is it? There for a smooth body with 45 modes; here for three equal links with one
+harmonic, every gait certified. Coefficients are given relative to mu_f = 1; exchanging head and
+tail exchanges mu_f and mu_b, so mu_b >= mu_f is all there is.
 """
 
 import numpy as np

@@ -1,4 +1,5 @@
-"""The best one-harmonic gait of three equal links at every pace: from slow motion to periods in which inertia is all.
+"""The best one-harmonic gait of three equal links at every pace: from slow motion to periods in
+which inertia is all.
 
 Cells are solved from slow to fast, and starts travel between neighbours (`docs/howto/pace.md`).
 """

@@ -1,6 +1,8 @@
-"""What a limit on the joint angles costs the isotropic three-link crawler, from joints that turn freely to 30 degrees.
+"""What a limit on the joint angles costs the isotropic three-link crawler, from joints that turn
+freely to 30 degrees.
 
-Starts travel from wide limits to narrow ones: a gait that fits is kept, one that does not is projected and then solved.
+Starts travel from wide limits to narrow ones: a gait that fits is kept, one that does not is
+projected and then solved.
 """
 
 import numpy as np

@@ -2,7 +2,8 @@
 
 import os
 
-# before NumPy is loaded: the workers use all processors already, and threads of theirs would only wait for each other
+# before NumPy is loaded: the workers use all processors already, and threads of theirs would only
+# wait for each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -16,7 +17,8 @@ import pytest
 from filelock import FileLock
 
 matplotlib.use("Agg")
-# a run in the background of a shell script ignores Ctrl-C, and so would the programs that the tests interrupt
+# a run in the background of a shell script ignores Ctrl-C, and so would the programs that the tests
+# interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 ROOT = Path(__file__).resolve().parents[1]
@@ -24,7 +26,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pytest.fixture(scope="session")
 def once(tmp_path_factory):
-    """A function from (name, make) to what `make()` returns: the first worker that asks makes it, the others read its file."""
+    """A function from (name, make) to what `make()` returns: the first worker that asks makes it,
+    the others read its file."""
     own = tmp_path_factory.getbasetemp()
     folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "once"
     folder.mkdir(exist_ok=True)
@@ -71,7 +74,8 @@ def three_link(solved):
 
 @pytest.fixture(scope="session")
 def unsolved():
-    """A function from a problem to a solution whose one level is the guess, in balance but not optimal."""
+    """A function from a problem to a solution whose one level is the guess, in balance but not
+    optimal."""
     return guess_in_balance
 
 
@@ -86,11 +90,24 @@ def guess_in_balance(problem):
     transcription = transcribe(control_problem(problem))
     x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)
     gait, mesh = transcription.member(x[transcription.layout.parameters[:, 0]]), transcription.mesh
-    fine = replay(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), problem.delta, instants=200)
+    fine = replay(
+        problem.body,
+        problem.friction,
+        lambda t: (gait.angles(t), gait.rates(t)),
+        problem.delta,
+        instants=200,
+    )
     measured = {"value": fine.efficiency, "distance": fine.distance, "work": fine.work}
-    conditions = {"kkt_error": 1.0, "violation": 1.0, "complementarity": 0.0, "optimal": False, "status": "guess"}
+    conditions = {
+        "kkt_error": 1.0,
+        "violation": 1.0,
+        "complementarity": 0.0,
+        "optimal": False,
+        "status": "guess",
+    }
     answer = Answer(
-        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, None, x, 0 * x, np.zeros(transcription.assembly.m),
+        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, None, x, 0 * x,
+        np.zeros(transcription.assembly.m),
         **measured, **conditions, iterations=0, seconds=0.0,
     )  # fmt: skip
     return Solution(problem, answer, message="only a guess.")

@@ -1,4 +1,5 @@
-"""The benchmarks measure what they say: other tools get the same physics, and references are right."""
+"""The benchmarks measure what they say: other tools get the same physics, and references are
+right."""
 
 import numpy as np
 import pytest
@@ -23,10 +24,22 @@ from scripts.models.ellipses import admissible
 def test_other_tools_are_given_the_same_physics(delta):
     rng = np.random.default_rng(1)
     for _ in range(5):
-        own, t, theta, z = rng.normal(size=3), rng.uniform(0, np.pi), rng.normal(), rng.normal(size=3)
+        own, t, theta, z = (
+            rng.normal(size=3),
+            rng.uniform(0, np.pi),
+            rng.normal(),
+            rng.normal(size=3),
+        )
         balance, rates = physics.balance_and_rates(np, t, theta, z, own, delta)
         gait, phase = ellipse(*own), np.array([t / (2 * np.pi)])
-        now = instant(Chain(), Friction(), gait.angles(phase), gait.rates(phase) / (2 * np.pi), z[:, None], delta)
+        now = instant(
+            Chain(),
+            Friction(),
+            gait.angles(phase),
+            gait.rates(phase) / (2 * np.pi),
+            z[:, None],
+            delta,
+        )
         np.testing.assert_allclose(balance, net_force(now.posture, now.force)[:, 0], atol=3e-6)
         assert rates[2] == pytest.approx(total_power(now.velocity, now.force).item(), rel=1e-5)
 
@@ -81,14 +94,19 @@ def test_rows_about_published_results_judge_by_the_printed_digits():
 def test_the_swimmer_written_apart_has_the_small_strokes_of_a_closed_form():
     assert drag.displacement_per_area() == pytest.approx(5 / 243, rel=1e-6)
     # the connection does not depend on the heading, nor on the unit of drag
-    R, turned = drag.resistance(0.0, np.array([0.4, -0.9])), drag.resistance(1.1, np.array([0.4, -0.9]))
+    R, turned = (
+        drag.resistance(0.0, np.array([0.4, -0.9])),
+        drag.resistance(1.1, np.array([0.4, -0.9])),
+    )
     np.testing.assert_allclose(np.linalg.eigvalsh(R), np.linalg.eigvalsh(turned), atol=1e-15)
 
 
 def test_the_numbers_of_the_zoo_keep_their_problems_and_all_families_are_stated():
     lengths = "0.1712, 0.1186, 0.2235, 0.1596, 0.3273"
     paths = "paths of curvature <= 2 per rad, symmetry none, within 3.14"
-    known = f"links of lengths {lengths} from the tail [body lengths], friction (5.95461, 1, 1) {paths}"
+    known = (
+        f"links of lengths {lengths} from the tail [body lengths], friction (5.95461, 1, 1) {paths}"
+    )
     assert described(zoo_problem(99)) == known
     kinds = {type(law_problem(k).friction).__name__ for k in range(10)}
     assert kinds == {"Elliptic", "Viscous", "PowerLaw", "OwnLaw", "Friction"}
@@ -111,8 +129,12 @@ def test_the_robot_of_the_engines_has_the_inertia_of_the_chain():
         mass, (x, y), about = matrix[0, 0], (matrix[1, 2], -matrix[0, 2]), matrix[2, 2]
         posture = task.body.posture(angles[:, None])
         assert mass == pytest.approx(1.0, abs=1e-6)
-        assert (x, y) == pytest.approx(tuple(at.item() for at in task.body.centre_of_mass(posture)), abs=1e-6)
-        assert about - x**2 - y**2 == pytest.approx(moment_of_inertia(task.body, posture).item(), rel=1e-4)
+        assert (x, y) == pytest.approx(
+            tuple(at.item() for at in task.body.centre_of_mass(posture)), abs=1e-6
+        )
+        assert about - x**2 - y**2 == pytest.approx(
+            moment_of_inertia(task.body, posture).item(), rel=1e-4
+        )
 
 
 def test_an_engine_with_contacts_that_do_not_lift_goes_as_far_as_the_certificate_says():
@@ -129,11 +151,17 @@ def test_a_table_of_starts_says_what_they_found(tmp_path):
     law = (10.0, 1.0, 1.0)
     advance(law, "antipodal", 1, 1, tmp_path, PUBLISHED)
     write_tables((law,), ["antipodal"], 1, tmp_path, tmp_path, "a command", PUBLISHED)
-    for delta, line in zip((DELTA, SMALL_DELTA), _table_rows(tmp_path / "robustness.md"), strict=True):
+    for delta, line in zip(
+        (DELTA, SMALL_DELTA), _table_rows(tmp_path / "robustness.md"), strict=True
+    ):
         assert line[:4] == ["(10, 1, 1)", "antipodal", "1", "100%"], delta
         assert float(line[5]) == pytest.approx(0.11271, abs=1e-5)
 
 
 def _table_rows(path):
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in path.read_text().splitlines() if "|" in line]
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in path.read_text().splitlines()
+        if "|" in line
+    ]
     return [row for row in rows if row[0].startswith("(") and row[1] == "antipodal"]

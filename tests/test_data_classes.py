@@ -1,4 +1,5 @@
-"""What kind of thing each of the library's data classes is: a value, which others may be equal to, or one of its own."""
+"""What kind of thing each of the library's data classes is: a value, which others may be equal to,
+or one of its own."""
 
 import dataclasses
 import importlib
@@ -10,14 +11,20 @@ import colloc
 # fmt: off
 VALUES = {
     "BSpline", "Basis",
-    "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FeetLaw", "Foot",
-    "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Period", "Polygon",
-    "Coupled", "Known", "Paced", "PacedOnSlope", "PathLimit", "PathLimits", "PotentialSpace", "Quantity", "Regime", "Slope",
-    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Replay", "Saved", "TensorSpline",
-    "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step", "Gap",
+    "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic",
+    "FeetLaw", "Foot",
+    "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective",
+    "OwnLaw", "Period", "Polygon",
+    "Coupled", "Known", "Paced", "PacedOnSlope", "PathLimit", "PathLimits", "PotentialSpace",
+    "Quantity", "Regime", "Slope",
+    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Replay", "Saved",
+    "TensorSpline",
+    "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder",
+    "Step", "Gap",
 }
 MUTABLE = {
-    "Archive", "Candidate", "CellState", "Group", "PathGeometry", "Run", "Solution", "State", "_Heard",
+    "Archive", "Candidate", "CellState", "Group", "PathGeometry", "Run", "Solution", "State",
+    "_Heard",
     "_Meshes", "_State",
 }
 # fmt: on
@@ -25,11 +32,17 @@ MUTABLE = {
 
 def data_classes():
     modules = (
-        m.name for m in pkgutil.walk_packages(colloc.__path__, "colloc.") if not m.name.endswith(("__main__", "._kernel"))
+        m.name
+        for m in pkgutil.walk_packages(colloc.__path__, "colloc.")
+        if not m.name.endswith(("__main__", "._kernel"))
     )
     for name in modules:
         for thing in vars(importlib.import_module(name)).values():
-            if inspect.isclass(thing) and thing.__module__ == name and "__dataclass_params__" in vars(thing):
+            if (
+                inspect.isclass(thing)
+                and thing.__module__ == name
+                and "__dataclass_params__" in vars(thing)
+            ):
                 yield thing
 
 
@@ -37,7 +50,12 @@ def test_values_compare_and_hash_by_their_fields_and_nothing_else_does():
     """Arrays have no truth value, so what holds them is no value."""
     by_fields = {c for c in data_classes() if c.__dataclass_params__.eq and c.__name__ != "_Heard"}
     assert {c.__name__ for c in by_fields} == VALUES
-    held = {c.__name__: [f.name for f in dataclasses.fields(c) if f.compare and "ndarray" in str(f.type)] for c in by_fields}
+    held = {
+        c.__name__: [
+            f.name for f in dataclasses.fields(c) if f.compare and "ndarray" in str(f.type)
+        ]
+        for c in by_fields
+    }
     assert not {name: fields for name, fields in held.items() if fields}
     assert all(c.__hash__ is not None for c in by_fields)
 

@@ -19,7 +19,9 @@ ROOT = Path(__file__).resolve().parents[1]
 def shown(markdown, page="tutorial.md"):
     """A page after both of its hooks."""
     stated = SimpleNamespace(file=SimpleNamespace(src_uri=page), meta={})
-    return docs_site.on_page_content(docs_site.on_page_markdown(markdown, stated, None, None), stated, None, None)
+    return docs_site.on_page_content(
+        docs_site.on_page_markdown(markdown, stated, None, None), stated, None, None
+    )
 
 
 @pytest.mark.parametrize(
@@ -32,7 +34,11 @@ def shown(markdown, page="tutorial.md"):
         ("[a](../limits.md#files)", "howto/check.md", "[a](../limits.md#files)"),
         ("![a](../../results/curated/x.png)", "howto/report.md", "![a](../curated/x.png)"),
         ("[a](../results/curated/gallery.json)", "known.md", "a (`results/curated/gallery.json`)"),
-        ("[`kernel.c`](../colloc/mechanics/native/kernel.c)", "known.md", "`colloc/mechanics/native/kernel.c`"),
+        (
+            "[`kernel.c`](../colloc/mechanics/native/kernel.c)",
+            "known.md",
+            "`colloc/mechanics/native/kernel.c`",
+        ),
         ("[a](https://example.org/x)", "known.md", "[a](https://example.org/x)"),
         ("[a](#files)", "limits.md", "[a](#files)"),
         ("[a](../../docs/bound.md)", "curated/frontier.md", "[a](../bound.md)"),
@@ -50,37 +56,55 @@ def test_what_stands_for_files_are_pages_that_are_made():
 
 def test_a_long_formula_scrolls_in_its_own_line_and_one_in_a_text_stays_there():
     alone, inside = shown("```math\nx_1 + y_1\n```"), shown("so $`x_1`$ is")
-    assert re.search(r'<span style="display: block; overflow-x: auto"><math [^>]*display="block".*</math></span>', alone)
+    assert re.search(
+        r'<span style="display: block; overflow-x: auto"><math '
+        r'[^>]*display="block".*</math></span>',
+        alone,
+    )
     assert "overflow" not in inside
     assert inside.startswith("so <math")
 
 
 @pytest.fixture
 def program():
-    return browser() or pytest.skip("no browser is installed here: chromium, chromium-browser or google-chrome")
+    return browser() or pytest.skip(
+        "no browser is installed here: chromium, chromium-browser or google-chrome"
+    )
 
 
 @pytest.mark.slow
 def test_in_a_browser_no_page_is_too_wide_dark_is_dark_and_the_search_finds(program, tmp_path):
-    subprocess.run([sys.executable, "-m", "mkdocs", "build", "-q", "-d", tmp_path], cwd=ROOT, check=True)
-    assert [line for dark in (False, True) for line in complaints(program, tmp_path, dark=dark)] == []
+    subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "-q", "-d", tmp_path], cwd=ROOT, check=True
+    )
+    assert [
+        line for dark in (False, True) for line in complaints(program, tmp_path, dark=dark)
+    ] == []
 
 
 @pytest.mark.slow
-def test_a_checker_of_accessibility_finds_nothing_serious_in_a_report(program, three_link, tmp_path):
+def test_a_checker_of_accessibility_finds_nothing_serious_in_a_report(
+    program, three_link, tmp_path
+):
     axe = ROOT / "build/package/axe.min.js"
     if not axe.exists():
         pytest.skip("there is no build/package/axe.min.js: npm pack axe-core, as .ci/run does")
     three_link.report(tmp_path / "report.html")
     text = axe.read_text(encoding="utf-8")
-    assert [line for dark in (False, True) for line in complaints(program, tmp_path, text, dark=dark)] == []
+    assert [
+        line for dark in (False, True) for line in complaints(program, tmp_path, text, dark=dark)
+    ] == []
 
 
 @pytest.mark.slow
 def test_the_browser_sees_what_is_wrong_with_a_page(program, tmp_path):
-    (tmp_path / "wide.html").write_text('<body style="background: #fff"><p style="width: 500px">wide</p>', encoding="utf-8")
+    (tmp_path / "wide.html").write_text(
+        '<body style="background: #fff"><p style="width: 500px">wide</p>', encoding="utf-8"
+    )
     (tmp_path / "search").mkdir()
-    (tmp_path / "index.html").write_text('<input data-md-component="search-query">', encoding="utf-8")
+    (tmp_path / "index.html").write_text(
+        '<input data-md-component="search-query">', encoding="utf-8"
+    )
     said = complaints(program, tmp_path, dark=True)
     assert any(re.fullmatch(r"wide.html at 360: 1\d\d pixels too wide", line) for line in said)
     assert "wide.html at 360: light on a dark system" in said

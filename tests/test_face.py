@@ -1,4 +1,5 @@
-"""What a person who imports colloc holds: light, complete, documented by examples that run, and clear about mistakes."""
+"""What a person who imports colloc holds: light, complete, documented by examples that run, and
+clear about mistakes."""
 
 import doctest
 import importlib
@@ -19,8 +20,16 @@ HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy", "
 
 
 def test_importing_colloc_loads_nothing_heavy_and_shows_every_public_name():
-    code = f"import sys, colloc; print([m for m in {HEAVY!r} if m in sys.modules], set(colloc.__all__) <= set(dir(colloc)))"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[] True\n"
+    code = (
+        f"import sys, colloc; print([m for m in {HEAVY!r} if m in sys.modules], "
+        f"set(colloc.__all__) <= set(dir(colloc)))"
+    )
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout
+        == "[] True\n"
+    )
 
 
 def test_every_public_name_has_one_home():
@@ -32,7 +41,9 @@ def test_completion_offers_the_public_names_and_nothing_else():
     offered = {name for name in dir(colloc) if not name.startswith("__")}
     assert offered == set(colloc.__all__)
     assert "__version__" in dir(colloc)
-    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "version"
+    ]
     assert colloc.__version__ == stated
 
 
@@ -52,7 +63,9 @@ WITH_EXAMPLES = [
 @pytest.mark.parametrize("module", WITH_EXAMPLES)
 def test_the_examples_of_the_docstrings_run(module, monkeypatch):
     monkeypatch.chdir(ROOT)
-    ended = doctest.testmod(importlib.import_module(module))
+    ended = doctest.testmod(
+        importlib.import_module(module), optionflags=doctest.NORMALIZE_WHITESPACE
+    )
     assert ended.attempted > 0
     assert ended.failed == 0
 
@@ -79,9 +92,18 @@ def test_the_module_behind_python_m_is_also_the_function():
         (lambda: colloc.Harmonic(harmonic=2), "did you mean harmonics"),
         (lambda: colloc.Problem("x").with_(intervalls=3), "did you mean intervals"),
         (lambda: colloc.FreePath(colour=1), "it takes curvature, symmetry, winding"),
-        (lambda: colloc.solve(5), "problem must be a Problem or the path of a problem file, not int"),
-        (lambda: colloc.solve(colloc.Problem("x"), starts=0), "starts must be a whole number of at least 1"),
-        (lambda: colloc.solve(colloc.Problem("x"), seconds=np.nan), "seconds must be positive, not nan"),
+        (
+            lambda: colloc.solve(5),
+            "problem must be a Problem or the path of a problem file, not int",
+        ),
+        (
+            lambda: colloc.solve(colloc.Problem("x"), starts=0),
+            "starts must be a whole number of at least 1",
+        ),
+        (
+            lambda: colloc.solve(colloc.Problem("x"), seconds=np.nan),
+            "seconds must be positive, not nan",
+        ),
     ],
 )
 def test_a_wrong_argument_is_named_with_what_is_right(made, said):
@@ -90,9 +112,19 @@ def test_a_wrong_argument_is_named_with_what_is_right(made, said):
 
 
 def test_what_is_printed_of_a_result_is_short(three_link):
-    shown = (three_link, three_link.problem, three_link.certificate, three_link.answer, three_link.gait, three_link.sample(0.0))
+    shown = (
+        three_link,
+        three_link.problem,
+        three_link.certificate,
+        three_link.answer,
+        three_link.gait,
+        three_link.sample(0.0),
+    )
     problem = three_link.problem
-    for thing in (*shown, colloc.replay(problem.body, problem.friction, three_link.gait, 1e-2, instants=200)):
+    for thing in (
+        *shown,
+        colloc.replay(problem.body, problem.friction, three_link.gait, 1e-2, instants=200),
+    ):
         assert "\n" not in repr(thing)
         assert len(repr(thing)) < 160
     assert str(three_link.gait).count("\n") == 1
@@ -101,24 +133,41 @@ def test_what_is_printed_of_a_result_is_short(three_link):
 def test_a_gait_stands_where_a_path_is_asked_for(three_link):
     problem, certificate = three_link.problem, three_link.certificate
     measured = colloc.replay(problem.body, problem.friction, three_link.gait, problem.delta)
-    assert abs(measured.efficiency - certificate.efficiency) <= certificate.efficiency_error + measured.error
+    assert (
+        abs(measured.efficiency - certificate.efficiency)
+        <= certificate.efficiency_error + measured.error
+    )
 
 
 def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_path):
     assert len(three_link.plot().axes) == 5
     assert three_link.plot()._repr_png_().startswith(b"\x89PNG")  # by which a notebook shows it
-    assert three_link.report(tmp_path / "x.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert (
+        three_link.report(tmp_path / "x.html")
+        .read_text(encoding="utf-8")
+        .startswith("<!DOCTYPE html>")
+    )
     axes = Figure().add_subplot()
     assert three_link.plot(ax=axes) is axes
     assert axes.collections  # the path
     for panel in ("power", "mesh", "shape-1-2"):
         axes = Figure().add_subplot()
         assert three_link.plot(axes, panel) is axes
-    with pytest.raises(colloc.ProblemError, match="there is no panel 'pwoer'; there are gait, filmstrip, lab, angles"):
+    with pytest.raises(
+        colloc.ProblemError,
+        match="there is no panel 'pwoer'; there are gait, filmstrip, lab, angles",
+    ):
         three_link.plot(axes, "pwoer")
-    with pytest.raises(colloc.ProblemError, match=r"ax must be a matplotlib Axes .* not 'x.png'; .*savefig"):
+    with pytest.raises(
+        colloc.ProblemError, match=r"ax must be a matplotlib Axes .* not 'x.png'; .*savefig"
+    ):
         three_link.plot("x.png")
-    assert three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200).stat().st_size > 1000
+    assert (
+        three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200)
+        .stat()
+        .st_size
+        > 1000
+    )
     with pytest.raises(colloc.ProblemError, match=r"should end in \.gif or \.mp4"):
         three_link.animate(tmp_path / "x.avi")
     t = np.array([0.0, 0.3])
@@ -133,7 +182,9 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
 
 def test_labelled_angles_come_back_as_the_gait_they_are_of(three_link):
     angles = three_link.to_xarray().joint_angles
-    back = fitted_gait(angles.transpose(), 2, period=1.0).gait  # whatever the order of their dimensions
+    back = fitted_gait(
+        angles.transpose(), 2, period=1.0
+    ).gait  # whatever the order of their dimensions
     t = np.linspace(0.0, 1.0, 50)
     np.testing.assert_allclose(back.angles(t), three_link.gait.angles(t), atol=1e-9)
 
@@ -146,8 +197,22 @@ def test_a_gait_is_exported_from_python_as_by_the_command(three_link, tmp_path, 
         stated = three_link.export(tmp_path / name, **settings)
         assert stated["period_s"] * stated["rate_hz"] == stated["samples_per_period"]
         by_hand = (tmp_path / name).read_text(encoding="utf-8")
-        words = [f"--{key.replace('_', '-')} {' '.join(map(str, np.ravel(value)))}" for key, value in settings.items()]
-        assert main(["export", str(tmp_path / "x.h5"), "--output", str(tmp_path / name), *" ".join(words).split()]) == 0
+        words = [
+            f"--{key.replace('_', '-')} {' '.join(map(str, np.ravel(value)))}"
+            for key, value in settings.items()
+        ]
+        assert (
+            main(
+                [
+                    "export",
+                    str(tmp_path / "x.h5"),
+                    "--output",
+                    str(tmp_path / name),
+                    *" ".join(words).split(),
+                ]
+            )
+            == 0
+        )
         assert (tmp_path / name).read_text(encoding="utf-8") == by_hand
     (tmp_path / "x.csv").unlink()
     for name, settings, words in (
@@ -163,7 +228,9 @@ def test_a_gait_is_exported_from_python_as_by_the_command(three_link, tmp_path, 
 
 def test_a_missing_library_is_named(three_link, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(colloc.CollocError, match=r"this needs pandas, which is not installed: pip install pandas"):
+    with pytest.raises(
+        colloc.CollocError, match=r"this needs pandas, which is not installed: pip install pandas"
+    ):
         three_link.to_dataframe()
 
 
@@ -184,7 +251,10 @@ def test_as_many_starts_are_tried_as_are_asked_for_else_as_the_file_states(tmp_p
             for output in (None, to):
                 with pytest.raises(colloc.ProblemError, match="enough"):
                     colloc.solve(path, *given, output=output)
-            assert main(["solve", str(path), "--output", str(to), *(f"--starts={n}" for n in given)]) == 2
+            assert (
+                main(["solve", str(path), "--output", str(to), *(f"--starts={n}" for n in given)])
+                == 2
+            )
     assert asked == [None] * 3 + [5] * 3 + [3] * 3 + [5] * 3
 
 
@@ -203,7 +273,12 @@ def test_progress_is_told_and_printed_only_if_asked(capsys):
 
 
 def test_a_search_over_many_starts_tells_of_every_one_in_units_of_the_friction_stated(capsys):
-    problem = colloc.Problem("quick", friction=colloc.Friction(10, 10, 10), gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    problem = colloc.Problem(
+        "quick",
+        friction=colloc.Friction(10, 10, 10),
+        gait=colloc.Harmonic(1, "bilateral"),
+        delta=1e-2,
+    )
     told = []
     solution = colloc.solve(problem, starts=4, progress=told.append, verbose=True)
     tried = [news for news in told if news.stage == "explore" and news.count == 4]

@@ -1,4 +1,5 @@
-"""Data flows one way: imports point down the packages and never in a circle; heavy libraries are named in few places."""
+"""Data flows one way: imports point down the packages and never in a circle; heavy libraries are
+named in few places."""
 
 import ast
 import importlib
@@ -13,7 +14,8 @@ from benchmarks.numbers import numbers
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
 PACKAGES = tuple(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
-"""The packages of the library as the page lists them, lower ones first: a module imports its own package and lower ones."""
+"""The packages of the library as the page lists them, lower ones first: a module imports its own
+package and lower ones."""
 BESIDE = {"__init__", "__main__", "solve"}
 """What lies beside the packages: the face, ``python -m colloc`` and ``python -m colloc.solve``."""
 STAGES = ("explore", "descend", "refine", "confirm", "certify", "choose")
@@ -33,7 +35,11 @@ def packages():
 
 def modules():
     """Dotted name below colloc to path, of all modules in packages."""
-    return {f"{path.parent.name}.{path.stem}": path for path in (ROOT / "colloc").glob("*/*.py") if path.stem != "__init__"}
+    return {
+        f"{path.parent.name}.{path.stem}": path
+        for path in (ROOT / "colloc").glob("*/*.py")
+        if path.stem != "__init__"
+    }
 
 
 def imported(path):
@@ -75,7 +81,12 @@ def test_the_library_imports_nothing_that_lies_outside_it():
 def test_no_circles_between_modules():
     known = modules()
     graph = {
-        name: {".".join(other.split(".")[1:3]) for other in imported(path) if other.startswith("colloc.")} & set(known) - {name}
+        name: {
+            ".".join(other.split(".")[1:3])
+            for other in imported(path)
+            if other.startswith("colloc.")
+        }
+        & set(known) - {name}
         for name, path in known.items()
     }
     while graph:
@@ -92,15 +103,22 @@ def test_heavy_libraries_are_named_in_few_packages():
 
 
 def test_only_one_module_names_ipopt():
-    assert [name for name, path in modules().items() if '"ipopt"' in path.read_text(encoding="utf-8")] == ["search.ipopt"]
+    assert [
+        name for name, path in modules().items() if '"ipopt"' in path.read_text(encoding="utf-8")
+    ] == ["search.ipopt"]
 
 
 def called_from(module, run):
-    """Modules of the library that a module calls while something runs, in the order of their first call."""
+    """Modules of the library that a module calls while something runs, in the order of their first
+    call."""
     found = []
 
     def watch(frame, event, _):
-        if event == "call" and frame.f_back is not None and frame.f_back.f_globals.get("__name__") == module:
+        if (
+            event == "call"
+            and frame.f_back is not None
+            and frame.f_back.f_globals.get("__name__") == module
+        ):
             name = frame.f_globals.get("__name__", "")
             if name.startswith("colloc.") and name != module and name not in found:
                 found.append(name)
@@ -122,7 +140,10 @@ def test_a_problem_passes_few_modules_on_its_way_to_a_solution_in_the_order_of_t
     way = called_from("colloc.search.solve", lambda: solve(problem, 2))
     stages = [name.rpartition(".")[2] for name in way if name.rpartition(".")[2] in STAGES]
     assert stages == list(STAGES)
-    assert len([name for name in way if name.startswith(("colloc.search", "colloc.results"))]) <= MOST_ON_THE_WAY, way
+    assert (
+        len([name for name in way if name.startswith(("colloc.search", "colloc.results"))])
+        <= MOST_ON_THE_WAY
+    ), way
 
 
 def test_no_stage_knows_what_comes_after_it_or_who_calls_it():
@@ -132,12 +153,17 @@ def test_no_stage_knows_what_comes_after_it_or_who_calls_it():
         later[stage] -= {"certify"}  # whose thresholds they keep
     known = modules()
     for stage, others in later.items():
-        names = {other for other in imported(known[f"search.{stage}"]) if other.startswith("colloc.search.")}
+        names = {
+            other
+            for other in imported(known[f"search.{stage}"])
+            if other.startswith("colloc.search.")
+        }
         assert not {name.split(".")[2] for name in names} & others, stage
 
 
 def test_no_public_name_is_shadowed_by_a_package():
-    """Importing colloc.x sets the attribute x of colloc, so a function of that name would vanish once it is used.
+    """Importing colloc.x sets the attribute x of colloc, so a function of that name would vanish
+    once it is used.
 
     ``colloc.solve`` is both: its module can be called (tests/test_face.py).
     """
@@ -147,13 +173,18 @@ def test_no_public_name_is_shadowed_by_a_package():
 
 
 def test_what_is_bound_late_exists():
-    """The face names functions of higher packages for lower ones; these are the only imports that do not point down."""
+    """The face names functions of higher packages for lower ones; these are the only imports that
+    do not point down."""
     import colloc  # binds
     from colloc.system import late_binding
 
     assert colloc
     assert all(callable(late_binding.bound(name)) for name in late_binding._WHERE)
-    users = {name for name, path in modules().items() if "late_binding import bound" in path.read_text(encoding="utf-8")}
+    users = {
+        name
+        for name, path in modules().items()
+        if "late_binding import bound" in path.read_text(encoding="utf-8")
+    }
     assert users == {"results.solution", "results.robot", "studies.pareto", "studies.steering"}
 
 
@@ -164,11 +195,14 @@ def test_the_page_names_what_exists_and_fits_a_screen():
 
 
 def test_the_engine_takes_no_problem_apart():
-    """`colloc.gaits.control_problem` does that once; motions, programs and errors of meshes are made from its parts."""
+    """`colloc.gaits.control_problem` does that once; motions, programs and errors of meshes are
+    made from its parts."""
     for name, path in modules().items():
         if name.partition(".")[0] in ("motion", "verification", "collocation", "reduced"):
             assert "colloc.gaits.problem" not in set(imported(path)), name
-            assert not re.search(r"\.problem\b", path.read_text(encoding="utf-8").replace("colloc.gaits.problem", "")), name
+            assert not re.search(
+                r"\.problem\b", path.read_text(encoding="utf-8").replace("colloc.gaits.problem", "")
+            ), name
 
 
 MOST_MEMBERS, WIDER = 15, {"Body": 46, "Law": 16}
@@ -189,13 +223,18 @@ def test_a_protocol_has_few_members():
         node.name: node
         for path in modules().values()
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ClassDef) and any(getattr(base, "id", "") == "Protocol" for base in node.bases)
+        if isinstance(node, ast.ClassDef)
+        and any(getattr(base, "id", "") == "Protocol" for base in node.bases)
     }
     counted = {name: len(members(name, classes)) for name in classes}
-    assert {name: n for name, n in counted.items() if n > MOST_MEMBERS and n > WIDER.get(name, 0)} == {}
+    assert {
+        name: n for name, n in counted.items() if n > MOST_MEMBERS and n > WIDER.get(name, 0)
+    } == {}
 
 
-COLLOCATED = re.compile(r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|collocation|reduced|search)\b")
+COLLOCATED = re.compile(
+    r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|collocation|reduced|search)\b"
+)
 ADAPTIVE = (
     "played",
     "replay",
@@ -218,13 +257,24 @@ def test_what_checks_a_motion_shares_no_mesh_and_no_program_with_what_found_it()
         name = wanted.pop()
         seen.add(name)
         others = set(imported(known[name]))
-        assert not any(map(COLLOCATED.match, others)), f"{name} imports {sorted(filter(COLLOCATED.match, others))}"
+        assert not any(map(COLLOCATED.match, others)), (
+            f"{name} imports {sorted(filter(COLLOCATED.match, others))}"
+        )
         wanted |= {other.removeprefix("colloc.") for other in others} & known.keys() - seen
 
 
-NUMBERS = {"explore": 8, "descend": 3, "refine": 5, "confirm": 3, "certify": 10, "solve": 2, "converge": 4, "effort": 2}
-"""At most so many numbers that somebody has set, in the stages of a search: `python -m benchmarks.numbers` says what each
-trades. They may become fewer."""
+NUMBERS = {
+    "explore": 8,
+    "descend": 3,
+    "refine": 5,
+    "confirm": 3,
+    "certify": 10,
+    "solve": 2,
+    "converge": 4,
+    "effort": 2,
+}
+"""At most so many numbers that somebody has set, in the stages of a search: `python -m
+benchmarks.numbers` says what each trades. They may become fewer."""
 
 
 @pytest.mark.parametrize("stage", NUMBERS)

@@ -1,4 +1,5 @@
-"""The notebook of the documentation: it was run from top to bottom, its page shows all of it, and a new run says the same."""
+"""The notebook of the documentation: it was run from top to bottom, its page shows all of it, and a
+new run says the same."""
 
 import ast
 import json
@@ -16,17 +17,29 @@ CODE = [cell for cell in CELLS if cell["cell_type"] == "code"]
 def said(cell):
     """The words of a cell's outputs."""
     outputs = cell["outputs"]
-    return "".join("".join(o.get("text", "")) + "".join(o.get("data", {}).get("text/plain", "")) + "\n" for o in outputs)
+    return "".join(
+        "".join(o.get("text", "")) + "".join(o.get("data", {}).get("text/plain", "")) + "\n"
+        for o in outputs
+    )
 
 
 def numbers(text):
-    """Without signs: a gait and its mirror image are worth the same, and the last bit of a sine says which is found."""
-    return [float(value) for value in re.findall(r"(?<![\w.])\d+\.\d+(?!e)(?:\b)", text.replace("-", " "))]
+    """Without signs: a gait and its mirror image are worth the same, and the last bit of a sine
+    says which is found."""
+    return [
+        float(value)
+        for value in re.findall(r"(?<![\w.])\d+\.\d+(?!e)(?:\b)", text.replace("-", " "))
+    ]
 
 
 def test_it_was_run_once_from_top_to_bottom_without_an_error():
     assert [cell["execution_count"] for cell in CODE] == list(range(1, len(CODE) + 1))
-    assert not [o for cell in CODE for o in cell["outputs"] if o["output_type"] == "error" or o.get("name") == "stderr"]
+    assert not [
+        o
+        for cell in CODE
+        for o in cell["outputs"]
+        if o["output_type"] == "error" or o.get("name") == "stderr"
+    ]
     kinds = {kind for cell in CODE for o in cell["outputs"] for kind in o.get("data", {})}
     assert {"image/png", "image/gif", "text/html"} <= kinds
 
@@ -34,14 +47,20 @@ def test_it_was_run_once_from_top_to_bottom_without_an_error():
 def test_the_first_cell_installs_and_the_others_are_python_that_imports_what_exists():
     first, *others = ("".join(cell["source"]) for cell in CODE)
     assert "%pip install -q {SOURCE}" in first
-    names = [node.attr for source in others for node in ast.walk(ast.parse(source)) if is_of_colloc(node)]
+    names = [
+        node.attr for source in others for node in ast.walk(ast.parse(source)) if is_of_colloc(node)
+    ]
     import colloc
 
     assert {"Problem", "solve", "replay", "save"} <= set(names) <= set(dir(colloc))
 
 
 def is_of_colloc(node):
-    return isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "colloc"
+    return (
+        isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == "colloc"
+    )
 
 
 def test_it_is_the_problem_of_the_tutorial():
@@ -55,7 +74,9 @@ def test_it_is_the_problem_of_the_tutorial():
     ):
         assert line in stated
         assert line in tutorial
-    efficiency, distance = re.findall(r"efficiency is about (0\.\d+) with d = (0\.\d+)", tutorial)[0]
+    efficiency, distance = re.findall(r"efficiency is about (0\.\d+) with d = (0\.\d+)", tutorial)[
+        0
+    ]
     words = "".join(map(said, CODE))
     assert f"d/W = {efficiency}" in words
     assert f"distance {distance}" in words

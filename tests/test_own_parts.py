@@ -1,4 +1,5 @@
-"""A body and a class of gaits that the library does not know, as the documentation writes them: one file each."""
+"""A body and a class of gaits that the library does not know, as the documentation writes them: one
+file each."""
 
 import pickle
 import re
@@ -32,7 +33,11 @@ def run(page, monkeypatch):
         monkeypatch.setattr(gait_fields, kinds, list(getattr(gait_fields, kinds)))
     module = types.ModuleType("own_parts")
     monkeypatch.setitem(sys.modules, "own_parts", module)
-    for block in re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+    for block in re.findall(
+        r"^```python\n(.*?)^```",
+        (DOCS / page).read_text(encoding="utf-8"),
+        re.MULTILINE | re.DOTALL,
+    ):
         exec(compile(block, page, "exec"), module.__dict__)
     return module
 
@@ -46,7 +51,9 @@ def test_a_body_of_your_own_is_solved_certified_kept_and_read(monkeypatch, tmp_p
     assert (read.problem.body, read.problem.hash) == (body, found.problem.hash)
     # the joints follow the belts, and move as those of the chain do
     joints = body.joint_angles(found.sample([0.3]).angles)
-    np.testing.assert_allclose(body.outline(found.sample([0.3]).angles), Chain((0.2,) * 5).outline(joints), atol=1e-14)
+    np.testing.assert_allclose(
+        body.outline(found.sample([0.3]).angles), Chain((0.2,) * 5).outline(joints), atol=1e-14
+    )
 
 
 @pytest.mark.parametrize("part", [Moved, Shaped, Body, Law])
@@ -59,11 +66,16 @@ def test_a_body_that_says_its_outline_alone_looks_like_one_that_says_everything(
     body, rng = Chain((0.2, 0.5, 0.3)), np.random.default_rng(3)
     angles, rates, z = rng.normal(size=(2, 6)), rng.normal(size=(2, 6)), rng.normal(size=(3, 6))
     np.testing.assert_allclose(Body.centre(body, angles), body.centre(angles), atol=1e-14)
-    np.testing.assert_allclose(Body.speeds(body, angles, rates, z)[1], body.speeds(angles, rates, z)[1], atol=1e-8)
+    np.testing.assert_allclose(
+        Body.speeds(body, angles, rates, z)[1], body.speeds(angles, rates, z)[1], atol=1e-8
+    )
     places, force = Body.rubbing(body, Friction(), angles, rates, 1e-9, z, 3)
     x, y = body.outline(angles)
-    np.testing.assert_allclose(places, np.stack([0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])]), atol=1e-14)
-    np.testing.assert_allclose(np.linalg.norm(force, axis=0), 1.0, atol=1e-12)  # dry, and alike in all directions
+    np.testing.assert_allclose(
+        places, np.stack([0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])]), atol=1e-14
+    )
+    # dry, and alike in all directions
+    np.testing.assert_allclose(np.linalg.norm(force, axis=0), 1.0, atol=1e-12)
     one, _ = Body.rubbing(body, Friction(), angles[:, :1], rates[:, :1], 1e-9, z[:, :1], 1)
     np.testing.assert_array_equal(one, places[:, :1, :1])
 
@@ -72,7 +84,9 @@ def test_a_body_that_says_its_outline_alone_looks_like_one_that_says_everything(
 def test_four_motors_do_better_than_two(monkeypatch):
     own = run("own_body.md", monkeypatch)
     gait = own.found.gait
-    guess = Fourier(*(np.array(own.problem.body.gears) @ part for part in (gait.mean, gait.cos, gait.sin)))
+    guess = Fourier(
+        *(np.array(own.problem.body.gears) @ part for part in (gait.mean, gait.cos, gait.sin))
+    )
     free = solve(own.problem.with_(body=Chain((0.2,) * 5), guess=guess), 1)
     assert free.status == "solved"
     assert free.efficiency > own.found.efficiency
@@ -80,7 +94,8 @@ def test_four_motors_do_better_than_two(monkeypatch):
 
 @dataclass(frozen=True)
 class Tents(ClassOfGaits):
-    """Angles that are linear between values at equally spaced phases: linear in their parameters, and no Fourier series."""
+    """Angles that are linear between values at equally spaced phases: linear in their parameters,
+    and no Fourier series."""
 
     values: int = 8
     symmetry: str = "none"
@@ -101,7 +116,9 @@ class Tents(ClassOfGaits):
 @pytest.mark.parametrize("starts", [1, 2])
 def test_a_class_without_a_search_is_refused_in_words(monkeypatch, starts):
     monkeypatch.setattr(gait_fields, "CLASSES", [*gait_fields.CLASSES, Tents])
-    with pytest.raises(ProblemError, match="no search is known for the class Tents: derive it from LinearClass"):
+    with pytest.raises(
+        ProblemError, match="no search is known for the class Tents: derive it from LinearClass"
+    ):
         solve(Problem("tents", gait=Tents(), delta=1e-2), starts=starts)
 
 
@@ -127,16 +144,23 @@ def test_a_class_that_is_no_fourier_series_is_one_file_too(monkeypatch, tmp_path
 @pytest.mark.slow
 def test_a_class_of_your_own_can_be_put_on_a_slope_and_taken_off_it(monkeypatch, capsys):
     own = run("own_gait_class.md", monkeypatch)
-    level, uphill = own.problem, own.problem.with_(grade=0.02, friction=Friction(mu_t=10, mu_f=1, mu_b=1.5), delta=1e-2)
+    level, uphill = (
+        own.problem,
+        own.problem.with_(grade=0.02, friction=Friction(mu_t=10, mu_f=1, mu_b=1.5), delta=1e-2),
+    )
     assert isinstance(uphill.gait, own.OwnHarmonics)
     assert uphill.gait.describe() == level.gait.describe()
     assert uphill.gait.size(2) == level.gait.size(2) + 1  # where it points
     assert uphill.with_(grade=0.0).gait == level.gait
     assert Problem.from_dict(uphill.to_dict()).hash == uphill.hash
-    assert pickle.loads(pickle.dumps(Problem("up", gait=Harmonic(1), grade=0.1).gait)).level == Harmonic(1)
+    assert pickle.loads(
+        pickle.dumps(Problem("up", gait=Harmonic(1), grade=0.1).gait)
+    ).level == Harmonic(1)
     found = solve(uphill, starts=1)
     assert found.status == "solved", found.message
-    np.testing.assert_array_equal([*found.gait.cos[[0, 1], [1, 0]], *found.gait.sin[[0, 1], [1, 0]]], 0.0)
+    np.testing.assert_array_equal(
+        [*found.gait.cos[[0, 1], [1, 0]], *found.gait.sin[[0, 1], [1, 0]]], 0.0
+    )
     assert found.distance > 0
 
 
@@ -151,13 +175,19 @@ def moments_at(solution, t):
 def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
     heat = Quantity("heat", "sum(moment**2)", "loss in the windings")
     cool = Objective("distance / (work + 5 * heat)", name="coolness", quantities=[heat])
-    problem = Problem("cool", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective=cool, delta=1e-3)
+    problem = Problem(
+        "cool", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective=cool, delta=1e-3
+    )
     found = solve(problem, starts=1)
     assert found.status == "solved", found.message
     values, t = found.certificate.values, (np.arange(8000) + 0.3) / 8000
     # the heat is a fiftieth of what the distance is divided by, and that is replayed to 1e-6
-    assert values["heat"] == pytest.approx((moments_at(found, t)[0] ** 2).sum(axis=0).mean(), rel=5e-5)
-    assert found.value == pytest.approx(values["distance"] / (values["work"] + 5 * values["heat"]), rel=1e-5)
+    assert values["heat"] == pytest.approx(
+        (moments_at(found, t)[0] ** 2).sum(axis=0).mean(), rel=5e-5
+    )
+    assert found.value == pytest.approx(
+        values["distance"] / (values["work"] + 5 * values["heat"]), rel=1e-5
+    )
     usual = solve(problem.with_(objective="efficiency"), starts=1)
     assert usual.efficiency > found.efficiency
     read = load(save(found, tmp_path / "cool.h5"))
@@ -168,11 +198,15 @@ def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "gait", [Harmonic(1, "bilateral"), pytest.param(FreePath(4.0, "bilateral"), marks=pytest.mark.slow)], ids=["series", "path"]
+    "gait",
+    [Harmonic(1, "bilateral"), pytest.param(FreePath(4.0, "bilateral"), marks=pytest.mark.slow)],
+    ids=["series", "path"],
 )
 def test_a_quantity_stated_anew_is_the_one_that_is_known(gait):
     mine = Objective("distance / mine", quantities=[Quantity("mine", DRIVEN_WORK.density)])
-    known = Problem("known", ellipse(0.0, 2.8, 1.3), gait=gait, objective="driven efficiency", delta=1e-3)
+    known = Problem(
+        "known", ellipse(0.0, 2.8, 1.3), gait=gait, objective="driven efficiency", delta=1e-3
+    )
     first, second = (solve(each, starts=1) for each in (known, known.with_(objective=mine)))
     assert second.status == first.status == "solved"
     assert second.value == first.value
@@ -184,7 +218,8 @@ def test_what_a_quantity_is_proportional_to_follows_from_its_formula():
     mixed = Quantity("mixed", "sum(moment**2 + rate**2)")
     assert [each.friction_degree for each in (heat, effort, mixed)] == [2.0, 1.0, None]
     assert [each.pace_degree for each in (heat, effort, mixed)] == [0.0, 1.0, None]
-    # what has a scale of its own is proportional to nothing, though beyond that scale it seems to be
+    # what has a scale of its own is proportional to nothing, though beyond that scale it seems to
+    # be
     soft, gears = (
         Quantity("soft", "sum(tanh((moment / 0.01)**2))"),
         Quantity("gears", "sum(abs(rate) * where(abs(rate) > 17, 9, 1))"),
@@ -193,19 +228,27 @@ def test_what_a_quantity_is_proportional_to_follows_from_its_formula():
     assert gears.pace_degree is None
     assert Objective("distance * work / heat", quantities=[heat]).degree == -1.0
     assert Objective("distance / mixed", quantities=[mixed]).degree is None
-    for name, density, why in [("heat", "moment**2", "no sum over the joints"), ("work", "sum(rate)", "a name of its own")]:
+    for name, density, why in [
+        ("heat", "moment**2", "no sum over the joints"),
+        ("work", "sum(rate)", "a name of its own"),
+    ]:
         with pytest.raises(ProblemError, match=why):
             Quantity(name, density)
     with pytest.raises(ProblemError, match="speaks of heat"):
         Objective("distance / heat")
 
 
-WEAK = Problem("weak", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), torque_limit=0.053, delta=1e-2)
+WEAK = Problem(
+    "weak", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), torque_limit=0.053, delta=1e-2
+)
 
 
 def test_a_limit_of_your_own_is_kept_certified_stored_and_read(tmp_path):
-    """On the sum of all squared torques, which is what heats a motor: it binds, and does not elsewhere."""
-    problem = WEAK.with_(torque_limit=None, limits=[PathLimit("heat", "sum(moment**2)", 0.005, both_ways=False)])
+    """On the sum of all squared torques, which is what heats a motor: it binds, and does not
+    elsewhere."""
+    problem = WEAK.with_(
+        torque_limit=None, limits=[PathLimit("heat", "sum(moment**2)", 0.005, both_ways=False)]
+    )
     found = solve(problem, starts=1)
     assert found.status == "solved", found.message
     moments, _ = moments_at(found, np.linspace(0, 1, 4001))
@@ -218,7 +261,8 @@ def test_a_limit_of_your_own_is_kept_certified_stored_and_read(tmp_path):
 
 @pytest.mark.slow
 def test_limits_stated_anew_are_those_that_are_known():
-    """A torque as a row of the same program; a speed as rows of it, which the library keeps at the gait's fastest instants."""
+    """A torque as a row of the same program; a speed as rows of it, which the library keeps at the
+    gait's fastest instants."""
     mine = WEAK.with_(torque_limit=None, limits=[PathLimit("torque", "moment", 0.053)])
     assert solve(mine, starts=1).value == solve(WEAK, starts=1).value
     fast = WEAK.with_(torque_limit=None, speed_limit=9.0)
@@ -235,7 +279,11 @@ def test_limits_that_cannot_be_kept_or_read_are_refused():
     with pytest.raises(ProblemError, match="has 3 values; give one, or 2"):
         WEAK.with_(limits=[PathLimit("heat", "moment**2", (1.0, 1.0, 1.0))])
     with pytest.raises(ProblemError, match="the speed is limited"):
-        WEAK.with_(torque_limit=None, gait=FreePath(4.0, "bilateral"), limits=[PathLimit("speed", "rate", 9.0)])
+        WEAK.with_(
+            torque_limit=None,
+            gait=FreePath(4.0, "bilateral"),
+            limits=[PathLimit("speed", "rate", 9.0)],
+        )
     for none in (["moment < 1"], 3):
         with pytest.raises(ProblemError, match="PathLimit"):
             WEAK.with_(limits=none)

@@ -1,4 +1,5 @@
-"""What packages are made from says the same everywhere: versions, requirements, the command, the files that go along."""
+"""What packages are made from says the same everywhere: versions, requirements, the command, the
+files that go along."""
 
 import re
 import tomllib
@@ -9,9 +10,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 STATED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-PACKED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"]["find"][
-    "include"
-]
+PACKED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"][
+    "packages"
+]["find"]["include"]
 NEEDED = dict(requirement.split(">=") for requirement in STATED["dependencies"])
 RECIPE = (ROOT / "recipe/recipe.yaml").read_text(encoding="utf-8")
 CONDA_NAMES = {"matplotlib-base": "matplotlib"}
@@ -44,13 +45,24 @@ def test_the_recipe_builds_and_starts_what_the_wheel_does():
 def test_of_all_packages_in_the_source_tree_the_wheel_holds_the_library():
     packages = {path.parent.name for path in ROOT.glob("*/__init__.py")}
     assert {"colloc", "research", "scripts"} <= packages
-    assert {name for name in packages if any(fnmatch(name, pattern) for pattern in PACKED)} == {"colloc"}
+    assert {name for name in packages if any(fnmatch(name, pattern) for pattern in PACKED)} == {
+        "colloc"
+    }
 
 
 def test_the_recipe_is_read_by_who_builds_it():
     yaml = pytest.importorskip("yaml")
     recipe = yaml.safe_load(RECIPE)
-    assert set(recipe) == {"schema_version", "context", "package", "source", "build", "requirements", "tests", "about"}
+    assert set(recipe) == {
+        "schema_version",
+        "context",
+        "package",
+        "source",
+        "build",
+        "requirements",
+        "tests",
+        "about",
+    }
     assert recipe["requirements"]["run"] == listed("run")
 
 
@@ -72,5 +84,7 @@ def test_citation_and_version_agree():
 def test_binder_takes_a_python_that_is_supported_and_installs_the_clone():
     """For docs/notebook.ipynb; requirements are installed from the root of the clone."""
     python = (ROOT / "binder/runtime.txt").read_text(encoding="utf-8").strip()
-    assert numbers(python.removeprefix("python-")) >= numbers(STATED["requires-python"].removeprefix(">="))
+    assert numbers(python.removeprefix("python-")) >= numbers(
+        STATED["requires-python"].removeprefix(">=")
+    )
     assert (ROOT / "binder/requirements.txt").read_text(encoding="utf-8") == ".\n"

@@ -1,4 +1,5 @@
-"""The modules of scripts/ and benchmarks/ fit the library as it is: each imports without doing anything and explains itself."""
+"""The modules of scripts/ and benchmarks/ fit the library as it is: each imports without doing
+anything and explains itself."""
 
 import ast
 import importlib
@@ -13,7 +14,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("scripts", "scripts/paper", "scripts/models", "benchmarks")
-MODULES = sorted(path for folder in FOLDERS for path in (ROOT / folder).glob("*.py") if path.stat().st_size)
+MODULES = sorted(
+    path for folder in FOLDERS for path in (ROOT / folder).glob("*.py") if path.stat().st_size
+)
 OPTIONAL = {"docs_site": "mkdocs", "play_in_mujoco": "mujoco"}
 """Modules that need more than the tests do."""
 EXAMPLES = ("continue_delta", "continue_epsilon")
@@ -55,7 +58,8 @@ PROGRAMS = [path for path in MODULES if starts_itself(path) and path.stem not in
 
 @pytest.fixture
 def ended(tmp_path, monkeypatch, capfd):
-    """A function from a program and an option to its exit code and what it prints, out and as errors; it writes nothing."""
+    """A function from a program and an option to its exit code and what it prints, out and as
+    errors; it writes nothing."""
 
     def run(path, option):
         needed(path)
@@ -89,11 +93,16 @@ def test_a_program_refuses_what_it_does_not_understand(path, ended):
 def test_nothing_that_can_be_started_is_left_out():
     names = {path.stem for path in PROGRAMS}
     assert {"reproduce_paper", "kernel", "peer_table", "curate"} <= names
-    assert {path.stem for path in MODULES if not path.stem.startswith("__") and has_main(path)} <= names
+    assert {
+        path.stem for path in MODULES if not path.stem.startswith("__") and has_main(path)
+    } <= names
 
 
 def has_main(path):
-    return any(isinstance(n, ast.FunctionDef) and n.name == "main" for n in ast.parse(path.read_text(encoding="utf-8")).body)
+    return any(
+        isinstance(n, ast.FunctionDef) and n.name == "main"
+        for n in ast.parse(path.read_text(encoding="utf-8")).body
+    )
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)

@@ -1,1 +1,2 @@
-"""The same problem in general tools, each written the way its documentation shows; see `benchmarks.peer_table`."""
+"""The same problem in general tools, each written the way its documentation shows; see
+`benchmarks.peer_table`."""

@@ -1,7 +1,8 @@
-"""The three-link problem in colloc: python -m benchmarks.peers.colloc_three_link --starts 20 [--refined]
+"""The three-link problem in colloc: python -m benchmarks.peers.colloc_three_link --starts 20
+[--refined]
 
-Without --refined the mesh, scheme and levels are those of the other tools (no refinement); with it, everything is at its
-defaults, and a start counts only with a certificate.
+Without --refined the mesh, scheme and levels are those of the other tools (no refinement); with it,
+everything is at its defaults, and a start counts only with a certificate.
 """
 
 from __future__ import annotations
@@ -19,9 +20,19 @@ from colloc.search.solve import confirmed, solve
 def best(refined: bool, start: np.ndarray) -> dict:
     """The gait and efficiency from one start, or what went wrong."""
     same_work: dict = {} if refined else {"scheme": "radau-3", "mesh_tolerance": 0}
-    problem = Problem("peer", ellipse(*start), gait=Harmonic(1, "bilateral"), intervals=INTERVALS, **same_work)
-    solution = solve(problem, 1) if refined else Solution(problem, confirmed(begin_at(problem, problem.guess)))
-    good = solution.status == SOLVED if refined else solution.history[-1].optimal and solution.history[-1].delta <= 1e-4
+    problem = Problem(
+        "peer", ellipse(*start), gait=Harmonic(1, "bilateral"), intervals=INTERVALS, **same_work
+    )
+    solution = (
+        solve(problem, 1)
+        if refined
+        else Solution(problem, confirmed(begin_at(problem, problem.guess)))
+    )
+    good = (
+        solution.status == SOLVED
+        if refined
+        else solution.history[-1].optimal and solution.history[-1].delta <= 1e-4
+    )
     if not good:
         return failed(solution.history[-1].delta, solution.message)
     gait = solution.gait

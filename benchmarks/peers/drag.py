@@ -1,8 +1,10 @@
-"""Purcell's swimmer by resistive-force theory, written apart from the library: one matrix of resistances, three equal links.
+"""Purcell's swimmer by resistive-force theory, written apart from the library: one matrix of
+resistances, three equal links.
 
-State: position of the middle of the middle link, its heading, and the two joint angles (link ahead less link behind). With the
-Jacobian J_k of a link's midpoint velocity and spin s_k, drag takes the power ``v' R v``,
-``R = sum l J_k' (c_t t t' + c_n n n') J_k + c_n l^3/12 s_k' s_k``; rigid rates follow from force-free, torque-free motion.
+State: position of the middle of the middle link, its heading, and the two joint angles (link ahead
+less link behind). With the Jacobian J_k of a link's midpoint velocity and spin s_k, drag takes the
+power ``v' R v``, ``R = sum l J_k' (c_t t t' + c_n n n') J_k + c_n l^3/12 s_k' s_k``; rigid rates
+follow from force-free, torque-free motion.
 """
 
 from __future__ import annotations
@@ -45,15 +47,19 @@ def cost(angles: np.ndarray) -> np.ndarray:
 
 
 def displacement_per_area(step: float = 1e-4) -> float:
-    """Net displacement of a small loop round the straight shape, per area of the loop: curl and bracket of the connection."""
+    """Net displacement of a small loop round the straight shape, per area of the loop: curl and
+    bracket of the connection."""
     ahead, behind = (np.array([connection(sign * step * e) for e in np.eye(2)]) for sign in (1, -1))
     slope = (ahead - behind) / (2 * step)  # (angle, rigid, rate)
     A = connection(np.zeros(2))
     curl = slope[0, :, 1] - slope[1, :, 0]
-    bracket = np.array([A[2, 0] * -A[1, 1] + A[1, 0] * A[2, 1], A[2, 0] * A[0, 1] - A[0, 0] * A[2, 1]])
+    bracket = np.array(
+        [A[2, 0] * -A[1, 1] + A[1, 0] * A[2, 1], A[2, 0] * A[0, 1] - A[0, 0] * A[2, 1]]
+    )
     return float(np.hypot(*(curl[:2] + bracket)))
 
 
 def best_small_stroke() -> float:
-    """Largest displacement per work of small strokes in a period of 1: the isoperimetric problem in the metric of the cost."""
+    """Largest displacement per work of small strokes in a period of 1: the isoperimetric problem in
+    the metric of the cost."""
     return displacement_per_area() / (4 * np.pi * np.sqrt(np.linalg.det(cost(np.zeros(2)))))

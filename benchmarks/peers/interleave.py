@@ -1,8 +1,10 @@
-"""Runs every tool on the same starts, in turns: python -m benchmarks.peers.interleave --peers peers-venv/bin/python
+"""Runs every tool on the same starts, in turns: python -m benchmarks.peers.interleave --peers
+peers-venv/bin/python
 
-On a machine that others use, processor seconds depend on the hour. So all tools are started at once and take turns, start by
-start (A B C A B C ...): what disturbs one disturbs all, and ratios hold. One thread each. Writes results/peers/NAME.jsonl,
-which `benchmarks.peer_table` reads. --only takes names of tools (default: those with their best options).
+On a machine that others use, processor seconds depend on the hour. So all tools are started at once
+and take turns, start by start (A B C A B C ...): what disturbs one disturbs all, and ratios hold.
+One thread each. Writes results/peers/NAME.jsonl, which `benchmarks.peer_table` reads. --only takes
+names of tools (default: those with their best options).
 """
 
 from __future__ import annotations
@@ -20,7 +22,16 @@ _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 def started(tool: Tool, python: str, starts: int, first: int) -> subprocess.Popen[str]:
     """A tool's process, which waits for a line before every start."""
-    command = [python, "-m", *tool.command, "--starts", str(starts), "--first", str(first), "--paced"]
+    command = [
+        python,
+        "-m",
+        *tool.command,
+        "--starts",
+        str(starts),
+        "--first",
+        str(first),
+        "--paced",
+    ]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     return subprocess.Popen(command, text=True, env=os.environ | _ONE_THREAD, **pipes)  # type: ignore[call-overload]
 
@@ -38,22 +49,39 @@ def turn(process: subprocess.Popen[str]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--peers", default=sys.executable, help="Python of the environment with rockit and YAPSS")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--peers", default=sys.executable, help="Python of the environment with rockit and YAPSS"
+    )
     parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument("--first", type=int, default=0, help="go on after so many starts of an earlier run")
-    parser.add_argument("--only", nargs="*", metavar="NAME", help=f"of {', '.join((*OWN, *OTHERS))}")
+    parser.add_argument(
+        "--first", type=int, default=0, help="go on after so many starts of an earlier run"
+    )
+    parser.add_argument(
+        "--only", nargs="*", metavar="NAME", help=f"of {', '.join((*OWN, *OTHERS))}"
+    )
     options = parser.parse_args()
     tools = {**OWN, **OTHERS}
     names = options.only or [name for name in tools if name not in RECORDED_ONCE]
     FOLDER.mkdir(parents=True, exist_ok=True)
     running = {
-        name: started(tools[name], sys.executable if name in OWN else options.peers, options.starts, options.first)
+        name: started(
+            tools[name],
+            sys.executable if name in OWN else options.peers,
+            options.starts,
+            options.first,
+        )
         for name in names
     }
     files = {name: FOLDER / tools[name].file for name in names}
     for path in files.values():  # what an earlier run has beyond the first starts is made again
-        kept = path.read_text(encoding="utf-8").splitlines(keepends=True)[: options.first] if options.first else []
+        kept = (
+            path.read_text(encoding="utf-8").splitlines(keepends=True)[: options.first]
+            if options.first
+            else []
+        )
         path.write_text("".join(kept), encoding="utf-8")
     for k in range(options.first, options.starts):
         for name, process in running.items():

@@ -1,7 +1,9 @@
-"""What a newcomer would try: Nelder-Mead over (A0, A1, B1): python -m benchmarks.peers.nelder_mead --starts 20
+"""What a newcomer would try: Nelder-Mead over (A0, A1, B1): python -m benchmarks.peers.nelder_mead
+--starts 20
 
-Every evaluation solves the balance at 400 instants of the period at delta = 1e-4 (`solve_balance`, in one batch) and sums
-distance and work. Gaits that cross themselves or exceed pi are worth nothing.
+Every evaluation solves the balance at 400 instants of the period at delta = 1e-4 (`solve_balance`,
+in one batch) and sums distance and work. Gaits that cross themselves or exceed pi are worth
+nothing.
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
-"""What every tool is given: the isotropic three-link body, its gait, and friction in closed form, for any array library.
+"""What every tool is given: the isotropic three-link body, its gait, and friction in closed form,
+for any array library.
 
-`m` is a module with sin, cos, sqrt and log: numpy, casadi, or the tool's own. The closed form is the one of
-`mechanics.link_friction` without its case distinctions: 1 - q is lowered by one part in 1e6, which changes forces by less than
-1e-6 and keeps every expression smooth. Phase runs over 0..pi, half a period; delta is per radian of phase.
+`m` is a module with sin, cos, sqrt and log: numpy, casadi, or the tool's own. The closed form is
+the one of `mechanics.link_friction` without its case distinctions: 1 - q is lowered by one part in
+1e6, which changes forces by less than 1e-6 and keeps every expression smooth. Phase runs over
+0..pi, half a period; delta is per radian of phase.
 """
 
 LENGTH = 1 / 3
@@ -33,7 +35,11 @@ def link_force(m, vs, vn, w, delta):
     root = m.sqrt(q)
     g = 0.5 * m.log((1 + root) ** 2 / one_less_q) / root
     h = (g - 1) / q
-    return -2 * LENGTH * vs * g / S, -2 * LENGTH * vn / S, -w * LENGTH**3 / S * (0.5 * Q - a2 * h / S**2)
+    return (
+        -2 * LENGTH * vs * g / S,
+        -2 * LENGTH * vn / S,
+        -w * LENGTH**3 / S * (0.5 * Q - a2 * h / S**2),
+    )
 
 
 def balance_and_rates(m, t, theta, z, parameters, delta):

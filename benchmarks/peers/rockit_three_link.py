@@ -1,9 +1,11 @@
-"""The three-link problem in rockit, after its examples dae.py (algebraic states) and repeated solves.
+"""The three-link problem in rockit, after its examples dae.py (algebraic states) and repeated
+solves.
 
 Run in the peers' environment: python -m benchmarks.peers.rockit_three_link --starts 20 [--tuned]
 
-The program is written and its derivatives are made once; every level is a call of one function from a packed guess (`gist`)
-to a packed solution. `set_initial` would evaluate the guess expression by expression, twenty times as long as IPOPT's work.
+The program is written and its derivatives are made once; every level is a call of one function from
+a packed guess (`gist`) to a packed solution. `set_initial` would evaluate the guess expression by
+expression, twenty times as long as IPOPT's work.
 """
 
 from __future__ import annotations
@@ -38,7 +40,9 @@ def build(tuned: bool) -> Program:
     parameters = ocp.variable(3)
     delta = ocp.parameter()
     (q1, q2), _ = gait(ca, ocp.t, *ca.vertsplit(parameters))
-    balance, rates = balance_and_rates(ca, ocp.t, theta, ca.vertsplit(z), ca.vertsplit(parameters), delta)
+    balance, rates = balance_and_rates(
+        ca, ocp.t, theta, ca.vertsplit(z), ca.vertsplit(parameters), delta
+    )
     for state, rate in zip((theta, x, W), rates, strict=True):
         ocp.set_der(state, rate)
     for equation in balance:
@@ -49,7 +53,9 @@ def build(tuned: bool) -> Program:
     ocp.subject_to(-np.pi <= (q2 <= np.pi))
     ocp.add_objective(-ocp.at_tf(x) / ocp.at_tf(W))
     ipopt = {**DEFAULT, **(TUNED if tuned else {})}
-    ocp.solver("ipopt", {"print_time": False, "expand": True, "error_on_fail": True, "ipopt": ipopt})
+    ocp.solver(
+        "ipopt", {"print_time": False, "expand": True, "error_on_fail": True, "ipopt": ipopt}
+    )
     ocp.method(DirectCollocation(N=INTERVALS, M=1, degree=DEGREE, scheme="radau"))
     ocp.set_value(delta, DELTAS[0])
     states = ca.vertcat(theta, x, W)
@@ -61,19 +67,24 @@ def build(tuned: bool) -> Program:
     every = ca.vertcat(*[ca.vec(part) for part in samples])
     pack = np.linalg.pinv(np.array(ca.evalf(ca.jacobian(every, ocp.gist))))
     step = np.pi / INTERVALS
-    roots = (np.arange(INTERVALS)[:, None] + np.array(ca.collocation_points(DEGREE, "radau"))).ravel() * step
+    roots = (
+        np.arange(INTERVALS)[:, None] + np.array(ca.collocation_points(DEGREE, "radau"))
+    ).ravel() * step
     return Program(solve, np.concatenate([np.arange(INTERVALS + 1) * step, roots]), unpack, pack)
 
 
 def solve(program: Program, start: np.ndarray) -> dict:
-    """Continuation in delta from one start; the gait and efficiency of the last level, or where it failed."""
+    """Continuation in delta from one start; the gait and efficiency of the last level, or where it
+    failed."""
     own = start
     for level in DELTAS:
         delta = level / (2 * np.pi)
         states, velocity = feasible_motion(own, delta, program.phases)
         first = INTERVALS + 1
         motion = [states[:, :first], states[:, first:], velocity[:, first:], own, delta]
-        guess = program.pack @ np.concatenate([np.asarray(part).ravel(order="F") for part in motion])
+        guess = program.pack @ np.concatenate(
+            [np.asarray(part).ravel(order="F") for part in motion]
+        )
         try:
             solution = program.solve(guess)
         except RuntimeError as error:

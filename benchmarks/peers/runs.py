@@ -1,4 +1,5 @@
-"""One line of JSON a start, with its processor seconds; paced by whoever wants several tools to take turns."""
+"""One line of JSON a start, with its processor seconds; paced by whoever wants several tools to
+take turns."""
 
 from __future__ import annotations
 
@@ -15,18 +16,31 @@ from benchmarks.peers.starts import starts
 
 
 def arguments(page: str, **flags: str) -> argparse.Namespace:
-    """The options of a tool's script: --starts, --first, --paced, and its own switches with their help."""
-    parser = argparse.ArgumentParser(description=page, formatter_class=argparse.RawDescriptionHelpFormatter)
+    """The options of a tool's script: --starts, --first, --paced, and its own switches with their
+    help."""
+    parser = argparse.ArgumentParser(
+        description=page, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument("--first", type=int, default=0, help="starts to leave out, of an earlier run that was cut short")
-    parser.add_argument("--paced", action="store_true", help="wait for a line on standard input before every start")
+    parser.add_argument(
+        "--first",
+        type=int,
+        default=0,
+        help="starts to leave out, of an earlier run that was cut short",
+    )
+    parser.add_argument(
+        "--paced", action="store_true", help="wait for a line on standard input before every start"
+    )
     for name, words in flags.items():
         parser.add_argument(f"--{name}", action="store_true", help=words)
     return parser.parse_args()
 
 
-def run(options: argparse.Namespace, build: Callable[[], Any], solve: Callable[[Any, np.ndarray], dict]) -> None:
-    """Prints what `solve` makes of every start; the first one of all pays for `build`, and for the processes it starts."""
+def run(
+    options: argparse.Namespace, build: Callable[[], Any], solve: Callable[[Any, np.ndarray], dict]
+) -> None:
+    """Prints what `solve` makes of every start; the first one of all pays for `build`, and for the
+    processes it starts."""
     program = build() if options.first else None
     begin = _processor_seconds()
     for start in starts(options.starts)[options.first :]:

@@ -1,7 +1,8 @@
 """SciPy's SLSQP on the reduced functions: python -m benchmarks.peers.slsqp_three_link --starts 20
 
-`colloc.reduced` gives minus the efficiency and its exact gradient as functions of (A0, A1, B1); the optimiser is SciPy's. Mesh,
-scheme and levels of delta are those of the other tools; joint limits hold at the mesh's points, where they are linear.
+`colloc.reduced` gives minus the efficiency and its exact gradient as functions of (A0, A1, B1); the
+optimiser is SciPy's. Mesh, scheme and levels of delta are those of the other tools; joint limits
+hold at the mesh's points, where they are linear.
 """
 
 from __future__ import annotations
@@ -19,12 +20,18 @@ from colloc.search.spaces import space_near
 
 TOLERANCE = 1e-9
 STATED = Problem(
-    "peer", ellipse(0.3, 1.0, 0.5), gait=Harmonic(1, "bilateral"), intervals=INTERVALS, scheme="radau-3", mesh_tolerance=0
+    "peer",
+    ellipse(0.3, 1.0, 0.5),
+    gait=Harmonic(1, "bilateral"),
+    intervals=INTERVALS,
+    scheme="radau-3",
+    mesh_tolerance=0,
 )
 
 
 class Reduced:
-    """Minus the efficiency of a gait and its gradient, and the joint limits at the mesh's points."""
+    """Minus the efficiency of a gait and its gradient, and the joint limits at the mesh's
+    points."""
 
     def __init__(self) -> None:
         space, _ = space_near(STATED, STATED.guess)
@@ -34,7 +41,8 @@ class Reduced:
         self.limits = {"type": "ineq", "fun": lambda v: np.pi - both @ v, "jac": lambda v: -both}
 
     def minimised(self, v: np.ndarray, delta: float) -> tuple[bool, str, np.ndarray, float]:
-        """Whether SLSQP says that it is done, its message, where it ended and minus the efficiency there."""
+        """Whether SLSQP says that it is done, its message, where it ended and minus the efficiency
+        there."""
         self.program.delta = delta / RADIANS
         ended = minimize(
             self.program.objective,
@@ -48,7 +56,8 @@ class Reduced:
 
 
 def solve(reduced: Reduced, start: np.ndarray) -> dict:
-    """Continuation in delta from one start; the gait and efficiency of the last level, or where it failed."""
+    """Continuation in delta from one start; the gait and efficiency of the last level, or where it
+    failed."""
     v = start
     for delta in DELTAS:
         good, message, v, value = reduced.minimised(v, delta)

@@ -1,4 +1,5 @@
-"""Random admissible gaits to start from, the same for every tool, with a feasible motion from colloc's NumPy solver."""
+"""Random admissible gaits to start from, the same for every tool, with a feasible motion from
+colloc's NumPy solver."""
 
 from __future__ import annotations
 
@@ -20,8 +21,11 @@ def starts(count: int, seed: int = 0) -> np.ndarray:
     return np.array(found)
 
 
-def feasible_motion(parameters: np.ndarray, delta: float, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """States (theta, distance, work) and tail velocities, each ``(3, n)``, of a gait at phases 0..pi; all per radian."""
+def feasible_motion(
+    parameters: np.ndarray, delta: float, phases: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """States (theta, distance, work) and tail velocities, each ``(3, n)``, of a gait at phases
+    0..pi; all per radian."""
     body, friction = Chain(), Friction()
     gait = ellipse(*parameters)
     fine = np.linspace(0, np.pi, 401)
@@ -34,10 +38,17 @@ def feasible_motion(parameters: np.ndarray, delta: float, phases: np.ndarray) ->
         return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(fine))])
 
     theta = integral(z[2])
-    dx, dy = (integral(r)[-1] for r in (np.cos(theta) * cx - np.sin(theta) * cy, np.sin(theta) * cx + np.cos(theta) * cy))
+    dx, dy = (
+        integral(r)[-1]
+        for r in (np.cos(theta) * cx - np.sin(theta) * cy, np.sin(theta) * cx + np.cos(theta) * cy)
+    )
     theta -= np.arctan2(dy, dx)
     states = np.stack(
-        [theta, integral(np.cos(theta) * cx - np.sin(theta) * cy), integral(total_power(now.velocity, now.force)[0])]
+        [
+            theta,
+            integral(np.cos(theta) * cx - np.sin(theta) * cy),
+            integral(total_power(now.velocity, now.force)[0]),
+        ]
     )
     return (
         np.stack([np.interp(phases, fine, row) for row in states]),

@@ -1,4 +1,5 @@
-"""The three-link problem in YAPSS, after its examples isoperimetric.py (closed curves) and newton.py (parameters).
+"""The three-link problem in YAPSS, after its examples isoperimetric.py (closed curves) and
+newton.py (parameters).
 
 Run in the peers' environment: python -m benchmarks.peers.yapss_three_link --starts 20 [--tuned]
 """
@@ -28,7 +29,9 @@ def build(delta: float, own: np.ndarray, tuned: bool) -> yapss.Problem:
     def continuous(arg) -> None:
         phase = arg.phase[0]
         own = tuple(arg.parameter)
-        balance, rates = balance_and_rates(yapss.math, phase.time, phase.state[0], tuple(phase.control), own, delta)
+        balance, rates = balance_and_rates(
+            yapss.math, phase.time, phase.state[0], tuple(phase.control), own, delta
+        )
         phase.dynamics[:] = rates
         phase.path[:] = (*balance, *gait(yapss.math, phase.time, *own)[0])
 
@@ -53,7 +56,8 @@ def build(delta: float, own: np.ndarray, tuned: bool) -> yapss.Problem:
 
 
 def solve(tuned: bool, start: np.ndarray) -> dict:
-    """Continuation in delta from one start; the gait and efficiency of the last level, or where it failed."""
+    """Continuation in delta from one start; the gait and efficiency of the last level, or where it
+    failed."""
     own = start
     for level in DELTAS:
         solution = build(level / (2 * np.pi), own, tuned).solve()
@@ -66,4 +70,5 @@ def solve(tuned: bool, start: np.ndarray) -> dict:
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
     chosen = arguments(__doc__, tuned="options under which it converges from most starts")
-    run(chosen, lambda: chosen.tuned, solve)  # a problem is written anew at every level: delta is a number in it
+    # a problem is written anew at every level: delta is a number in it
+    run(chosen, lambda: chosen.tuned, solve)

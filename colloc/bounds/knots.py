@@ -1,9 +1,11 @@
-r"""Where the potential of the bound wants its knots: the dual residual of the functions that a knot would add.
+r"""Where the potential of the bound wants its knots: the dual residual of the functions that a knot
+would add.
 
-The multipliers of the program are a measure that closes for every potential of the space. It need not close for a function psi
-outside of it: its mean rate g = int dpsi/dt is the slope of the program's value in the coefficient of psi. With a penalty on
-roughness R, functions of slopes g can lower the value by up to ``g.R^-1.g`` over twice the penalty's weight. So knots are
-inserted where that is largest. (The measure's own weight is no guide: it may close well where it is heavy.)
+The multipliers of the program are a measure that closes for every potential of the space. It need
+not close for a function psi outside of it: its mean rate g = int dpsi/dt is the slope of the
+program's value in the coefficient of psi. With a penalty on roughness R, functions of slopes g can
+lower the value by up to ``g.R^-1.g`` over twice the penalty's weight. So knots are inserted where
+that is largest. (The measure's own weight is no guide: it may close well where it is heavy.)
 """
 
 from __future__ import annotations
@@ -21,14 +23,18 @@ from colloc.numerics.spline import TensorSpline
 _SHARE = 0.3
 """Of the largest worth, that a knot needs to be inserted together with the best."""
 _SINGULAR = 1e-10
-"""Added to the roughness, of its mean diagonal: affine functions have none. For these the measure closes."""
+"""Added to the roughness, of its mean diagonal: affine functions have none. For these the measure
+closes."""
 
 
 def worth(space: PotentialSpace, measure: Measure) -> float:
-    """What the functions of a space can gain over those that the measure closes for, up to a factor."""
+    """What the functions of a space can gain over those that the measure closes for, up to a
+    factor."""
     rows, _ = Samples(space, measure.motion).rows(np.arange(measure.weight.size), measure.heading)
     slope = rows.T @ measure.weight
-    roughness = space.roughness + _SINGULAR * space.roughness.diagonal().mean() * sparse.eye(space.size)
+    roughness = space.roughness + _SINGULAR * space.roughness.diagonal().mean() * sparse.eye(
+        space.size
+    )
     return float(slope @ spsolve(roughness.tocsc(), slope))
 
 
@@ -41,7 +47,8 @@ def with_knots(space: PotentialSpace, added: np.ndarray) -> PotentialSpace:
 
 
 def with_more_knots(space: PotentialSpace, measure: Measure, intervals: int) -> PotentialSpace:
-    """The potentials with knots in the middle of those intervals where they are worth most, at most `intervals` in all."""
+    """The potentials with knots in the middle of those intervals where they are worth most, at most
+    `intervals` in all."""
     knots = space.spline.knots
     middle = 0.5 * (knots[1:] + knots[:-1])
     places = middle[middle > -1e-12]

@@ -1,8 +1,10 @@
-"""The multipliers of the bound's program: the best motion that it knows of, as a measure on shapes, headings and directions.
+"""The multipliers of the bound's program: the best motion that it knows of, as a measure on shapes,
+headings and directions.
 
-The program that bounds the efficiency is the dual of a linear one: of all ways to share out work among motions (shape, heading
-of the middle link, direction of the joint rates) so that they close in the mean, find the one that travels farthest. Its
-multipliers are that mixture. They say where a gait should look for its shapes.
+The program that bounds the efficiency is the dual of a linear one: of all ways to share out work
+among motions (shape, heading of the middle link, direction of the joint rates) so that they close
+in the mean, find the one that travels farthest. Its multipliers are that mixture. They say where a
+gait should look for its shapes.
 """
 
 from __future__ import annotations
@@ -50,10 +52,12 @@ class Measure:
         return float(self.time @ (np.cos(self.heading) * u - np.sin(self.heading) * v))
 
     def path(self) -> Corners:
-        """A closed path of two joint angles through the mean shapes of the measure, symmetric both ways: a start for a search.
+        """A closed path of two joint angles through the mean shapes of the measure, symmetric both
+        ways: a start for a search.
 
-        The images of the measure fill four sectors about the straight body; in one of them shapes are averaged by their angle
-        about it, from the antidiagonal, where the body is its own image backwards, to the diagonal.
+        The images of the measure fill four sectors about the straight body; in one of them shapes
+        are averaged by their angle about it, from the antidiagonal, where the body is its own image
+        backwards, to the diagonal.
 
         Raises
         ------
@@ -73,7 +77,10 @@ class Measure:
                 share = self.weight[inside] / self.weight[inside].sum()
                 shapes.append((share @ across[inside], share @ along[inside]))
         if len(shapes) < 4:
-            raise ProblemError("the measure is no path: it lies at a few shapes, which loops about one of them would use.")
+            raise ProblemError(
+                "the measure is no path: it lies at a few shapes, which loops about one of them "
+                "would use."
+            )
         quarter = np.array([(shapes[0][0], 0.0), *shapes, (0.0, shapes[-1][1])]).T
         half = np.stack([quarter[1] + quarter[0], quarter[1] - quarter[0]])
         return Corners(np.concatenate([half, half[::-1, -2::-1]], axis=1), BILATERAL)

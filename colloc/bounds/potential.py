@@ -1,12 +1,14 @@
 r"""Potentials over shape and heading: the unknowns of the upper bound (docs/bound.md).
 
-For any function ``phi(q, theta)`` of the joint angles q and the heading theta of the middle link, the integral of its rate
-vanishes over a closed gait. So the distance along a fixed direction may be counted as ``v_x(q, theta, r) + d phi/dt``, and
+For any function ``phi(q, theta)`` of the joint angles q and the heading theta of the middle link,
+the integral of its rate vanishes over a closed gait. So the distance along a fixed direction may be
+counted as ``v_x(q, theta, r) + d phi/dt``, and
 
     efficiency <= max over q, theta, r of ( Re(e^{i theta} v) + d phi/dt ) / P.
 
-As a Fourier series in theta, ``phi = Re sum_k e^{i k theta} c_k(q)``. The harmonic k = 1 alone follows a point c_1(q) of the
-body frame (x + i y) from the middle link; k = 0 is a potential on shape space. Splines in q, parities from the symmetries.
+As a Fourier series in theta, ``phi = Re sum_k e^{i k theta} c_k(q)``. The harmonic k = 1 alone
+follows a point c_1(q) of the body frame (x + i y) from the middle link; k = 0 is a potential on
+shape space. Splines in q, parities from the symmetries.
 """
 
 from __future__ import annotations
@@ -35,7 +37,8 @@ class PotentialSpace:
     harmonics : tuple of int
         Those used; odd ones suffice where mu_b = mu_f.
     end_swap : bool
-        Whether the body is the same when turned end for end (see `colloc.bounds.coulomb_motion.swaps_ends`).
+        Whether the body is the same when turned end for end (see
+        `colloc.bounds.coulomb_motion.swaps_ends`).
     together : int, optional
         Only sums of functions of so many joint angles each.
     """
@@ -49,7 +52,9 @@ class PotentialSpace:
     def bases(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Bases of the real parts (even under the mirror) and of the imaginary parts (odd)."""
         swap = -1 if self.end_swap else None
-        return self.spline.symmetric_basis(1, swap, self.together), self.spline.symmetric_basis(-1, swap, self.together)
+        return self.spline.symmetric_basis(1, swap, self.together), self.spline.symmetric_basis(
+            -1, swap, self.together
+        )
 
     @cached_property
     def layout(self) -> list[tuple[int, int, slice]]:
@@ -69,10 +74,15 @@ class PotentialSpace:
 
     @cached_property
     def roughness(self) -> sparse.csr_matrix:
-        """Quadratic form of the free coefficients: integral of the squared second derivatives, harmonic k weighted by k^2."""
+        """Quadratic form of the free coefficients: integral of the squared second derivatives,
+        harmonic k weighted by k^2."""
         table = self.spline.roughness
         return sparse.block_diag(
-            [max(k, 1) ** 2 * (self.bases[part].T @ table @ self.bases[part]) for k, part, _ in self.layout], format="csr"
+            [
+                max(k, 1) ** 2 * (self.bases[part].T @ table @ self.bases[part])
+                for k, part, _ in self.layout
+            ],
+            format="csr",
         )
 
     def coefficients(self, free: np.ndarray) -> dict[int, np.ndarray]:
@@ -83,11 +93,12 @@ class PotentialSpace:
         return full
 
     def turned(self, free: np.ndarray) -> np.ndarray:
-        """The same potential for the body turned end for end: ``c_k(q)`` becomes ``-conj(c_k(reversed q))``.
+        """The same potential for the body turned end for end: ``c_k(q)`` becomes
+        ``-conj(c_k(reversed q))``.
 
-        Turning the body and reversing time take angles q to -reversed q and rates r to reversed r; the velocity of the middle
-        link in its own axes and its heading stay as they are, the sense of its rotation does not. By the mirror image
-        ``c_k(-q) = conj(c_k(q))``.
+        Turning the body and reversing time take angles q to -reversed q and rates r to reversed r;
+        the velocity of the middle link in its own axes and its heading stay as they are, the sense
+        of its rotation does not. By the mirror image ``c_k(-q) = conj(c_k(q))``.
         """
         found = np.empty_like(free)
         for _, part, where in self.layout:
@@ -116,7 +127,8 @@ class Samples:
         return both
 
     def amplitudes(self, free: np.ndarray) -> dict[int, np.ndarray]:
-        """Complex amplitudes ``(n,)`` by harmonic k of the gain ``Re sum_k e^{i k theta} a_k`` as a function of heading."""
+        """Complex amplitudes ``(n,)`` by harmonic k of the gain ``Re sum_k e^{i k theta} a_k`` as a
+        function of heading."""
         motion = self.motion
         result = {1: motion.velocity[0] + 1j * motion.velocity[1]}
         for k, c in self.space.coefficients(free).items():
@@ -130,7 +142,8 @@ class Samples:
         return gain / self.motion.power, heading
 
     def rows(self, chosen: np.ndarray, heading: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
-        """The gain of chosen samples at given headings, over power: ``matrix @ free + constant``."""
+        """The gain of chosen samples at given headings, over power: ``matrix @ free +
+        constant``."""
         u, v = self.motion.velocity[:, chosen]
         constant = (np.cos(heading) * u - np.sin(heading) * v) / self.motion.power[chosen]
         scale = 1.0 / self.motion.power[chosen]
@@ -145,7 +158,8 @@ class Samples:
 
 
 def largest_ratios(space: PotentialSpace, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
-    """Largest (gain over heading) / power of each motion, ``(n,)``; `Samples` of a part at a time, as they are large."""
+    """Largest (gain over heading) / power of each motion, ``(n,)``; `Samples` of a part at a time,
+    as they are large."""
     parts = np.array_split(np.arange(motion.size), motion.size // _AT_ONCE + 1)
     return np.concatenate([Samples(space, motion.take(part)).ratio(free)[0] for part in parts])
 
@@ -153,7 +167,8 @@ def largest_ratios(space: PotentialSpace, free: np.ndarray, motion: CoulombMotio
 def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Maximum over theta of ``Re sum_k e^{i k theta} a_k`` and its place, ``(n,)`` each.
 
-    Closed form if only k = 0 and 1 occur; else the best of a grid of headings, polished by Newton steps.
+    Closed form if only k = 0 and 1 occur; else the best of a grid of headings, polished by Newton
+    steps.
     """
     if set(amplitudes) <= {0, 1}:
         first = amplitudes[1]

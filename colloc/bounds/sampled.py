@@ -1,8 +1,9 @@
 """An upper bound on the efficiency of every gait of a body: derivation in docs/bound.md.
 
-The bound is the value of a convex problem: choose a potential over shape and heading (`colloc.bounds.potential`) so that the
-largest (gain / power) over all shapes, headings and rate directions is smallest. It is solved by exchange of samples
-(`bounds.cutting_plane`). What comes out is a *sampled* bound; `research/guarantee` guarantees one for associated friction.
+The bound is the value of a convex problem: choose a potential over shape and heading
+(`colloc.bounds.potential`) so that the largest (gain / power) over all shapes, headings and rate
+directions is smallest. It is solved by exchange of samples (`bounds.cutting_plane`). What comes out
+is a *sampled* bound; `research/guarantee` guarantees one for associated friction.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ class Budget:
     intervals : int
         Knot intervals of the splines in every joint angle, at most.
     harmonics : tuple of int, optional
-        Harmonics in the heading; by default (1, 3), of more than three links (1,), or (0, 1) where mu_b differs from mu_f.
+        Harmonics in the heading; by default (1, 3), of more than three links (1,), or (0, 1) where
+        mu_b differs from mu_f.
     shapes, directions : int
         The first lattice: steps of every joint angle, and rate directions.
     rounds : int
@@ -51,8 +53,8 @@ class Budget:
     tolerance : float
         Excess of the summits over the program's value at which a bound counts as converged.
     first : int
-        Even intervals to begin with; more knots are inserted where they are worth most (`colloc.bounds.knots`). As many as
-        `intervals` keep the knots even.
+        Even intervals to begin with; more knots are inserted where they are worth most
+        (`colloc.bounds.knots`). As many as `intervals` keep the knots even.
     smoothing : float
         Weight of the roughness of the potential.
     together : int, optional
@@ -72,8 +74,11 @@ class Budget:
 
 
 QUICK = Budget()
-FOUR_LINKS = Budget(5, None, 6, 40, 80, starts=400, tolerance=1e-3, first=5, smoothing=1e-4, together=2)
-"""Functions of two joint angles at a time: 81 unknowns do better than 108 that are products of three."""
+FOUR_LINKS = Budget(
+    5, None, 6, 40, 80, starts=400, tolerance=1e-3, first=5, smoothing=1e-4, together=2
+)
+"""Functions of two joint angles at a time: 81 unknowns do better than 108 that are products of
+three."""
 FIVE_LINKS = replace(FOUR_LINKS, intervals=3, first=3, tolerance=3e-3)
 
 
@@ -96,12 +101,15 @@ class Bound:
     Attributes
     ----------
     sampled : float
-        Largest ratio met on any sample; what lies between samples may exceed it. Or 1/min(mu), if that is less.
+        Largest ratio met on any sample; what lies between samples may exceed it. Or 1/min(mu), if
+        that is less.
     floor : float
-        Value of the last program: no potential of this space does better on the samples held, up to the smoothing (1e-5).
+        Value of the last program: no potential of this space does better on the samples held, up to
+        the smoothing (1e-5).
     converged : bool
-        Whether the last climbs between the samples stayed within the budget's tolerance of `floor`, and those of a check that
-        the program knows nothing of (`colloc.bounds.recheck`) within twice of it.
+        Whether the last climbs between the samples stayed within the budget's tolerance of `floor`,
+        and those of a check that the program knows nothing of (`colloc.bounds.recheck`) within
+        twice of it.
     guaranteed : float or None
         Value certified between samples too (`research/guarantee`), if asked for and possible.
     missing : str
@@ -149,13 +157,19 @@ class Bound:
 
     def report(self, efficiency: float) -> str:
         """One line for reports: efficiency, bound, gap, and what is proved."""
-        proved = f"guaranteed {self.guaranteed:.4f}" if self.guaranteed is not None else self.missing
-        return f"efficiency {efficiency:.4f}, upper bound {self.sampled:.4f}, gap {self.gap(efficiency):.4f} ({proved})"
+        proved = (
+            f"guaranteed {self.guaranteed:.4f}" if self.guaranteed is not None else self.missing
+        )
+        return (
+            f"efficiency {efficiency:.4f}, upper bound {self.sampled:.4f}, gap "
+            f"{self.gap(efficiency):.4f} ({proved})"
+        )
 
 
 MISSING_MARGIN = "sampled at {samples} motions: not certified between them"
 MISSING_LAW = (
-    "sampled at {samples} motions: for this law the balance has no convex potential, so neither uniqueness of the "
+    "sampled at {samples} motions: for this law the balance has no convex potential, so neither "
+    "uniqueness of the "
     "motion nor a margin between samples is known"
 )
 
@@ -200,7 +214,11 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
 
 def bound_key(domain: Domain, budget: Budget) -> str:
     """SHA-256 of what a bound depends on."""
-    stated = {"body": fields(domain.body), "friction": fields(domain.friction), "joint_limit": domain.joint_limit}
+    stated = {
+        "body": fields(domain.body),
+        "friction": fields(domain.friction),
+        "joint_limit": domain.joint_limit,
+    }
     return statement_hash({"version": VERSION, "domain": stated, "budget": asdict(budget)})
 
 
@@ -212,13 +230,16 @@ def known_bound(
     budget: Budget | None = None,
     cache: str | os.PathLike,
 ) -> Bound | None:
-    """The bound that an earlier run left in the cache, or None; arguments as for `efficiency_bound`."""
+    """The bound that an earlier run left in the cache, or None; arguments as for
+    `efficiency_bound`."""
     key = bound_key(Domain(body, friction, float(joint_limit)), budget or usual_budget(body))
     entry = read_rows(Path(cache), CACHE).get(key)
     if entry is None:
         return None
     try:
-        stored: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
+        stored: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()
+        }
         return Bound(**stored)
     except (TypeError, AttributeError):
         raise StoreError(f"{cache} holds something else than bounds; move it away.") from None
@@ -232,14 +253,16 @@ def efficiency_bound(
     budget: Budget | None = None,
     cache: str | os.PathLike | None = None,
 ) -> Bound:
-    """An upper bound on d/W over all gaits with |joint angles| <= joint_limit and links i, i + 2 not crossing.
+    """An upper bound on d/W over all gaits with |joint angles| <= joint_limit and links i, i + 2
+    not crossing.
 
     Parameters
     ----------
     body : Chain
         Two to five links.
     friction : Friction
-        Coulomb friction or the elliptic law, delta -> 0 (docs/bound.md states what finite delta changes).
+        Coulomb friction or the elliptic law, delta -> 0 (docs/bound.md states what finite delta
+        changes).
     joint_limit : float
         At most pi.
     budget : Budget, optional
@@ -250,8 +273,8 @@ def efficiency_bound(
     Raises
     ------
     ProblemError
-        For a joint limit outside (0, pi], more than five links, even harmonics with mu_b = mu_f, or feet under a law that is
-        not associated.
+        For a joint limit outside (0, pi], more than five links, even harmonics with mu_b = mu_f, or
+        feet under a law that is not associated.
     StoreError
         If the cache cannot be read. One that cannot be written costs a `ReadOnlyRunWarning`.
     """
@@ -259,15 +282,22 @@ def efficiency_bound(
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
     if body.n_link > MOST_LINKS:
         raise ProblemError(
-            f"bounds are computed for at most {MOST_LINKS} links, not {body.n_link}: the samples fill all of shape space."
+            f"bounds are computed for at most {MOST_LINKS} links, not {body.n_link}: the samples "
+            f"fill all of shape space."
         )
     budget = budget or usual_budget(body)
-    known = known_bound(body, friction, joint_limit, budget=budget, cache=cache) if cache is not None else None
+    known = (
+        known_bound(body, friction, joint_limit, budget=budget, cache=cache)
+        if cache is not None
+        else None
+    )
     if known is not None:
         return known
     domain = Domain(body, friction, float(joint_limit))
     if domain.law.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
-        raise ProblemError("even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only.")
+        raise ProblemError(
+            "even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only."
+        )
     bound = compute_bound(domain, budget)
     if cache is not None:
         try:

@@ -1,4 +1,5 @@
-"""Where each decision variable of a collocated problem sits in the vector x, and its unit of time. No CasADi."""
+"""Where each decision variable of a collocated problem sits in the vector x, and its unit of time.
+No CasADi."""
 
 from __future__ import annotations
 
@@ -16,12 +17,14 @@ from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 
 RADIANS = 2 * np.pi
-"""Radians of phase per period: rates, velocities and delta of the variables are those per period divided by it."""
+"""Radians of phase per period: rates, velocities and delta of the variables are those per period
+divided by it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Where each kind of variable sits in the vector x: index arrays, ``(n_component, n_position)``."""
+    """Where each kind of variable sits in the vector x: index arrays, ``(n_component,
+    n_position)``."""
 
     parameters: np.ndarray
     theta: np.ndarray
@@ -40,15 +43,21 @@ class Layout:
     """Which of the parameters is the logarithm of the period, if one is."""
 
     def of_period(self, names: Iterable[str]) -> np.ndarray:
-        """``(n, 1)``: where quantities of the solved part of the period are; of the rotation its end and its begin."""
-        ends = {"distance": [self.distance[0, -1]], "work": [self.work[0, -1]], "rotation": self.theta[0, [-1, 0]]}
+        """``(n, 1)``: where quantities of the solved part of the period are; of the rotation its
+        end and its begin."""
+        ends = {
+            "distance": [self.distance[0, -1]],
+            "work": [self.work[0, -1]],
+            "rotation": self.theta[0, [-1, 0]],
+        }
         own = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
         own["period"] = self.parameters[self.pace]  # its logarithm
         return np.concatenate([(ends | own)[name] for name in names])[:, None]
 
 
 def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = None) -> Layout:
-    """Index arrays of all variables on a mesh; a gait's arcs meet at knots, by default at the edges."""
+    """Index arrays of all variables on a mesh; a gait's arcs meet at knots, by default at the
+    edges."""
     body, gait, full = control.dynamics.body, control.admissible.gait, control.formulation == FULL
     n_joint = body.n_joint
     # without them angles, rates and velocities along a path follow from its parameters
@@ -73,8 +82,14 @@ def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = No
     return Layout(n=start, **indices, integrals=control.aims.integrals, pace=pace)
 
 
-def distance_and_work(control: ControlProblem, layout: Layout, x: np.ndarray) -> tuple[float, float]:
-    """Of a whole period, as the problem states them, from variables ``(n,)`` in units of friction. Of a gait that turns the
-    variables have the way that is seen from axes that turn evenly (`colloc.gaits.period`)."""
-    way, work = (float(x[row[0, -1]]) / control.admissible.gait.fraction for row in (layout.distance, layout.work))
+def distance_and_work(
+    control: ControlProblem, layout: Layout, x: np.ndarray
+) -> tuple[float, float]:
+    """Of a whole period, as the problem states them, from variables ``(n,)`` in units of friction.
+    Of a gait that turns the variables have the way that is seen from axes that turn evenly
+    (`colloc.gaits.period`)."""
+    way, work = (
+        float(x[row[0, -1]]) / control.admissible.gait.fraction
+        for row in (layout.distance, layout.work)
+    )
     return chord_per_way(control.dynamics.turn) * way, work * control.unit

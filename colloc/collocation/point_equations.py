@@ -1,15 +1,17 @@
-"""CasADi expressions of one mesh point: what collocation evaluates, each stated for a single instant.
+"""CasADi expressions of one mesh point: what collocation evaluates, each stated for a single
+instant.
 
-The physics is the body's (`colloc.mechanics.bodies`); here it is only arranged into outputs. The balance
-itself is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
-*formulations* of a point:
+The physics is the body's (`colloc.mechanics.bodies`); here it is only arranged into outputs. The
+balance itself is a step function of the tail velocity as delta goes to 0 and does not converge as a
+constraint. Two cures, the *formulations* of a point:
 
 ``full``
-    Link forces are variables, each tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0;
-    the balance is linear in the forces.
+    Link forces are variables, each tied to its velocities by an equation scaled like a velocity, F
+    / I0 + mu v = 0; the balance is linear in the forces.
 ``implicit velocity``
-    The tail velocity is tied to the one that balances the body, z - Z(angles, rates) = 0, with Z from the NumPy solver
-    and its derivatives from the implicit function theorem. The velocity map is mild where the balance is not.
+    The tail velocity is tied to the one that balances the body, z - Z(angles, rates) = 0, with Z
+    from the NumPy solver and its derivatives from the implicit function theorem. The velocity map
+    is mild where the balance is not.
 """
 
 from __future__ import annotations
@@ -32,23 +34,31 @@ from colloc.mechanics.law import Law
 from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
 
 N_RATE = 3
-"""The last outputs of a point: rotation rate, velocity of the centre of mass along the lab's x, and power."""
+"""The last outputs of a point: rotation rate, velocity of the centre of mass along the lab's x, and
+power."""
 
 
 @lru_cache(maxsize=32)
-def point_function(formulation: str, body: Body, friction: Law, regime: Regime = LEVEL, unit: float = 1.0) -> LocalFunction:
-    """Outputs at a mesh point: equations that must vanish, then rates of rotation and distance and power of the joints, all per
-    period divided by `unit`, as the law of friction takes rates.
+def point_function(
+    formulation: str, body: Body, friction: Law, regime: Regime = LEVEL, unit: float = 1.0
+) -> LocalFunction:
+    """Outputs at a mesh point: equations that must vanish, then rates of rotation and distance and
+    power of the joints, all per period divided by `unit`, as the law of friction takes rates.
 
-    Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links. With
-    inertia the momenta, too: they, not the balance, have to be those that the body has, and before the last outputs are their
-    rates; at a free pace the logarithm of the period comes last.
+    Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces,
+    couples of the links. With inertia the momenta, too: they, not the balance, have to be those
+    that the body has, and before the last outputs are their rates; at a free pace the logarithm of
+    the period comes last.
     """
     if regime.froude:
         log_period = ca.SX.sym("log_period", int(regime.free_pace))
         froude = ca.exp(-2.0 * log_period) if regime.free_pace else regime.froude
-        return _point_with_inertia(checked_mass(body), friction, regime, froude * unit**2, log_period)
-    return _full_point(body, friction, regime) if formulation == FULL else _map_point(body, friction)
+        return _point_with_inertia(
+            checked_mass(body), friction, regime, froude * unit**2, log_period
+        )
+    return (
+        _full_point(body, friction, regime) if formulation == FULL else _map_point(body, friction)
+    )
 
 
 def _symbols(body: Body) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -71,10 +81,14 @@ def _full_point(body: Body, friction: Law, regime: Regime) -> LocalFunction:
         balance += load_wrench(body, body.posture(angles), load)  # type: ignore[attr-defined, arg-type]
         power -= ca.sum1(load * centre)
     out = ca.vertcat(laws, balance, z[2], forward(theta - regime.ahead, centre), power)
-    return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
+    return local_function(
+        "point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out
+    )
 
 
-def _point_with_inertia(body: Chain, friction: Law, regime: Regime, froude: float | ca.SX, log_period: ca.SX) -> LocalFunction:
+def _point_with_inertia(
+    body: Chain, friction: Law, regime: Regime, froude: float | ca.SX, log_period: ca.SX
+) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     forces, states, posture = (
         ca.SX.sym("forces", len(body.force_names)),
@@ -89,20 +103,31 @@ def _point_with_inertia(body: Chain, friction: Law, regime: Regime, froude: floa
         pushed += ca.vertcat(pull, 0)
         power -= ca.sum1(pull * centre)
     changes = pushed / froude + turning(z, states)
-    out = ca.vertcat(laws, own - states, changes, z[2], forward(theta - regime.ahead, centre), power)
-    return local_function("point", ca.vertcat(theta, angles, rates, z, forces, states, log_period), ca.SX(0, 1), delta, out)
+    out = ca.vertcat(
+        laws, own - states, changes, z[2], forward(theta - regime.ahead, centre), power
+    )
+    return local_function(
+        "point",
+        ca.vertcat(theta, angles, rates, z, forces, states, log_period),
+        ca.SX(0, 1),
+        delta,
+        out,
+    )
 
 
 def across_point(dynamics: Dynamics) -> LocalFunction:
     """Velocity of the centre of mass to the left of the direction whose way counts."""
     body, friction, regime, *_ = dynamics
     theta, angles, rates, z, delta = _symbols(body)
-    out = forward(theta - regime.ahead - 0.5 * np.pi, body.sliding(friction, angles, rates, z, delta).centre)
+    out = forward(
+        theta - regime.ahead - 0.5 * np.pi, body.sliding(friction, angles, rates, z, delta).centre
+    )
     return local_function("across", ca.vertcat(theta, angles, rates, z), ca.SX(0, 1), delta, out)
 
 
 def _map_point(body: Body, friction: Law) -> LocalFunction:
-    """Outputs z - Z, rates at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter)."""
+    """Outputs z - Z, rates at z, power at Z, where Z(angles, rates) solves the balance (an instance
+    parameter)."""
     theta, angles, rates, z, delta = _symbols(body)
     solved, local = ca.SX.sym("Z", 3), ca.vertcat(theta, angles, rates, z)
     balanced = body.sliding(friction, angles, rates, solved, delta)
@@ -112,29 +137,41 @@ def _map_point(body: Body, friction: Law) -> LocalFunction:
 
 
 def gait_check(check: ShapeCheck, n_joint: int, n_parameter: int) -> LocalFunction:
-    """A shape check as a function of gait parameters; given: the gait's angle matrix, by columns, and the share of the cut."""
+    """A shape check as a function of gait parameters; given: the gait's angle matrix, by columns,
+    and the share of the cut."""
     p = ca.SX.sym("p", n_parameter)
     matrix, share = ca.SX.sym("Phi", n_joint * n_parameter), ca.SX.sym("share")
     angles = ca.reshape(matrix, n_joint, n_parameter) @ p
-    return local_function("check", p, ca.vertcat(matrix, share), ca.SX.sym("delta"), check.cut(angles, share))
+    return local_function(
+        "check", p, ca.vertcat(matrix, share), ca.SX.sym("delta"), check.cut(angles, share)
+    )
 
 
 def mean_square(weights: ca.DM) -> LocalFunction:
     """The quadratic form ``p' weights p`` of gait parameters."""
     p = ca.SX.sym("p", weights.shape[0])
-    return local_function("mean_square", p, ca.SX(0, 1), ca.SX.sym("delta"), ca.bilin(weights, p, p))
+    return local_function(
+        "mean_square", p, ca.SX(0, 1), ca.SX.sym("delta"), ca.bilin(weights, p, p)
+    )
 
 
 def member_equations(gait: AnyClass, n_joint: int) -> LocalFunction:
-    """Fourier coefficients less those that the own parameters of a class give (`colloc.gaits.serpenoid`): 0 of members."""
+    """Fourier coefficients less those that the own parameters of a class give
+    (`colloc.gaits.serpenoid`): 0 of members."""
     p = ca.SX.sym("p", gait.size(n_joint))
     given = ca.vertcat(*(value for row in gait.coefficients(p, n_joint) for value in row))
-    return local_function("members", p, ca.SX(0, 1), ca.SX.sym("delta"), p[gait.n_own : gait.n_own + given.numel()] - given)
+    return local_function(
+        "members",
+        p,
+        ca.SX(0, 1),
+        ca.SX.sym("delta"),
+        p[gait.n_own : gait.n_own + given.numel()] - given,
+    )
 
 
 def density_point(quantity: Quantity, dynamics: Dynamics, unit: float) -> LocalFunction:
-    """Density of a quantity at a point, from joint angles and rates or, if it needs forces, from the locals of `with_forces`,
-    per period divided by `unit`."""
+    """Density of a quantity at a point, from joint angles and rates or, if it needs forces, from
+    the locals of `with_forces`, per period divided by `unit`."""
     theta, angles, rates, _, delta = _symbols(dynamics.body)
     if not quantity.needs_forces:
         out = quantity.at(Instants(dynamics.body, dynamics.law, angles, rates, delta, unit=unit))
@@ -146,7 +183,8 @@ def density_point(quantity: Quantity, dynamics: Dynamics, unit: float) -> LocalF
 def with_forces(
     dynamics: Dynamics, theta: ca.SX, angles: ca.SX, rates: ca.SX, delta: ca.SX, unit: float
 ) -> tuple[ca.SX, Instants]:
-    """The locals orientation, angles, rates and forces of a point of a full program, and its instant as formulas see it."""
+    """The locals orientation, angles, rates and forces of a point of a full program, and its
+    instant as formulas see it."""
     body, law = dynamics.body, dynamics.law
     forces, load = ca.SX.sym("forces", len(body.force_names)), dynamics.regime.pull(theta)
     now = Instants(body, law, angles, rates, delta, forces=forces, unit=unit, load=load)
@@ -154,7 +192,8 @@ def with_forces(
 
 
 def actuator_point(limits: PathLimits, dynamics: Dynamics, unit: float) -> LocalFunction:
-    """What limited actuators do at a point, as parts of what they can; locals and unit as of `with_forces`."""
+    """What limited actuators do at a point, as parts of what they can; locals and unit as of
+    `with_forces`."""
     theta, angles, rates, _, delta = _symbols(dynamics.body)
     local, now = with_forces(dynamics, theta, angles, rates, delta, unit)
     return local_function("actuators", local, ca.SX(0, 1), delta, limits.at(now))

@@ -1,4 +1,5 @@
-"""A collocated problem, whatever its class of gaits: objective and constraints in blocks, bounds, and names of the rows."""
+"""A collocated problem, whatever its class of gaits: objective and constraints in blocks, bounds,
+and names of the rows."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from colloc.numerics.constraint_rows import Group, stacked
 from colloc.numerics.mesh import Mesh
 
 Implicit = dict[str, Callable[[ca.MX, ca.MX], ca.MX]]
-"""By name of a block, the velocities that are tied to those of the balance solver, from its locals and delta."""
+"""By name of a block, the velocities that are tied to those of the balance solver, from its locals
+and delta."""
 
 
 class CollocatedClass(Protocol):
@@ -43,7 +45,8 @@ class CollocatedClass(Protocol):
         """The mesh in phases of a member."""
 
     def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
-        """What a check's block is given at an instant of every cell of a mesh in phases, ``(n_given, n_cell)``."""
+        """What a check's block is given at an instant of every cell of a mesh in phases,
+        ``(n_given, n_cell)``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,18 +101,26 @@ class GaitProgram:
         return self.gaits.phase_mesh(gait)
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
-        """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.
+        """Instance parameters of all blocks (objective first), with every check moved to its cell's
+        worst instant.
 
-        An inequality between nodes is kept by constraining it where the gait `parameters` comes closest to it: see
-        `colloc.collocation.worst_instants`.
+        An inequality between nodes is kept by constraining it where the gait `parameters` comes
+        closest to it: see `colloc.collocation.worst_instants`.
         """
         gait = self.member(parameters)
         mesh, given = self.phase_mesh(gait), {}
         limit = self.control.admissible.joint_limit
-        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks, limit), strict=True):
-            given[check.name] = np.vstack([self.gaits.placed(check, times, mesh), held_shares(check, gait, times)])
+        for check, times in zip(
+            self.checks, worst_instants(gait, mesh, self.checks, limit), strict=True
+        ):
+            given[check.name] = np.vstack(
+                [self.gaits.placed(check, times, mesh), held_shares(check, gait, times)]
+            )
         blocks = zip(self.names, self.assembly.blocks, strict=True)
-        return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]
+        return [
+            self.assembly.objective.parameters,
+            *(given.get(name, block.parameters) for name, block in blocks),
+        ]
 
 
 class ProgramRows(NamedTuple):
@@ -122,14 +133,25 @@ class ProgramRows(NamedTuple):
     groups: dict[str, slice]
 
 
-def stacked_rows(n: int, blocks: dict[str, BlockParts], groups: list[Group], implicit: Implicit | None = None) -> ProgramRows:
+def stacked_rows(
+    n: int, blocks: dict[str, BlockParts], groups: list[Group], implicit: Implicit | None = None
+) -> ProgramRows:
     """Groups of rows over the first of n variables, or all, one below the other."""
     ends = np.cumsum([0] + [g.m for g in groups])
     scattered = tuple(
-        Block(function, gather, stacked(groups, name, function.n_out * gather.shape[1]), given, (implicit or {}).get(name))
+        Block(
+            function,
+            gather,
+            stacked(groups, name, function.n_out * gather.shape[1]),
+            given,
+            (implicit or {}).get(name),
+        )
         for name, (function, gather, given) in blocks.items()
     )
-    linear = [sparse.csr_matrix((g.linear.data, g.linear.indices, g.linear.indptr), shape=(g.m, n)) for g in groups]
+    linear = [
+        sparse.csr_matrix((g.linear.data, g.linear.indices, g.linear.indptr), shape=(g.m, n))
+        for g in groups
+    ]
     return ProgramRows(
         sparse.vstack(linear).tocsr(),
         scattered,

@@ -1,4 +1,5 @@
-"""CasADi expressions of the bounds on shapes and their rates: joint limits, joint speeds, and links that must not cross."""
+"""CasADi expressions of the bounds on shapes and their rates: joint limits, joint speeds, and links
+that must not cross."""
 
 from __future__ import annotations
 
@@ -23,14 +24,17 @@ _PLACES, _FLAT = 9, 1e-12
 
 @dataclass(frozen=True, eq=False)
 class ShapeCheck:
-    """A scalar function of the shape that admissibility bounds from above (angles also from below), or of the shape's rates.
+    """A scalar function of the shape that admissibility bounds from above (angles also from below),
+    or of the shape's rates.
 
-    along: its values ``(n_time,)`` at shapes ``(n_joint, n_time)``. share: there, the weight of the first of two functions of
-    which this is the minimum, or -1; of the largest angle on a stretch of a smooth body, where on the body it is. cut: of
-    shapes and shares ``(n_time,)``, or CasADi's for one, the tangent planes of these weights, the function itself where they
-    are negative, or the angles at these places, ``(1, n_time)``. slope: its derivative with respect to the shape. row: it per
-    shape coordinate, if it is linear. place: which of the body's angles it is, -1 if it is none. fixed: its bounds, if these
-    are not the limits of such an angle. derivative: 1 if "shapes" are their rates per period.
+    along: its values ``(n_time,)`` at shapes ``(n_joint, n_time)``. share: there, the weight of the
+    first of two functions of which this is the minimum, or -1; of the largest angle on a stretch of
+    a smooth body, where on the body it is. cut: of shapes and shares ``(n_time,)``, or CasADi's for
+    one, the tangent planes of these weights, the function itself where they are negative, or the
+    angles at these places, ``(1, n_time)``. slope: its derivative with respect to the shape. row:
+    it per shape coordinate, if it is linear. place: which of the body's angles it is, -1 if it is
+    none. fixed: its bounds, if these are not the limits of such an angle. derivative: 1 if "shapes"
+    are their rates per period.
     """
 
     name: str
@@ -49,7 +53,8 @@ class ShapeCheck:
         return self.fixed is None or np.isfinite(self.fixed[0])
 
     def bounds(self, limit: Limit) -> tuple[float, float]:
-        """The least and the largest value allowed, for a limit on the body's angles, or one on each."""
+        """The least and the largest value allowed, for a limit on the body's angles, or one on
+        each."""
         return self.fixed or range_of(limit[self.place] if isinstance(limit, tuple) else limit)
 
     def of(self, gait: Any, times: np.ndarray) -> np.ndarray:
@@ -57,12 +62,14 @@ class ShapeCheck:
         return np.asarray(gait.rates(times) if self.derivative else gait.angles(times))
 
     def matrix(self, gait_class: Any, times: np.ndarray, n_joint: int) -> np.ndarray:
-        """The same of a class that is linear in its parameters, ``(n_time, n_joint, n_parameter)``."""
+        """The same of a class that is linear in its parameters, ``(n_time, n_joint,
+        n_parameter)``."""
         matrix = gait_class.rate_matrix if self.derivative else gait_class.angle_matrix
         return np.asarray(matrix(times, n_joint))
 
     def magnitudes(self, shapes: np.ndarray, limit: Limit) -> np.ndarray:
-        """What a bound from above is laid on, ``(n_time,)``: an angle is bounded both ways, by as much from their middle."""
+        """What a bound from above is laid on, ``(n_time,)``: an angle is bounded both ways, by as
+        much from their middle."""
         values = self.along(shapes)
         return np.abs(values - self.middle(limit)) if self.both_ways else values
 
@@ -75,11 +82,13 @@ class ShapeCheck:
         return self.share(shapes) if self.both_ways else np.full(shapes.shape[1], -1.0)
 
     def group(self, limit: Limit, n_cell: int, n: int) -> Group:
-        """The rows that keep it within its bounds in every mesh cell, by the block of its name, for n variables in all."""
+        """The rows that keep it within its bounds in every mesh cell, by the block of its name, for
+        n variables in all."""
         return block_group(self.name, *self.bounds(limit), n_cell, n)
 
     def nearer_bounds(self, values: np.ndarray, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
-        """Of the bounds on values ``(n,)``, lower and upper, the nearer one; infinite in the place of the other."""
+        """Of the bounds on values ``(n,)``, lower and upper, the nearer one; infinite in the place
+        of the other."""
         lower, upper = self.bounds(limit)
         below = values - lower < upper - values
         return np.where(below, lower, -np.inf), np.where(below, np.inf, upper)
@@ -94,26 +103,40 @@ class ShapeCheck:
 def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) -> list[ShapeCheck]:
     """Functions of the shape, or of its rates, that admissibility bounds.
 
-    Angles to be kept within the limit of the problem; then functions that must not be positive: for parts that might cross,
-    and for the pairs `far` of parts farther apart; then rates over the largest
+    Angles to be kept within the limit of the problem; then functions that must not be positive: for
+    parts that might cross, and for the pairs `far` of parts farther apart; then rates over the
+    largest
     allowed, `speeds` [rad per period] of each shape coordinate.
     """
     angles = ca.SX.sym("q", body.n_joint)
     names, stretches = enumerate(body.limit_names), body.stretches
     if stretches:
-        checks = [_stretch_check(name, angles, stretch, k) for (k, name), stretch in zip(names, stretches, strict=True)]
+        checks = [
+            _stretch_check(name, angles, stretch, k)
+            for (k, name), stretch in zip(names, stretches, strict=True)
+        ]
     else:
-        checks = [_angle_check(name, angles, row, k) for (k, name), row in zip(names, body.limited, strict=True)]
+        checks = [
+            _angle_check(name, angles, row, k)
+            for (k, name), row in zip(names, body.limited, strict=True)
+        ]
     known = _contact_checks(body)
-    checks += [known.get(each.name) or known.setdefault(each.name, _minimum_check(each, angles)) for each in body.contacts(far)]
+    checks += [
+        known.get(each.name) or known.setdefault(each.name, _minimum_check(each, angles))
+        for each in body.contacts(far)
+    ]
     unit = np.eye(body.n_joint)
-    rates = (_angle_check(f"speed of {body.coordinate} {j + 1}", angles, unit[j] / most, -1) for j, most in enumerate(speeds))
+    rates = (
+        _angle_check(f"speed of {body.coordinate} {j + 1}", angles, unit[j] / most, -1)
+        for j, most in enumerate(speeds)
+    )
     return checks + [replace(rate, fixed=(-1.0, 1.0), derivative=1) for rate in rates]
 
 
 @lru_cache(maxsize=64)
 def _contact_checks(body: Body) -> dict[str, ShapeCheck]:
-    """Those of a body's contacts that were made, by their names: most are in the checks of many sets of pairs."""
+    """Those of a body's contacts that were made, by their names: most are in the checks of many
+    sets of pairs."""
     return {}
 
 
@@ -139,11 +162,17 @@ def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> Sh
     rows = stretch.angles_at(fine)
 
     def largest(shapes: np.ndarray) -> np.ndarray:
-        """Where on the body it is, ``(n_time,)``: a parabola through the largest of some places and those beside it."""
+        """Where on the body it is, ``(n_time,)``: a parabola through the largest of some places and
+        those beside it."""
         heights = np.abs(rows @ shapes)
-        inner, every = np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2), np.arange(heights.shape[1])
+        inner, every = (
+            np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2),
+            np.arange(heights.shape[1]),
+        )
         low, mid, high = (heights[inner + k, every] for k in (-1, 0, 1))
-        offset = np.where(low - 2 * mid + high < -_FLAT, vertex(low, mid, high), np.sign(high - low))
+        offset = np.where(
+            low - 2 * mid + high < -_FLAT, vertex(low, mid, high), np.sign(high - low)
+        )
         return fine[inner] + np.clip(offset, -1, 1) * (fine[1] - fine[0])
 
     def along(shapes: np.ndarray) -> np.ndarray:
@@ -157,7 +186,9 @@ def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> Sh
 
 def _slope(cut: Callable[[Array, Array], Array], angles: ca.SX) -> ca.Function:
     share = ca.SX.sym("share")
-    return ca.Function("slope", [angles, share], [ca.densify(ca.gradient(cut(angles, share), angles))])
+    return ca.Function(
+        "slope", [angles, share], [ca.densify(ca.gradient(cut(angles, share), angles))]
+    )
 
 
 def _minimum_check(contact: Contact, angles: ca.SX) -> ShapeCheck:

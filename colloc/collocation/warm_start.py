@@ -1,4 +1,5 @@
-"""Feasible starting points: from a gait alone to all variables of a transcription, through the fixed-point solver."""
+"""Feasible starting points: from a gait alone to all variables of a transcription, through the
+fixed-point solver."""
 
 from __future__ import annotations
 
@@ -14,17 +15,25 @@ from colloc.numerics.mesh import Mesh
 
 
 def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: float) -> np.ndarray:
-    """Variables ``(n,)`` that satisfy every equation of the transcription but net rotation, for gait parameters
-    ``(n_parameter,)`` and delta in the units of the problem's class of gaits."""
+    """Variables ``(n,)`` that satisfy every equation of the transcription but net rotation, for
+    gait parameters ``(n_parameter,)`` and delta in the units of the problem's class of gaits."""
     gait = transcription.member(parameters)
     mesh = transcription.phase_mesh(gait)
-    return balanced_variables(transcription.control.dynamics, transcription.layout, mesh, gait, parameters, delta)
+    return balanced_variables(
+        transcription.control.dynamics, transcription.layout, mesh, gait, parameters, delta
+    )
 
 
 def balanced_variables(
-    dynamics: Dynamics, layout: Layout, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, delta: float
+    dynamics: Dynamics,
+    layout: Layout,
+    mesh: Mesh,
+    gait: AnyGait,
+    parameters: np.ndarray,
+    delta: float,
 ) -> np.ndarray:
-    """The same for a layout of variables, a mesh in phases of the gait, and the gait's parameters in that layout."""
+    """The same for a layout of variables, a mesh in phases of the gait, and the gait's parameters
+    in that layout."""
     x = np.zeros(layout.n)
     x[layout.parameters[:, 0]] = parameters
     unit = gait.speed_unit
@@ -37,9 +46,13 @@ def balanced_variables(
     now, z = along.now, along.z
 
     centre, weight, points = np.array(now.centre), unit * stage_weights(mesh), mesh.points
-    pose = CollocatedPose.on_mesh(mesh, unit * z[OMEGA] - kind.turn, unit * centre, first_theta(kind, begin))
+    pose = CollocatedPose.on_mesh(
+        mesh, unit * z[OMEGA] - kind.turn, unit * centre, first_theta(kind, begin)
+    )
     power = (weight * now.power[points]).sum(axis=1)
-    shares = kind.shares(Passed(complex(pose.place[-1]), float(pose.rotations.sum()), float(power.sum()), begin))
+    shares = kind.shares(
+        Passed(complex(pose.place[-1]), float(pose.rotations.sum()), float(power.sum()), begin)
+    )
     heading = float(np.angle(shares["distance"].side))
     ahead = (pose.place * np.exp(-1j * heading)).real
     climbed = (pose.place * np.conj(shares["work"].side)).real

@@ -1,4 +1,5 @@
-"""Command line: two results side by side: what was asked, what came out, and whether it is the same gait."""
+"""Command line: two results side by side: what was asked, what came out, and whether it is the same
+gait."""
 
 from __future__ import annotations
 
@@ -15,16 +16,16 @@ from colloc.results.store import load
 
 DIFFERENT = 1
 _EPILOG = """\
-Joint angles are compared at the start phase, and in the mirror image, where they are nearest; of a symmetric body also named
-from the other end, under friction that is the same both ways also run backwards. Exit codes: 0 the same optimum; 1 different;
-2 bad file.
+Joint angles are compared at the start phase, and in the mirror image, where they are nearest; of a
+symmetric body also named from the other end, under friction that is the same both ways also run
+backwards. Exit codes: 0 the same optimum; 1 different; 2 bad file.
 
   colloc compare results/a.h5 results/b.h5"""
 
 
 def gait_distance(a: Solution, b: Solution) -> float | None:
-    """Root-mean-square distance [rad] of the joint angles of two gaits, where start phase and the symmetries of body and
-    friction bring them nearest; None for other bodies."""
+    """Root-mean-square distance [rad] of the joint angles of two gaits, where start phase and the
+    symmetries of body and friction bring them nearest; None for other bodies."""
     if a.problem.body != b.problem.body:
         return None
     law = b.problem.law if a.problem.law.reversible else a.problem.law
@@ -47,7 +48,10 @@ def _short(value: object) -> str:
 def rows(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
     """What came out, as text: name, first, second."""
     first, second = _outcome(a), _outcome(b)
-    return [("", a.problem.name, b.problem.name), *((name, text, second[name]) for name, text in first.items())]
+    return [
+        ("", a.problem.name, b.problem.name),
+        *((name, text, second[name]) for name, text in first.items()),
+    ]
 
 
 def _outcome(solution: Solution) -> dict[str, str]:
@@ -59,7 +63,9 @@ def _outcome(solution: Solution) -> dict[str, str]:
         "value": f"{measured.value:.6f}",
         "  error": f"{certificate.value_error:.0e}" if certificate.replayed else "-",
         "efficiency": f"{measured.efficiency:.6f}{error}",
-        "  at delta -> 0": f"{certificate.efficiency_at_zero_delta:.6f}" if certificate.replayed else "-",
+        "  at delta -> 0": f"{certificate.efficiency_at_zero_delta:.6f}"
+        if certificate.replayed
+        else "-",
         "distance d": f"{measured.distance:.6f}",
         "work W": f"{measured.work:.6f}",
         "delta": f"{answer.delta:.1e}",
@@ -76,10 +82,16 @@ def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
         return False, f"other objectives: {what.name} and {b.problem.objective.name}."
     values = [s.measured.value for s in (a, b)]
     difference = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
-    apart, named = gait_distance(a, b), "efficiencies" if what == EFFICIENCY else f"values of {what.name}"
+    apart, named = (
+        gait_distance(a, b),
+        "efficiencies" if what == EFFICIENCY else f"values of {what.name}",
+    )
     if apart is None:
         return False, f"other bodies; {named} differ by {100 * difference:.3g} %."
-    text = f"{named} differ by {100 * difference:.3g} %, joint angles by {apart:.3g} rad (root mean square)"
+    text = (
+        f"{named} differ by {100 * difference:.3g} %, joint angles by {apart:.3g} rad (root "
+        f"mean square)"
+    )
     same = difference <= SAME_VALUE and apart < SAME_GAIT
     return same, f"{'the same optimum' if same else 'different'}: {text}."
 
@@ -102,7 +114,15 @@ def main(options: argparse.Namespace) -> int:
     lines = [("", Path(options.first).name, Path(options.second).name), *rows(a, b)]
     changes = changed_fields(a, b) if not options.quiet else []
     if changes:
-        lines += [("", "", ""), ("problem:", "", ""), *((f"  {name}", x, y) for name, x, y in changes)]
+        lines += [
+            ("", "", ""),
+            ("problem:", "", ""),
+            *((f"  {name}", x, y) for name, x, y in changes),
+        ]
     widths = [max(len(line[k]) for line in lines) for k in range(2)]
-    tell(options, facts, [*(f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines), sentence])
+    tell(
+        options,
+        facts,
+        [*(f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines), sentence],
+    )
     return OK if same else DIFFERENT

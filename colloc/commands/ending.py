@@ -1,7 +1,8 @@
-"""How every command ends: an exit code, one sentence for people where something is wrong, and no traceback for it.
+"""How every command ends: an exit code, one sentence for people where something is wrong, and no
+traceback for it.
 
-Exit codes: 0 well; 2 bad problem, option or file; 3 not converged or none found; 4 a certificate failed; 130 interrupted;
-141 the reader of the output left.
+Exit codes: 0 well; 2 bad problem, option or file; 3 not converged or none found; 4 a certificate
+failed; 130 interrupted; 141 the reader of the output left.
 Nothing heavy is imported here, so that Ctrl-C ends a command well from its first moments on.
 """
 
@@ -30,23 +31,27 @@ _page: list[TextIO] = []
 
 
 def run(parser: argparse.ArgumentParser, command: _Command, arguments: Sequence[str] | None) -> int:
-    """Parse the arguments (None: those of the process) and run a command on them, `options.command` being all that was typed;
-    returns the exit code."""
+    """Parse the arguments (None: those of the process) and run a command on them, `options.command`
+    being all that was typed; returns the exit code."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     typed = argparse.Namespace(command=" ".join([parser.prog, *words]))
     return exit_code(lambda: command(parser.parse_args(words, typed)), as_json="--json" in words)
 
 
-def command(parser: Callable[[], argparse.ArgumentParser]) -> Callable[[_Command], Callable[..., int]]:
+def command(
+    parser: Callable[[], argparse.ArgumentParser],
+) -> Callable[[_Command], Callable[..., int]]:
     """Make ``main(arguments)``, see `run`, of what a command does with its options."""
     return lambda main: lambda arguments=None: run(parser(), main, arguments)
 
 
 def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
-    """Run a command; errors made for people, and those of the system, become one sentence on standard error and an exit code.
+    """Run a command; errors made for people, and those of the system, become one sentence on
+    standard error and an exit code.
 
-    A KeyboardInterrupt may carry a sentence about what was kept. With `as_json` standard output is kept for one JSON object
-    (`show`), which the sentence is too; what anything else prints goes to standard error.
+    A KeyboardInterrupt may carry a sentence about what was kept. With `as_json` standard output is
+    kept for one JSON object (`show`), which the sentence is too; what anything else prints goes to
+    standard error.
     """
     _open_closed_streams()
     _print_in_words()
@@ -64,15 +69,30 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
         return _ended(BAD_PROBLEM, "error", str(error), as_json)
     except BrokenPipeError:
         _leave_output()
-        return _ended(UNREAD, "unread", "nobody reads the output any more; what was saved before is kept.", as_json=False)
+        return _ended(
+            UNREAD,
+            "unread",
+            "nobody reads the output any more; what was saved before is kept.",
+            as_json=False,
+        )
     except OSError as error:
         where = error.filename or "the output"
         if error.filename is None:
             _leave_output()
-        return _ended(BAD_PROBLEM, "error", f"cannot read or write {where}: {error.strerror or error}.", as_json)
+        return _ended(
+            BAD_PROBLEM,
+            "error",
+            f"cannot read or write {where}: {error.strerror or error}.",
+            as_json,
+        )
     except KeyboardInterrupt as stop:
         _end_workers()
-        return _ended(INTERRUPTED, "interrupted", f"interrupted; {str(stop) or 'nothing was written.'}", as_json)
+        return _ended(
+            INTERRUPTED,
+            "interrupted",
+            f"interrupted; {str(stop) or 'nothing was written.'}",
+            as_json,
+        )
 
 
 def show(text: str) -> None:
@@ -94,8 +114,8 @@ def _kept_page(as_json: bool) -> Iterator[None]:
 
 
 def _open_closed_streams() -> None:
-    """Streams that the caller closed lead nowhere; else the next file that is opened would get their number, and what compiled
-    code prints would go into it."""
+    """Streams that the caller closed lead nowhere; else the next file that is opened would get
+    their number, and what compiled code prints would go into it."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             try:
@@ -116,7 +136,8 @@ def said_if_interrupted(saved: Sequence[str]) -> Iterator[None]:
 
 
 def _end_workers() -> None:
-    """End processes of this one that are still at work; what they were at is not kept, and Python would wait for them."""
+    """End processes of this one that are still at work; what they were at is not kept, and Python
+    would wait for them."""
     if "multiprocessing" in sys.modules:
         for child in sys.modules["multiprocessing"].active_children():
             child.terminate()
@@ -139,7 +160,9 @@ def _leave_output() -> None:
 def _words_for(error: UnicodeError) -> tuple[str | bytes, int]:
     assert isinstance(error, UnicodeEncodeError)
     letters = error.object[error.start : error.end]
-    return "".join(_IN_WORDS.get(c) or c.encode("ascii", "backslashreplace").decode() for c in letters), error.end
+    return "".join(
+        _IN_WORDS.get(c) or c.encode("ascii", "backslashreplace").decode() for c in letters
+    ), error.end
 
 
 def _print_in_words() -> None:

@@ -22,11 +22,16 @@ _EPILOG = """\
 _FLOOR = {
     "": "    body=Chain({lengths}),",
     "feet": """\
-    # and what they stand on: feet on each link, evenly spread; or one by one, feet=(Foot(0), Wheel(1), ...)
+    # and what they stand on: feet on each link, evenly spread; or one by one,
+    # feet=(Foot(0), Wheel(1), ...)
     body=Chain({lengths}, feet={feet}),""",
     "wheels": """\
-    # and what they stand on: a wheel in the middle of each link, with its own friction in units of the weight
-    body=Chain({lengths}, feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range({links}))),""",
+    # and what they stand on: a wheel in the middle of each link, with its own friction
+    # in units of the weight
+    body=Chain(
+        {lengths},
+        feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range({links})),
+    ),""",
 }
 _TEMPLATE = '''\
 """{links} links: change what is yours, then `colloc solve {file}`."""
@@ -37,47 +42,82 @@ PROBLEM = Problem(
     name="{name}",
     # link lengths from tail to head; they add up to 1, the unit of length
 {floor}
-    # what sliding sideways, forwards and backwards costs, in units of the weight; friction does not depend on speed
+    # what sliding sideways, forwards and backwards costs, in units of the weight;
+    # friction does not depend on speed
     friction=Friction(mu_t=1.0, mu_f=1.0, mu_b=1.0),
     # the class of gaits to search, which decides the answer: more harmonics allow finer motions.
-    # "bilateral": the body run backwards in time looks the same from its head; it never turns, and half a period is enough.
-    # It needs lengths that read the same from both ends. Others: "antipodal" (the second half mirrors the first), "none"
+    # "bilateral": the body run backwards in time looks the same from its head; it never turns,
+    # and half a period is enough. It needs lengths that read the same from both ends.
+    # Others: "antipodal" (the second half mirrors the first), "none"
     gait=Harmonic(harmonics=2, symmetry="{symmetry}"),
-    # the largest angle of a joint [rad], at most pi. In degrees: `from math import radians` above, and radians(100) here
+    # the largest angle of a joint [rad], at most pi. In degrees: `from math import radians`
+    # above, and radians(100) here
     joint_limit=3.14,
-    # No guess is needed: travelling waves, known gaits and random ones are tried. guess=Fourier(mean, cos, sin) adds yours.
+    # No guess is needed: travelling waves, known gaits and random ones are tried.
+    # guess=Fourier(mean, cos, sin) adds yours.
 )
 '''
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("init", "Write a commented problem file for a chain of links; it runs as it is.", _EPILOG)
-    parser.add_argument("problem", type=Path, metavar="FILE.py", help="the file to write; an existing one is left alone")
+    parser = new_parser(
+        "init", "Write a commented problem file for a chain of links; it runs as it is.", _EPILOG
+    )
+    parser.add_argument(
+        "problem",
+        type=Path,
+        metavar="FILE.py",
+        help="the file to write; an existing one is left alone",
+    )
     chain = parser.add_mutually_exclusive_group()
-    chain.add_argument("--links", type=int, default=_FEWEST, metavar="N", help=f"equal links (default: {_FEWEST})")
-    chain.add_argument("--lengths", type=float, nargs="+", metavar="L", help="of the links, tail to head, in any unit")
+    chain.add_argument(
+        "--links", type=int, default=_FEWEST, metavar="N", help=f"equal links (default: {_FEWEST})"
+    )
+    chain.add_argument(
+        "--lengths",
+        type=float,
+        nargs="+",
+        metavar="L",
+        help="of the links, tail to head, in any unit",
+    )
     floor = parser.add_mutually_exclusive_group()
-    floor.add_argument("--feet", type=int, default=0, metavar="N", help="feet on each link (default: none, it lies)")
+    floor.add_argument(
+        "--feet",
+        type=int,
+        default=0,
+        metavar="N",
+        help="feet on each link (default: none, it lies)",
+    )
     floor.add_argument("--wheels", action="store_true", help="a wheel in the middle of each link")
     add_printing(parser)
     return parser
 
 
 def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bool = False) -> str:
-    """Text of a problem file for a chain of links of such lengths, in any unit, on the floor, on feet or on wheels.
+    """Text of a problem file for a chain of links of such lengths, in any unit, on the floor, on
+    feet or on wheels.
 
     Raises `ProblemError` if a number is out of range, or the file's name cannot be a problem's.
     """
     links, whole = len(lengths), math.fsum(lengths)
     if not _FEWEST <= links <= _MOST:
-        raise ProblemError(f"a chain must have {_FEWEST} to {_MOST} links here, not {links}{' or more' * (links > _MOST)}.")
+        raise ProblemError(
+            f"a chain must have {_FEWEST} to {_MOST} links here, not "
+            f"{links}{' or more' * (links > _MOST)}."
+        )
     if not (all(length > 0 for length in lengths) and math.isfinite(whole)):
-        raise ProblemError(f"--lengths must be positive numbers, not {', '.join(f'{length:g}' for length in lengths)}.")
+        raise ProblemError(
+            f"--lengths must be positive numbers, not "
+            f"{', '.join(f'{length:g}' for length in lengths)}."
+        )
     if max(lengths) > _LONGER * min(lengths):
-        raise ProblemError(f"the longest of --lengths is more than {_LONGER:g} times as long as the shortest.")
+        raise ProblemError(
+            f"the longest of --lengths is more than {_LONGER:g} times as long as the shortest."
+        )
     if path.suffix != ".py":
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
-    Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))  # refuses what files cannot have
+    # refuses what files cannot have
+    Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))
     names = ["Chain", "Friction", "Harmonic", "Problem", *(["Wheel"] if wheels else [])]
     floor = _FLOOR["wheels" if wheels else "feet" if feet else ""]
     return _TEMPLATE.format(
@@ -86,7 +126,9 @@ def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bo
         name=path.stem,
         names=", ".join(names),
         floor=floor.format(
-            lengths=f"({', '.join(f'{length:.12g} / {whole:.12g}' for length in lengths)})", feet=feet, links=links
+            lengths=f"({', '.join(f'{length:.12g} / {whole:.12g}' for length in lengths)})",
+            feet=feet,
+            links=links,
         ),
         symmetry="bilateral" if list(lengths) == list(reversed(lengths)) else "none",
     )

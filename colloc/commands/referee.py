@@ -1,6 +1,7 @@
 """Command line: check the table of known gaits from the gaits alone, and take in what is better.
 
-Exit codes: 0 every row holds, 2 bad table or result, or one that is not better, 4 a row does not hold, 130 interrupted.
+Exit codes: 0 every row holds, 2 bad table or result, or one that is not better, 4 a row does not
+hold, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -15,22 +16,34 @@ from colloc.system.errors import CollocError, ProblemError
 from colloc.system.progress import StatusLine
 
 _EPILOG = """\
-A row is a problem, a gait and a value; the referee replays the gait, and believes nothing else. A result is taken in if it is
-certified, and better than what is known of the same question: body, friction, class of gaits, objective, limits and delta.
+A row is a problem, a gait and a value; the referee replays the gait, and believes nothing else. A
+result is taken in if it is certified, and better than what is known of the same question: body,
+friction, class of gaits, objective, limits and delta.
 
   colloc referee
   colloc referee --only three_link
-  colloc referee --add results/mine.h5 --by "colloc solve mine.py"      into known.json, begun as a copy"""
+  colloc referee --add results/mine.h5 --by "colloc solve mine.py"    into known.json"""
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("referee", "Check the best gaits that are known, from the gaits alone; take in better ones.", _EPILOG)
-    table = "another table than the one that comes with colloc; with --add (default: known.json) begun as a copy of that"
+    parser = new_parser(
+        "referee",
+        "Check the best gaits that are known, from the gaits alone; take in better ones.",
+        _EPILOG,
+    )
+    table = (
+        "another table than the one that comes with colloc; with --add (default: known.json) "
+        "begun as a copy of that"
+    )
     parser.add_argument("--table", metavar="FILE.json", help=table)
     parser.add_argument("--only", metavar="NAME", help="rows of the problem of this name")
-    parser.add_argument("--dry", action="store_true", help="check bounds under dry friction as well")
+    parser.add_argument(
+        "--dry", action="store_true", help="check bounds under dry friction as well"
+    )
     parser.add_argument("--add", metavar="FILE.h5", help="a result to take in")
-    parser.add_argument("--by", metavar="COMMAND", help="with --add: the command that anyone can find it with")
+    parser.add_argument(
+        "--by", metavar="COMMAND", help="with --add: the command that anyone can find it with"
+    )
     add_printing(parser)
     return parser
 
@@ -54,11 +67,23 @@ def _checked(options: argparse.Namespace, rows: Sequence) -> int:
             name = row.statement["name"]
             progress.say(f"{name}: replaying, {number + 1} of {len(chosen)}")
             try:
-                complaint = row.complaint(row.certificate()) or (row.dry_complaint() if options.dry else "")
+                complaint = row.complaint(row.certificate()) or (
+                    row.dry_complaint() if options.dry else ""
+                )
             except CollocError as error:
                 complaint = str(error)
-            told.append({"name": name, "value": row.value, "value_error": row.value_error, "complaint": complaint})
-            lines.append(f"  {'NO ' if complaint else 'ok '} {name:<28s} {row.value:.8f} +- {row.value_error:.0e}  {complaint}")
+            told.append(
+                {
+                    "name": name,
+                    "value": row.value,
+                    "value_error": row.value_error,
+                    "complaint": complaint,
+                }
+            )
+            lines.append(
+                f"  {'NO ' if complaint else 'ok '} {name:<28s} {row.value:.8f} +- "
+                f"{row.value_error:.0e}  {complaint}"
+            )
     failed = sum(bool(each["complaint"]) for each in told)
     verdict = f"{len(told) - failed} of {len(told)} rows hold"
     tell(options, {"rows": told, "failed": failed}, [verdict, *(line.rstrip() for line in lines)])
@@ -75,6 +100,10 @@ def _taken_in(options: argparse.Namespace) -> int:
     table = Path(options.table or "known.json")
     with alone_in(table.parent):  # no other takes a row in between the reading and the writing
         save_known(with_row(known(table if table.exists() else None), new), table)
-    said = f"{new.statement['name']}: {new.value:.8f} +- {new.value_error:.0e} is the best that is known; saved {table}"
+    said = (
+        f"{new.statement['name']}: {new.value:.8f} +- {new.value_error:.0e} is the best "
+        f"that is "
+        f"known; saved {table}"
+    )
     tell(options, {"name": new.statement["name"], "value": new.value, "table": str(table)}, [said])
     return OK

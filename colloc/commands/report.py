@@ -1,4 +1,5 @@
-"""Command line: a self-contained web page about a result, and its figures one by one for a publication.
+"""Command line: a self-contained web page about a result, and its figures one by one for a
+publication.
 
 Exit codes: 0 written, 2 bad file or option.
 """
@@ -29,22 +30,33 @@ from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
 
 _EPILOG = """\
-The page needs no network and no other file: film with friction, robot, shape space, speeds, power, certificate, convergence,
-mesh, problem source, versions, and how to reproduce it. Results that failed get a page too.
+The page needs no network and no other file: film with friction, robot, shape space, speeds, power,
+certificate, convergence, mesh, problem source, versions, and how to reproduce it. Results that
+failed get a page too.
 
   colloc report results/three_link.h5                 results/three_link.html
-  colloc report results/three_link.h5 --figures       also results/three_link-*.pdf and .png, one panel each
-  colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5          with speed, power and torques of a robot"""
+  colloc report results/three_link.h5 --figures       also PDF and PNG of each panel
+  colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5   of a robot"""
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("report", "Write one self-contained web page about a result.", _EPILOG)
     add_result(parser)
-    parser.add_argument("--problem", metavar="FILE.py", help="problem file whose REFERENCE to hold the result against")
-    parser.add_argument("--figures", action="store_true", help="also write publication figures, PDF and PNG, one panel each")
+    parser.add_argument(
+        "--problem",
+        metavar="FILE.py",
+        help="problem file whose REFERENCE to hold the result against",
+    )
+    parser.add_argument(
+        "--figures",
+        action="store_true",
+        help="also write publication figures, PDF and PNG, one panel each",
+    )
     add_robot(parser)
     add_pace(parser)
-    parser.add_argument("--output", metavar="PATH", help="folder, or .html file (default: beside the result)")
+    parser.add_argument(
+        "--output", metavar="PATH", help="folder, or .html file (default: beside the result)"
+    )
     add_printing(parser)
     return parser
 
@@ -56,7 +68,13 @@ def main(options: argparse.Namespace) -> int:
     path = output_path(options.output, source.with_suffix(".html"))
     with StatusLine(enabled=not (options.quiet or options.json)) as line:
         line.say("writing the page")
-        write_report(solution, path, _reference(options.problem), source.parent, robot=_robot(solution, options))
+        write_report(
+            solution,
+            path,
+            _reference(options.problem),
+            source.parent,
+            robot=_robot(solution, options),
+        )
         figures: list[Path] = []
         if options.figures:
             from colloc.pictures.publication import save_panels
@@ -64,7 +82,12 @@ def main(options: argparse.Namespace) -> int:
             line.say("drawing the figures")
             figures = save_panels(solution, path.with_suffix(""))
     size = path.stat().st_size
-    facts = {"status": "written", "file": str(path), "bytes": size, "figures": [str(f) for f in figures]}
+    facts = {
+        "status": "written",
+        "file": str(path),
+        "bytes": size,
+        "figures": [str(f) for f in figures],
+    }
     saved = f"saved {path} ({size / 1000:.0f} kB, self-contained)"
     tell(options, facts, [saved, *(f"  {figure}" for figure in figures)])
     return OK

@@ -24,21 +24,33 @@ from colloc.results.robot import Robot
 from colloc.results.store import load
 
 _EPILOG = """\
-The robot is as long as its links together, and its mass is spread over them as the problem says. The numbers
-are those at the period that is given, with inertia. The friction coefficients are those of the problem.
+The robot is as long as its links together, and its mass is spread over them as the problem says.
+The numbers are those at the period that is given, with inertia. The friction coefficients are those
+of the problem.
 
   colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5
-  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --max-speed 2.0 --max-torque 2.5 2.0
-  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --figure        results/three_link.robot.png"""
+  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 \\
+    --max-speed 2.0 --max-torque 2.5 2.0
+  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --figure   with a picture"""
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("robot", "What a gait does on a robot: speed, work, power, torques, the shortest period.", _EPILOG)
+    parser = new_parser(
+        "robot",
+        "What a gait does on a robot: speed, work, power, torques, the shortest period.",
+        _EPILOG,
+    )
     add_result(parser)
     add_robot(parser, required=True)
     add_pace(parser, required=True)
-    parser.add_argument("--figure", action="store_true", help="also draw torque, speed and power over time")
-    parser.add_argument("--output", metavar="PATH", help="folder or .png file of the figure (default: beside the result)")
+    parser.add_argument(
+        "--figure", action="store_true", help="also draw torque, speed and power over time"
+    )
+    parser.add_argument(
+        "--output",
+        metavar="PATH",
+        help="folder or .png file of the figure (default: beside the result)",
+    )
     add_printing(parser)
     return parser
 

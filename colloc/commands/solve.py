@@ -10,7 +10,16 @@ from pathlib import Path
 
 from colloc.commands import ending
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, command, said_if_interrupted
-from colloc.commands.options import add_bound, add_printing, add_problem, add_verbose, changed, new_parser, output_path, tell
+from colloc.commands.options import (
+    add_bound,
+    add_printing,
+    add_problem,
+    add_verbose,
+    changed,
+    new_parser,
+    output_path,
+    tell,
+)
 from colloc.commands.summary import kept_facts, kept_lines, summary_dict, summary_lines
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
@@ -18,16 +27,23 @@ from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
 
 _MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
-"""Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""
+"""Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000
+intervals."""
 SEARCHES = ("reduced", "full")
-EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED, INTERRUPTED: ending.INTERRUPTED}
+EXIT = {
+    SOLVED: OK,
+    NOT_CONVERGED: NONE_FOUND,
+    CERTIFICATE_FAILED: FAILED,
+    INTERRUPTED: ending.INTERRUPTED,
+}
 _EPILOG = """\
-Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130 interrupted.
+Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130
+interrupted.
 
-A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. A former result of another problem called NAME, or
-a better one of this problem, is kept as NAME.former-1.h5. What is found on the way is kept in NAME.run.sqlite; after Ctrl-C or
-a crash the same command goes on, and ends as if nothing had happened. Ctrl-C leaves the best gait so far in
-NAME.interrupted.h5.
+A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. A former result of
+another problem called NAME, or a better one of this problem, is kept as NAME.former-1.h5. What is
+found on the way is kept in NAME.run.sqlite; after Ctrl-C or a crash the same command goes on, and
+ends as if nothing had happened. Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
 
   colloc solve problems/three_link.py
   colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
@@ -35,12 +51,20 @@ NAME.interrupted.h5.
 
 
 def _parser() -> argparse.ArgumentParser:
-    what = "Find the best gait of a problem file, by default the most efficient, and certify it by an independent replay."
+    what = (
+        "Find the best gait of a problem file, by default the most efficient, and certify "
+        "it by "
+        "an independent replay."
+    )
     parser = new_parser("solve", what, _EPILOG)
     add_problem(parser)
-    parser.add_argument("--start", metavar="FILE.h5", help="start from the gait of an earlier result")
+    parser.add_argument(
+        "--start", metavar="FILE.h5", help="start from the gait of an earlier result"
+    )
     parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
-    parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
+    parser.add_argument(
+        "--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)"
+    )
     parser.add_argument(
         "--starts",
         type=int,
@@ -58,11 +82,16 @@ def _parser() -> argparse.ArgumentParser:
         "--search",
         choices=SEARCHES,
         default=SEARCHES[0],
-        help="reduced: SQP on the gait's parameters, answered by IPOPT on the full program (default); full: IPOPT on the full "
+        help="reduced: SQP on the gait's parameters, answered by IPOPT on the full program "
+        "(default); full: IPOPT on the full "
         "program at every level of delta, from the guess alone",
     )
     add_bound(parser)
-    parser.add_argument("--dry", action="store_true", help="certify it also under dry friction, with no delta (a second)")
+    parser.add_argument(
+        "--dry",
+        action="store_true",
+        help="certify it also under dry friction, with no delta (a second)",
+    )
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png")
     parser.add_argument("--pdf", action="store_true", help="draw NAME.pdf too")
     add_printing(parser)
@@ -87,7 +116,10 @@ def main(options: argparse.Namespace) -> int:
     if not quiet and problem.intervals > _MANY_INTERVALS:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
         hint = "mesh_tolerance refines a small mesh where it has to be fine"
-        print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
+        print(
+            f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.",
+            file=sys.stderr,
+        )
     # a gait that is given on the command line is to be improved, not left for another
     starts = options.starts or (1 if options.start else stated.starts)
     with StatusLine(enabled=not quiet) as line:
@@ -117,12 +149,21 @@ def main(options: argparse.Namespace) -> int:
             if options.bound:
                 line.say("computing an upper bound on every gait")
             try:
-                bound = upper_bound(problem, path.parent, compute=options.bound and not solution.interrupted)
+                bound = upper_bound(
+                    problem, path.parent, compute=options.bound and not solution.interrupted
+                )
             except CollocError as error:  # what is solved is not lost for it
                 complaints.append(f"no bound: {error}")
-        facts = {**summary_dict(solution, path if saved else None, stated.reference, bound), "kept": kept_facts(kept)}
+        facts = {
+            **summary_dict(solution, path if saved else None, stated.reference, bound),
+            "kept": kept_facts(kept),
+        }
         said = summary_lines(solution, stated.reference, verbose=options.verbose)
-        tell(options, facts, [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)])
+        tell(
+            options,
+            facts,
+            [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)],
+        )
         if saved and not options.no_figure and not solution.interrupted:
             with StatusLine(enabled=not quiet) as line:
                 line.say("drawing")
@@ -144,4 +185,9 @@ def _drawn(solution: Solution, path: Path, *, pdf: bool) -> list[str]:
     from colloc.pictures.solution_figure import solution_figure
     from colloc.pictures.style import save as save_figure
 
-    return [str(file) for file in save_figure(solution_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + pdf])]
+    return [
+        str(file)
+        for file in save_figure(
+            solution_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + pdf]
+        )
+    ]

@@ -21,23 +21,29 @@ if TYPE_CHECKING:
     from colloc.results.kept import Saved
 
 
-def summary_lines(solution: Solution, reference: Reference | None, *, verbose: bool = False) -> list[str]:
-    """What a person wants to know at the end: the result, whether the checks hold, and what failed; with `verbose` also the
-    search, the gait and every check."""
+def summary_lines(
+    solution: Solution, reference: Reference | None, *, verbose: bool = False
+) -> list[str]:
+    """What a person wants to know at the end: the result, whether the checks hold, and what failed;
+    with `verbose` also the search, the gait and every check."""
     verdict = f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"
     certificate = solution.certificate
     lines = [verdict]
     if certificate.replayed:
-        alone = solution.answer.program in (PRESCRIBED, EVALUATED)  # what these are the best of, `_search_lines` tells
+        # what these are the best of, `_search_lines` tells
+        alone = solution.answer.program in (PRESCRIBED, EVALUATED)
         best = solution.problem.objective
         lines = [
             verdict if alone else f"{verdict} ({solution.standing[0]})",
-            f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e} by independent replay "
+            f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e} by "
+            f"independent replay "
             f"({certificate.instants} instants); {certificate.value_at_zero_delta:.6f} +- "
             f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
             *_besides(solution),
-            f"  distance d      {certificate.distance:.6f} +- {certificate.errors['distance']:.0e}      "
-            f"work W  {certificate.work:.6f} +- {certificate.errors['work']:.0e}      at delta {solution.answer.delta:.0e}",
+            f"  distance d      {certificate.distance:.6f} +- "
+            f"{certificate.errors['distance']:.0e}      "
+            f"work W  {certificate.work:.6f} +- {certificate.errors['work']:.0e}      at delta "
+            f"{solution.answer.delta:.0e}",
         ]
         lines += _background(solution) if verbose else []
         lines += _check_lines(certificate, verbose)
@@ -61,14 +67,20 @@ def _background(solution: Solution) -> list[str]:
 
 
 def _check_lines(certificate: Certificate, verbose: bool) -> list[str]:
-    """Every check; or in one line that they hold, with the one that comes nearest to its limit, and those that fail."""
+    """Every check; or in one line that they hold, with the one that comes nearest to its limit, and
+    those that fail."""
     if verbose:
         return [f"  {check.line()}" for check in certificate.checks]
     held = [check for check in certificate.checks if check.passed]
-    nearest = max(held, key=lambda check: abs(check.value) / max(check.threshold, 1e-300), default=None)
+    nearest = max(
+        held, key=lambda check: abs(check.value) / max(check.threshold, 1e-300), default=None
+    )
     lines = [f"  {check.line()}" for check in certificate.failures]
     if nearest is not None:
-        largest = f"largest: {nearest.name}, {abs(nearest.value):.1e} where {nearest.threshold:.0e} is allowed"
+        largest = (
+            f"largest: {nearest.name}, {abs(nearest.value):.1e} where "
+            f"{nearest.threshold:.0e} is allowed"
+        )
         lines.insert(0, f"  {len(held)} checks hold ({largest})")
     return lines
 
@@ -77,13 +89,23 @@ def _besides(solution: Solution) -> list[str]:
     """What a period comes to that its objective, and what is asked for, make worth telling."""
     found, problem, lines = solution.certificate, solution.problem, []
     if problem.objective != EFFICIENCY:
-        lines.append(f"  {EFFICIENCY.label:<15s} {found.efficiency:.6f} +- {found.efficiency_error:.0e}")
+        lines.append(
+            f"  {EFFICIENCY.label:<15s} {found.efficiency:.6f} +- {found.efficiency_error:.0e}"
+        )
     if found.dry is not None:
-        lines.append(f"  dry friction    between {found.dry[0]:.8f} and {found.dry[1]:.8f}, with no delta")
-    lines += [f"  {each.name.replace('_', ' '):<15s} {found.values[each.name]:.6f}" for each in problem.integrals]
+        lines.append(
+            f"  dry friction    between {found.dry[0]:.8f} and {found.dry[1]:.8f}, with no delta"
+        )
+    lines += [
+        f"  {each.name.replace('_', ' '):<15s} {found.values[each.name]:.6f}"
+        for each in problem.integrals
+    ]
     with suppress(NotConvergedError):  # of what a slope holds only while it moves
         if problem.froude:
-            slowly = f"{solution.played_slowly:.6f} ({problem.objective.short} of the same gait without inertia)"
+            slowly = (
+                f"{solution.played_slowly:.6f} ({problem.objective.short} of the same gait "
+                f"without inertia)"
+            )
             lines.append(f"  played slowly   {slowly}")
     if (held := solution.share_held).any():
         shares = ", ".join(f"{100 * share:.0f}" for share in held)
@@ -100,16 +122,26 @@ def _search_lines(solution: Solution) -> list[str]:
     """What was solved last, and what the gait is the best of."""
     answer = solution.answer
     if answer.program == PRESCRIBED:
-        return [f"nothing is free: the motion is prescribed, measured on a mesh of {answer.edges.size - 1} intervals"]
+        return [
+            f"nothing is free: the motion is prescribed, measured on a mesh of "
+            f"{answer.edges.size - 1} intervals"
+        ]
     if answer.program == EVALUATED:
-        return [f"nothing is sought: the gait was given, measured on a mesh of {answer.edges.size - 1} intervals"]
+        return [
+            f"nothing is sought: the gait was given, measured on a mesh of {answer.edges.size - 1} "
+            f"intervals"
+        ]
     rows = f"{answer.x.size} variables, {answer.lam_g.size} constraints"
     how = f"{answer.iterations} iterations of IPOPT" if answer.program != REDUCED else answer.status
-    lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {answer.kkt_error:.0e}"]
+    lines = [
+        f"{solution.problem.formulation} program: {rows}, {how}, KKT error {answer.kkt_error:.0e}"
+    ]
     return [*lines, *solution.standing]
 
 
-def summary_dict(solution: Solution, path: Path | None, reference: Reference | None, bound: Bound | None) -> dict:
+def summary_dict(
+    solution: Solution, path: Path | None, reference: Reference | None, bound: Bound | None
+) -> dict:
     """The same as one JSON object; without a path nothing is saved."""
     certificate = solution.certificate
     result: dict = {
@@ -137,7 +169,12 @@ def summary_dict(solution: Solution, path: Path | None, reference: Reference | N
         "limits": limit_use.shares(solution) if certificate.replayed else {},
         "feet_hold": solution.share_held.tolist() if certificate.replayed else [],
         "others": [
-            {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
+            {
+                "value": a.value,
+                "delta": a.delta,
+                "starts": a.starts,
+                "on_speed_floor": a.on_speed_floor,
+            }
             for a in solution.others
         ],
         "gait": fields(solution.gait),

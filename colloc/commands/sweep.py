@@ -1,4 +1,5 @@
-"""Command line: run a study file over processes or a Dask cluster; resumable, and nothing finished is ever lost."""
+"""Command line: run a study file over processes or a Dask cluster; resumable, and nothing finished
+is ever lost."""
 
 from __future__ import annotations
 
@@ -24,16 +25,41 @@ _MOST_FAILURES_SHOWN = 12
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser(
         "sweep",
-        "Solve every problem of a study file; starts travel between neighbours. What is done is not solved again.",
-        "Exit codes: 0 every cell has a certified gait; 2 bad study, option or folder; 3 some cells have none;\n"
+        "Solve every problem of a study file; starts travel between neighbours. What is done is "
+        "not solved again.",
+        "Exit codes: 0 every cell has a certified gait; 2 bad study, option or folder; 3 some "
+        "cells have none;\n"
         "130 interrupted (what is done is kept). A study file is Python code, and is executed.",
     )
-    parser.add_argument("study", help="a Python file that states STUDY, for example studies/friction_plane.py")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes, one BLAS thread each (default: 1)")
-    parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster (tcp://host:8786), or 'local'")
-    parser.add_argument("--chunk", type=int, metavar="N", help="cells to a task, instead of the study's own number")
-    parser.add_argument("--retry", action="store_true", help="solve again what ended in an error, a crash or the time limit")
-    parser.add_argument("--output", metavar="FOLDER", default="results", help="for NAME.nc and NAME.study/ (default: results)")
+    parser.add_argument(
+        "study", help="a Python file that states STUDY, for example studies/friction_plane.py"
+    )
+    parser.add_argument(
+        "--workers",
+        type=int,
+        default=1,
+        metavar="N",
+        help="processes, one BLAS thread each (default: 1)",
+    )
+    parser.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="scheduler of a Dask cluster (tcp://host:8786), or 'local'",
+    )
+    parser.add_argument(
+        "--chunk", type=int, metavar="N", help="cells to a task, instead of the study's own number"
+    )
+    parser.add_argument(
+        "--retry",
+        action="store_true",
+        help="solve again what ended in an error, a crash or the time limit",
+    )
+    parser.add_argument(
+        "--output",
+        metavar="FOLDER",
+        default="results",
+        help="for NAME.nc and NAME.study/ (default: results)",
+    )
     add_printing(parser)
     return parser
 
@@ -55,7 +81,11 @@ def _executor(options: argparse.Namespace) -> tuple[Callable[[int], Executor] | 
         return None, options.workers
     from colloc.system.dask_pool import connected
 
-    return connected(options.dask, options.workers, lambda text: print(f"colloc: {text}", file=sys.stderr, flush=True))
+    return connected(
+        options.dask,
+        options.workers,
+        lambda text: print(f"colloc: {text}", file=sys.stderr, flush=True),
+    )
 
 
 def _run(study: Study, source: str, options: argparse.Namespace) -> int:
@@ -76,21 +106,30 @@ def _run(study: Study, source: str, options: argparse.Namespace) -> int:
         if not quiet:
             _announce(run)
         try:
-            interrupted = _work(run, options, quiet, lambda: _save(run, out, source, options.command))
+            interrupted = _work(
+                run, options, quiet, lambda: _save(run, out, source, options.command)
+            )
         except CollocError:
             _save(run, out, source, options.command)
             raise
         path = _save(run, out, source, options.command)
     tell(options, _summary(run, path), _summary_lines(run, path))
     if interrupted:
-        print("colloc: interrupted; what is done is kept, and the same command goes on from there.", file=sys.stderr)
+        print(
+            "colloc: interrupted; what is done is kept, and the same command goes on from there.",
+            file=sys.stderr,
+        )
         return INTERRUPTED
     return OK if all(state.best for state in run.cells.values()) else NONE_FOUND
 
 
 def _announce(run) -> None:
     todo, total = len(run.missing), len(run.cells)
-    print(f"{run.study.name}: {total} cells, {total - todo} done already or without a problem, {todo} to go", flush=True)
+    print(
+        f"{run.study.name}: {total} cells, {total - todo} done already or without a problem, "
+        f"{todo} to go",
+        flush=True,
+    )
 
 
 def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path]) -> bool:
@@ -111,9 +150,12 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
                 what = f"{best.outcome.value:9.6f}" if best else "     none"
                 tries = Counter(a.outcome.status for a in progress.new)
                 told = ", ".join(f"{n} {status}" for status, n in tries.items())
-                left = (time.perf_counter() - begin) / progress.done * (progress.total - progress.done)
+                left = (
+                    (time.perf_counter() - begin) / progress.done * (progress.total - progress.done)
+                )
                 print(
-                    f"{cell_text(run.study, progress.cell)}: {what}  ({told}; round {number}: {progress.done} of "
+                    f"{cell_text(run.study, progress.cell)}: {what}  ({told}; round {number}: "
+                    f"{progress.done} of "
                     f"{progress.total}, {left:.0f} s left)",
                     flush=True,
                 )
@@ -138,14 +180,22 @@ def _save(run, out: Path, source: str, command: str) -> Path:
         known = upper_bound(problem, out, compute=False)
         return None if known is None else known.sampled
 
-    return save_study(study_table(run, bound), out / f"{run.study.name}.nc", source=source, command=command)
+    return save_study(
+        study_table(run, bound), out / f"{run.study.name}.nc", source=source, command=command
+    )
 
 
 def _summary(run, path: Path) -> dict:
     from colloc.studies.table import NO_PROBLEM, NOT_TRIED
 
     counts = Counter(
-        "solved" if s.best else NO_PROBLEM if s.problem is None else "no certified gait" if s.attempts else f"{NOT_TRIED} yet"
+        "solved"
+        if s.best
+        else NO_PROBLEM
+        if s.problem is None
+        else "no certified gait"
+        if s.attempts
+        else f"{NOT_TRIED} yet"
         for s in run.cells.values()
     )
     below = [run.study.coordinates(cell) for cell in run.cells if run.below_neighbour(cell)]
@@ -165,14 +215,27 @@ def _summary_lines(run, path: Path) -> list[str]:
     lines = [f"{run.study.name}: {len(run.cells)} cells: {counts}; saved {path}"]
     below = [cell for cell in run.cells if run.below_neighbour(cell)]
     if below:
-        lines.append(f"  {len(below)} of them below what a neighbour's gait achieves there as it is: more starts may find more")
+        lines.append(
+            f"  {len(below)} of them below what a neighbour's gait achieves there as it is: more "
+            f"starts may find more"
+        )
     for cell in below[:_MOST_FAILURES_SHOWN]:
         found, could = run.cells[cell].best.outcome.value, run.neighbour_value(cell)
-        lines.append(f"  {cell_text(run.study, cell)}: {found:.6f}, where a neighbour's gait achieves {could:.6f}")
-    failed = [(cell, state) for cell, state in run.cells.items() if not state.best and (state.attempts or state.message)]
+        lines.append(
+            f"  {cell_text(run.study, cell)}: {found:.6f}, where a neighbour's gait achieves "
+            f"{could:.6f}"
+        )
+    failed = [
+        (cell, state)
+        for cell, state in run.cells.items()
+        if not state.best and (state.attempts or state.message)
+    ]
     for cell, state in failed[:_MOST_FAILURES_SHOWN]:
         message = state.attempts[-1].outcome.message if state.attempts else state.message
         lines.append(f"  {cell_text(run.study, cell)}: {message}")
     if len(failed) > _MOST_FAILURES_SHOWN:
-        lines.append(f"  ... and {len(failed) - _MOST_FAILURES_SHOWN} more; all are in the file, with their messages")
+        lines.append(
+            f"  ... and {len(failed) - _MOST_FAILURES_SHOWN} more; all are in the file, with their "
+            f"messages"
+        )
     return lines

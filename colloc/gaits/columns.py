@@ -1,4 +1,5 @@
-"""Gaits on functions of one's own: joint angles are linear in columns over time, such as the primitives of a controller."""
+"""Gaits on functions of one's own: joint angles are linear in columns over time, such as the
+primitives of a controller."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 
 Column: TypeAlias = Any
-"""Samples over a period, ``(n_time,)`` or ``(n_joint, n_time)``, or a function of phases that returns such."""
+"""Samples over a period, ``(n_time,)`` or ``(n_joint, n_time)``, or a function of phases that
+returns such."""
 
 _DEGREE, _FEWEST, _SAMPLED, _ROUNDING = 5, 24, 192, 1e-15
 """Of the interpolating spline; samples at least; samples of functions; rounding."""
@@ -27,7 +29,8 @@ _ROUGH = 0.02
 _EVEN = 1e-3
 """Relative difference of steps that counts as none."""
 _RESOLVED, _MOST = 1e-6, 24
-"""Share of the mean square rate that harmonics left out may hold, and the most that meshes are made for."""
+"""Share of the mean square rate that harmonics left out may hold, and the most that meshes are made
+for."""
 
 
 @named_arguments
@@ -35,30 +38,33 @@ _RESOLVED, _MOST = 1e-6, 24
 class Basis(LinearClass):
     """The class of gaits that are linear in columns of one's own over time.
 
-    A column is known at evenly spaced phases and interpolated by a periodic spline of degree 5. Where the search is, only its
-    multiple can change: neither its shape nor its phase.
+    A column is known at evenly spaced phases and interpolated by a periodic spline of degree 5.
+    Where the search is, only its multiple can change: neither its shape nor its phase.
 
     Parameters
     ----------
     columns : sequence, or path of a CSV file
-        Each column is ``(n_time,)``, a function of time that every joint has a coefficient of; or ``(n_joint, n_time)``, angles
-        of all joints, with one coefficient [rad]. Samples are evenly spaced over one period, the first not repeated, at least
-        24; or a column is a function of phases ``(n_time,)`` that returns such values. A file has times in its first column
-        and functions of time in the others.
+        Each column is ``(n_time,)``, a function of time that every joint has a coefficient of; or
+        ``(n_joint, n_time)``, angles of all joints, with one coefficient [rad]. Samples are evenly
+        spaced over one period, the first not repeated, at least 24; or a column is a function of
+        phases ``(n_time,)`` that returns such values. A file has times in its first column and
+        functions of time in the others.
     symmetry : {"none", "bilateral", "antipodal"}
         One that the columns have: images of columns have to be combinations of columns.
 
     Raises
     ------
     ProblemError
-        If the columns cannot be read, are not finite, do not close, are too rough to be interpolated, or depend on one another.
+        If the columns cannot be read, are not finite, do not close, are too rough to be
+        interpolated, or depend on one another.
 
     Examples
     --------
     >>> import numpy as np
     >>> from colloc import Basis
     >>> bump = lambda t: np.exp(2 * np.cos(2 * np.pi * t))
-    >>> four = Basis([bump, lambda t: bump(t - 0.25), lambda t: bump(t - 0.5), lambda t: bump(t - 0.75)])
+    >>> four = Basis([bump, lambda t: bump(t - 0.25), lambda t: bump(t - 0.5),
+    ...     lambda t: bump(t - 0.75)])
     >>> four.size(n_joint=2)
     8
     >>> four.describe()
@@ -75,7 +81,8 @@ class Basis(LinearClass):
         self._check_symmetry()
         if self.error > _ROUGH:
             raise ProblemError(
-                f"the columns are too rough: a spline through their samples is off by {self.error:.2g} of the largest one. "
+                f"the columns are too rough: a spline through their samples is off by "
+                f"{self.error:.2g} of the largest one. "
                 "Give columns that close after one period, more samples, or smoother ones."
             )
 
@@ -86,8 +93,9 @@ class Basis(LinearClass):
 
     @property
     def error(self) -> float:
-        """Estimate of the error of interpolation, of the largest value. What a spline through every other sample misses at the
-        others falls, from every fourth to every other sample, by a factor; this is what one more such step leaves."""
+        """Estimate of the error of interpolation, of the largest value. What a spline through every
+        other sample misses at the others falls, from every fourth to every other sample, by a
+        factor; this is what one more such step leaves."""
         return _splines(self)[1]
 
     @property
@@ -96,7 +104,8 @@ class Basis(LinearClass):
         return _splines(self)[2]
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """The columns, of all joints one after the other, at phases t or their derivatives per period."""
+        """The columns, of all joints one after the other, at phases t or their derivatives per
+        period."""
         return _splines(self)[0](np.asarray(t) % 1.0, nu=derivative).T
 
     def label(self, number: int) -> str:
@@ -113,13 +122,19 @@ class Basis(LinearClass):
 
     def check_joints(self, n_joint: int) -> None:
         if self._whole and len(self.columns[0]) != n_joint:
-            raise ProblemError(f"the columns have angles of {len(self.columns[0])} joints, and the body has {n_joint}.")
+            raise ProblemError(
+                f"the columns have angles of {len(self.columns[0])} joints, and the body has "
+                f"{n_joint}."
+            )
         super().check_joints(n_joint)
 
     def describe(self) -> str:
         count = len(self.columns)
         kind = "of angles of all joints" if self._whole else "over time"
-        return f"{count} column{'s' * (count > 1)} {kind}, interpolated to {self.error:.0e}, symmetry {self.symmetry}"
+        return (
+            f"{count} column{'s' * (count > 1)} {kind}, interpolated to {self.error:.0e}, "
+            f"symmetry {self.symmetry}"
+        )
 
 
 @lru_cache(maxsize=32)
@@ -140,7 +155,9 @@ def _splines(kind: Basis) -> tuple[Any, float, int]:
 
     now, before = missed(2), missed(4)
     falls = np.clip(now / max(before, _ROUNDING), 0.5 ** (_DEGREE + 1), 1.0)
-    power = (np.arange(n // 2 + 1)[:, None] ** 2 * np.abs(np.fft.rfft(values, axis=0)) ** 2).sum(axis=1)
+    power = (np.arange(n // 2 + 1)[:, None] ** 2 * np.abs(np.fft.rfft(values, axis=0)) ** 2).sum(
+        axis=1
+    )
     left = 1 - np.cumsum(power) / power.sum()
     return spline, float(now * falls), int(np.clip(np.argmax(left < _RESOLVED), 1, _MOST))
 
@@ -153,12 +170,22 @@ def _checked(given: str | os.PathLike[str] | Sequence[Column]) -> tuple:
         found = [np.array(_sampled(column), dtype=float) for column in given]
     except (TypeError, ValueError):
         raise ProblemError(
-            "gait.columns must be a sequence of columns: samples over a period, or functions of the phase."
+            "gait.columns must be a sequence of columns: samples over a period, or functions of "
+            "the phase."
         ) from None
-    if not found or found[0].ndim not in (1, 2) or any(column.shape != found[0].shape for column in found):
-        raise ProblemError("gait.columns must be alike: each (n_time,), or each (n_joint, n_time), with as many samples.")
+    if (
+        not found
+        or found[0].ndim not in (1, 2)
+        or any(column.shape != found[0].shape for column in found)
+    ):
+        raise ProblemError(
+            "gait.columns must be alike: each (n_time,), or each (n_joint, n_time), with as many "
+            "samples."
+        )
     if found[0].shape[-1] < _FEWEST:
-        raise ProblemError(f"gait.columns have {found[0].shape[-1]} samples of a period: give at least {_FEWEST}.")
+        raise ProblemError(
+            f"gait.columns have {found[0].shape[-1]} samples of a period: give at least {_FEWEST}."
+        )
     if not all(np.isfinite(column).all() for column in found):
         raise ProblemError("gait.columns must be finite numbers.")
     if max(np.ptp(column, axis=-1).max() for column in found) == 0:
@@ -175,11 +202,15 @@ def _sampled(column: Column | Callable[[np.ndarray], np.ndarray]) -> Any:
 
 
 def _read(path: Path) -> list[np.ndarray]:
-    """The columns of a file but the first, which is time at even steps of a period; the last line may be the first again."""
+    """The columns of a file but the first, which is time at even steps of a period; the last line
+    may be the first again."""
     _, table = csv_table(path, _FEWEST)
     steps = np.diff(table[:, 0])
     if steps.min() <= 0 or np.ptp(steps) > _EVEN * steps.mean():
         raise ProblemError(f"{path}: the times in the first column must rise by even steps.")
     values = table[:, 1:]
-    repeats = np.abs(values[-1] - values[0]).max() <= 0.1 * np.abs(np.diff(values, axis=0)).max(axis=1).mean()
+    repeats = (
+        np.abs(values[-1] - values[0]).max()
+        <= 0.1 * np.abs(np.diff(values, axis=0)).max(axis=1).mean()
+    )
     return list(values[:-1].T if repeats else values.T)

@@ -1,12 +1,15 @@
-"""What is solved: how a body moves, which of its gaits are allowed, what they are to be best at; and friction's own unit.
+"""What is solved: how a body moves, which of its gaits are allowed, what they are to be best at;
+and friction's own unit.
 
-A `Problem` is what somebody states. It is taken apart here, once, into an optimal control problem: `Dynamics`, `Admissible`,
-`Aims` and limits on actuators. Programs, motions and errors of meshes are made from these, and none of them asks a `Problem`.
+A `Problem` is what somebody states. It is taken apart here, once, into an optimal control problem:
+`Dynamics`, `Admissible`, `Aims` and limits on actuators. Programs, motions and errors of meshes are
+made from these, and none of them asks a `Problem`.
 
-Friction comes in units of its own size, so that what a solver sees is never larger or smaller than it was made for. Balance and
-velocities depend on the ratios of the coefficients only; forces and work are proportional to them, efficiency inversely. So a
-problem with coefficients of 1e-6 is one with coefficients of 1, and tolerances are relative to friction. An objective that is
-proportional to no power of the coefficients is left as it is.
+Friction comes in units of its own size, so that what a solver sees is never larger or smaller than
+it was made for. Balance and velocities depend on the ratios of the coefficients only; forces and
+work are proportional to them, efficiency inversely. So a problem with coefficients of 1e-6 is one
+with coefficients of 1, and tolerances are relative to friction. An objective that is proportional
+to no power of the coefficients is left as it is.
 """
 
 from __future__ import annotations
@@ -37,7 +40,8 @@ class Dynamics(NamedTuple):
     symmetry: str
     """Of the motion: which part of a period follows from the other (`colloc.gaits.symmetry`)."""
     turn: float = 0.0
-    """By which a period is asked to turn the body [rad]: the way is seen from axes that turn evenly (`colloc.gaits.period`)."""
+    """By which a period is asked to turn the body [rad]: the way is seen from axes that turn evenly
+    (`colloc.gaits.period`)."""
 
     def in_speeds_of(self, unit: float) -> Dynamics:
         """The same for speeds that are divided by a unit."""
@@ -76,7 +80,9 @@ class Aims(NamedTuple):
 
     def uses(self, quantity: str) -> bool:
         """Whether any of it speaks of a quantity of a period, by its name."""
-        return any(quantity in aim.uses for aim in (self.objective, *(aim for aim, _ in self.at_least)))
+        return any(
+            quantity in aim.uses for aim in (self.objective, *(aim for aim, _ in self.at_least))
+        )
 
     @property
     def integrals(self) -> tuple[Quantity, ...]:
@@ -128,9 +134,14 @@ class ControlProblem:
     unit: float
 
     def mesh(self, edges: np.ndarray | None = None, of_scheme: str = "") -> Mesh:
-        """The first mesh on the part of the period that is solved: uniform and of the usual scheme; or as given."""
+        """The first mesh on the part of the period that is solved: uniform and of the usual scheme;
+        or as given."""
         rule = scheme(of_scheme or self.scheme)
-        return uniform_mesh(rule, self.intervals, self.admissible.gait.fraction) if edges is None else Mesh(rule, edges)
+        return (
+            uniform_mesh(rule, self.intervals, self.admissible.gait.fraction)
+            if edges is None
+            else Mesh(rule, edges)
+        )
 
     def stated(self, value: float) -> float:
         """A value of the objective as the problem states it."""
@@ -143,10 +154,16 @@ class ControlProblem:
 
 def control_problem(problem: Problem) -> ControlProblem:
     """What solves a problem: its parts, in units of friction."""
-    body, gait, law, aims = problem.body, problem.gait, problem.law, (problem.objective, *(aim for aim, _ in problem.at_least))
+    body, gait, law, aims = (
+        problem.body,
+        problem.gait,
+        problem.law,
+        (problem.objective, *(aim for aim, _ in problem.at_least)),
+    )
     limits, regime = problem.path_limits, problem.regime
     degrees = [part.degree for part in aims] + [limit.friction_degree for limit in limits.each]
-    unit = 1.0 if None in degrees or regime.free_pace else friction_unit(law)  # what a gait says of its pace has no unit
+    # what a gait says of its pace has no unit
+    unit = 1.0 if None in degrees or regime.free_pace else friction_unit(law)
     return ControlProblem(
         problem,
         Dynamics(
@@ -156,7 +173,9 @@ def control_problem(problem: Problem) -> ControlProblem:
             gait.motion_symmetry,
             problem.rotation or 0.0,
         ),
-        Admissible(gait, body, problem.joint_limit, problem.largest_speeds, problem.smallest_shape_speed),
+        Admissible(
+            gait, body, problem.joint_limit, problem.largest_speeds, problem.smallest_shape_speed
+        ),
         Aims(
             problem.objective,
             tuple((aim, value / _size(aim, unit)) for aim, value in problem.at_least),
@@ -174,7 +193,8 @@ def control_problem(problem: Problem) -> ControlProblem:
 
 
 def friction_unit(law: Law) -> float:
-    """The power of ten nearest to the smallest coefficient, which bounds the efficiency: 1 for friction of usual size."""
+    """The power of ten nearest to the smallest coefficient, which bounds the efficiency: 1 for
+    friction of usual size."""
     return float(10.0 ** np.rint(np.log10(law.smallest)))
 
 

@@ -1,8 +1,8 @@
 """What a gait is, and a class of gaits: the bases of all kinds.
 
-A gait is a function of the phase, with words for its reader. A class says which gaits are allowed. Its members are known by a
-vector of parameters on a mesh. How a class is collocated and searched, where its angles are not linear in its parameters, is
-registered in `colloc.search.spaces`.
+A gait is a function of the phase, with words for its reader. A class says which gaits are allowed.
+Its members are known by a vector of parameters on a mesh. How a class is collocated and searched,
+where its angles are not linear in its parameters, is registered in `colloc.search.spaces`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ DELTA_START = 0.01
 
 
 class GaitFunction:
-    """Base of the kinds of gaits: ``gait(t)`` gives joint angles and rates, so a gait can stand where a path is asked for.
+    """Base of the kinds of gaits: ``gait(t)`` gives joint angles and rates, so a gait can stand
+    where a path is asked for.
 
     Examples
     --------
@@ -44,7 +45,8 @@ class GaitFunction:
     theta: float | None = None
     """Where the tail link points at phase 0, of a gait for a slope (`colloc.gaits.sloped`)."""
     log_period: float | None = None
-    """Logarithm of the period [sqrt(length / gravity)], of a gait that says its pace (`colloc.gaits.inertia`)."""
+    """Logarithm of the period [sqrt(length / gravity)], of a gait that says its pace
+    (`colloc.gaits.inertia`)."""
     coordinate = "joint"
     """What the gait's body calls a shape coordinate."""
 
@@ -76,11 +78,13 @@ class GaitFunction:
 
     @property
     def speed_unit(self) -> float:
-        """Speeds among the variables of a program are those per period divided by this: by default per radian of phase."""
+        """Speeds among the variables of a program are those per period divided by this: by default
+        per radian of phase."""
         return 2 * np.pi
 
     def grown(self, factor: float) -> Any:
-        """The gait with shapes multiplied by a factor about their mean, where it can grow; else as it is."""
+        """The gait with shapes multiplied by a factor about their mean, where it can grow; else as
+        it is."""
         return self
 
     @property
@@ -103,11 +107,16 @@ class GaitFunction:
         found = []
         if self.log_period is not None:
             period = np.exp(self.log_period)
-            said = f"a period takes {period:.5g} sqrt(L/g), {period / np.sqrt(GRAVITY):.3g} s for a body of 1 m"
+            said = (
+                f"a period takes {period:.5g} sqrt(L/g), {period / np.sqrt(GRAVITY):.3g} s for "
+                f"a body of 1 m"
+            )
             found.append(f"{said}: Froude number {period**-2:.4g}")
         if self.theta is not None:
             turned = np.degrees(np.angle(np.exp(1j * self.theta)))
-            found.append(f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)")
+            found.append(
+                f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)"
+            )
         return found
 
     def named(self, coordinate: str) -> Any:
@@ -123,16 +132,19 @@ class GaitFunction:
         return "\n".join(self.lines())
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self.n_joint} {self.coordinate}{'s' if self.n_joint > 1 else ''}>"
+        return (
+            f"<{type(self).__name__} of {self.n_joint} "
+            f"{self.coordinate}{'s' if self.n_joint > 1 else ''}>"
+        )
 
 
 class UnitSpeedGait(GaitFunction):
     """A gait that runs along its path at constant shape speed.
 
-    Only the part of the period that symmetry leaves is stored; `colloc.gaits.symmetry` gives the rest. The phase is the arc
-    length from the start over the length of the whole closed path, ``|q'(t)| = length``. Power and distance do not depend on
-    the pace once delta scales with it: delta of such gaits is measured at unit shape speed, ``delta_unit`` times that per
-    period.
+    Only the part of the period that symmetry leaves is stored; `colloc.gaits.symmetry` gives the
+    rest. The phase is the arc length from the start over the length of the whole closed path,
+    ``|q'(t)| = length``. Power and distance do not depend on the pace once delta scales with it:
+    delta of such gaits is measured at unit shape speed, ``delta_unit`` times that per period.
     """
 
     length: float
@@ -140,7 +152,10 @@ class UnitSpeedGait(GaitFunction):
 
     def _check_symmetry(self) -> None:
         if self.symmetry not in SYMMETRIES:
-            raise ProblemError(f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}.")
+            raise ProblemError(
+                f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not "
+                f"{self.symmetry!r}."
+            )
 
     def _angles(self, phase: np.ndarray) -> np.ndarray:
         """At phases of the part that is stored, as `angles`."""
@@ -152,12 +167,14 @@ class UnitSpeedGait(GaitFunction):
 
     @property
     def delta_unit(self) -> float:
-        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
+        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per
+        period."""
         return self.length
 
     @property
     def speed_unit(self) -> float:
-        """Speeds among the variables of a program are those per period divided by this: they are at unit shape speed."""
+        """Speeds among the variables of a program are those per period divided by this: they are at
+        unit shape speed."""
         return self.length
 
     @property
@@ -170,7 +187,8 @@ class UnitSpeedGait(GaitFunction):
         return imaged(self.symmetry, self._angles(phase), image)
 
     def rates(self, t: np.ndarray) -> np.ndarray:
-        """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side ahead."""
+        """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side
+        ahead."""
         phase, image = reduced(self.symmetry, t)
         return imaged(self.symmetry, self._rates(phase), image, derivative=1)
 
@@ -192,7 +210,8 @@ class ClassOfGaits:
     without_cusps = False
     """Whether members come to rest nowhere, but for paths that are retraced."""
     linear = True
-    """Whether angles of a class of series are linear in the parameters by which its members are searched."""
+    """Whether angles of a class of series are linear in the parameters by which its members are
+    searched."""
     of_arcs = False
     """Whether it has curvature, and arcs that meet."""
     may_tell = False
@@ -200,12 +219,17 @@ class ClassOfGaits:
 
     def _check_symmetry(self) -> None:
         if self.symmetry not in self.symmetries:
-            raise ProblemError(f"gait.symmetry must be one of {', '.join(self.symmetries)}, not {self.symmetry!r}.")
+            raise ProblemError(
+                f"gait.symmetry must be one of {', '.join(self.symmetries)}, not {self.symmetry!r}."
+            )
 
     def check_joints(self, n_joint: int) -> None:
         """A `ProblemError` if bodies with so many shape coordinates have no gaits of the class."""
         if self.unit_speed and n_joint < 2:
-            raise ProblemError(f"the class {type(self).__name__} needs a body of at least three links, or two modes.")
+            raise ProblemError(
+                f"the class {type(self).__name__} needs a body of at least three links, or two "
+                f"modes."
+            )
 
     def retraces(self, n_joint: int) -> bool:
         """Whether every member goes back the way it came, in as many shape coordinates."""
@@ -228,7 +252,8 @@ class ClassOfGaits:
 
     @property
     def seeds(self) -> Any:
-        """The class that starts are drawn from: by default a few harmonics, where the class bounds the path."""
+        """The class that starts are drawn from: by default a few harmonics, where the class bounds
+        the path."""
         return self.series(_SEED_HARMONICS)
 
     def series(self, harmonics: int) -> Any:
@@ -240,13 +265,17 @@ class ClassOfGaits:
         return gait
 
     def through(self, gait: Any) -> Any:
-        """The gait that stands for any gait where a search in the class begins: by default itself."""
+        """The gait that stands for any gait where a search in the class begins: by default
+        itself."""
         return gait
 
     def guessed(self, gait: Any) -> tuple[Any, float]:
-        """What is checked of a guess, and its shape speed in rad per radian of phase: by default those of its path."""
+        """What is checked of a guess, and its shape speed in rad per radian of phase: by default
+        those of its path."""
         points = symmetric_samples(gait, self.symmetry)
-        return gait, float(np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.fraction))
+        return gait, float(
+            np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.fraction)
+        )
 
     @property
     def level(self) -> Any:
@@ -270,7 +299,8 @@ class ClassOfGaits:
         return 4, "a path"
 
     def first_edges(self, edges: np.ndarray) -> np.ndarray:
-        """The mesh from which a finer one is grown: by default its own, whose edges mean something."""
+        """The mesh from which a finer one is grown: by default its own, whose edges mean
+        something."""
         return edges
 
     def laid_on(self, gait: Any, edges: np.ndarray) -> Any:
@@ -298,16 +328,21 @@ class ClassOfGaits:
         return True
 
     def own_checks(self, gait: Any) -> list[tuple[str, float, float, str]]:
-        """What a certificate checks of a member beyond what all gaits have to keep: name, value, allowed, meaning."""
+        """What a certificate checks of a member beyond what all gaits have to keep: name, value,
+        allowed, meaning."""
         return []
 
 
 def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
-    """Numbers of a gait as an array of so many dimensions. `ProblemError` if they, or their squares, are none or not finite."""
+    """Numbers of a gait as an array of so many dimensions. `ProblemError` if they, or their
+    squares, are none or not finite."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise ProblemError(f"{name} must be numbers, not {shown(value)}.") from None
-    if array.ndim != ndim or not (np.abs(array) < np.sqrt(np.finfo(float).max) / (array.size + 1)).all():
+    if (
+        array.ndim != ndim
+        or not (np.abs(array) < np.sqrt(np.finfo(float).max) / (array.size + 1)).all()
+    ):
         raise ProblemError(f"{name} must be a finite {ndim}-D array.")
     return array

@@ -1,4 +1,5 @@
-"""Problems, gaits, classes of gaits, bodies and laws of friction as plain dictionaries (JSON), and back.
+"""Problems, gaits, classes of gaits, bodies and laws of friction as plain dictionaries (JSON), and
+back.
 
 The names of the fields tell the kind; of laws other than Coulomb's their name does.
 """
@@ -39,7 +40,8 @@ from colloc.system.arguments import STATED_IF_SET
 from colloc.system.errors import ProblemError
 
 AnyGait: TypeAlias = Any
-"""One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
+"""One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are
+of some kind."""
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
@@ -49,24 +51,35 @@ CLASSES: list[type] = [Harmonic, BSpline, Basis, FreePath, Polygon, Prescribed, 
 BODIES: list[type] = [Chain, Coupled, ModalBody, CrawlerBody, Concertina, Wave]
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 MOTIONS: list[type] = []
-"""Kinds of motion, `colloc.gaits.regime.Regime`, other than those that a grade and a Froude number ask for."""
+"""Kinds of motion, `colloc.gaits.regime.Regime`, other than those that a grade and a Froude number
+ask for."""
 PARTS: list[type] = [Foot, FeetLaw]
 """What bodies and laws hold."""
 
 
 def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None) -> None:
-    """A `ProblemError` for a part of a problem that is of none of some kinds, or does not answer what they do."""
+    """A `ProblemError` for a part of a problem that is of none of some kinds, or does not answer
+    what they do."""
     if isinstance(value, type) or not isinstance(value, answers or tuple(kinds)):
         what = type(value).__name__
         if answers is not None and type(value) in kinds:
             lacks = [each for each in vars(answers) if each[0] != "_" and not hasattr(value, each)]
-            raise ProblemError(f"{name}: a {what} does not say its {', '.join(lacks)} ({answers.__module__}).")
-        raise ProblemError(f"{name} must be a {' or '.join(kind.__name__ for kind in kinds)}, not {what}.")
+            raise ProblemError(
+                f"{name}: a {what} does not say its {', '.join(lacks)} ({answers.__module__})."
+            )
+        raise ProblemError(
+            f"{name} must be a {' or '.join(kind.__name__ for kind in kinds)}, not {what}."
+        )
 
 
 def fields(value: Any) -> dict[str, Any]:
-    """The kind of a gait, a class of gaits, a body or a law, and its fields as numbers, strings and lists."""
-    stated = [f for f in dataclasses.fields(value) if f.metadata != STATED_IF_SET or getattr(value, f.name) != f.default]
+    """The kind of a gait, a class of gaits, a body or a law, and its fields as numbers, strings and
+    lists."""
+    stated = [
+        f
+        for f in dataclasses.fields(value)
+        if f.metadata != STATED_IF_SET or getattr(value, f.name) != f.default
+    ]
     found = {f.name: getattr(value, f.name) for f in stated}
     return {KIND: type(value).__name__, **{name: _plain(own) for name, own in found.items()}}
 
@@ -80,16 +93,22 @@ def _plain(value: Any) -> Any:
 
 
 def _revived(value: Any) -> Any:
-    """A part of a body, a law or a gait, such as a foot, from what `fields` made of it; anything else as it is."""
+    """A part of a body, a law or a gait, such as a foot, from what `fields` made of it; anything
+    else as it is."""
     if isinstance(value, list) and any(isinstance(part, dict) for part in value):
         return tuple(_revived(part) for part in value)
-    return _from([*LAWS, *PARTS, *CLASSES, *BODIES], value) if isinstance(value, dict) and KIND in value else value
+    return (
+        _from([*LAWS, *PARTS, *CLASSES, *BODIES], value)
+        if isinstance(value, dict) and KIND in value
+        else value
+    )
 
 
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
     values = dict(given)
     name = values.pop(KIND)
-    kind = next((kind for kind in reversed(kinds) if kind.__name__ == name), None)  # of one defined again the last
+    # of one defined again the last
+    kind = next((kind for kind in reversed(kinds) if kind.__name__ == name), None)
     if kind is None:
         raise KeyError(f"{name} is none of {', '.join(kind.__name__ for kind in kinds)}")
     return kind(**{name: _revived(value) for name, value in values.items()})
@@ -118,10 +137,17 @@ def body_from(given: dict[str, Any]) -> Body:
 def problem_fields(problem: Any) -> dict[str, Any]:
     """All fields of a problem; what is usual of what it asks for is left out."""
     stated = {f.name: getattr(problem, f.name) for f in dataclasses.fields(problem)}
-    usual = [f.name for f in dataclasses.fields(problem) if f.metadata == STATED_IF_SET and stated[f.name] == f.default]
+    usual = [
+        f.name
+        for f in dataclasses.fields(problem)
+        if f.metadata == STATED_IF_SET and stated[f.name] == f.default
+    ]
     stated["gait"] = problem.gait.level  # the grade says that it is on a slope
     stated |= {name: fields(stated[name]) for name in ("guess", "gait", "body", "friction")}
-    stated |= {"objective": problem.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in problem.at_least]}
+    stated |= {
+        "objective": problem.objective.fields(),
+        "at_least": [[aim.fields(), least] for aim, least in problem.at_least],
+    }
     if problem.motion is not None:
         stated["motion"] = fields(problem.motion)
     stated["limits"] = [limit.fields() for limit in problem.limits]

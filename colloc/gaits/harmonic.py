@@ -1,4 +1,5 @@
-"""Harmonic gaits: joint angles as finite Fourier series of the phase, with or without a symmetry (`colloc.gaits.symmetry`)."""
+"""Harmonic gaits: joint angles as finite Fourier series of the phase, with or without a symmetry
+(`colloc.gaits.symmetry`)."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from colloc.system.arguments import STATED_IF_SET, check_finite, is_whole, named
 from colloc.system.errors import ProblemError
 
 SAME_START = 1e-9
-"""Sine of the first joint's first harmonic, or of the wave, up to which a gait starts where those of its class do."""
+"""Sine of the first joint's first harmonic, or of the wave, up to which a gait starts where those
+of its class do."""
 
 
 @named_arguments
@@ -29,7 +31,8 @@ class Fourier(GaitFunction):
     mean : (n_joint,)
     cos, sin : (n_joint, n_harmonic)
     theta : float, optional
-        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
+        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left
+        [rad].
     log_period : float, optional
         At a free pace: logarithm of the period [sqrt(length / gravity)].
 
@@ -54,7 +57,8 @@ class Fourier(GaitFunction):
             object.__setattr__(self, name, finite_array(f"guess.{name}", getattr(self, name), ndim))
         if self.cos.shape != self.sin.shape or len(self.cos) != len(self.mean):
             raise ProblemError(
-                f"guess.mean, cos and sin disagree in shape: {self.mean.shape}, {self.cos.shape}, {self.sin.shape}."
+                f"guess.mean, cos and sin disagree in shape: {self.mean.shape}, {self.cos.shape}, "
+                f"{self.sin.shape}."
             )
 
     @property
@@ -73,7 +77,8 @@ class Fourier(GaitFunction):
 
     @cached_property
     def _terms(self) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies ``(K, 1)``, and what angles and rates ``(2 n_joint, 2 K)`` have of their cosines and then sines."""
+        """Frequencies ``(K, 1)``, and what angles and rates ``(2 n_joint, 2 K)`` have of their
+        cosines and then sines."""
         k = 2 * np.pi * np.arange(1, self.n_harmonic + 1)
         return k[:, None], np.block([[self.cos, self.sin], [k * self.sin, -k * self.cos]])
 
@@ -98,7 +103,9 @@ class Fourier(GaitFunction):
             terms = [_rounded(self.mean[j])]
             for k in range(self.n_harmonic):
                 wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
-                terms.append(f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}")
+                terms.append(
+                    f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}"
+                )
             found.append(f"{self.coordinate} {j + 1}: " + " ".join(terms))
         return [*found, *self.pointing]
 
@@ -128,12 +135,14 @@ def _rounded(value: float) -> str:
 
 
 def ellipse(A0: float, A1: float, B1: float) -> Fourier:
-    """The paper's one-harmonic gait of a three-link body (section V), symmetric about angle 1 = -angle 2.
+    """The paper's one-harmonic gait of a three-link body (section V), symmetric about angle 1 =
+    -angle 2.
 
     Parameters
     ----------
     A0, A1, B1 : float
-        ``angle 1 = A0 + A1 cos 2πt + B1 sin 2πt`` and ``angle 2 = -A0 - A1 cos 2πt + B1 sin 2πt`` [rad].
+        ``angle 1 = A0 + A1 cos 2πt + B1 sin 2πt`` and ``angle 2 = -A0 - A1 cos 2πt + B1 sin 2πt``
+        [rad].
 
     Examples
     --------
@@ -151,8 +160,8 @@ def ellipse(A0: float, A1: float, B1: float) -> Fourier:
 class Harmonic(LinearClass):
     """The class of gaits with `harmonics` harmonics and a given symmetry.
 
-    A member is a parameter vector p; angles are linear in it. Without a symmetry that fixes it, the start phase is
-    fixed by taking the first joint's first sine coefficient out.
+    A member is a parameter vector p; angles are linear in it. Without a symmetry that fixes it, the
+    start phase is fixed by taking the first joint's first sine coefficient out.
 
     Parameters
     ----------
@@ -177,17 +186,21 @@ class Harmonic(LinearClass):
 
     def __post_init__(self) -> None:
         if not is_whole(self.harmonics, 1, 64):
-            raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}.")
+            raise ProblemError(
+                f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}."
+            )
         self._check_symmetry()
         if self.symmetry == ANTIPODAL and self.harmonics % 2 == 0:
             raise ProblemError(
-                f"antipodal gaits have odd harmonics only, as q(t + 1/2) = -q(t): {self.harmonics} would be the same class as "
+                f"antipodal gaits have odd harmonics only, as q(t + 1/2) = -q(t): {self.harmonics} "
+                f"would be the same class as "
                 f"{self.harmonics - 1}; ask for {self.harmonics - 1} or {self.harmonics + 1}."
             )
 
     @property
     def without_cusps(self) -> bool:  # type: ignore[override]
-        """Whether members come to rest nowhere, but for paths that are retraced: ellipses do not."""
+        """Whether members come to rest nowhere, but for paths that are retraced: ellipses do
+        not."""
         return self.harmonics == 1
 
     def series(self, harmonics: int) -> Harmonic:
@@ -196,10 +209,14 @@ class Harmonic(LinearClass):
 
     def describe(self) -> str:
         """The class in words, for reports."""
-        return f"{self.harmonics} harmonic{'s' if self.harmonics > 1 else ''}, symmetry {self.symmetry}"
+        return (
+            f"{self.harmonics} harmonic{'s' if self.harmonics > 1 else ''}, symmetry "
+            f"{self.symmetry}"
+        )
 
     def _basis(self, n_joint: int) -> np.ndarray:
-        """``(n_joint * (2 K + 1), n_parameter)``: parameters to (mean, cos_1, sin_1, cos_2, ...) of every joint."""
+        """``(n_joint * (2 K + 1), n_parameter)``: parameters to (mean, cos_1, sin_1, cos_2, ...) of
+        every joint."""
         columns = []
         for kind in range(2 * self.harmonics + 1):
             odd_harmonic = (kind + 1) // 2 % 2 == 1
@@ -226,7 +243,8 @@ class Harmonic(LinearClass):
         return np.arange(n) / n
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """``(2 K + 1, n_time)``: 1, cos 1, sin 1, cos 2, ... at phases t, or what they change by per period."""
+        """``(2 K + 1, n_time)``: 1, cos 1, sin 1, cos 2, ... at phases t, or what they change by
+        per period."""
         k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
         waves = np.empty((2 * self.harmonics + 1, t.size))
         if derivative:
@@ -244,12 +262,15 @@ class Harmonic(LinearClass):
             table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
         return Fourier(table[:, 0], table[:, 1::2], table[:, 2::2])
 
-    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Fourier:
+    def member(
+        self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None
+    ) -> Fourier:
         """The gait of a parameter vector; the mesh does not matter."""
         return self.fourier(parameters, n_joint)
 
     def through(self, gait: Any) -> Fourier:
-        """The Fourier series of a gait, paced by its own phase, with the symmetry and harmonics of the class."""
+        """The Fourier series of a gait, paced by its own phase, with the symmetry and harmonics of
+        the class."""
         if isinstance(gait, Fourier):
             return gait
         half = symmetric_samples(gait, self.symmetry)
@@ -268,10 +289,15 @@ class Harmonic(LinearClass):
         return n_joint * (2 * self.harmonics + 1)
 
     def drawn(self, unit: np.ndarray, n_joint: int) -> Fourier:
-        """Harmonic k has an amplitude that falls like 1/k, so that no harmonic dominates the rates."""
+        """Harmonic k has an amplitude that falls like 1/k, so that no harmonic dominates the
+        rates."""
         table = (2 * unit - 1).reshape(n_joint, -1)
         falling = 1.0 / np.arange(1, self.harmonics + 1)
-        return Fourier(table[:, 0], table[:, 1 : self.harmonics + 1] * falling, table[:, self.harmonics + 1 :] * falling)
+        return Fourier(
+            table[:, 0],
+            table[:, 1 : self.harmonics + 1] * falling,
+            table[:, self.harmonics + 1 :] * falling,
+        )
 
     def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Fourier:
         series = self.through(gait).resized(self.harmonics)
@@ -284,7 +310,8 @@ class Harmonic(LinearClass):
         return self.fourier(self.parameters(drawn), gait.n_joint)
 
     def parameters(self, gait: Fourier) -> np.ndarray:
-        """The parameter vector of the class member nearest to `gait`, after shifting its start phase if that is free."""
+        """The parameter vector of the class member nearest to `gait`, after shifting its start
+        phase if that is free."""
         gait = gait.resized(self.harmonics)
         if self.symmetry != BILATERAL:
             gait = shifted(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
@@ -301,8 +328,8 @@ class Harmonic(LinearClass):
         return np.linalg.lstsq(self._basis(gait.n_joint), table.ravel(), rcond=None)[0]
 
     def largest_parameters(self, body: Body, limit: float) -> np.ndarray:
-        """Bounds on the parameters ``(n_parameter,)`` of gaits whose angles keep a limit: a function bounded by L has Fourier
-        coefficients of at most 4 L / pi."""
+        """Bounds on the parameters ``(n_parameter,)`` of gaits whose angles keep a limit: a
+        function bounded by L has Fourier coefficients of at most 4 L / pi."""
         # coordinates, such as amplitudes of modes, may be larger than what is bounded
         largest = max(1.0, np.abs(np.linalg.pinv(body.limited)).sum(axis=1).max())
         return np.full(self.size(body.n_joint), largest * 4 * limit / np.pi)
@@ -310,11 +337,14 @@ class Harmonic(LinearClass):
 
 def harmonics_within(highest: int, symmetry: str) -> Harmonic:
     """The class of all harmonics up to `highest` that gaits of a symmetry have."""
-    return Harmonic(highest - 1 if symmetry == ANTIPODAL and highest % 2 == 0 else highest, symmetry)
+    return Harmonic(
+        highest - 1 if symmetry == ANTIPODAL and highest % 2 == 0 else highest, symmetry
+    )
 
 
 def series_of(gait_class: ClassOfGaits, harmonics: int) -> Harmonic:
-    """The class of Fourier series up to about so many harmonics that stand for the gaits of a class."""
+    """The class of Fourier series up to about so many harmonics that stand for the gaits of a
+    class."""
     return harmonics_within(harmonics, gait_class.symmetry)
 
 

@@ -27,14 +27,16 @@ class Free(NamedTuple):
     Parameters
     ----------
     low, high : float
-        Above 0; where they are one the pace is given. The best pace of the plain efficiency is the slowest, unless inertia
-        helps: a term in the "period" says what time is worth.
+        Above 0; where they are one the pace is given. The best pace of the plain efficiency is the
+        slowest, unless inertia helps: a term in the "period" says what time is worth.
 
     Examples
     --------
     >>> import colloc
-    >>> colloc.Problem("mine", froude=colloc.Free(0.01, 1), objective="distance / (work + 0.1 * period)")
-    <Problem mine: best distance / (work + 0.1 * period), 2 joints, friction (1, 1, 1), Froude number 0.01 to 1, 1 harmonic, \
+    >>> colloc.Problem("mine", froude=colloc.Free(0.01, 1),
+    ...     objective="distance / (work + 0.1 * period)")
+    <Problem mine: best distance / (work + 0.1 * period), 2 joints, friction (1, 1, 1), Froude
+    number 0.01 to 1, 1 harmonic, \
 symmetry none, delta 1e-04>
     """
 
@@ -43,7 +45,8 @@ symmetry none, delta 1e-04>
 
 
 class AtFreePace(Telling):
-    """What a free pace changes in a class of gaits: members say how long a period takes, at first the middle of the range."""
+    """What a free pace changes in a class of gaits: members say how long a period takes, at first
+    the middle of the range."""
 
     tells = "log_period"
     pace: Free
@@ -60,7 +63,8 @@ class AtFreePace(Telling):
 
 @dataclass(frozen=True)
 class Paced(Regime):
-    """At a Froude number L/(g T^2), at which inertia counts, or at one in a range, whose middle it is."""
+    """At a Froude number L/(g T^2), at which inertia counts, or at one in a range, whose middle it
+    is."""
 
     froude: float  # type: ignore[misc]
     free: Free | None = None
@@ -79,7 +83,10 @@ class Paced(Regime):
 
     @property
     def label(self) -> str:
-        return f"{super().label}, Froude number {' to '.join(f'{each:g}' for each in self.free or (self.froude,))}"
+        return (
+            f"{super().label}, Froude number "
+            f"{' to '.join(f'{each:g}' for each in self.free or (self.froude,))}"
+        )
 
     def at(self, gait: Any) -> Self:
         if self.free is None:
@@ -87,7 +94,10 @@ class Paced(Regime):
         if gait.log_period is None and self.free.low == self.free.high:
             return replace(self, free=None)
         if gait.log_period is None:
-            raise ProblemError("the gait does not say its pace: give it a log_period, or the problem one Froude number.")
+            raise ProblemError(
+                "the gait does not say its pace: give it a log_period, or the problem one Froude "
+                "number."
+            )
         return replace(self, froude=float(np.exp(-2.0 * gait.log_period)), free=None)
 
     def class_of(self, gait_class: Any) -> Any:
@@ -95,38 +105,58 @@ class Paced(Regime):
         if self.free is None:
             return level
         if not level.may_tell or level.unit_speed or not level.linear:
-            raise ProblemError(f"a free pace is sought with a gait of a class Harmonic, not {type(level).__name__}.")
+            raise ProblemError(
+                f"a free pace is sought with a gait of a class Harmonic, not "
+                f"{type(level).__name__}."
+            )
         return telling(AtFreePace, level, pace=self.free)
 
     def describe(self) -> str:
         if self.free is not None:
-            return f"played at the best Froude number from {self.free.low:.4g} to {self.free.high:.4g}"
+            return (
+                f"played at the best Froude number from {self.free.low:.4g} to {self.free.high:.4g}"
+            )
         period = 1 / np.sqrt(GRAVITY * self.froude)
-        return f"played at the Froude number {self.froude:.4g}: a body of 1 m takes {period:.3g} s a period"
+        return (
+            f"played at the Froude number {self.froude:.4g}: a body of 1 m takes "
+            f"{period:.3g} s "
+            f"a period"
+        )
 
     def in_units_of(self, unit: float) -> Self:
-        return replace(super().in_units_of(unit), froude=self.froude / unit)  # where time counts the unit is 1
+        # where time counts the unit is 1
+        return replace(super().in_units_of(unit), froude=self.froude / unit)
 
     def check(self, problem: Any) -> None:
         if self.free and not set(problem.objective.uses) & _PACED:
             raise ProblemError(
-                f"a free pace needs an objective that depends on it, as distance and work do, not {problem.objective.name!r}."
+                f"a free pace needs an objective that depends on it, as distance and work do, not "
+                f"{problem.objective.name!r}."
             )
         checked_mass(problem.body)
         if not problem.gait.free:
-            raise ProblemError("a prescribed motion is played with inertia by colloc.inertial_motion: leave froude out.")
+            raise ProblemError(
+                "a prescribed motion is played with inertia by colloc.inertial_motion: leave "
+                "froude out."
+            )
         super().check(problem)
         if not problem.gait.unit_speed and problem.gait.symmetry not in (NONE, ANTIPODAL):
             raise ProblemError(
-                f"gaits of symmetry {problem.gait.symmetry} run backwards in half of their period, as nothing with inertia "
+                f"gaits of symmetry {problem.gait.symmetry} run backwards in half of their period, "
+                f"as nothing with inertia "
                 f"does: take symmetry {ANTIPODAL!r} or {NONE!r}."
             )
         if problem.path_limits.names or any(each.needs_forces for each in problem.integrals):
-            raise ProblemError("what single joints have to do with inertia is not known yet: leave driven work and limits out.")
+            raise ProblemError(
+                "what single joints have to do with inertia is not known yet: leave driven work "
+                "and limits out."
+            )
         if problem.formulation != FULL:
             raise ProblemError(f"with inertia there is only the formulation {FULL!r}.")
         if scheme(problem.scheme).left:
-            raise ProblemError(f"with inertia a gauss-N or radau-N scheme is needed, not {problem.scheme}.")
+            raise ProblemError(
+                f"with inertia a gauss-N or radau-N scheme is needed, not {problem.scheme}."
+            )
 
 
 @dataclass(frozen=True)
@@ -152,8 +182,8 @@ class PacedOnSlope(Paced, Slope):
 
 
 def paced_from(froude: Any, slope: Slope | None, *, timed: bool) -> Paced:
-    """How a problem states its pace: a number, or a range; `timed`: something asked for speaks of the period, which is then
-    a parameter of the gait. `ProblemError` if it is none."""
+    """How a problem states its pace: a number, or a range; `timed`: something asked for speaks of
+    the period, which is then a parameter of the gait. `ProblemError` if it is none."""
     free = None
     if isinstance(froude, (tuple, list)):
         if len(froude) != 2 or not all(map(is_number, froude)) or not 0 < froude[0] <= froude[1]:
@@ -164,8 +194,13 @@ def paced_from(froude: Any, slope: Slope | None, *, timed: bool) -> Paced:
         free, froude = Free(*map(float, froude)), float(np.sqrt(froude[0] * froude[1]))
     elif not is_number(froude) or froude < 0:
         raise ProblemError(
-            f"froude must be a number that is not negative, length over (gravity times period^2), not {froude!r}."
+            f"froude must be a number that is not negative, length over (gravity times period^2), "
+            f"not {froude!r}."
         )
     elif timed:
         free = Free(froude, froude)
-    return Paced(froude, free) if slope is None else PacedOnSlope(**vars(slope), froude=froude, free=free)
+    return (
+        Paced(froude, free)
+        if slope is None
+        else PacedOnSlope(**vars(slope), froude=froude, free=free)
+    )

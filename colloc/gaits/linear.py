@@ -1,9 +1,11 @@
-"""Classes of gaits that are linear in their parameters, and their members: sums of functions of the phase.
+"""Classes of gaits that are linear in their parameters, and their members: sums of functions of the
+phase.
 
     q_j(t) = sum_i T_ji phi_i(t),      T = B p
 
-A class says what its functions phi are, with their derivatives, and which tables T it allows; with a symmetry, those that are
-their own image. Fourier series (`colloc.gaits.harmonic`), B-splines and columns of one's own are such classes.
+A class says what its functions phi are, with their derivatives, and which tables T it allows; with
+a symmetry, those that are their own image. Fourier series (`colloc.gaits.harmonic`), B-splines and
+columns of one's own are such classes.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ _SERIES = 64
 _CLOSED = 1e-6
 """Relative distance of an image from the class at which it counts as a member."""
 _MOVES = 1e-3
-"""Shape speed, of what the parameters may be, below which a guess counts as one that a class has nothing of."""
+"""Shape speed, of what the parameters may be, below which a guess counts as one that a class has
+nothing of."""
 
 
 @named_arguments
@@ -43,7 +46,8 @@ class Combination(GaitFunction):
     table : (n_joint, n_function)
         Their coefficients.
     theta : float, optional
-        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
+        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left
+        [rad].
     log_period : float, optional
         At a free pace: logarithm of the period [sqrt(length / gravity)].
 
@@ -66,7 +70,10 @@ class Combination(GaitFunction):
         object.__setattr__(self, "table", finite_array("guess.table", self.table, 2))
         needed = self.basis.functions(np.zeros(1)).shape[0]
         if self.table.shape[1] != needed:
-            raise ProblemError(f"guess.table has {self.table.shape[1]} columns, and the class has {needed} functions.")
+            raise ProblemError(
+                f"guess.table has {self.table.shape[1]} columns, and the class has {needed} "
+                f"functions."
+            )
 
     @property
     def n_joint(self) -> int:
@@ -80,7 +87,9 @@ class Combination(GaitFunction):
     @property
     def shape_speed(self) -> float:
         """Root-mean-square shape speed, in rad per radian of phase."""
-        return float(np.sqrt((self.rates(self.basis.instants) ** 2).sum(axis=0).mean()) / (2 * np.pi))
+        return float(
+            np.sqrt((self.rates(self.basis.instants) ** 2).sum(axis=0).mean()) / (2 * np.pi)
+        )
 
     def angles(self, t: np.ndarray) -> np.ndarray:
         return self.table @ self.basis.functions(np.asarray(t, dtype=float))
@@ -90,8 +99,14 @@ class Combination(GaitFunction):
 
     def lines(self) -> list[str]:
         """The formula, joint by joint, or mode by mode."""
-        table, names = np.round(self.table, 4) + 0.0, [self.basis.label(i) for i in range(self.table.shape[1])]
-        rows = (" ".join(f"{c:+.4f} {name}" for c, name in zip(row, names, strict=True) if c != 0) for row in table)
+        table, names = (
+            np.round(self.table, 4) + 0.0,
+            [self.basis.label(i) for i in range(self.table.shape[1])],
+        )
+        rows = (
+            " ".join(f"{c:+.4f} {name}" for c, name in zip(row, names, strict=True) if c != 0)
+            for row in table
+        )
         formula = (f"{self.coordinate} {j}: {row or '0'}" for j, row in enumerate(rows, 1))
         return [f"φ: {self.basis.describe()}", *formula, *self.pointing]
 
@@ -108,15 +123,17 @@ class Combination(GaitFunction):
         return self.scaled(-1.0)
 
     def grown(self, factor: float) -> Combination:
-        """The gait with all angles multiplied by a factor: a class need not have constant angles."""
+        """The gait with all angles multiplied by a factor: a class need not have constant
+        angles."""
         return self.scaled(factor)
 
 
 class LinearClass(ClassOfGaits):
-    """Base of the classes in whose parameters joint angles are linear. One has to say what its `functions` are, how fast
-    they vary (`harmonics`), ``series`` and `describe`; the rest follows.
+    """Base of the classes in whose parameters joint angles are linear. One has to say what its
+    `functions` are, how fast they vary (`harmonics`), ``series`` and `describe`; the rest follows.
 
-    A problem refuses classes whose functions depend on one another, and symmetries whose images of members are none.
+    A problem refuses classes whose functions depend on one another, and symmetries whose images of
+    members are none.
     """
 
     symmetry: str
@@ -125,7 +142,8 @@ class LinearClass(ClassOfGaits):
     linear = moves_knots = may_tell = True
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """``(n_function, n_time)``: the functions of the phase at phases t, or their derivatives per period."""
+        """``(n_function, n_time)``: the functions of the phase at phases t, or their derivatives
+        per period."""
         raise NotImplementedError
 
     def label(self, number: int) -> str:
@@ -133,7 +151,8 @@ class LinearClass(ClassOfGaits):
         return f"φ{number + 1}"
 
     def allowed(self, n_joint: int) -> np.ndarray:
-        """``(n_joint * n_function, n_column)``: the tables that are allowed before any symmetry; by default all."""
+        """``(n_joint * n_function, n_column)``: the tables that are allowed before any symmetry; by
+        default all."""
         return np.eye(n_joint * self.functions(np.zeros(1)).shape[0])
 
     @property
@@ -156,10 +175,13 @@ class LinearClass(ClassOfGaits):
 
     def first_edges(self, edges: np.ndarray) -> np.ndarray:
         """The mesh from which a finer one is grown: a coarse uniform one."""
-        return np.linspace(edges[0], edges[-1], max(int(_COARSE * self.fraction), 2 * self.harmonics) + 1)
+        return np.linspace(
+            edges[0], edges[-1], max(int(_COARSE * self.fraction), 2 * self.harmonics) + 1
+        )
 
     def _basis(self, n_joint: int) -> np.ndarray:
-        """``(n_joint * n_function, n_parameter)``: parameters to the tables that the class allows."""
+        """``(n_joint * n_function, n_parameter)``: parameters to the tables that the class
+        allows."""
         return _symmetric_tables(self, n_joint)
 
     def size(self, n_joint: int, n_interval: int | None = None) -> int:
@@ -171,7 +193,8 @@ class LinearClass(ClassOfGaits):
         self._basis(n_joint)
 
     def retraces(self, n_joint: int) -> bool:
-        """As where one function moves all joints: whether the rates of a member drawn by chance have one direction."""
+        """As where one function moves all joints: whether the rates of a member drawn by chance
+        have one direction."""
         drawn = np.random.default_rng(0).normal(size=self._basis(n_joint).shape[1])
         return bool(np.linalg.matrix_rank(self.rate_matrix(self.instants, n_joint) @ drawn) <= 1)
 
@@ -184,7 +207,8 @@ class LinearClass(ClassOfGaits):
         return self.nearest(gait)
 
     def nearest(self, gait: Any) -> np.ndarray:
-        """The parameter vector of the class member nearest to a gait, in its phase (least squares over the period)."""
+        """The parameter vector of the class member nearest to a gait, in its phase (least squares
+        over the period)."""
         if getattr(gait, "basis", None) == self:
             return np.linalg.lstsq(self._basis(gait.n_joint), gait.table.ravel(), rcond=None)[0]
         matrix = self.angle_matrix(self.instants, gait.n_joint)
@@ -192,7 +216,8 @@ class LinearClass(ClassOfGaits):
         return np.linalg.lstsq(matrix.reshape(angles.size, -1), angles.ravel(), rcond=None)[0]
 
     def through(self, gait: Any) -> Any:
-        """The member nearest to a gait; of one that has no phase of its own, to its Fourier series in arc length."""
+        """The member nearest to a gait; of one that has no phase of its own, to its Fourier series
+        in arc length."""
         if getattr(gait, "basis", None) == self:
             return gait
         timed = gait if gait.is_series else self.series(_SERIES).through(gait)
@@ -203,7 +228,8 @@ class LinearClass(ClassOfGaits):
         return near, near.shape_speed
 
     def first_guess(self, gait: Any) -> Any:
-        """The member nearest to a wave; where there is next to nothing of a wave in the class, all its functions at once."""
+        """The member nearest to a wave; where there is next to nothing of a wave in the class, all
+        its functions at once."""
         near = self.through(gait)
         if near.shape_speed > _MOVES * gait.shape_speed:
             return near.scaled(gait.shape_speed / near.shape_speed)
@@ -215,10 +241,15 @@ class LinearClass(ClassOfGaits):
         largest = max(1.0, np.abs(np.linalg.pinv(body.limited)).sum(axis=1).max())
         matrix = self.angle_matrix(self.instants, body.n_joint)
         # parameters are linear in the angles at the instants
-        return largest * limit * np.abs(np.linalg.pinv(matrix.reshape(-1, matrix.shape[2]))).sum(axis=1)
+        return (
+            largest
+            * limit
+            * np.abs(np.linalg.pinv(matrix.reshape(-1, matrix.shape[2]))).sum(axis=1)
+        )
 
     def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
-        """The least and the most that parameters of gaits whose angles keep a limit may be, ``(n_parameter,)`` each."""
+        """The least and the most that parameters of gaits whose angles keep a limit may be,
+        ``(n_parameter,)`` each."""
         largest = self.largest_parameters(body, limit)
         return -largest, largest
 
@@ -235,14 +266,19 @@ class LinearClass(ClassOfGaits):
         return np.einsum("wt,jwp->tjp", functions, basis)
 
     def mean_square_rate(self, n_joint: int) -> np.ndarray:
-        """``(n_parameter, n_parameter)``: the mean square shape speed per period as a quadratic form of the parameters."""
+        """``(n_parameter, n_parameter)``: the mean square shape speed per period as a quadratic
+        form of the parameters."""
         rates = self.rate_matrix(self.instants, n_joint)
         return np.einsum("tjp,tjq->pq", rates, rates) / self.instants.size
 
     def enclosed_area(self, n_joint: int) -> np.ndarray:
-        """``(n_parameter, n_parameter)``: the area ``integral of sum_(i<j) (q_i dq_j - q_j dq_i) / 2`` that a path encloses in
-        the planes of its joints [rad^2], as a quadratic form of the parameters; 0 for retraced paths."""
-        angles, rates = self.angle_matrix(self.instants, n_joint), self.rate_matrix(self.instants, n_joint)
+        """``(n_parameter, n_parameter)``: the area ``integral of sum_(i<j) (q_i dq_j - q_j dq_i) /
+        2`` that a path encloses in the planes of its joints [rad^2], as a quadratic form of the
+        parameters; 0 for retraced paths."""
+        angles, rates = (
+            self.angle_matrix(self.instants, n_joint),
+            self.rate_matrix(self.instants, n_joint),
+        )
         sign = np.triu(np.ones((n_joint, n_joint)), 1)
         form = 0.5 * np.einsum("tip,ij,tjq->pq", angles, sign - sign.T, rates) / self.instants.size
         return 0.5 * (form + form.T)
@@ -257,10 +293,12 @@ class LinearClass(ClassOfGaits):
         return self.member((2 * unit - 1) / self._sizes(n_joint), n_joint)
 
     def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
-        """The member nearest to a gait, with every coefficient moved by normals of `step` [rad]; of harmonic k, where there
-        are such, of ``step / k^fall``."""
+        """The member nearest to a gait, with every coefficient moved by normals of `step` [rad]; of
+        harmonic k, where there are such, of ``step / k^fall``."""
         v = self.parameters(self.through(gait))
-        return self.member(v + step * rng.normal(size=v.size) / self._sizes(gait.n_joint), gait.n_joint)
+        return self.member(
+            v + step * rng.normal(size=v.size) / self._sizes(gait.n_joint), gait.n_joint
+        )
 
     def _sizes(self, n_joint: int) -> np.ndarray:
         """Largest angle that a unit of every parameter makes [rad]."""
@@ -274,8 +312,14 @@ def _symmetric_tables(kind: LinearClass, n_joint: int) -> np.ndarray:
     functions = kind.functions(kind.instants)
     angles = np.einsum("jwp,wt->jtp", allowed.reshape(n_joint, len(functions), -1), functions)
     matrix = angles.reshape(-1, allowed.shape[1])
-    if np.linalg.matrix_rank(matrix, tol=_CLOSED * np.abs(matrix).max() * np.sqrt(len(matrix))) < matrix.shape[1]:
-        raise ProblemError(f"the functions of the class {type(kind).__name__} depend on one another: leave some out.")
+    if (
+        np.linalg.matrix_rank(matrix, tol=_CLOSED * np.abs(matrix).max() * np.sqrt(len(matrix)))
+        < matrix.shape[1]
+    ):
+        raise ProblemError(
+            f"the functions of the class {type(kind).__name__} depend on one another: leave "
+            f"some out."
+        )
     if kind.symmetry == NONE:
         return allowed
     images = {
@@ -285,14 +329,21 @@ def _symmetric_tables(kind: LinearClass, n_joint: int) -> np.ndarray:
     image = images[kind.symmetry]().reshape(matrix.shape)
     turned = np.linalg.lstsq(matrix, image, rcond=None)[0]
     if np.abs(matrix @ turned - image).max() > _CLOSED * np.abs(matrix).max():
-        how = "run backwards, seen from the other end," if kind.symmetry == BILATERAL else "half a period later, negated,"
+        how = (
+            "run backwards, seen from the other end,"
+            if kind.symmetry == BILATERAL
+            else "half a period later, negated,"
+        )
         raise ProblemError(
-            f"the class {type(kind).__name__} has no symmetry {kind.symmetry!r} for {n_joint} joints: its functions {how} are "
+            f"the class {type(kind).__name__} has no symmetry {kind.symmetry!r} for {n_joint} "
+            f"joints: its functions {how} are "
             "no combinations of its functions. Take symmetry 'none'."
         )
     own = np.eye(len(turned)) + turned
     _, r, order = qr(own, mode="economic", pivoting=True)
     rank = int((np.abs(np.diag(r)) > _CLOSED * abs(r[0, 0])).sum()) if abs(r[0, 0]) > _CLOSED else 0
     if rank == 0:
-        raise ProblemError(f"the class {type(kind).__name__} has no gait of symmetry {kind.symmetry!r} but rest.")
+        raise ProblemError(
+            f"the class {type(kind).__name__} has no gait of symmetry {kind.symmetry!r} but rest."
+        )
     return allowed @ own[:, np.sort(order[:rank])]

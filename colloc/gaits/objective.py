@@ -1,7 +1,8 @@
 """What a gait is to be best at: one expression of what a period comes to.
 
-The expression is stated once, as text (`colloc.numerics.expression`). It is evaluated with floats for a value, with numbers
-that carry their gradient for the search in the reduced space and for error bars, and with CasADi for the full program.
+The expression is stated once, as text (`colloc.numerics.expression`). It is evaluated with floats
+for a value, with numbers that carry their gradient for the search in the reduced space and for
+error bars, and with CasADi for the full program.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
 QUANTITIES = {
-    "distance": "displacement of the centre of mass over a period, the chord of the arc if a turn is asked for [body lengths]",
+    "distance": "displacement of the centre of mass over a period, the chord of the arc if a turn "
+    "is asked for [body lengths]",
     "work": "work against friction over a period",
     "rotation": "net rotation over a period, counter-clockwise [rad]",
     **{name: quantity.meaning for name, quantity in INTEGRALS.items()},
@@ -44,8 +46,8 @@ class Objective:
     Parameters
     ----------
     expression : str
-        Of `QUANTITIES` and `quantities`: numbers, ``+ - * / **``, brackets, and `colloc.numerics.expression.FUNCTIONS`; powers
-        have constant exponents.
+        Of `QUANTITIES` and `quantities`: numbers, ``+ - * / **``, brackets, and
+        `colloc.numerics.expression.FUNCTIONS`; powers have constant exponents.
     name : str, optional
         By default that of `NAMED`, or the expression.
     quantities : sequence of Quantity, optional
@@ -75,7 +77,10 @@ class Objective:
     def __post_init__(self) -> None:
         object.__setattr__(self, "quantities", quantities_of(self.quantities))
         if any(each.name in INTEGRALS and each != INTEGRALS[each.name] for each in self.quantities):
-            raise ProblemError(f"objective: a quantity has the name of another one; taken are {', '.join(QUANTITIES)}.")
+            raise ProblemError(
+                f"objective: a quantity has the name of another one; taken are "
+                f"{', '.join(QUANTITIES)}."
+            )
         try:
             stated = formula(NAMED.get(self.expression, self.expression), self._names)
         except (ProblemError, TypeError) as error:
@@ -83,7 +88,10 @@ class Objective:
             raise ProblemError(f"objective: {error} {known}") from None
         if not stated.names & {*self._names}:
             known = ", ".join(self._names)
-            raise ProblemError(f"the objective {stated.text!r} speaks of nothing that a gait does; it may of {known}.")
+            raise ProblemError(
+                f"the objective {stated.text!r} speaks of nothing that a gait does; it may of "
+                f"{known}."
+            )
         object.__setattr__(self, "expression", stated.text)
         names = {expression: name for name, expression in NAMED.items()}
         object.__setattr__(self, "name", self.name or names.get(self.expression, self.expression))
@@ -94,14 +102,19 @@ class Objective:
         except (ArithmeticError, TypeError, ValueError):
             values, partials = [np.nan], [{}]
         if not all(isinstance(value, float) and np.isfinite(value) for value in values):
-            raise ProblemError(f"the objective {self.expression!r} has no value for a usual gait: {self._samples[0]}.")
+            raise ProblemError(
+                f"the objective {self.expression!r} has no value for a usual gait: "
+                f"{self._samples[0]}."
+            )
         if not all(_FLATTEST < max(map(abs, each.values())) < 1 / _FLATTEST for each in partials):
             raise ProblemError(
-                f"the objective {self.expression!r} does not tell usual gaits apart: it is too flat or too steep."
+                f"the objective {self.expression!r} does not tell usual gaits apart: it is too "
+                f"flat or too steep."
             )
         if min(each.get("distance", 0.0) for each in partials) < 0:
             raise ProblemError(
-                f"the objective {self.expression!r} falls with the distance; a body counts its distance in the direction in "
+                f"the objective {self.expression!r} falls with the distance; a body counts its "
+                f"distance in the direction in "
                 "which it moves, so it can only be asked to go far."
             )
 
@@ -124,7 +137,10 @@ class Objective:
 
     @property
     def _samples(self) -> list[dict[str, float]]:
-        return [dict.fromkeys(self._names, other) | sample for sample, other in zip(_SAMPLES, _OTHERS, strict=True)]
+        return [
+            dict.fromkeys(self._names, other) | sample
+            for sample, other in zip(_SAMPLES, _OTHERS, strict=True)
+        ]
 
     @cached_property
     def uses(self) -> tuple[str, ...]:
@@ -138,7 +154,8 @@ class Objective:
 
     @cached_property
     def degree(self) -> float | None:
-        """The power of the friction coefficients that the value is proportional to; None if to none."""
+        """The power of the friction coefficients that the value is proportional to; None if to
+        none."""
         if "period" in self.uses:  # it depends on the ratio of weight to friction
             return None
         degrees, powers = {"work": 1.0}, []
@@ -154,9 +171,13 @@ class Objective:
         near = float(np.round(powers[0], 6))
         return near if np.allclose(powers, near, rtol=0, atol=1e-9) else None
 
-    def gradient(self, period: Mapping[str, float], slopes: Mapping[str, np.ndarray]) -> np.ndarray | float:
+    def gradient(
+        self, period: Mapping[str, float], slopes: Mapping[str, np.ndarray]
+    ) -> np.ndarray | float:
         """Of the value, from the quantities of a period and their gradients."""
-        return self._formula.differentiated({name: Dual(period[name], (slopes[name],)) for name in self.uses}).slopes[0]
+        return self._formula.differentiated(
+            {name: Dual(period[name], (slopes[name],)) for name in self.uses}
+        ).slopes[0]
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
         """Derivative with respect to each quantity that it uses."""
@@ -165,12 +186,16 @@ class Objective:
         return dict(zip(self.uses, np.broadcast_to(slope, len(self.uses)).tolist(), strict=True))
 
     def shares(self, period: Mapping[str, float]) -> dict[str, float]:
-        """What a small change of each quantity changes in the value, over its magnitude, per unit of the change."""
+        """What a small change of each quantity changes in the value, over its magnitude, per unit
+        of the change."""
         size = max(abs(self(period)), 1e-300)
-        return dict.fromkeys(self._names, 0.0) | {name: slope / size for name, slope in self.partials(period).items()}
+        return dict.fromkeys(self._names, 0.0) | {
+            name: slope / size for name, slope in self.partials(period).items()
+        }
 
     def relative_error(self, period: Mapping[str, float], errors: Mapping[str, Any]) -> Any:
-        """Relative error of the value from those of quantities, numbers or arrays, whose signs are not known."""
+        """Relative error of the value from those of quantities, numbers or arrays, whose signs are
+        not known."""
         shares = self.shares(period)
         return sum(abs(shares.get(name, 0.0)) * error for name, error in errors.items())
 
@@ -191,11 +216,14 @@ class Objective:
 
 
 def integrals_of(aims: Iterable[Objective]) -> tuple[Quantity, ...]:
-    """The integrals that any of some objectives speaks of. `ProblemError` if two of them have one name."""
+    """The integrals that any of some objectives speaks of. `ProblemError` if two of them have one
+    name."""
     found: dict[str, Quantity] = {}
     for each in (quantity for aim in aims for quantity in aim.integrals):
         if found.setdefault(each.name, each) != each:
-            raise ProblemError(f"two quantities are called {each.name}: give one of them another name.")
+            raise ProblemError(
+                f"two quantities are called {each.name}: give one of them another name."
+            )
     return tuple(found.values())
 
 
@@ -206,11 +234,18 @@ NAMED = {
     "driven efficiency": "distance / driven_work",
     "towing": "distance ** 2 / work",
 }
-"""Objectives that a problem may name: distance per work; per path in shape space, which is the speed of a body whose shape
-changes at unit rate; rotation per work; distance per work where no actuator recovers energy from being driven backwards
-(`colloc.mechanics.actuators`); and for viscous drag, whose work grows with the pace, Lighthill's efficiency: the work of
-towing the straight body as far in the same time, at unit drag along it, per work."""
-_SHORT = {"efficiency": "d/W", "speed": "d/L", "turning": "θ/W", "driven efficiency": "d/W+", "towing": "d²/W"}
+"""Objectives that a problem may name: distance per work; per path in shape space, which is the
+speed of a body whose shape changes at unit rate; rotation per work; distance per work where no
+actuator recovers energy from being driven backwards (`colloc.mechanics.actuators`); and for viscous
+drag, whose work grows with the pace, Lighthill's efficiency: the work of towing the straight body
+as far in the same time, at unit drag along it, per work."""
+_SHORT = {
+    "efficiency": "d/W",
+    "speed": "d/L",
+    "turning": "θ/W",
+    "driven efficiency": "d/W+",
+    "towing": "d²/W",
+}
 EFFICIENCY, SPEED, TURNING, DRIVEN, TOWING = (Objective(name) for name in NAMED)
 
 
@@ -219,15 +254,22 @@ def objective_from(stated: object) -> Objective:
     if isinstance(stated, Objective):
         return stated
     if isinstance(stated, dict):
-        return Objective(**stated | {"quantities": [Quantity(**each) for each in stated.get("quantities", ())]})
+        return Objective(
+            **stated | {"quantities": [Quantity(**each) for each in stated.get("quantities", ())]}
+        )
     return Objective(stated)  # type: ignore[arg-type]
 
 
 def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
     """Objectives and the values that they must reach at least, from a mapping or pairs."""
     pairs = stated.items() if isinstance(stated, Mapping) else () if stated is None else stated
-    if not isinstance(pairs, Iterable) or not all(isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in pairs):
-        raise ProblemError(f"at_least names what must be reached with its value, as {{'distance': 0.3}}, not {shown(stated)}.")
+    if not isinstance(pairs, Iterable) or not all(
+        isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in pairs
+    ):
+        raise ProblemError(
+            f"at_least names what must be reached with its value, as {{'distance': 0.3}}, not "
+            f"{shown(stated)}."
+        )
     found = []
     for what, least in pairs:
         if not is_number(least):

@@ -1,8 +1,9 @@
-"""The numbers of a problem that nobody knows exactly or that could be chosen otherwise, each with the problem where it differs.
+"""The numbers of a problem that nobody knows exactly or that could be chosen otherwise, each with
+the problem where it differs.
 
-Friction, lengths, weights, masses, feet, what limits the gait. What has to stay alike stays so: lengths, weights, and masses
-add up to 1, and where the class of gaits asks for a body that reads the same from both ends, mirrored links and feet change
-together.
+Friction, lengths, weights, masses, feet, what limits the gait. What has to stay alike stays so:
+lengths, weights, and masses add up to 1, and where the class of gaits asks for a body that reads
+the same from both ends, mirrored links and feet change together.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ class Parameter:
     value : float
         What it is; the first, where several change together.
     changed : callable
-        The problem where it differs by a part of itself (0.1: a tenth more), or if it is not relative by so much.
-        `ProblemError` where it cannot.
+        The problem where it differs by a part of itself (0.1: a tenth more), or if it is not
+        relative by so much. `ProblemError` where it cannot.
     relative : bool
         False for places of feet, which move by parts of their links towards the head.
     """
@@ -97,7 +98,8 @@ def _of_friction(problem: Problem) -> Iterator[Parameter]:
 
 
 def _coefficients(law: Law) -> list[tuple[str, float]]:
-    """Fields of a law that are coefficients, with their values; those of a law of formulas may bear the same names."""
+    """Fields of a law that are coefficients, with their values; those of a law of formulas may bear
+    the same names."""
     own = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
     return [(field, float(own[field])) for field in _COEFFICIENTS if is_number(own.get(field))]
 
@@ -111,7 +113,10 @@ def _with_friction(problem: Problem, field: str, by: float) -> Problem:
 
 
 def _with_friction_of_feet(problem: Problem, law: Law, field: str, by: float) -> Problem:
-    feet = [replace(foot, friction=_scaled(law, field, by)) if foot.friction == law else foot for foot in _feet(problem)]
+    feet = [
+        replace(foot, friction=_scaled(law, field, by)) if foot.friction == law else foot
+        for foot in _feet(problem)
+    ]
     return _with_chain(problem, feet=tuple(feet))
 
 
@@ -126,7 +131,10 @@ def _with_chain(problem: Problem, **changes: Any) -> Problem:
     chain = _chain(problem)
     assert chain is not None  # whoever asks has looked
     chain = replace(chain, **changes)
-    return _with(problem, body=replace(problem.body, chain=chain) if isinstance(problem.body, Coupled) else chain)
+    return _with(
+        problem,
+        body=replace(problem.body, chain=chain) if isinstance(problem.body, Coupled) else chain,
+    )
 
 
 def _feet(problem: Problem) -> tuple[Foot, ...]:
@@ -146,12 +154,19 @@ def _of_body(problem: Problem) -> Iterator[Parameter]:
                 name = f"{words} of {_counted('link', links)}"
                 yield Parameter(name, own[links[0]], partial(_with_shares, problem, field, links))
     if body.width:
-        yield Parameter("width", body.width, lambda by: _with_chain(problem, width=body.width * (1 + by)))
+        yield Parameter(
+            "width", body.width, lambda by: _with_chain(problem, width=body.width * (1 + by))
+        )
     feet = body.standing_on
     for group in _feet_alike(feet, body.n_link, mirrored):
         which = _counted("foot", sorted(group))
         if any(group.values()):
-            yield Parameter(f"place of {which}", feet[min(group)].place, partial(_with_places, problem, group), relative=False)
+            yield Parameter(
+                f"place of {which}",
+                feet[min(group)].place,
+                partial(_with_places, problem, group),
+                relative=False,
+            )
         if len(group) < len(feet):
             weight = feet[min(group)].weight
             assert weight is not None  # a body's feet have their weights
@@ -169,7 +184,11 @@ def _counted(what: str, which: Sequence[int]) -> str:
     """ "link 2" or "links 1 and 3", counted from 1 at the tail."""
     numbers = [str(k + 1) for k in which]
     many = {"foot": "feet"}.get(what, f"{what}s")
-    return f"{what} {numbers[0]}" if len(numbers) == 1 else f"{many} {', '.join(numbers[:-1])} and {numbers[-1]}"
+    return (
+        f"{what} {numbers[0]}"
+        if len(numbers) == 1
+        else f"{many} {', '.join(numbers[:-1])} and {numbers[-1]}"
+    )
 
 
 def _changed_shares(shares: Sequence[float], which: Sequence[int], by: float) -> tuple[float, ...]:
@@ -180,12 +199,15 @@ def _changed_shares(shares: Sequence[float], which: Sequence[int], by: float) ->
 
 
 def _with_shares(problem: Problem, field: str, which: list[int], by: float) -> Problem:
-    return _with_chain(problem, **{field: _changed_shares(getattr(_chain(problem), field), which, by)})
+    return _with_chain(
+        problem, **{field: _changed_shares(getattr(_chain(problem), field), which, by)}
+    )
 
 
 def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dict[int, float]]:
-    """Feet that change together, and which way each moves when they do: left and right ones, and where the body has to read the
-    same from both ends those at both; 0 for one in the very middle, which cannot move."""
+    """Feet that change together, and which way each moves when they do: left and right ones, and
+    where the body has to read the same from both ends those at both; 0 for one in the very middle,
+    which cannot move."""
     groups: list[dict[int, float]] = []
     for k, foot in enumerate(feet):
         if any(k in group for group in groups):
@@ -194,7 +216,9 @@ def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dic
         ahead, back = ([foot, foot.mirrored], [turned, turned.mirrored] if mirrored else [])
         group = {}
         for j, other in enumerate(feet):
-            side = any(other.is_like(one) for one in ahead) - any(other.is_like(one) for one in back)
+            side = any(other.is_like(one) for one in ahead) - any(
+                other.is_like(one) for one in back
+            )
             if side or any(other.is_like(one) for one in ahead):
                 group[j] = float(side)
         groups.append(group)
@@ -202,7 +226,10 @@ def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dic
 
 
 def _with_places(problem: Problem, group: dict[int, float], by: float) -> Problem:
-    feet = [replace(foot, place=foot.place + by * group.get(k, 0.0)) for k, foot in enumerate(_feet(problem))]
+    feet = [
+        replace(foot, place=foot.place + by * group.get(k, 0.0))
+        for k, foot in enumerate(_feet(problem))
+    ]
     return _with_chain(problem, feet=tuple(feet))
 
 
@@ -222,19 +249,30 @@ def _of_limits(problem: Problem) -> Iterator[Parameter]:
         if least:
             yield Parameter(f"least {aim.name}", least, partial(_with_least, problem, k))
     if problem.rotation:
-        yield Parameter("net rotation", problem.rotation, partial(_with_number, problem, "rotation"))
+        yield Parameter(
+            "net rotation", problem.rotation, partial(_with_number, problem, "rotation")
+        )
     if hasattr(problem.gait, "curvature"):
         bent = problem.gait.curvature
-        yield Parameter("curvature of paths", bent, lambda by: _with(problem, gait=_scaled(problem.gait, "curvature", by)))
+        yield Parameter(
+            "curvature of paths",
+            bent,
+            lambda by: _with(problem, gait=_scaled(problem.gait, "curvature", by)),
+        )
 
 
 def _first(stated: Any) -> float:
-    """The first number of a limit, which may be one for all joints, one each, or a least and a largest angle of each."""
+    """The first number of a limit, which may be one for all joints, one each, or a least and a
+    largest angle of each."""
     return _first(stated[0]) if isinstance(stated, tuple) else abs(float(stated))
 
 
 def _grown(stated: Any, by: float) -> Any:
-    return tuple(_grown(each, by) for each in stated) if isinstance(stated, tuple) else stated * (1 + by)
+    return (
+        tuple(_grown(each, by) for each in stated)
+        if isinstance(stated, tuple)
+        else stated * (1 + by)
+    )
 
 
 def _with_number(problem: Problem, field: str, by: float) -> Problem:
@@ -242,5 +280,8 @@ def _with_number(problem: Problem, field: str, by: float) -> Problem:
 
 
 def _with_least(problem: Problem, which: int, by: float) -> Problem:
-    least = [(aim, value * (1 + by) if k == which else value) for k, (aim, value) in enumerate(problem.at_least)]
+    least = [
+        (aim, value * (1 + by) if k == which else value)
+        for k, (aim, value) in enumerate(problem.at_least)
+    ]
     return _with(problem, at_least=tuple(least))

@@ -1,7 +1,7 @@
 """Any gait as points along its path: the start of a search over another class of paths.
 
-A gait of one class seeds the next through these points: its symmetric part is sampled by arc length on the part of the
-period that is solved, and arcs or straight pieces are laid through the samples.
+A gait of one class seeds the next through these points: its symmetric part is sampled by arc length
+on the part of the period that is solved, and arcs or straight pieces are laid through the samples.
 """
 
 from __future__ import annotations
@@ -53,15 +53,21 @@ def _by_arc_length(points: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, floa
 
 
 def graded_edges(gait: Gait, target: FreePath, n: int) -> np.ndarray:
-    """Phases of `n` intervals along the path of a gait, half of them spread by length and half by how much it turns.
+    """Phases of `n` intervals along the path of a gait, half of them spread by length and half by
+    how much it turns.
 
-    A turn counts as spread over the length that the sharpest allowed bend needs, so that a corner gets several intervals.
+    A turn counts as spread over the length that the sharpest allowed bend needs, so that a corner
+    gets several intervals.
     """
     points = symmetric_samples(gait, target.symmetry)
     points, length = _by_arc_length(points, np.linspace(0.0, 1.0, _DENSE + 1))
     step = np.diff(_extended(points, target.symmetry))
     cosine = np.sum(step[:, 1:] * step[:, :-1], axis=0)
-    area = np.sqrt(np.maximum(np.sum(step[:, 1:] ** 2, axis=0) * np.sum(step[:, :-1] ** 2, axis=0) - cosine**2, 0.0))
+    area = np.sqrt(
+        np.maximum(
+            np.sum(step[:, 1:] ** 2, axis=0) * np.sum(step[:, :-1] ** 2, axis=0) - cosine**2, 0.0
+        )
+    )
     turn = np.arctan2(area, cosine)
     width = min(_DENSE, max(1, round(_BEND / target.curvature / length * _DENSE)))
     spread = np.convolve(turn, np.ones(width) / width, mode="same")[_DENSE - 1 : 2 * _DENSE]
@@ -81,12 +87,21 @@ def arcs_through(gait: Gait, target: FreePath, edges: np.ndarray) -> ArcPath:
     step = 0.25 * float(np.diff(at).min())
     before, after = at - step, at + step
     extended = _extended(points, target.symmetry)
-    tangent = _by_arc_length(extended, (1 + after) / 3)[0] - _by_arc_length(extended, (1 + before) / 3)[0]
+    tangent = (
+        _by_arc_length(extended, (1 + after) / 3)[0] - _by_arc_length(extended, (1 + before) / 3)[0]
+    )
     tangents = tangent / np.linalg.norm(tangent, axis=0)
     if gait.n_joint == 2:
         tangents = np.unwrap(np.arctan2(tangents[1], tangents[0]))[None]
         tangents = tangents + _end_correction(tangents, target, at)
-    return ArcPath(edges, shapes, tangents, length / fraction(target.symmetry), target.symmetry, theta=gait.theta)
+    return ArcPath(
+        edges,
+        shapes,
+        tangents,
+        length / fraction(target.symmetry),
+        target.symmetry,
+        theta=gait.theta,
+    )
 
 
 def _extended(points: np.ndarray, symmetry: str) -> np.ndarray:
@@ -99,7 +114,8 @@ def _extended(points: np.ndarray, symmetry: str) -> np.ndarray:
 
 
 def _end_correction(headings: np.ndarray, target: FreePath, at: np.ndarray) -> np.ndarray:
-    """What makes headings turn by the whole windings asked for, spread evenly (a rough guess for another winding)."""
+    """What makes headings turn by the whole windings asked for, spread evenly (a rough guess for
+    another winding)."""
     share = fraction(target.symmetry)
     turned = float(headings[0, -1] - headings[0, 0])
     unit = 2 * np.pi * share
@@ -113,9 +129,13 @@ def _end_correction(headings: np.ndarray, target: FreePath, at: np.ndarray) -> n
 
 
 def corners_through(gait: Gait, target: Polygon) -> Corners:
-    """The polygon of the class nearest to the path of `gait`, its corners on the path (least squares, exact search); one that
-    is in the class already as it is."""
-    if isinstance(gait, Corners) and gait.symmetry == target.symmetry and gait.vertices.shape[1] == target.pieces + 1:
+    """The polygon of the class nearest to the path of `gait`, its corners on the path (least
+    squares, exact search); one that is in the class already as it is."""
+    if (
+        isinstance(gait, Corners)
+        and gait.symmetry == target.symmetry
+        and gait.vertices.shape[1] == target.pieces + 1
+    ):
         return gait
     points = symmetric_samples(gait, target.symmetry)
     points, _ = _by_arc_length(points, np.linspace(0.0, 1.0, _POLYGON_POINTS))
@@ -129,7 +149,8 @@ def corners_through(gait: Gait, target: Polygon) -> Corners:
 
 
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
-    """Indices of the ``pieces + 1`` points, ends included, whose chords are nearest to all points (dynamic programming)."""
+    """Indices of the ``pieces + 1`` points, ends included, whose chords are nearest to all points
+    (dynamic programming)."""
     n = points.shape[1]
     cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
     for i in range(n - 1):
@@ -139,7 +160,11 @@ def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
         along = dots / np.maximum(squares, 1e-300)
         np.clip(along, 0.0, 1.0, out=along)
         nearer = along * (2 * dots - along * squares)
-        cost[i, i + 1 :] = np.cumsum(squares) - squares - np.einsum("kj,kj->j", nearer, before[: n - i - 1, : n - i - 1])
+        cost[i, i + 1 :] = (
+            np.cumsum(squares)
+            - squares
+            - np.einsum("kj,kj->j", nearer, before[: n - i - 1, : n - i - 1])
+        )
     best, back = cost[0].copy(), []
     for _ in range(pieces - 1):
         total = best[:, None] + cost

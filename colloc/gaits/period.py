@@ -1,12 +1,15 @@
-r"""What a period of a gait comes to: values of the quantities that objectives speak of, each with its errors.
+r"""What a period of a gait comes to: values of the quantities that objectives speak of, each with
+its errors.
 
-A period that turns the body by alpha turns everything about one point of the floor. The displacement of the centre of mass x
-then depends on the phase that the period is begun at, for the body wriggles about the circle that it follows. The chord of
-the circle's arc does not; it is the distance of a gait that is asked to turn:
+A period that turns the body by alpha turns everything about one point of the floor. The
+displacement of the centre of mass x then depends on the phase that the period is begun at, for the
+body wriggles about the circle that it follows. The chord of the circle's arc does not; it is the
+distance of a gait that is asked to turn:
 
     chord = (2 sin(alpha/2) / alpha) |integral of e^(-i alpha t) x'(t) dt|.
 
-The integral is the way as it is seen from *axes that turn evenly*, by alpha a period; for alpha = 0 it is the displacement.
+The integral is the way as it is seen from *axes that turn evenly*, by alpha a period; for alpha = 0
+it is the displacement.
 """
 
 from __future__ import annotations
@@ -26,7 +29,8 @@ def chord_per_way(turn: float) -> float:
 
 @dataclass(frozen=True)
 class Period:
-    """Quantities of a period, by the names of `colloc.gaits.objective.QUANTITIES`; what nobody measured is left out.
+    """Quantities of a period, by the names of `colloc.gaits.objective.QUANTITIES`; what nobody
+    measured is left out.
 
     Attributes
     ----------
@@ -34,7 +38,8 @@ class Period:
     errors : mapping of str to float
         How much each may be wrong by, of unknown sign.
     others : mapping of str to float
-        How much each could change at most if the body took any other of its balanced motions; empty where there is one motion.
+        How much each could change at most if the body took any other of its balanced motions; empty
+        where there is one motion.
 
     Examples
     --------
@@ -51,7 +56,8 @@ class Period:
 
     @property
     def distance(self) -> float:
-        """Displacement of the centre of mass, or the chord of the arc where a turn is asked for [body lengths]."""
+        """Displacement of the centre of mass, or the chord of the arc where a turn is asked for
+        [body lengths]."""
         return self.values["distance"]
 
     @property

@@ -1,6 +1,8 @@
-"""Polygons, run through at constant shape speed, and the class of them with a given number of corners.
+"""Polygons, run through at constant shape speed, and the class of them with a given number of
+corners.
 
-The parameters of a member are the joint angles at the ends of all straight pieces of the part of the period that is solved.
+The parameters of a member are the joint angles at the ends of all straight pieces of the part of
+the period that is solved.
 """
 
 from __future__ import annotations
@@ -28,11 +30,13 @@ class Corners(UnitSpeedGait):
     Parameters
     ----------
     corners : (n_joint, n)
-        Joint angles [rad] at the corners, in order. Without a symmetry the last is joined to the first. With one these are
-        the vertices of half the path, ends included; an end that lies within an edge is no corner of the polygon.
+        Joint angles [rad] at the corners, in order. Without a symmetry the last is joined to the
+        first. With one these are the vertices of half the path, ends included; an end that lies
+        within an edge is no corner of the polygon.
     symmetry : {"none", "bilateral", "antipodal"}
     theta : float, optional
-        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
+        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left
+        [rad].
 
     Examples
     --------
@@ -65,7 +69,9 @@ class Corners(UnitSpeedGait):
     def vertices(self) -> np.ndarray:
         """Ends of the straight pieces of the stored part, ``(n_joint, n_piece + 1)``."""
         closed = self.symmetry == "none"
-        return np.concatenate([self.corners, self.corners[:, :1]], axis=1) if closed else self.corners
+        return (
+            np.concatenate([self.corners, self.corners[:, :1]], axis=1) if closed else self.corners
+        )
 
     def _lengths(self) -> np.ndarray:
         return np.linalg.norm(np.diff(self.vertices), axis=0)
@@ -108,11 +114,16 @@ class Corners(UnitSpeedGait):
         return self._side(phase)[1]
 
     def _side(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where the side that each phase lies on begins, the rates on it, and how long ago it began."""
+        """Where the side that each phase lies on begins, the rates on it, and how long ago it
+        began."""
         phases, vertices = self.phases, self.vertices
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
         # a side of no length is never chosen
-        return vertices[:, k], (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k]), phase - phases[k]
+        return (
+            vertices[:, k],
+            (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k]),
+            phase - phases[k],
+        )
 
     def grown(self, factor: float) -> Corners:
         """The polygon with shapes multiplied by a factor about their mean over the path."""
@@ -124,7 +135,9 @@ class Corners(UnitSpeedGait):
         n = self.corners.shape[1]
         if n > _MOST_TOLD:
             return [f"path of length {self.length:.4f} rad, {n} vertices", *self.pointing]
-        corners = [f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in self.corners.T]
+        corners = [
+            f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in self.corners.T
+        ]
         return [f"path of length {self.length:.4f} rad", *corners, *self.pointing]
 
 
@@ -139,8 +152,9 @@ class Polygon(ClassOfGaits):
         At least 2 (a retraced segment), over the whole period. Even if antipodal.
     symmetry : {"none", "bilateral", "antipodal"}
     axis : {"corner", "side"}
-        Of a bilateral polygon: whether its axis (angle 1 = -angle 2 for two joints) first meets a corner or the middle of
-        a side. With an odd number of corners it meets one of each, and this does not matter.
+        Of a bilateral polygon: whether its axis (angle 1 = -angle 2 for two joints) first meets a
+        corner or the middle of a side. With an odd number of corners it meets one of each, and this
+        does not matter.
     shortest_side : float
         Lower bound on the length of a side [rad].
 
@@ -162,14 +176,20 @@ class Polygon(ClassOfGaits):
 
     def __post_init__(self) -> None:
         if not is_whole(self.corners, 2, 64):
-            raise ProblemError(f"gait.corners must be a whole number from 2 to 64, not {self.corners!r}.")
+            raise ProblemError(
+                f"gait.corners must be a whole number from 2 to 64, not {self.corners!r}."
+            )
         self._check_symmetry()
         if self.axis not in ("corner", "side"):
             raise ProblemError(f"gait.axis must be 'corner' or 'side', not {self.axis!r}.")
         if self.symmetry == ANTIPODAL and self.corners % 2:
-            raise ProblemError(f"an antipodal polygon has an even number of corners, not {self.corners}.")
+            raise ProblemError(
+                f"an antipodal polygon has an even number of corners, not {self.corners}."
+            )
         if not (is_number(self.shortest_side) and 0 < self.shortest_side < np.pi):
-            raise ProblemError(f"gait.shortest_side must lie in (0, pi), not {self.shortest_side!r}.")
+            raise ProblemError(
+                f"gait.shortest_side must lie in (0, pi), not {self.shortest_side!r}."
+            )
 
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: some on every side."""
@@ -177,7 +197,11 @@ class Polygon(ClassOfGaits):
 
     def describe(self) -> str:
         """The class in words, for reports."""
-        axis = f" through a {self.axis}" if self.symmetry == BILATERAL and self.corners % 2 == 0 else ""
+        axis = (
+            f" through a {self.axis}"
+            if self.symmetry == BILATERAL and self.corners % 2 == 0
+            else ""
+        )
         return f"polygons of {self.corners} corners, symmetry {self.symmetry}{axis}"
 
     def retraces(self, n_joint: int) -> bool:
@@ -207,10 +231,13 @@ class Polygon(ClassOfGaits):
         return n_joint * (self.pieces + 1)
 
     def split(self, parameters: np.ndarray, n_joint: int) -> np.ndarray:
-        """Angles at the ends of the pieces, ``(n_joint, n_piece + 1)``; works on the parameters' index array as well."""
+        """Angles at the ends of the pieces, ``(n_joint, n_piece + 1)``; works on the parameters'
+        index array as well."""
         return parameters.reshape(-1, n_joint).T
 
-    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Corners:
+    def member(
+        self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None
+    ) -> Corners:
         return Corners.through(self.split(parameters, n_joint), self.symmetry)
 
     def parameters(self, gait: Corners) -> np.ndarray:

@@ -1,6 +1,7 @@
 """The class of gaits with nothing free: a body whose motion is prescribed runs through its phases.
 
-The shape coordinates of such a body are a point on a circle, ``(cos 2 pi t, sin 2 pi t)``: closed, and the same for all.
+The shape coordinates of such a body are a point on a circle, ``(cos 2 pi t, sin 2 pi t)``: closed,
+and the same for all.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ class Phases(GaitFunction):
     Parameters
     ----------
     schedule : (n + 1,)
-        Phases from 0 to the part of the period that is solved, between which the motion is smooth in time.
+        Phases from 0 to the part of the period that is solved, between which the motion is smooth
+        in time.
     symmetry : {"none", "antipodal"}
     """
 
@@ -67,7 +69,8 @@ class Prescribed(ClassOfGaits):
     Parameters
     ----------
     stages : tuple of float
-        Phases from 0 to the part of the period that is solved, between which the motion is smooth in time.
+        Phases from 0 to the part of the period that is solved, between which the motion is smooth
+        in time.
     symmetry : {"none", "antipodal"}
         Antipodal: the second half period is the mirror image of the first.
     """
@@ -82,8 +85,15 @@ class Prescribed(ClassOfGaits):
         stages = tuple(float(t) for t in self.stages)
         object.__setattr__(self, "stages", stages)
         self._check_symmetry()
-        if len(stages) < 2 or stages[0] != 0.0 or stages[-1] != self.fraction or min(np.diff(stages)) <= 0:
-            raise ProblemError(f"gait.stages must ascend from 0 to {self.fraction:g}, not {stages}.")
+        if (
+            len(stages) < 2
+            or stages[0] != 0.0
+            or stages[-1] != self.fraction
+            or min(np.diff(stages)) <= 0
+        ):
+            raise ProblemError(
+                f"gait.stages must ascend from 0 to {self.fraction:g}, not {stages}."
+            )
 
     def intervals(self, n_joint: int) -> int:
         """Intervals of a first mesh: some in every stage."""
@@ -96,7 +106,10 @@ class Prescribed(ClassOfGaits):
     def edges(self, n: int) -> np.ndarray:
         """A mesh of about n intervals on which every stage ends at a knot."""
         each = max(1, round(n / (len(self.stages) - 1)))
-        parts = [np.linspace(a, b, each + 1)[:-1] for a, b in zip(self.stages, self.stages[1:], strict=False)]
+        parts = [
+            np.linspace(a, b, each + 1)[:-1]
+            for a, b in zip(self.stages, self.stages[1:], strict=False)
+        ]
         return np.concatenate([*parts, self.stages[-1:]])
 
     def describe(self) -> str:
@@ -105,7 +118,9 @@ class Prescribed(ClassOfGaits):
     def size(self, n_joint: int, n_interval: int | None = None) -> int:
         return 0
 
-    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Phases:
+    def member(
+        self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None
+    ) -> Phases:
         """The only one."""
         return Phases(self.stages, self.symmetry)
 

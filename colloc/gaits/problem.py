@@ -1,4 +1,5 @@
-"""A problem: body, friction, class of gaits, objective, guess and discretisation; frozen and validated when it is made."""
+"""A problem: body, friction, class of gaits, objective, guess and discretisation; frozen and
+validated when it is made."""
 
 from __future__ import annotations
 
@@ -21,23 +22,37 @@ from colloc.gaits.sloped import slope_from
 from colloc.gaits.symmetry import ANTIPODAL, NONE, check_symmetric
 from colloc.mechanics.bodies import FULL, Body, formulations
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.densities import PathLimit, PathLimits, Quantity, stated_limit, torque_and_power
+from colloc.mechanics.densities import (
+    PathLimit,
+    PathLimits,
+    Quantity,
+    stated_limit,
+    torque_and_power,
+)
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
-from colloc.system.arguments import STATED_IF_SET, check_finite, is_number, is_whole, named_arguments
+from colloc.system.arguments import (
+    STATED_IF_SET,
+    check_finite,
+    is_number,
+    is_whole,
+    named_arguments,
+)
 from colloc.system.errors import ProblemError
 from colloc.system.result_names import check_name
 
 SMALLEST_DELTA = 1e-14
-"""Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
+"""Balances are verified down to it; at speeds of order 1, less is below the rounding of their
+differences."""
 
 LARGEST_DELTA = 1e3
-"""Body lengths per period, far above the speeds of any gait, and far from where numbers overflow."""
+"""Body lengths per period, far above the speeds of any gait, and far from where numbers
+overflow."""
 
 MOST_COORDINATES = 100
-"""Of a shape: contact is looked for in every pair of links at thousands of phases, which takes 10 s at so many, and no search
-ends with more."""
+"""Of a shape: contact is looked for in every pair of links at thousands of phases, which takes 10 s
+at so many, and no search ends with more."""
 
 
 @named_arguments
@@ -48,72 +63,83 @@ class Problem:
     Parameters
     ----------
     name : str
-        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200, and no ending that colloc itself
-        gives to files (`colloc.system.result_names`).
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200, and no ending
+        that colloc itself gives to files (`colloc.system.result_names`).
     guess : Fourier, ArcPath or Corners, optional
-        An admissible gait to start from, of any class; it is projected onto the class `gait`. By default a travelling wave
-        (`colloc.gaits.guesses`).
+        An admissible gait to start from, of any class; it is projected onto the class `gait`. By
+        default a travelling wave (`colloc.gaits.guesses`).
     body : Chain or ModalBody
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
         Or any other `colloc.mechanics.law.Law` (docs/howto/laws.md).
     gait : Harmonic, FreePath or Polygon
-        The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md). By default one
-        harmonic or, for a body whose motion is prescribed, that motion (`colloc.gaits.prescribed`).
+        The class of gaits; which paths in shape space are allowed decides the answer
+        (docs/gait_classes.md). By default one harmonic or, for a body whose motion is prescribed,
+        that motion (`colloc.gaits.prescribed`).
     delta : float
-        Regularisation speed of friction at which the problem is finally solved, in body lengths per period; for free paths
-        and polygons at unit shape speed, in body lengths per radian of path. By default 1e-4 for chains; 1e-2 for smooth
-        bodies, whose panels have to resolve it.
+        Regularisation speed of friction at which the problem is finally solved, in body lengths per
+        period; for free paths and polygons at unit shape speed, in body lengths per radian of path.
+        By default 1e-4 for chains; 1e-2 for smooth bodies, whose panels have to resolve it.
     delta_start : float
-        Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), 0.02 on a slope, and 0.01 where delta is
-        measured at unit shape speed.
+        Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), 0.02 on a
+        slope, and 0.01 where delta is measured at unit shape speed.
     joint_limit : float, or sequence of float or (float, float)
-        Largest |joint angle| [rad], at most pi, of all joints or of each, or the least and the largest of a joint, as in
-        ``((-1, 2), 1.5)``; of a smooth body, largest |tangent angle| from its mean direction, at most pi/2.
+        Largest |joint angle| [rad], at most pi, of all joints or of each, or the least and the
+        largest of a joint, as in ``((-1, 2), 1.5)``; of a smooth body, largest |tangent angle| from
+        its mean direction, at most pi/2.
     smallest_shape_speed : float
-        Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
-        2 pi. It keeps the search away from gaits
-        whose speeds sink to delta, where regularised friction is viscous and efficiency meaningless.
+        Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the
+        length of a path over 2 pi. It keeps the search away from gaits
+        whose speeds sink to delta, where regularised friction is viscous and efficiency
+        meaningless.
     intervals : int
-        Intervals of the first mesh, on the part of the period that is solved; by default as many as the class asks for.
+        Intervals of the first mesh, on the part of the period that is solved; by default as many as
+        the class asks for.
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"full", "implicit velocity"}
-        The nonlinear program whose solution is the answer, see `collocation.point_equations`: with tail velocities and link
-        forces as variables and the balance as constraints, or with the velocities tied to those of the balance solver. The
-        first is usual for chains; of smooth bodies there is only the second.
+        The nonlinear program whose solution is the answer, see `collocation.point_equations`: with
+        tail velocities and link forces as variables and the balance as constraints, or with the
+        velocities tied to those of the balance solver. The first is usual for chains; of smooth
+        bodies there is only the second.
     mesh_tolerance : float
-        Relative error of the objective to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
+        Relative error of the objective to which the mesh is refined at the final delta; 0 keeps the
+        uniform mesh.
     objective : Objective or str
-        What is maximised (`colloc.gaits.objective`): "efficiency", "speed", "turning", "driven efficiency", or an expression
-        of distance, work, rotation, length, driven_work and, with inertia, period.
+        What is maximised (`colloc.gaits.objective`): "efficiency", "speed", "turning", "driven
+        efficiency", or an expression of distance, work, rotation, length, driven_work and, with
+        inertia, period.
     rotation : float or None
-        Net rotation over a period [rad], counter-clockwise; None leaves it free. Other values than 0 need a class without
-        symmetry.
+        Net rotation over a period [rad], counter-clockwise; None leaves it free. Other values than
+        0 need a class without symmetry.
     at_least : mapping or pairs of (Objective or str, float)
         Values of a period that must be reached, as ``{"distance": 0.3}``.
     torque_limit, power_limit : float or sequence of float, optional
-        The most that the joints' actuators can do, all or each: magnitude of the moment [weight x body length], power
-        delivered [weight x body length / period]. With a power limit the pace matters.
+        The most that the joints' actuators can do, all or each: magnitude of the moment [weight x
+        body length], power delivered [weight x body length / period]. With a power limit the pace
+        matters.
     limits : PathLimit or sequence of PathLimit, optional
         Others, on functions of an instant of your own (docs/howto/motors.md).
     speed_limit : float or sequence of float, optional
-        The largest speed of the joints at any instant, all or each [rad per period]: that of a motor [rad/s] times the period
-        [s]. The pace matters.
+        The largest speed of the joints at any instant, all or each [rad per period]: that of a
+        motor [rad/s] times the period [s]. The pace matters.
     grade : float
-        Tangent of the inclination of the ground; 0 is the level (docs/howto/slopes.md). On a slope "distance" is the climb and
-        "work" that of the joints, and where the body points is sought with the gait.
+        Tangent of the inclination of the ground; 0 is the level (docs/howto/slopes.md). On a slope
+        "distance" is the climb and "work" that of the joints, and where the body points is sought
+        with the gait.
     towards : float, optional
-        Direction on a slope whose way counts instead of the climb, with none across it, from straight uphill to the left [rad].
+        Direction on a slope whose way counts instead of the climb, with none across it, from
+        straight uphill to the left [rad].
     froude : float or Free
-        Froude number L/(g T^2) at which gaits are played: length over gravity and the period squared; 0 is so slow that inertia
-        does not matter (docs/howto/pace.md). What counts is its ratio to the coefficient of friction. ``Free(low, high)``: the
-        pace is sought with the gait, where the objective speaks of the "period" [sqrt(length / gravity)].
+        Froude number L/(g T^2) at which gaits are played: length over gravity and the period
+        squared; 0 is so slow that inertia does not matter (docs/howto/pace.md). What counts is its
+        ratio to the coefficient of friction. ``Free(low, high)``: the pace is sought with the gait,
+        where the objective speaks of the "period" [sqrt(length / gravity)].
     motion : Regime, optional
         A kind of motion of your own, instead of `grade` and `froude` (`colloc.gaits.regime`).
     shrinking : bool
-        Whether a gait may be the answer that shrank until nobody sees it move. By default the best gait of finite size is, if
-        there is one.
+        Whether a gait may be the answer that shrank until nobody sees it move. By default the best
+        gait of finite size is, if there is one.
 
     Examples
     --------
@@ -157,10 +183,16 @@ class Problem:
     shrinking: bool = field(default=False, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
-        coordinates = getattr(self.body, "n_joint", 0)  # asked first: to look what else a body answers can take gigabytes
+        # asked first: to look what else a body answers can take gigabytes
+        coordinates = getattr(self.body, "n_joint", 0)
         if is_whole(coordinates, MOST_COORDINATES + 1):
-            what = f"the body has {coordinates} {self.body.coordinate}s, and {MOST_COORDINATES} are allowed"
-            raise ProblemError(f"{what}: fewer links, or a smooth body of a few modes, come near it.")
+            what = (
+                f"the body has {coordinates} {self.body.coordinate}s, and {MOST_COORDINATES} "
+                f"are allowed"
+            )
+            raise ProblemError(
+                f"{what}: fewer links, or a smooth body of a few modes, come near it."
+            )
         check_kind("body", self.body, gait_fields.BODIES, Body)
         schedule = self.body.schedule
         self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
@@ -170,10 +202,21 @@ class Problem:
         regime = self.regime
         object.__setattr__(self, "gait", regime.class_of(self.gait))
         stated = self.froude
-        object.__setattr__(self, "froude", Free(*map(float, stated)) if isinstance(stated, (list, tuple)) else float(stated))
+        object.__setattr__(
+            self,
+            "froude",
+            Free(*map(float, stated)) if isinstance(stated, (list, tuple)) else float(stated),
+        )
         usual = self.body.usual
-        start = (self.gait.delta_start or usual.delta_start) if self.law.regularised else usual.delta
-        self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=formulations(self.body)[0])
+        start = (
+            (self.gait.delta_start or usual.delta_start) if self.law.regularised else usual.delta
+        )
+        self._fill(
+            delta=usual.delta,
+            delta_start=start,
+            joint_limit=usual.limit,
+            formulation=formulations(self.body)[0],
+        )
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
         self._check_aims()
@@ -183,7 +226,11 @@ class Problem:
         if self.guess is None:
             limits = self.joint_limit, self.largest_speeds, self.smallest_shape_speed
             free = self.gait.free
-            self._fill(guess=usual_guess(self.body, self.gait, *limits) if free else self.gait.member(np.empty(0), 2))
+            self._fill(
+                guess=usual_guess(self.body, self.gait, *limits)
+                if free
+                else self.gait.member(np.empty(0), 2)
+            )
         check_kind("guess", self.guess, gait_fields.GAITS)
         check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 
@@ -197,9 +244,15 @@ class Problem:
         check_name(self.name)
         check_kind("friction", self.friction, gait_fields.LAWS, Law)
         check_kind("gait", self.gait, gait_fields.CLASSES)
-        check_kind("motion", LEVEL if self.motion is None else self.motion, [Regime, *gait_fields.MOTIONS])
+        check_kind(
+            "motion", LEVEL if self.motion is None else self.motion, [Regime, *gait_fields.MOTIONS]
+        )
         if self.gait.free == bool(self.body.schedule):
-            what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
+            what = (
+                "a prescribed motion has no class of gaits"
+                if self.gait.free
+                else "this body's motion is not prescribed"
+            )
             raise ProblemError(f"{what}; leave gait out, or take another body.")
 
     def _check_numbers(self) -> None:
@@ -209,20 +262,26 @@ class Problem:
             raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
         if self.delta < SMALLEST_DELTA:
             raise ProblemError(
-                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that order are lost in rounding. "
+                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that "
+                f"order are lost in rounding. "
                 "The paper uses 1e-4, and a certificate states the efficiency for delta -> 0."
             )
         if max(self.delta, self.delta_start) > LARGEST_DELTA:
             raise ProblemError(
-                f"delta and delta_start must be at most {LARGEST_DELTA:g}: at such speeds friction would be viscous."
+                f"delta and delta_start must be at most {LARGEST_DELTA:g}: at such speeds friction "
+                f"would be viscous."
             )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
         object.__setattr__(self, "joint_limit", checked_limit(self.body, self.joint_limit))
         if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
-            raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
+            raise ProblemError(
+                f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}."
+            )
         if self.smallest_shape_speed <= 0:
-            raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
+            raise ProblemError(
+                f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}."
+            )
         if self.formulation not in formulations(self.body):
             known = ", ".join(formulations(self.body))
             raise ProblemError(f"formulation must be one of {known}, not {self.formulation!r}.")
@@ -230,54 +289,85 @@ class Problem:
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
         self._check_resolution()
         if self.intervals > 100_000:
-            raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")
+            raise ProblemError(
+                f"the mesh is too large: {self.intervals} intervals; use at most 100000."
+            )
 
     def _check_aims(self) -> None:
         if self.uses("period") and not self.froude:
-            raise ProblemError("what is asked for speaks of the period: state the pace, froude=0.05 or froude=Free(0.001, 1).")
+            raise ProblemError(
+                "what is asked for speaks of the period: state the pace, froude=0.05 or "
+                "froude=Free(0.001, 1)."
+            )
         if self.rotation is not None and not is_number(self.rotation):
             raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
         if self.rotation == 0 and self.uses("rotation"):
-            raise ProblemError("the objective speaks of the rotation, which is 0 unless rotation says otherwise (None: free).")
+            raise ProblemError(
+                "the objective speaks of the rotation, which is 0 unless rotation says otherwise "
+                "(None: free)."
+            )
         if self.rotation != 0 and self.gait.symmetry != NONE:
             raise ProblemError(
-                f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class without symmetry."
+                f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class "
+                f"without symmetry."
             )
-        if not self.gait.free and (self.objective != EFFICIENCY or self.at_least or self.speed_limit is not None):
-            raise ProblemError("nothing is free in a prescribed motion; leave objective, at_least and speed_limit out.")
+        if not self.gait.free and (
+            self.objective != EFFICIENCY or self.at_least or self.speed_limit is not None
+        ):
+            raise ProblemError(
+                "nothing is free in a prescribed motion; leave objective, at_least and "
+                "speed_limit out."
+            )
 
     def _check_actuators(self) -> None:
         for name in ("torque_limit", "power_limit", "speed_limit"):
-            object.__setattr__(self, name, checked_actuator_limit(name, getattr(self, name), self.body.n_joint))
+            object.__setattr__(
+                self, name, checked_actuator_limit(name, getattr(self, name), self.body.n_joint)
+            )
         given = self.limits if isinstance(self.limits, Iterable) else (self.limits,)
         object.__setattr__(self, "limits", tuple(stated_limit(each) for each in given))
         limits = self.path_limits
         forced = [each.name for each in self.integrals if each.needs_forces]
-        asks = forced[0] if forced else f"a limit on the {limits.each[0].name}" if limits.each else ""
+        asks = (
+            forced[0] if forced else f"a limit on the {limits.each[0].name}" if limits.each else ""
+        )
         if asks and self.formulation != FULL:
-            raise ProblemError(f"{asks} needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
-        most = float(np.linalg.norm(of_each(self.speed_limit, self.body.n_joint))) if self.speed_limit else np.inf
+            raise ProblemError(
+                f"{asks} needs the forces on the body's parts: a chain, and the formulation "
+                f"{FULL!r}."
+            )
+        most = (
+            float(np.linalg.norm(of_each(self.speed_limit, self.body.n_joint)))
+            if self.speed_limit
+            else np.inf
+        )
         if most <= (least := 2 * np.pi * self.smallest_shape_speed):
             raise ProblemError(
-                f"speed_limit leaves no gait: all joints together move at {most:.3g} rad per period at most, and "
-                f"smallest_shape_speed asks for {least:.3g} on average (2 pi {self.smallest_shape_speed:g}). Make that smaller."
+                f"speed_limit leaves no gait: all joints together move at {most:.3g} rad per "
+                f"period at most, and "
+                f"smallest_shape_speed asks for {least:.3g} on average (2 pi "
+                f"{self.smallest_shape_speed:g}). Make that smaller."
             )
 
     @property
     def path_limits(self) -> PathLimits:
         """What motors can do, joint by joint, and the other `limits`."""
         n_joint = self.body.n_joint
-        motors = torque_and_power(of_each(self.torque_limit, n_joint), of_each(self.power_limit, n_joint))
+        motors = torque_and_power(
+            of_each(self.torque_limit, n_joint), of_each(self.power_limit, n_joint)
+        )
         return PathLimits((*motors, *(each.on(n_joint) for each in self.limits)))
 
     @property
     def largest_speeds(self) -> tuple[float, ...]:
-        """Of the joints at any instant [rad per period], joint by joint; nothing where there is no limit."""
+        """Of the joints at any instant [rad per period], joint by joint; nothing where there is no
+        limit."""
         return of_each(self.speed_limit, self.body.n_joint)
 
     @property
     def law(self) -> Law:
-        """The law of friction of all that touches the floor: `friction`, unless feet of the body have their own."""
+        """The law of friction of all that touches the floor: `friction`, unless feet of the body
+        have their own."""
         return self.body.law(self.friction)
 
     @property
@@ -285,7 +375,9 @@ class Problem:
         """How gaits are played. `ProblemError` if they cannot be."""
         slope = slope_from(self.body, self.friction, self.grade, self.towards)
         if self.motion is not None and (slope is not None or self.froude != 0):
-            raise ProblemError("a kind of motion of your own takes the place of grade and froude: leave these out.")
+            raise ProblemError(
+                "a kind of motion of your own takes the place of grade and froude: leave these out."
+            )
         if self.froude == 0:
             return self.motion or slope or LEVEL
         return paced_from(self.froude, slope, timed=self.uses("period"))
@@ -297,7 +389,8 @@ class Problem:
 
     @property
     def paced_by(self) -> str:
-        """Why the pace of a gait matters, in words; "" where distance and work belong to its path."""
+        """Why the pace of a gait matters, in words; "" where distance and work belong to its
+        path."""
         if self.power_limit is not None:
             return "the joints' power is limited"
         if self.speed_limit is not None:
@@ -308,7 +401,9 @@ class Problem:
             return self.regime.pace
         if paced := [each.name for each in self.integrals if each.pace_degree != 1.0]:
             return f"the {paced[0]} of a path depends on how fast it is followed"
-        return "" if rate_independent(self.law) else f"work depends on the pace under {self.law.label}"
+        return (
+            "" if rate_independent(self.law) else f"work depends on the pace under {self.law.label}"
+        )
 
     @property
     def aims(self) -> tuple[Objective, ...]:
@@ -316,7 +411,8 @@ class Problem:
         return (self.objective, *(aim for aim, _ in self.at_least))
 
     def uses(self, quantity: str) -> bool:
-        """Whether the objective or what must be reached speaks of a quantity of a period, by its name."""
+        """Whether the objective or what must be reached speaks of a quantity of a period, by its
+        name."""
         return any(quantity in aim.uses for aim in self.aims)
 
     @property
@@ -327,11 +423,14 @@ class Problem:
     def _check_resolution(self) -> None:
         collocation, kind = scheme(self.scheme), type(self.gait).__name__
         if self.gait.unit_speed and collocation.left:
-            raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
+            raise ProblemError(
+                f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}."
+            )
         fewest, what = self.gait.fewest_intervals(collocation.s - collocation.left)
         if self.intervals < fewest:
             raise ProblemError(
-                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot resolve {what}; "
+                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot "
+                f"resolve {what}; "
                 f"use at least {fewest}."
             )
 
@@ -344,29 +443,42 @@ class Problem:
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
         if self.law.reversible and not self.froude and self.gait.retraces(self.body.n_joint):
             coordinate, alone = self.body.coordinate, self.body.n_joint == 1
-            which = f"a body with one {coordinate}" if alone else f"the class ({self.gait.describe()})"
+            which = (
+                f"a body with one {coordinate}" if alone else f"the class ({self.gait.describe()})"
+            )
             more = f"the body a second {coordinate}" if alone else "the class more freedom"
             raise ProblemError(
-                f"no gait of {which} goes anywhere when mu_f = mu_b: it retraces its path, and reversed rates reverse the "
-                f"motion (the scallop theorem). Give {more}, mu_b different from mu_f, or the problem a froude."
+                f"no gait of {which} goes anywhere when mu_f = mu_b: it retraces its path, and "
+                f"reversed rates reverse the "
+                f"motion (the scallop theorem). Give {more}, mu_b different from mu_f, or the "
+                f"problem a froude."
             )
         if self.keeps_heading and self.rotation:
             raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")
         if self.keeps_heading and self.gait.symmetry == ANTIPODAL:
             raise ProblemError(
-                "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: the body moves along its own axis of "
-                "symmetry, and as far back while it is bent to the other side. Take the class without symmetry, links that "
+                "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: the body "
+                "moves along its own axis of "
+                "symmetry, and as far back while it is bent to the other side. Take the class "
+                "without symmetry, links that "
                 "differ, or mu_b different from mu_f."
             )
 
     @property
     def keeps_heading(self) -> bool:
-        """Whether the body is its own mirror image in every shape: then it moves along its own axis and never turns."""
-        return self.body.n_joint == 1 and self.law.reversible and self.body.symmetric and not self.grade
+        """Whether the body is its own mirror image in every shape: then it moves along its own axis
+        and never turns."""
+        return (
+            self.body.n_joint == 1
+            and self.law.reversible
+            and self.body.symmetric
+            and not self.grade
+        )
 
     @property
     def asked(self) -> str:
-        """What is asked, in a line: the objective if it is not the efficiency, joints, friction, scene and class of gaits."""
+        """What is asked, in a line: the objective if it is not the efficiency, joints, friction,
+        scene and class of gaits."""
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
         return f"{best}{coordinates}, {self.law.label}{self.regime.label}, {self.gait.describe()}"

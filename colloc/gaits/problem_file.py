@@ -1,4 +1,5 @@
-"""Problem files: plain Python that states ``PROBLEM`` (and usually ``REFERENCE``). They are code, and are executed."""
+"""Problem files: plain Python that states ``PROBLEM`` (and usually ``REFERENCE``). They are code,
+and are executed."""
 
 from __future__ import annotations
 
@@ -46,7 +47,9 @@ class Reference:
 
     def verdict(self, efficiency: float) -> str:
         """Whether an efficiency agrees with it, in words."""
-        verb = "agrees with" if abs(efficiency - self.efficiency) <= self.tolerance else "DIFFERS from"
+        verb = (
+            "agrees with" if abs(efficiency - self.efficiency) <= self.tolerance else "DIFFERS from"
+        )
         return f"{verb} {self.efficiency:g} +- {self.tolerance:g} ({self.source})"
 
 
@@ -59,20 +62,25 @@ class ProblemFile:
     source: str
     """Its text."""
     starts: int | None = None
-    """``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess leads to."""
+    """``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess
+    leads to."""
 
 
 def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
-    """Execute a problem file. `ProblemError` if there is no such file, it cannot be read, it fails (with the line), or states
-    no ``PROBLEM``, or more than results can keep."""
+    """Execute a problem file. `ProblemError` if there is no such file, it cannot be read, it fails
+    (with the line), or states no ``PROBLEM``, or more than results can keep."""
     path, names, source = stated_names(path, "problem")
     problem, reference = names.get("PROBLEM"), names.get("REFERENCE")
     if problem is None:
         raise ProblemError(f"{path} states no PROBLEM; end it with PROBLEM = Problem(...).")
     if not isinstance(problem, Problem):
-        raise ProblemError(f"{path}: PROBLEM must be a colloc.Problem, not {type(problem).__name__}.")
+        raise ProblemError(
+            f"{path}: PROBLEM must be a colloc.Problem, not {type(problem).__name__}."
+        )
     if reference is not None and not isinstance(reference, Reference):
-        raise ProblemError(f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}.")
+        raise ProblemError(
+            f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}."
+        )
     length = len(json.dumps(problem.to_dict()).encode())
     if length > LONGEST_TEXT:
         raise ProblemError(f"{path}: {_too_long('the description of PROBLEM', length)}")
@@ -114,14 +122,15 @@ def problem_file_text(problem: Problem) -> str:
 
 def _too_long(what: str, size: int) -> str:
     return (
-        f"{what} has {size} bytes, and results keep at most {LONGEST_TEXT}: let the file read large data from another "
+        f"{what} has {size} bytes, and results keep at most {LONGEST_TEXT}: let the file read "
+        f"large data from another "
         "file, or state a guess of fewer numbers."
     )
 
 
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
-    """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is for the messages. What the
-    file prints goes to standard error.
+    """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is
+    for the messages. What the file prints goes to standard error.
     `ProblemError` as for `read_problem_file`."""
     path = Path(path)
     if not os.path.isfile(path):  # Path.is_file raises for a name that is too long
@@ -134,7 +143,8 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
         raise ProblemError(f"cannot read {path}: {error.strerror or error}.") from None
     if content.startswith(_HDF5):
         raise ProblemError(
-            f"{path} is a results file (HDF5), not a {kind} file in Python; colloc report or verify reads it, and colloc solve "
+            f"{path} is a results file (HDF5), not a {kind} file in Python; colloc report or "
+            f"verify reads it, and colloc solve "
             f"MINE.py --start {path} begins with its gait."
         )
     if size > LONGEST_TEXT:
@@ -142,7 +152,9 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
     try:
         source = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ProblemError(f"{path} is no text in UTF-8 (byte {error.start}), so no {kind} file.") from None
+        raise ProblemError(
+            f"{path} is no text in UTF-8 (byte {error.start}), so no {kind} file."
+        ) from None
     names: dict[str, object] = {"__name__": f"colloc_{kind}", "__file__": str(path)}
     try:
         with contextlib.redirect_stdout(sys.stderr):  # standard output is for results
@@ -161,7 +173,8 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
 
 
 def place_of(error: BaseException) -> str:
-    """File and line of somebody's code that raised, seen from where that was called; "" if it was not reached."""
+    """File and line of somebody's code that raised, seen from where that was called; "" if it was
+    not reached."""
     theirs = traceback.extract_tb(error.__traceback__)[1:]
     lines = [frame.lineno for frame in theirs if frame.filename == theirs[0].filename]
     return f"{theirs[0].filename}, line {lines[-1]}" if lines else ""

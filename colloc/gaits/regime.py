@@ -1,8 +1,9 @@
-"""How gaits are played, as a problem states it: slowly and on the level, unless its regime says otherwise.
+"""How gaits are played, as a problem states it: slowly and on the level, unless its regime says
+otherwise.
 
-A regime says what pulls the body, which way counts, what cannot be asked, and the words of reports. Which states its periods
-have, and how they are replayed, is registered for its type (`colloc.motion.kinds.kind_in`,
-`colloc.verification.replayer.replayer`).
+A regime says what pulls the body, which way counts, what cannot be asked, and the words of reports.
+Which states its periods have, and how they are replayed, is registered for its type
+(`colloc.motion.kinds.kind_in`, `colloc.verification.replayer.replayer`).
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from colloc.numerics.arrays import Array
 
 @dataclass(frozen=True)
 class Regime:
-    """Slowly, on the level. Other kinds of motion derive from it; one of your own is asked for by ``Problem(motion=...)``.
+    """Slowly, on the level. Other kinds of motion derive from it; one of your own is asked for by
+    ``Problem(motion=...)``.
 
     Examples
     --------
@@ -34,7 +36,8 @@ class Regime:
     spent: ClassVar[str] = "friction"
     """What the joints' work goes into."""
     others: ClassVar[str] = ""
-    """Between which motions a certificate looks, where these are not the balanced motions of an instant."""
+    """Between which motions a certificate looks, where these are not the balanced motions of an
+    instant."""
     others_measured: ClassVar[bool] = True
     """Whether it is known what other balanced motions would change."""
     pace: ClassVar[str] = ""
@@ -81,12 +84,13 @@ class Regime:
         return self
 
     def counted(self, way: complex) -> complex:
-        """What counts of the way of a period, and the way across that: on the level it is as long as it is."""
+        """What counts of the way of a period, and the way across that: on the level it is as long
+        as it is."""
         return complex(abs(way))
 
     def pull(self, theta: Array) -> Array | None:
-        """An outside force on the centre of mass of a body at orientations theta ``(1, n_time)``, in its axes, ``(2,
-        n_time)``; None if there is none. NumPy and CasADi."""
+        """An outside force on the centre of mass of a body at orientations theta ``(1, n_time)``,
+        in its axes, ``(2, n_time)``; None if there is none. NumPy and CasADi."""
         return None
 
     def describe(self) -> str:

@@ -1,10 +1,12 @@
-"""A problem on a slope: how steep it is, gaits that know where the body points, and what can be asked there.
+"""A problem on a slope: how steep it is, gaits that know where the body points, and what can be
+asked there.
 
-On a plane whose inclination has the tangent g, the *grade*, the weight pulls the body down the fall line with g, in units of
-the force that presses it on the ground. The motion depends on where the body points, so where it points at the start is a
-parameter of the gait, and no half of a period follows from the other. What a period comes to keeps its names: its *distance* is
-the climb of the centre of mass, or its way in the direction asked for; its *work* is that of the joints, against friction and
-the weight.
+On a plane whose inclination has the tangent g, the *grade*, the weight pulls the body down the fall
+line with g, in units of the force that presses it on the ground. The motion depends on where the
+body points, so where it points at the start is a parameter of the gait, and no half of a period
+follows from the other. What a period comes to keeps its names: its *distance* is the climb of the
+centre of mass, or its way in the direction asked for; its *work* is that of the joints, against
+friction and the weight.
 """
 
 from __future__ import annotations
@@ -32,8 +34,8 @@ _ANY_ANGLE = 100.0
 
 @dataclass(frozen=True)
 class Slope(Regime):
-    """A slope: the tangent of its inclination, and the direction whose way counts, from straight uphill to the left [rad];
-    None: the climb counts, whatever the way aside."""
+    """A slope: the tangent of its inclination, and the direction whose way counts, from straight
+    uphill to the left [rad]; None: the climb counts, whatever the way aside."""
 
     grade: float  # type: ignore[misc]
     towards: float | None = None
@@ -55,20 +57,24 @@ class Slope(Regime):
         return f"{super().label}, grade {self.grade:g}"
 
     def in_units_of(self, unit: float) -> Self:
-        return replace(super().in_units_of(unit), grade=self.grade / unit)  # the weight's pull is a force, too
+        # the weight's pull is a force, too
+        return replace(super().in_units_of(unit), grade=self.grade / unit)
 
     def class_of(self, gait_class: Any) -> Any:
-        """Any class that derives from `LinearClass`, one's own too, can be here, and paths. `ProblemError` for others."""
+        """Any class that derives from `LinearClass`, one's own too, can be here, and paths.
+        `ProblemError` for others."""
         level = super().class_of(gait_class)
         name = type(level).__name__
         if not level.may_tell:
             raise ProblemError(
-                f"on a slope gaits say where the body points, which those of the class {name} cannot: take Harmonic, BSpline, "
+                f"on a slope gaits say where the body points, which those of the class {name} "
+                f"cannot: take Harmonic, BSpline, "
                 "Basis, FreePath or Polygon."
             )
         if level.unit_speed and level.symmetry != NONE:
             raise ProblemError(
-                f"on a slope no part of a period follows from another: take {name}(..., symmetry='none'), which has gaits of "
+                f"on a slope no part of a period follows from another: take {name}(..., "
+                f"symmetry='none'), which has gaits of "
                 f"symmetry {level.symmetry}, too."
             )
         return telling(OnSlope, level)
@@ -77,29 +83,37 @@ class Slope(Regime):
         return way * np.exp(-1j * self.ahead)
 
     def pull(self, theta: Array) -> Array:
-        """Of the weight, in the body's axes, ``(2, n_time)``, with its tail link at angles theta ``(1, n_time)`` from straight
-        uphill; NumPy and CasADi."""
+        """Of the weight, in the body's axes, ``(2, n_time)``, with its tail link at angles theta
+        ``(1, n_time)`` from straight uphill; NumPy and CasADi."""
         xp = namespace(theta)
         return xp.stack([-self.grade * xp.cos(theta), self.grade * xp.sin(theta)])
 
     def check(self, problem: Any) -> None:
         if problem.rotation != 0:
             raise ProblemError(
-                "on a slope a body that a period turns has no gait that repeats, as its weight then pulls from another side: "
+                "on a slope a body that a period turns has no gait that repeats, as its weight "
+                "then pulls from another side: "
                 "leave rotation at 0, and out of what is asked for."
             )
         if problem.formulation != FULL:
             raise ProblemError(f"on a slope there is only the formulation {FULL!r}.")
         if scheme(problem.scheme).left:
-            raise ProblemError(f"on a slope a gauss-N or radau-N scheme is needed, not {problem.scheme}.")
+            raise ProblemError(
+                f"on a slope a gauss-N or radau-N scheme is needed, not {problem.scheme}."
+            )
 
     def describe(self) -> str:
-        way = "the climb" if self.towards is None else f"the way {np.degrees(self.towards):.4g}° to the left of straight uphill"
+        way = (
+            "the climb"
+            if self.towards is None
+            else f"the way {np.degrees(self.towards):.4g}° to the left of straight uphill"
+        )
         return f"slope of grade {self.grade:g}: d is {way}, W the work of the joints"
 
 
 class OnSlope(Telling):
-    """What a slope changes in a class of gaits: members say where the tail link points at phase 0."""
+    """What a slope changes in a class of gaits: members say where the tail link points at phase
+    0."""
 
     tells = "theta"
     least_and_most = -_ANY_ANGLE, _ANY_ANGLE
@@ -132,29 +146,38 @@ class OnSlope(Telling):
 
 def _checked_grade(grade: object) -> float:
     if not is_number(grade) or grade < 0:
-        raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
+        raise ProblemError(
+            f"grade must be a number that is not negative, the tangent of the inclination, not "
+            f"{grade!r}."
+        )
     return float(grade)
 
 
 def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
     """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
     if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
-        raise ProblemError(f"only a Chain, whose joints are its own, can be put on a slope, not {type(body).__name__}.")
+        raise ProblemError(
+            f"only a Chain, whose joints are its own, can be put on a slope, not "
+            f"{type(body).__name__}."
+        )
     _checked_grade(grade)
     if rate_independent(body.law(friction)) and grade >= (most := body.contact.most_held(friction)):
         raise ProblemError(
-            f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most {most:g} times the force "
+            f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most "
+            f"{most:g} times the force "
             "that presses it on the ground."
         )
     return body
 
 
 def slope_from(body: Body, friction: Law, grade: object, towards: object) -> Slope | None:
-    """The slope that a problem states; None for the level. `ProblemError` if there is none like it, or the body cannot be on
-    it."""
+    """The slope that a problem states; None for the level. `ProblemError` if there is none like it,
+    or the body cannot be on it."""
     tangent = _checked_grade(grade)
     if towards is not None and not is_number(towards):
-        raise ProblemError(f"towards must be a finite angle from straight uphill, or None, not {towards!r}.")
+        raise ProblemError(
+            f"towards must be a finite angle from straight uphill, or None, not {towards!r}."
+        )
     if tangent == 0:
         if towards is not None:
             raise ProblemError("towards is a direction on a slope: give a grade, or leave it out.")

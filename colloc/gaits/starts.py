@@ -1,9 +1,11 @@
-"""Where a search over gaits begins: by chance, or at a gait of another class or chain that is laid into this one.
+"""Where a search over gaits begins: by chance, or at a gait of another class or chain that is laid
+into this one.
 
 Start number k of a seed is the same whatever the number of starts.
-Admissible shapes form a region that is star-shaped about the straight body (joint limits and non-crossing keep holding
-when all angles shrink together). So a gait is sampled as a direction in the space of parameters, from a Latin
-hypercube, times a fraction of the largest amplitude that is admissible in that direction.
+Admissible shapes form a region that is star-shaped about the straight body (joint limits and
+non-crossing keep holding when all angles shrink together). So a gait is sampled as a direction in
+the space of parameters, from a Latin hypercube, times a fraction of the largest amplitude that is
+admissible in that direction.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from colloc.system.errors import ProblemError
 LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
 SAMPLERS = (LATIN_HYPERCUBE, PERTURBED)
 BLOCK = 25
-"""Starts per Latin hypercube: start k belongs to hypercube k // BLOCK, seeded by that number and the run's seed."""
+"""Starts per Latin hypercube: start k belongs to hypercube k // BLOCK, seeded by that number and
+the run's seed."""
 LARGEST_SEED = 2**63 - 1
 """Files keep seeds and numbers of starts in so many bits."""
 _FRACTIONS = (0.2, 0.95)
@@ -32,35 +35,43 @@ _CLEARLY_MOVING = 1.5
 _SPREAD = 0.3
 _ON_FLOOR = 1e-4
 _SHORT = 1.002
-"""An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
+"""An optimum on the lower bound of the path length is not too short; its length as a polyline is,
+by the corners it cuts."""
 _VISIBLE = np.pi / 20
-"""Least swing of one joint to either side [rad] in a gait that a person sees move, 9 degrees: a little more than one joint that
-moves alone has at the usual `Problem.smallest_shape_speed`."""
+"""Least swing of one joint to either side [rad] in a gait that a person sees move, 9 degrees: a
+little more than one joint that moves alone has at the usual `Problem.smallest_shape_speed`."""
 _PERIOD = np.linspace(0.0, 1.0, 1001)
 _NEAR = 10.0
-"""A search from a known optimum begins at so many times the final delta: friction more regularised than that prefers other
-gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100 times the final delta 0.3998)."""
+"""A search from a known optimum begins at so many times the final delta: friction more regularised
+than that prefers other gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100
+times the final delta 0.3998)."""
 
 
 def largest_amplitude(problem: Problem, gait: AnyGait) -> float:
-    """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for the straight body."""
-    largest = largest_factor(problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES))
+    """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for
+    the straight body."""
+    largest = largest_factor(
+        problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES)
+    )
     share = largest_share(gait, problem.largest_speeds)
     return min(largest, 1 / share) if share else largest
 
 
 def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:
-    """Whether a gait is as slow as ``smallest_shape_speed`` allows: then that bound, and no mechanics, decided its size."""
+    """Whether a gait is as slow as ``smallest_shape_speed`` allows: then that bound, and no
+    mechanics, decided its size."""
     return gait.shape_speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
 
 
 def is_visible(gait: AnyGait) -> bool:
-    """Whether a person sees a gait move, so that it is of finite size: a joint swings by 9 degrees or more to either side."""
+    """Whether a person sees a gait move, so that it is of finite size: a joint swings by 9 degrees
+    or more to either side."""
     return bool(np.ptp(gait.angles(_PERIOD), axis=1).max() >= 2 * _VISIBLE)
 
 
 def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndarray:
-    """Points ``(n, dimension)`` of the unit cube, one in every n-th of each coordinate (McKay, Beckman and Conover, 1979).
+    """Points ``(n, dimension)`` of the unit cube, one in every n-th of each coordinate (McKay,
+    Beckman and Conover, 1979).
 
     Those of `scipy.stats.qmc`, which takes half a second to load: a tenth of a whole search.
     """
@@ -71,8 +82,9 @@ def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndar
 
 
 def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
-    """Start number `start` of a Latin hypercube over the problem's class of gaits: one that clearly moves, or the fastest of
-    many. `ProblemError` if no admissible gait moves as fast as the problem's ``smallest_shape_speed``.
+    """Start number `start` of a Latin hypercube over the problem's class of gaits: one that clearly
+    moves, or the fastest of many. `ProblemError` if no admissible gait moves as fast as the
+    problem's ``smallest_shape_speed``.
     """
     block, row = divmod(start, BLOCK)
     dimension = problem.gait.seeds.dimension(problem.body.n_joint) + 1
@@ -83,11 +95,14 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
     for _ in range(_ATTEMPTS):
         if fastest.shape_speed > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return fastest
-        fastest = max(fastest, _scaled(problem, again.random(dimension)), key=lambda gait: gait.shape_speed)
+        fastest = max(
+            fastest, _scaled(problem, again.random(dimension)), key=lambda gait: gait.shape_speed
+        )
     if fastest.shape_speed > problem.smallest_shape_speed:
         return fastest
     raise ProblemError(
-        f"found no admissible start as fast as smallest_shape_speed {problem.smallest_shape_speed:g}; make it smaller."
+        f"found no admissible start as fast as smallest_shape_speed "
+        f"{problem.smallest_shape_speed:g}; make it smaller."
     )
 
 
@@ -108,7 +123,8 @@ def _multiplied(problem: Problem, drawn: AnyGait, fraction: float) -> AnyGait:
 
 
 def perturbed_gait(problem: Problem, seed: int, start: int) -> AnyGait:
-    """Start number `start` near the problem's own guess, whose coefficients move by normals of 0.3 rad.
+    """Start number `start` near the problem's own guess, whose coefficients move by normals of 0.3
+    rad.
 
     Where that leaves the admissible region, the whole gait is shrunk back into it.
     """
@@ -122,7 +138,8 @@ def perturbed_gait(problem: Problem, seed: int, start: int) -> AnyGait:
 
 
 def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> AnyGait:
-    """The gait of start number `start` of a sampler by name; "perturbed" ones lie near the problem's own guess."""
+    """The gait of start number `start` of a sampler by name; "perturbed" ones lie near the
+    problem's own guess."""
     if sampler not in SAMPLERS:
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {sampler!r}.")
     if sampler == PERTURBED:
@@ -130,11 +147,15 @@ def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> AnyGait
     return latin_hypercube_gait(problem, seed, start)
 
 
-def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> AnyGait:
-    """A gait of a chain laid into another body: every link gets the mean tangent angle of the part of the body it covers.
+def over_links(
+    gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(np.pi)
+) -> AnyGait:
+    """A gait of a chain laid into another body: every link gets the mean tangent angle of the part
+    of the body it covers.
 
-    That is linear in the joint angles and keeps the symmetries, if both bodies have them. A path of arcs becomes a polygon of
-    many corners. Where links would cross, or a joint pass its limit, all angles shrink.
+    That is linear in the joint angles and keeps the symmetries, if both bodies have them. A path of
+    arcs becomes a polygon of many corners. Where links would cross, or a joint pass its limit, all
+    angles shrink.
     """
     matrix = other.laid(np.array(body.lengths))
     angles = matrix @ gait.angles(_PERIOD)
@@ -143,12 +164,17 @@ def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = flo
 
 
 def laid_into(
-    gait_class: AnyClass, gait: AnyGait, body: Body, joint_limit: Limit = float(np.pi), smallest_shape_speed: float = 0.1
+    gait_class: AnyClass,
+    gait: AnyGait,
+    body: Body,
+    joint_limit: Limit = float(np.pi),
+    smallest_shape_speed: float = 0.1,
 ) -> AnyGait:
     """The gait that starts a search in a class: what stands for it there, made admissible.
 
-    A truncated series overshoots, and a path that touches its limits is no longer admissible then: all angles shrink. It cuts
-    corners, and a path as short as it may be becomes too short: it grows about its mean.
+    A truncated series overshoots, and a path that touches its limits is no longer admissible then:
+    all angles shrink. It cuts corners, and a path as short as it may be becomes too short: it grows
+    about its mean.
     """
     near = gait_class.through(gait)
     growth = 2 * np.pi * smallest_shape_speed / path_length(near)
@@ -160,7 +186,8 @@ def laid_into(
 
 
 def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float:
-    """Delta in the units of a class, from delta at unit shape speed, for a gait of the same path length.
+    """Delta in the units of a class, from delta at unit shape speed, for a gait of the same path
+    length.
 
     Harmonic gaits measure it per period, paths at unit shape speed.
     """
@@ -170,17 +197,21 @@ def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float
 def prolonged(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:
     """The problem in another class of gaits, to be searched from a known optimum of any class.
 
-    Delta stays what it is relative to the shape speed; other fields may be changed too (``intervals=...``).
+    Delta stays what it is relative to the shape speed; other fields may be changed too
+    (``intervals=...``).
 
     Examples
     --------
     >>> from colloc import FreePath, Harmonic, Problem, ellipse
     >>> best = ellipse(0, 2.86, 1.30)
-    >>> prolonged(Problem("loop", best, gait=Harmonic(1, "bilateral")), best, FreePath(8.0, "bilateral")).gait
+    >>> prolonged(Problem("loop", best, gait=Harmonic(1, "bilateral")), best, FreePath(8.0,
+    ...     "bilateral")).gait
     FreePath(curvature=8.0, symmetry='bilateral', winding=None)
     """
     at_unit_speed = problem.delta / delta_in(problem.gait, problem.guess, 1.0)
     delta = delta_in(gait_class, gait, at_unit_speed)
-    guess = laid_into(gait_class, gait, problem.body, problem.joint_limit, problem.smallest_shape_speed)
+    guess = laid_into(
+        gait_class, gait, problem.body, problem.joint_limit, problem.smallest_shape_speed
+    )
     stated = {"guess": guess, "gait": gait_class, "delta": delta, "delta_start": _NEAR * delta}
     return problem.with_(**(stated | changes))

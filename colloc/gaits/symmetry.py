@@ -1,12 +1,14 @@
 """Symmetries of gaits: the part of a period that has to be solved, and the other part from it.
 
-Symmetries of a gait q(t), phase t from 0 to 1 over a period, joints counted from the tail, with the exchange of tail and head
-``(S q)_j = -q_(n+1-j)``:
+Symmetries of a gait q(t), phase t from 0 to 1 over a period, joints counted from the tail, with the
+exchange of tail and head ``(S q)_j = -q_(n+1-j)``:
 
-- ``bilateral``: q(-t) = S q(t). The body at -t, seen from its head, has the shape it has at t. For any friction the net
-  rotation vanishes (paper, appendix A; `colloc.results.distinct_optima`) and the second half period repeats the first half's
-  displacement and work. The path starts and ends its half on shapes with S q = q, with tangents that S reverses.
-- ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any friction.
+- ``bilateral``: q(-t) = S q(t). The body at -t, seen from its head, has the shape it has at t. For
+  any friction the net rotation vanishes (paper, appendix A; `colloc.results.distinct_optima`) and
+  the second half period repeats the first half's displacement and work. The path starts and ends
+  its half on shapes with S q = q, with tangents that S reverses.
+- ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any
+  friction.
 - ``none``.
 """
 
@@ -29,7 +31,8 @@ def fraction(symmetry: str) -> float:
 
 
 def reduced(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Phases ``(n_time,)`` of the solved part that real phases t are images of, and whether they are (not identical)."""
+    """Phases ``(n_time,)`` of the solved part that real phases t are images of, and whether they
+    are (not identical)."""
     t = np.asarray(t, dtype=float)
     # whole periods are ends, not starts, so that a path that fails to close shows it
     phase = np.where((t > 0) & (t % 1.0 == 0), 1.0, t % 1.0)
@@ -46,16 +49,19 @@ def both_halves(symmetry: str, phases: np.ndarray) -> np.ndarray:
 
 
 def imaged(symmetry: str, values: np.ndarray, image: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """Angles ``(n_joint, n_time)``, or their first derivatives, those of the columns `image` turned into their images."""
+    """Angles ``(n_joint, n_time)``, or their first derivatives, those of the columns `image` turned
+    into their images."""
     if symmetry == BILATERAL:  # time runs backwards
         return np.where(image, -((-1) ** derivative) * values[::-1], values)
     return np.where(image, -values, values) if symmetry == ANTIPODAL else values
 
 
 def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarray:
-    """Points ``(n_joint, count + 1)`` along the solved part of the symmetric gait nearest to `gait`, evenly in phase.
+    """Points ``(n_joint, count + 1)`` along the solved part of the symmetric gait nearest to
+    `gait`, evenly in phase.
 
-    Phase 0 is kept if the gait has the symmetry about it, else moved to where it comes closest to having it.
+    Phase 0 is kept if the gait has the symmetry about it, else moved to where it comes closest to
+    having it.
     """
     if symmetry == NONE:
         return gait.angles(np.linspace(0.0, 1.0, count + 1))
@@ -66,7 +72,8 @@ def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarr
         angles = 0.5 * (angles - np.roll(angles, count, axis=1))
         return np.concatenate([angles[:, :count], -angles[:, :1]], axis=1)
     exchanged = -angles[::-1]
-    # asymmetry about phase k/(2n): sum over i of |q(i) - S q(k - i)|^2, up to a constant minus twice a circular convolution
+    # asymmetry about phase k/(2n): sum over i of |q(i) - S q(k - i)|^2, up to a constant minus
+    # twice a circular convolution
     spectrum = np.fft.rfft(angles, axis=1) * np.fft.rfft(exchanged, axis=1)
     match = np.fft.irfft(spectrum, n, axis=1).sum(axis=0)
     shift = 0 if match[0] > match.max() - 1e-9 * n else int(np.argmax(match))
@@ -77,11 +84,15 @@ def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarr
 
 
 def end_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices (A, B), independent rows, of the equations ``A q(first) + B q(last) = 0`` that close a path of angles."""
+    """Matrices (A, B), independent rows, of the equations ``A q(first) + B q(last) = 0`` that close
+    a path of angles."""
     unit = np.eye(n_joint)
     if symmetry == BILATERAL:
         rows = np.array(
-            [unit[j] + unit[n_joint - 1 - j] if 2 * j + 1 < n_joint else unit[j] for j in range((n_joint + 1) // 2)]
+            [
+                unit[j] + unit[n_joint - 1 - j] if 2 * j + 1 < n_joint else unit[j]
+                for j in range((n_joint + 1) // 2)
+            ]
         )
         zero = np.zeros_like(rows)
         return np.vstack([rows, zero]), np.vstack([zero, rows])
@@ -102,19 +113,29 @@ _ALIKE = {BILATERAL: "mirrored joints", ANTIPODAL: "to both sides"}
 
 
 def check_symmetric(problem: Any) -> None:
-    """A `ProblemError` if the body of a problem has no gaits with the symmetry of its class, or its limits forbid them."""
+    """A `ProblemError` if the body of a problem has no gaits with the symmetry of its class, or its
+    limits forbid them."""
     symmetry = problem.gait.symmetry
     if symmetry not in problem.body.symmetries:
         raise ProblemError(
-            f"gaits of symmetry {symmetry} need a body whose lengths, weights and feet read the same from both ends; "
+            f"gaits of symmetry {symmetry} need a body whose lengths, weights and feet read the "
+            f"same from both ends; "
             f"gaits of this one may have the symmetry {' or '.join(problem.body.symmetries)}."
         )
     if isinstance(problem.joint_limit, tuple):
         ranges = [range_of(own) for own in problem.joint_limit]
         opposite = [(-high, -low) for low, high in ranges]
-        if (symmetry == BILATERAL and ranges != opposite[::-1]) or (symmetry == ANTIPODAL and ranges != opposite):
-            raise ProblemError(f"gaits of symmetry {symmetry} bend {_ALIKE[symmetry]} alike: give them the same joint_limit.")
+        if (symmetry == BILATERAL and ranges != opposite[::-1]) or (
+            symmetry == ANTIPODAL and ranges != opposite
+        ):
+            raise ProblemError(
+                f"gaits of symmetry {symmetry} bend {_ALIKE[symmetry]} alike: give them the same "
+                f"joint_limit."
+            )
     for name in ("torque_limit", "power_limit", "speed_limit"):
         limit = getattr(problem, name)
         if symmetry == BILATERAL and np.ndim(limit) and limit != limit[::-1]:
-            raise ProblemError(f"gaits of symmetry {symmetry} bend mirrored joints alike: give them the same {name}.")
+            raise ProblemError(
+                f"gaits of symmetry {symmetry} bend mirrored joints alike: give them the same "
+                f"{name}."
+            )

@@ -1,4 +1,5 @@
-"""Classes of gaits whose members say one number more than how the joints move: where they point, how long a period takes.
+"""Classes of gaits whose members say one number more than how the joints move: where they point,
+how long a period takes.
 
 The number is the last parameter, and no joint angle depends on it.
 """
@@ -16,8 +17,9 @@ from colloc.mechanics.bodies import Body
 
 
 class Telling(ClassOfGaits):
-    """What saying a number changes in a class, of series or of paths; members whose last parameter is NaN do not say it yet.
-    Such classes derive from a child of this one first and then from the class that they are without (`telling`)."""
+    """What saying a number changes in a class, of series or of paths; members whose last parameter
+    is NaN do not say it yet. Such classes derive from a child of this one first and then from the
+    class that they are without (`telling`)."""
 
     tells: ClassVar[str]
     """What members call the number."""
@@ -61,7 +63,9 @@ class Telling(ClassOfGaits):
 
     def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
         own = self.without.bounds(body, limit)
-        lower, upper = (np.append(each, end) for each, end in zip(own, self.least_and_most, strict=True))
+        lower, upper = (
+            np.append(each, end) for each, end in zip(own, self.least_and_most, strict=True)
+        )
         return lower, upper
 
     def parameters(self, gait: Any) -> np.ndarray:
@@ -72,7 +76,11 @@ class Telling(ClassOfGaits):
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
         gait = self.without.member(parameters[:-1], n_joint, edges)
-        return gait if np.isnan(parameters[-1]) else replace(gait, **{self.tells: float(parameters[-1])})
+        return (
+            gait
+            if np.isnan(parameters[-1])
+            else replace(gait, **{self.tells: float(parameters[-1])})
+        )
 
     def through(self, gait: Any) -> Any:
         near = self.without.through(gait)
@@ -90,9 +98,15 @@ def telling(kind: type[Telling], gait_class: Any, **own: Any) -> Any:
 
 def _made(kind: Any, gait_class: Any, own: tuple[tuple[str, Any], ...]) -> Any:
     without: Any = type(gait_class)
-    return _type(kind, without, own)(**{f.name: getattr(gait_class, f.name) for f in fields(gait_class)})
+    return _type(kind, without, own)(
+        **{f.name: getattr(gait_class, f.name) for f in fields(gait_class)}
+    )
 
 
 @cache
 def _type(kind: Any, gait_class: Any, own: tuple[tuple[str, Any], ...]) -> Any:
-    return type(gait_class.__name__, (kind, gait_class), {"__doc__": gait_class.__doc__, "_own": own, **dict(own)})
+    return type(
+        gait_class.__name__,
+        (kind, gait_class),
+        {"__doc__": gait_class.__doc__, "_own": own, **dict(own)},
+    )

@@ -1,12 +1,14 @@
-r"""The associated elliptic law: dry friction with unequal coefficients whose balance has exactly one solution.
+r"""The associated elliptic law: dry friction with unequal coefficients whose balance has exactly
+one solution.
 
-Its dissipation at velocity (vs, vn) is ``D = sqrt((mu_s vs)^2 + (mu_t vn)^2)``, with mu_s = mu_f or mu_b as vs > 0 or < 0: a
-convex function, since its level line, two half ellipses that share an axis, bounds a convex set. The force is minus its
-gradient (principle of maximal dissipation; Goyal, Ruina and Papadopoulos, Wear 143, 1991). Where the body slides straight along
-or across itself it is that of Coulomb friction with the same coefficients; oblique sliding differs.
+Its dissipation at velocity (vs, vn) is ``D = sqrt((mu_s vs)^2 + (mu_t vn)^2)``, with mu_s = mu_f or
+mu_b as vs > 0 or < 0: a convex function, since its level line, two half ellipses that share an
+axis, bounds a convex set. The force is minus its gradient (principle of maximal dissipation; Goyal,
+Ruina and Papadopoulos, Wear 143, 1991). Where the body slides straight along or across itself it is
+that of Coulomb friction with the same coefficients; oblique sliding differs.
 
-With the tangential velocity stretched by mu_s/mu_t, D is mu_t times a speed: so on links the closed forms of equal coefficients
-hold, at stretched velocities.
+With the tangential velocity stretched by mu_s/mu_t, D is mu_t times a speed: so on links the closed
+forms of equal coefficients hold, at stretched velocities.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ class Elliptic(Friction):
     Parameters
     ----------
     mu_t, mu_f, mu_b : float
-        Friction on sliding across the body, forwards and backwards, in units of the weight; all positive.
+        Friction on sliding across the body, forwards and backwards, in units of the weight; all
+        positive.
 
     Examples
     --------

@@ -1,4 +1,5 @@
-"""Laws of friction that are stated as formulas: forces, derivatives and traits follow from the text."""
+"""Laws of friction that are stated as formulas: forces, derivatives and traits follow from the
+text."""
 
 from __future__ import annotations
 
@@ -17,13 +18,15 @@ _SAME, _LEAST = 1e-10, 1e-12
 
 
 class FormulaLaw:
-    """A law by its `formulas`, its name and its units; what it knows better than samples tell, it may say itself."""
+    """A law by its `formulas`, its name and its units; what it knows better than samples tell, it
+    may say itself."""
 
     kernel_numbers = ()
 
     @property
     def associated(self) -> bool:
-        """Samples cannot tell whether a formula is the gradient of a convex function: several motions are reckoned with."""
+        """Samples cannot tell whether a formula is the gradient of a convex function: several
+        motions are reckoned with."""
         return False
 
     @property
@@ -38,8 +41,8 @@ class FormulaLaw:
 
     @property
     def formulas(self) -> tuple[str, ...]:
-        """Force along and across in terms of `VARIABLES`, and, of an associated law, the potential whose gradient is minus the
-        force."""
+        """Force along and across in terms of `VARIABLES`, and, of an associated law, the potential
+        whose gradient is minus the force."""
         raise NotImplementedError
 
     @property
@@ -98,10 +101,13 @@ class FormulaLaw:
             "delta": Dual(delta + zero, (zero, zero)),
         }
         rows = [each.differentiated(at).slopes for each in self._read[:2]]
-        return tuple(tuple(zero - self.speed_unit / self.unit * slope for slope in row) for row in rows)
+        return tuple(
+            tuple(zero - self.speed_unit / self.unit * slope for slope in row) for row in rows
+        )
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        """The trace of the Jacobian in every direction: no less than the secant of a law that grows with the speed."""
+        """The trace of the Jacobian in every direction: no less than the secant of a law that grows
+        with the speed."""
         (ss, _), (_, nn) = self.density_jacobian(vs, vn, delta)
         zero = 0.0 * ss
         trace = regularised_speed(ss + nn, zero, _LEAST + zero)  # positive for any law

@@ -1,7 +1,8 @@
 """A power law between dry friction and viscous drag: the force grows like a power of the speed.
 
-With ``r = sqrt(vs^2 + vn^2 + delta^2)`` the force per length is ``-(mu_s vs, mu_t vn) r^(power - 1)``, with mu_s = mu_f or mu_b
-as vs > 0 or < 0: Coulomb friction at power 0, drag at power 1. Wet granular beds and yield-stress fluids lie between.
+With ``r = sqrt(vs^2 + vn^2 + delta^2)`` the force per length is ``-(mu_s vs, mu_t vn) r^(power -
+1)``, with mu_s = mu_f or mu_b as vs > 0 or < 0: Coulomb friction at power 0, drag at power 1. Wet
+granular beds and yield-stress fluids lie between.
 """
 
 from __future__ import annotations
@@ -43,7 +44,10 @@ class PowerLaw(Coefficients, FormulaLaw):
     def __post_init__(self) -> None:
         check_positive(self, "mu_t", "mu_f", "mu_b", of="friction.")
         if not (is_number(self.power) and 0 <= self.power <= 2):
-            raise ProblemError(f"friction.power must lie in [0, 2], not {self.power!r}; friction that falls with speed sticks.")
+            raise ProblemError(
+                f"friction.power must lie in [0, 2], not {self.power!r}; friction that falls with "
+                f"speed sticks."
+            )
 
     @property
     def degree(self) -> float:
@@ -55,7 +59,8 @@ class PowerLaw(Coefficients, FormulaLaw):
 
     @property
     def unit(self) -> float:
-        """Of the compiled kernel, which is one for all laws whose coefficients have the same ratios."""
+        """Of the compiled kernel, which is one for all laws whose coefficients have the same
+        ratios."""
         return 1.0 / self.mu_t
 
     @property
@@ -63,7 +68,9 @@ class PowerLaw(Coefficients, FormulaLaw):
         forward, backward = (f"{mu / self.mu_t:.14g}" for mu in (self.mu_f, self.mu_b))
         growth = f"speed ** {self.power - 1.0!r}"
         along = forward if self.reversible else f"where(vs > 0, {forward}, {backward})"
-        potential = (f"speed ** {self.power + 1.0!r} / {self.power + 1.0!r}",) if self.associated else ()
+        potential = (
+            (f"speed ** {self.power + 1.0!r} / {self.power + 1.0!r}",) if self.associated else ()
+        )
         return f"-{along} * vs * {growth}", f"-vn * {growth}", *potential
 
     @property
@@ -75,7 +82,9 @@ class PowerLaw(Coefficients, FormulaLaw):
         return f"{each}, times the speed to the power {self.power:g}"
 
     def in_units_of(self, unit: float) -> PowerLaw:
-        return PowerLaw(self.power, mu_t=self.mu_t / unit, mu_f=self.mu_f / unit, mu_b=self.mu_b / unit)
+        return PowerLaw(
+            self.power, mu_t=self.mu_t / unit, mu_f=self.mu_f / unit, mu_b=self.mu_b / unit
+        )
 
     def in_speeds_of(self, unit: float) -> PowerLaw:
         return self.in_units_of(unit**-self.power)

@@ -1,8 +1,9 @@
-"""Viscous drag: resistive-force theory of a slender body in a fluid so viscous that inertia does not count.
+"""Viscous drag: resistive-force theory of a slender body in a fluid so viscous that inertia does
+not count.
 
-Force per length is linear in the velocity, ``f = -(tangential vs, normal vn)``. The balance is linear, and distance and
-rotation belong to the path of a gait whatever its pace; work does not: it is smallest at constant power. Purcell's swimmer is a
-chain of three links under this law.
+Force per length is linear in the velocity, ``f = -(tangential vs, normal vn)``. The balance is
+linear, and distance and rotation belong to the path of a gait whatever its pace; work does not: it
+is smallest at constant power. Purcell's swimmer is a chain of three links under this law.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ class Viscous:
     Parameters
     ----------
     normal, tangential : float
-        Drag coefficients across and along the body; for a thin filament the first is nearly twice the second (J. Gray and
-        G. J. Hancock, J. Exp. Biol. 32, 1955). Only their ratio matters for the motion.
+        Drag coefficients across and along the body; for a thin filament the first is nearly twice
+        the second (J. Gray and G. J. Hancock, J. Exp. Biol. 32, 1955). Only their ratio matters for
+        the motion.
 
     Examples
     --------
@@ -86,7 +88,11 @@ class ClosedForm(LineIntegrals):
 
     def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
         zero, along, across = 0.0 * vs, self.law.tangential * length, self.law.normal * length
-        return (along + zero, zero, zero), (zero, across + zero, zero), (zero, zero, across * length**2 / 12 + zero)
+        return (
+            (along + zero, zero, zero),
+            (zero, across + zero, zero),
+            (zero, zero, across * length**2 / 12 + zero),
+        )
 
     secant = jacobian
 

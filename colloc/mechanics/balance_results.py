@@ -1,4 +1,5 @@
-"""What is said of a body's balance at instants: how it slides, the velocities that keep it, and the motion that follows."""
+"""What is said of a body's balance at instants: how it slides, the velocities that keep it, and the
+motion that follows."""
 
 from __future__ import annotations
 
@@ -23,8 +24,9 @@ class Sliding(NamedTuple):
 
 
 class Lifted(NamedTuple):
-    """A body whose parts' forces are variables: what vanishes where they obey the law of friction, scaled like velocities, and
-    where they balance; velocity of the centre of mass ``(2, n_time)`` and power ``(1, n_time)``."""
+    """A body whose parts' forces are variables: what vanishes where they obey the law of friction,
+    scaled like velocities, and where they balance; velocity of the centre of mass ``(2, n_time)``
+    and power ``(1, n_time)``."""
 
     laws: Array
     balance: Array
@@ -41,14 +43,16 @@ class BalanceSolution:
     z : (3, n_time)
         Tail velocity (u, v, omega) in the body frame.
     residual : (n_time,)
-        Largest of |net force| and |torque about the anchor| / body length, in units of the friction on a body that moves at
-        the largest rate: the largest coefficient, or less where delta exceeds that rate.
+        Largest of |net force| and |torque about the anchor| / body length, in units of the friction
+        on a body that moves at the largest rate: the largest coefficient, or less where delta
+        exceeds that rate.
     iterations : (n_time,)
         Newton and fixed-point steps taken.
     converged : (n_time,)
         Whether the residual reached the tolerance.
     anchor : (n_time,)
-        The slowest part (link of a chain, edge of a panel), in whose velocity the instant was solved.
+        The slowest part (link of a chain, edge of a panel), in whose velocity the instant was
+        solved.
     anchor_velocity : (3, n_time)
         Velocity of the anchor (the midpoint of a link), and its rotation rate, in body-frame axes.
     """
@@ -81,18 +85,19 @@ class BalancedMotion(NamedTuple):
     power: np.ndarray
     """Power dissipated by friction, ``(n_time,)``."""
     actuator_power: np.ndarray
-    """``(n_time,)``: power of what bends the body, from the moments of the friction on all that lies ahead; equals `power` in
-    balance."""
+    """``(n_time,)``: power of what bends the body, from the moments of the friction on all that
+    lies ahead; equals `power` in balance."""
 
 
 class Branches(NamedTuple):
     """Balanced velocities of instants, from one to `n_root` each."""
 
     z: np.ndarray
-    """``(n_root, 3, n_time)``: tail velocities (u, v, omega) in the body frame; NaN beyond those that were found."""
+    """``(n_root, 3, n_time)``: tail velocities (u, v, omega) in the body frame; NaN beyond those
+    that were found."""
     sign: np.ndarray
-    """``(n_root, n_time)``: of the determinant of `colloc.mechanics.balance.balance_jacobian`; 0 beyond those that were
-    found."""
+    """``(n_root, n_time)``: of the determinant of `colloc.mechanics.balance.balance_jacobian`; 0
+    beyond those that were found."""
 
     @property
     def number(self) -> np.ndarray:

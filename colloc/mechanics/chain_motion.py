@@ -1,4 +1,5 @@
-"""What follows from a balance of a chain: velocities of tail and centre of mass, powers, first derivatives. No CasADi."""
+"""What follows from a balance of a chain: velocities of tail and centre of mass, powers, first
+derivatives. No CasADi."""
 
 from __future__ import annotations
 
@@ -24,15 +25,23 @@ def chain_motion(
     solved: BalanceSolution,
     load: np.ndarray | None = None,
 ) -> BalancedMotion:
-    """The motion at instants that were solved for; arguments as for `colloc.mechanics.fixed_point.solve_balance`.
+    """The motion at instants that were solved for; arguments as for
+    `colloc.mechanics.fixed_point.solve_balance`.
 
     Under a load the actuators' power is that of friction less the load's.
     """
     friction = body.law(friction)
-    library, moving = native_kernel(body, friction), Moving(body, friction, angles, rates, delta, load)
+    library, moving = (
+        native_kernel(body, friction),
+        Moving(body, friction, angles, rates, delta, load),
+    )
     if library is None:
         return _named(_by_anchor(_values, (7,), moving, solved))
-    return _named(compiled_motion(library, moving, solved.anchor, solved.anchor_velocity, with_slopes=False)[0])
+    return _named(
+        compiled_motion(library, moving, solved.anchor, solved.anchor_velocity, with_slopes=False)[
+            0
+        ]
+    )
 
 
 def chain_slopes(
@@ -44,12 +53,17 @@ def chain_slopes(
     solved: BalanceSolution,
     load: np.ndarray | None = None,
 ) -> tuple[BalancedMotion, np.ndarray]:
-    """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates); under a
-    load two columns more, with respect to its components."""
+    """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to
+    (angles, rates); under a load two columns more, with respect to its components."""
     friction = body.law(friction)
-    library, moving = native_kernel(body, friction), Moving(body, friction, angles, rates, delta, load)
+    library, moving = (
+        native_kernel(body, friction),
+        Moving(body, friction, angles, rates, delta, load),
+    )
     if library is not None:
-        values, slopes = compiled_motion(library, moving, solved.anchor, solved.anchor_velocity, with_slopes=True)
+        values, slopes = compiled_motion(
+            library, moving, solved.anchor, solved.anchor_velocity, with_slopes=True
+        )
         return _named(values), slopes
     slopes = _by_anchor(_slopes, (6, 2 * body.n_joint + 2), moving, solved)
     values = _by_anchor(_values, (7,), moving, solved)
@@ -66,7 +80,8 @@ def _by_anchor(
     moving: Moving,
     solved: BalanceSolution,
 ) -> np.ndarray:
-    """What a function says of instants with a common anchor: of them, their load, the anchor and its velocity."""
+    """What a function says of instants with a common anchor: of them, their load, the anchor and
+    its velocity."""
     load = np.zeros((2, solved.anchor.size)) if moving.load is None else moving.load
     found = np.empty((*rows, solved.anchor.size))
     for link, at in groups(solved.anchor):
@@ -85,7 +100,9 @@ def _values(moving: Moving, load: np.ndarray, anchor: int, z: np.ndarray) -> np.
     for joint in range(body.n_joint):
         ahead, at = slice(joint + 1, None), joint + 1
         arm_x, arm_y = x[ahead] - x[at] + half[at] * c[at], y[ahead] - y[at] + half[at] * s[at]
-        actuator -= (arm_x * fy[ahead] - arm_y * fx[ahead] + force.couple[ahead]).sum(axis=0) * rates[joint]
+        actuator -= (arm_x * fy[ahead] - arm_y * fx[ahead] + force.couple[ahead]).sum(
+            axis=0
+        ) * rates[joint]
     tail = body.tail_velocity(now.posture, rates, z, anchor)
     centre = body.centre_velocity(now.posture, now.velocity)
     return np.concatenate([tail, *centre, total_power(now.velocity, force), actuator[None]])
@@ -99,7 +116,9 @@ def _slopes(moving: Moving, load: np.ndarray, anchor: int, z: np.ndarray) -> np.
     none, mass = np.zeros_like(behind), body.mass_column()[:, :, None]
     still = np.zeros((body.n_link, 2))
     dphi = np.concatenate([behind, none, still], axis=1)[:, :, None]
-    dw = np.repeat(np.concatenate([none, behind - behind[anchor], still], axis=1)[:, :, None], n_time, axis=2)
+    dw = np.repeat(
+        np.concatenate([none, behind - behind[anchor], still], axis=1)[:, :, None], n_time, axis=2
+    )
     along = np.concatenate([np.zeros((2 * n_joint, 2)), np.eye(2)])[None, :, :, None]
     path = body.weighted_path(anchor)
     d = implicit_changes(

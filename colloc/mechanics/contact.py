@@ -1,20 +1,24 @@
-"""Which shapes of a chain are admissible: links must not cross, nor come nearer to each other than their width.
+"""Which shapes of a chain are admissible: links must not cross, nor come nearer to each other than
+their width.
 
-Neighbours can only fold onto each other (|angle| <= pi). Links i and i + 2 with a joint at both ends of link i + 1 cross
-iff, with a and b the two joint angles, ``min(b + chi(a; l_i), a + chi(b; l_i+2)) > pi`` or the mirror image, where
-``chi(a; l) = atan2(l sin a, m + l cos a)`` and m is the length between; for equal lengths chi = a/2 and the condition is
-``min(2 a + b, a + 2 b) > 2 pi``. (Base m, base angles pi - a and pi - b: the tip of one link lies beyond the line of the
-other on both sides.)
+Neighbours can only fold onto each other (|angle| <= pi). Links i and i + 2 with a joint at both
+ends of link i + 1 cross iff, with a and b the two joint angles, ``min(b + chi(a; l_i), a + chi(b;
+l_i+2)) > pi`` or the mirror image, where ``chi(a; l) = atan2(l sin a, m + l cos a)`` and m is the
+length between; for equal lengths chi = a/2 and the condition is ``min(2 a + b, a + 2 b) > 2 pi``.
+(Base m, base angles pi - a and pi - b: the tip of one link lies beyond the line of the other on
+both sides.)
 
 Links farther apart cross iff each has its ends on both sides of the other's line (`clearance`).
 
-A link of width w is a strip with round ends, w/2 to either side of its middle line. The rule: *no joint and no free end comes
-nearer than w to the middle line of a link that it is not an end of*. Where no middle lines cross this says, since the distance
-of two segments is that of an end of one from the other:
+A link of width w is a strip with round ends, w/2 to either side of its middle line. The rule: *no
+joint and no free end comes nearer than w to the middle line of a link that it is not an end of*.
+Where no middle lines cross this says, since the distance of two segments is that of an end of one
+from the other:
 
 - links that are not neighbours do not overlap: their middle lines are at least w apart;
-- neighbours, which overlap about their joint whatever they do (a hinge is cut away there), close until the free end of the
-  shorter one, of length l, lies beside the other: the joint turns up to ``pi - asin(w / l)``.
+- neighbours, which overlap about their joint whatever they do (a hinge is cut away there), close
+  until the free end of the shorter one, of length l, lies beside the other: the joint turns up to
+  ``pi - asin(w / l)``.
 """
 
 from __future__ import annotations
@@ -31,7 +35,8 @@ from colloc.numerics.arrays import Array, namespace
 SMOOTHING = 1e-3
 """Width [rad] of the smoothed minimum; it errs to the safe side, by at most half of this."""
 CLEARANCE_SMOOTHING = 2e-4
-"""Width [body lengths] of smoothed absolute values and minima; they err to the safe side, by at most twice this."""
+"""Width [body lengths] of smoothed absolute values and minima; they err to the safe side, by at
+most twice this."""
 Pair = tuple[int, int]
 
 
@@ -43,7 +48,8 @@ def _subtended(angle: Array, link: float, middle: float) -> Array:
 
 
 def crossing_sums(body: Links, angles: Array, i: int) -> tuple[Array, Array]:
-    """For links i and i + 2, the two sums that both exceed pi, or both fall below -pi, where they cross; ``(1, n_time)`` each.
+    """For links i and i + 2, the two sums that both exceed pi, or both fall below -pi, where they
+    cross; ``(1, n_time)`` each.
 
     Joint angles ``(n_joint, n_time)``.
     """
@@ -65,12 +71,16 @@ def share_of_first(first: Array, second: Array, width: float = SMOOTHING) -> Arr
     return 0.5 - 0.5 * gap / namespace(gap).sqrt(gap * gap + width * width)
 
 
-def tangent_of_minimum(first: Array, second: Array, share: Array, width: float = SMOOTHING) -> Array:
-    """The tangent plane of `smooth_minimum` that has the slope `share` in the first argument; never below the minimum.
+def tangent_of_minimum(
+    first: Array, second: Array, share: Array, width: float = SMOOTHING
+) -> Array:
+    """The tangent plane of `smooth_minimum` that has the slope `share` in the first argument; never
+    below the minimum.
 
-    Where a path rounds the corner at which both sums are pi, the smaller sum has a peak with a kink, and the instant of the
-    peak moves with the path. By the envelope theorem the peak's height changes like the tangent plane at the peak, its
-    slope held; the minimum itself, at a fixed instant, falls whichever way the peak moves along the path.
+    Where a path rounds the corner at which both sums are pi, the smaller sum has a peak with a
+    kink, and the instant of the peak moves with the path. By the envelope theorem the peak's height
+    changes like the tangent plane at the peak, its slope held; the minimum itself, at a fixed
+    instant, falls whichever way the peak moves along the path.
     """
     share_of_second = 1.0 - share
     bulge = 0.5 - namespace(share).sqrt(share * share_of_second)
@@ -79,11 +89,13 @@ def tangent_of_minimum(first: Array, second: Array, share: Array, width: float =
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Two parts of a body that must not cross: the smaller of two functions of the shape must not be positive."""
+    """Two parts of a body that must not cross: the smaller of two functions of the shape must not
+    be positive."""
 
     name: str
     pair: Callable[[Array], tuple[Array, Array]]
-    """Of shapes ``(n_joint, n_time)``, the two functions, ``(1, n_time)`` each; NumPy and CasADi."""
+    """Of shapes ``(n_joint, n_time)``, the two functions, ``(1, n_time)`` each; NumPy and
+    CasADi."""
     width: float
     """Over which the minimum is smoothed."""
 
@@ -92,7 +104,8 @@ class Contact:
         return smooth_minimum(*self.pair(angles), self.width)
 
     def after(self, joints_at: Callable[[Array], Array]) -> Contact:
-        """The same parts as a function of other coordinates, of which the joint angles are a function."""
+        """The same parts as a function of other coordinates, of which the joint angles are a
+        function."""
         return replace(self, pair=lambda shape: self.pair(joints_at(shape)))
 
     def share(self, angles: Array) -> Array:
@@ -101,7 +114,8 @@ class Contact:
 
 
 def crossing_bounds(body: Links, angles: Array) -> Array | None:
-    """Smooth functions that are <= pi only at shapes where no links i and i + 2 cross, ``(2 (n_link - 2), n_time)``.
+    """Smooth functions that are <= pi only at shapes where no links i and i + 2 cross, ``(2 (n_link
+    - 2), n_time)``.
 
     None for a body of two links. Joint angles ``(n_joint, n_time)``.
     """
@@ -115,24 +129,29 @@ def crossing_bounds(body: Links, angles: Array) -> Array | None:
 
 
 def far_pairs(body: Links) -> list[tuple[int, int]]:
-    """All pairs of links that are more than two apart; `crossing_bounds` has those that are two apart."""
+    """All pairs of links that are more than two apart; `crossing_bounds` has those that are two
+    apart."""
     return [(i, j) for i in range(body.n_link) for j in range(i + 3, body.n_link)]
 
 
 def intrusions(body: Links, angles: Array, first: int, second: int) -> tuple[Array, Array]:
-    """Two smooth functions that are both > 0 where links `first` < `second` cross [body lengths]; ``(1, n_time)`` each.
+    """Two smooth functions that are both > 0 where links `first` < `second` cross [body lengths];
+    ``(1, n_time)`` each.
 
-    With m and d the mean and half the difference of the distances of one link's ends from the other's line, that link
-    lies on one side iff ``|d| - |m| <= 0``; this for one link, and for the other.
+    With m and d the mean and half the difference of the distances of one link's ends from the
+    other's line, that link lies on one side iff ``|d| - |m| <= 0``; this for one link, and for the
+    other.
     """
     return -_side(body, angles, first, second), -_side(body, angles, second, first)
 
 
 def clearance(body: Links, angles: Array, first: int, second: int) -> Array:
-    """A smooth function that is >= 0 only where links `first` < `second` do not cross [body lengths], ``(1, n_time)``.
+    """A smooth function that is >= 0 only where links `first` < `second` do not cross [body
+    lengths], ``(1, n_time)``.
 
-    Two segments cross iff neither lies on one side of the other: the smaller of the two `intrusions` decides. Smoothing also
-    closes the gap through which parallel links would slip through each other at one instant, when both ends pass at once.
+    Two segments cross iff neither lies on one side of the other: the smaller of the two
+    `intrusions` decides. Smoothing also closes the gap through which parallel links would slip
+    through each other at one instant, when both ends pass at once.
     """
     return -smooth_minimum(*intrusions(body, angles, first, second), CLEARANCE_SMOOTHING)
 
@@ -144,7 +163,8 @@ def _smooth_abs(xp, value: Array) -> Array:
 
 
 def _side(body: Links, angles: Array, line: int, link: int) -> Array:
-    """How far `link` stays on one side of the line through the link `line`; negative if its ends are on both sides."""
+    """How far `link` stays on one side of the line through the link `line`; negative if its ends
+    are on both sides."""
     xp, (turns, rises) = namespace(angles), _walk(tuple(body.lengths), line, link)
     heights = xp.matmul(rises, xp.sin(xp.matmul(turns, angles)))
     mean, spread = heights[0:1, :], heights[1:2, :]
@@ -153,8 +173,9 @@ def _side(body: Links, angles: Array, line: int, link: int) -> Array:
 
 @lru_cache(maxsize=4096)
 def _walk(lengths: tuple[float, ...], line: int, link: int) -> tuple[np.ndarray, np.ndarray]:
-    """Along the chain, in the frame of `line`, to the end of `link`: the turns of the links passed, of joint angles
-    ``(n, n_joint)``, and of their sines the mean height of that link's ends, and half their difference, ``(2, n)``."""
+    """Along the chain, in the frame of `line`, to the end of `link`: the turns of the links passed,
+    of joint angles ``(n, n_joint)``, and of their sines the mean height of that link's ends, and
+    half their difference, ``(2, n)``."""
     step = 1 if link > line else -1
     passed = list(range(line + step, link + step, step))
     turns = np.cumsum(np.eye(len(lengths))[[k - 1 if step > 0 else k for k in passed], :-1], axis=0)
@@ -169,31 +190,38 @@ def separate_pairs(body: Links) -> list[tuple[int, int]]:
     return [(i, j) for i in range(body.n_link) for j in range(i + 2, body.n_link)]
 
 
-def crossing_depth(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None) -> np.ndarray:
+def crossing_depth(
+    body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None
+) -> np.ndarray:
     """How far links penetrate each other, ``(n_time,)``; 0 where no two of them cross.
 
-    Plain segment intersection of the given pairs, by default of all that are not neighbours, independent of
-    `crossing_bounds` and `clearance`: the depth is the smallest distance from an end of one of two crossing segments to the
-    other segment.
+    Plain segment intersection of the given pairs, by default of all that are not neighbours,
+    independent of `crossing_bounds` and `clearance`: the depth is the smallest distance from an end
+    of one of two crossing segments to the other segment.
     """
     ends = np.stack(body.joints(angles))
     return _crossing(ends, _within_reach(ends, separate_pairs(body) if pairs is None else pairs))
 
 
 def passing_depth(body: Links, angles: np.ndarray) -> float:
-    """How far links pass through each other between successive instants of a path [body lengths]; 0 if none does.
+    """How far links pass through each other between successive instants of a path [body lengths]; 0
+    if none does.
 
-    A link cannot cross another without an end of one passing through the other. That shows even where no sample holds a
-    crossing (parallel links that slip through each other): an end that is beside the other link changes its side. The
-    value is the smaller of the end's distances before and after.
+    A link cannot cross another without an end of one passing through the other. That shows even
+    where no sample holds a crossing (parallel links that slip through each other): an end that is
+    beside the other link changes its side. The value is the smaller of the end's distances before
+    and after.
     """
     ends = np.stack(body.joints(angles))
     return _passing(ends, _within_reach(ends, separate_pairs(body)))
 
 
-def overlapping_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float) -> tuple[Pair, ...]:
-    """Those of pairs of links that overlap, or pass through each other between successive instants of a path, by more than
-    `least` [body lengths]; from the coordinates ``(2, n_link + 1, n_time)`` of joints and tips."""
+def overlapping_pairs(
+    ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float
+) -> tuple[Pair, ...]:
+    """Those of pairs of links that overlap, or pass through each other between successive instants
+    of a path, by more than `least` [body lengths]; from the coordinates ``(2, n_link + 1, n_time)``
+    of joints and tips."""
 
     def depth(one: list[Pair]) -> float:
         return max(float(_overlap(ends, one, width, _their_ends(one)).max()), _passing(ends, one))
@@ -202,8 +230,8 @@ def overlapping_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, lea
 
 
 def _within_reach(ends: np.ndarray, pairs: Sequence[Pair], width: float = 0.0) -> list[Pair]:
-    """Those of pairs whose links can come nearer than their width, at an instant or on the straight way to the next: most of
-    a long body never do, and their middles say so."""
+    """Those of pairs whose links can come nearer than their width, at an instant or on the straight
+    way to the next: most of a long body never do, and their middles say so."""
     middles, near = 0.5 * (ends[:, 1:] + ends[:, :-1]), []
     lengths = np.hypot(*(ends[:, 1:] - ends[:, :-1])).max(axis=1, initial=0.0)
     for i, j in pairs:
@@ -235,8 +263,11 @@ def _passing(ends: np.ndarray, pairs: Sequence[Pair]) -> float:
     return deepest
 
 
-def _end_distances(ends: np.ndarray, i: int, j: int) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-    """Signed distances of the ends of link j from the line of link i, the other way round, and which ends lie beside."""
+def _end_distances(
+    ends: np.ndarray, i: int, j: int
+) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+    """Signed distances of the ends of link j from the line of link i, the other way round, and
+    which ends lie beside."""
     result: list[list[np.ndarray]] = []
     beside = []
     for line, link in ((i, j), (j, i)):
@@ -244,7 +275,9 @@ def _end_distances(ends: np.ndarray, i: int, j: int) -> tuple[list[np.ndarray], 
         length = np.hypot(*along)
         seen = [ends[:, link] - ends[:, line], ends[:, link + 1] - ends[:, line]]
         result.append([_cross(along, p) / length for p in seen])
-        beside += [np.abs((along * p).sum(axis=0) / length - 0.5 * length) < 0.5 * length for p in seen]
+        beside += [
+            np.abs((along * p).sum(axis=0) / length - 0.5 * length) < 0.5 * length for p in seen
+        ]
     return result[0], result[1], beside
 
 
@@ -253,21 +286,34 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def ends_and_links(body: Links) -> list[Pair]:
-    """All (end, link) where the joint or tip number `end`, from 0 at the tail, is no end of the link."""
-    return [(end, link) for link in range(body.n_link) for end in range(body.n_link + 1) if end not in (link, link + 1)]
+    """All (end, link) where the joint or tip number `end`, from 0 at the tail, is no end of the
+    link."""
+    return [
+        (end, link)
+        for link in range(body.n_link)
+        for end in range(body.n_link + 1)
+        if end not in (link, link + 1)
+    ]
 
 
 def _their_ends(pairs: Sequence[Pair]) -> list[Pair]:
     """The same of pairs of links."""
-    return [(end, link) for i, j in pairs for link, ends in ((i, (j, j + 1)), (j, (i, i + 1))) for end in ends]
+    return [
+        (end, link)
+        for i, j in pairs
+        for link, ends in ((i, (j, j + 1)), (j, (i, i + 1)))
+        for end in ends
+    ]
 
 
 def square_distance(body: Links, angles: Array, end: int, link: int) -> Array:
-    """Of a joint or tip from a link, ``(1, n_time)``, from joint angles ``(n_joint, n_time)``; NumPy and CasADi."""
+    """Of a joint or tip from a link, ``(1, n_time)``, from joint angles ``(n_joint, n_time)``;
+    NumPy and CasADi."""
     xp = namespace(angles)
     step = 1 if end > link else -1
     length, along, across, turn = body.lengths[link], 0.0, 0.0, 0.0
-    # walk along the chain in the frame of the link, from its near end; away from the tail or towards it
+    # walk along the chain in the frame of the link, from its near end; away from the tail or
+    # towards it
     for k in range(link + 1, end) if step > 0 else range(link - 1, end - 1, -1):
         joint = k - 1 if step > 0 else k
         turn = turn + angles[joint : joint + 1, :]
@@ -279,34 +325,49 @@ def square_distance(body: Links, angles: Array, end: int, link: int) -> Array:
 
 
 def excess(body: Links, angles: Array, end: int, link: int) -> Array:
-    """A smooth function that is <= 0 where an end and a link keep the width, to first order the width that they lack
-    [body lengths], ``(1, n_time)``; it has a derivative on the link too, where the distance has none."""
+    """A smooth function that is <= 0 where an end and a link keep the width, to first order the
+    width that they lack [body lengths], ``(1, n_time)``; it has a derivative on the link too, where
+    the distance has none."""
     w = body.width
     return (w * w - square_distance(body, angles, end, link)) / (2 * w)
 
 
 def gap(body: Links, angles: np.ndarray) -> np.ndarray:
-    """The smallest distance of an end from a link that it is not an end of [body lengths], ``(n_time,)``; 0 where links cross.
+    """The smallest distance of an end from a link that it is not an end of [body lengths],
+    ``(n_time,)``; 0 where links cross.
 
     Neighbours of equal lengths l folded by an angle beyond pi/2 have the gap l sin(pi - |angle|).
     """
     ends = np.stack(body.joints(angles))
-    return np.where(_crossing(ends, separate_pairs(body)) > 0, 0.0, _gap(ends, ends_and_links(body)))
+    return np.where(
+        _crossing(ends, separate_pairs(body)) > 0, 0.0, _gap(ends, ends_and_links(body))
+    )
 
 
 def overlap(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None) -> np.ndarray:
-    """What links lack of their width, and how far they cross besides [body lengths], ``(n_time,)``; 0 where they keep it.
+    """What links lack of their width, and how far they cross besides [body lengths], ``(n_time,)``;
+    0 where they keep it.
 
     Of all, or of pairs of links.
     """
     ends = np.stack(body.joints(angles))
-    every, apart = (separate_pairs(body), ends_and_links(body)) if pairs is None else (pairs, _their_ends(pairs))
+    every, apart = (
+        (separate_pairs(body), ends_and_links(body))
+        if pairs is None
+        else (pairs, _their_ends(pairs))
+    )
     return _overlap(ends, _within_reach(ends, every), body.width, apart)
 
 
-def _overlap(ends: np.ndarray, pairs: Sequence[Pair], width: float, apart: Sequence[Pair]) -> np.ndarray:
+def _overlap(
+    ends: np.ndarray, pairs: Sequence[Pair], width: float, apart: Sequence[Pair]
+) -> np.ndarray:
     depth = _crossing(ends, pairs)
-    return depth if width == 0 else depth + np.maximum(width - np.where(depth > 0, 0.0, _gap(ends, apart)), 0.0)
+    return (
+        depth
+        if width == 0
+        else depth + np.maximum(width - np.where(depth > 0, 0.0, _gap(ends, apart)), 0.0)
+    )
 
 
 def _gap(ends: np.ndarray, apart: Sequence[Pair]) -> np.ndarray:
@@ -314,7 +375,8 @@ def _gap(ends: np.ndarray, apart: Sequence[Pair]) -> np.ndarray:
 
 
 def _from_segment(ends: np.ndarray, end: int, link: int) -> np.ndarray:
-    """Distance of a joint or tip from a link, by the coordinates ``(2, n_link + 1, n_time)`` of all, ``(n_time,)``."""
+    """Distance of a joint or tip from a link, by the coordinates ``(2, n_link + 1, n_time)`` of
+    all, ``(n_time,)``."""
     along, to = ends[:, link + 1] - ends[:, link], ends[:, end] - ends[:, link]
     part = np.clip((along * to).sum(axis=0) / (along * along).sum(axis=0), 0.0, 1.0)
     return np.hypot(*(to - part * along))

@@ -1,6 +1,8 @@
-"""A chain with fewer motors than joints, as a `colloc.mechanics.bodies.Body`: joint angles = gears @ motor angles + stuck ones.
+"""A chain with fewer motors than joints, as a `colloc.mechanics.bodies.Body`: joint angles = gears
+@ motor angles + stuck ones.
 
-Its mechanics is that of the chain, asked at the joint angles; derivatives come back through the gears.
+Its mechanics is that of the chain, asked at the joint angles; derivatives come back through the
+gears.
 """
 
 from __future__ import annotations
@@ -51,21 +53,24 @@ def _under_friction(name: str) -> Callable[..., Any]:
 @named_arguments
 @dataclass(frozen=True)
 class Coupled(Body):
-    """A chain some of whose joints hang on one motor, or are stuck; its shape coordinates are the angles of the motors.
+    """A chain some of whose joints hang on one motor, or are stuck; its shape coordinates are the
+    angles of the motors.
 
     Parameters
     ----------
     chain : Chain
     gears : sequence of sequence of float, optional
-        For each joint from the tail, how far each motor turns it; 0 where it does not. By default every joint that is not
-        stuck has a motor of its own.
+        For each joint from the tail, how far each motor turns it; 0 where it does not. By default
+        every joint that is not stuck has a motor of its own.
     stuck : mapping from int to float, optional
-        Joints that do not move, counted from 0 at the tail, and the angles at which they are [rad]. They hang on no motor.
+        Joints that do not move, counted from 0 at the tail, and the angles at which they are [rad].
+        They hang on no motor.
 
     Raises
     ------
     ProblemError
-        If a joint neither hangs on a motor nor is stuck, two motors do the same, or links cross at the stuck angles.
+        If a joint neither hangs on a motor nor is stuck, two motors do the same, or links cross at
+        the stuck angles.
 
     Examples
     --------
@@ -87,7 +92,9 @@ class Coupled(Body):
 
     def __post_init__(self) -> None:
         if type(self.chain) is not Chain:
-            raise ProblemError(f"Coupled is for the joints of a Chain, not of a {type(self.chain).__name__}.")
+            raise ProblemError(
+                f"Coupled is for the joints of a Chain, not of a {type(self.chain).__name__}."
+            )
         count = self.chain.n_joint
         object.__setattr__(self, "stuck", _checked_stuck(self.stuck, count))
         broken = {joint for joint, _ in self.stuck}
@@ -96,22 +103,34 @@ class Coupled(Body):
         object.__setattr__(self, "gears", _checked_gears(gears, count))
         for joint, row in enumerate(self.gears):
             if any(row) == (joint in broken):
-                what = "is stuck, and hangs on a motor" if any(row) else "hangs on no motor: give its angle in stuck"
+                what = (
+                    "is stuck, and hangs on a motor"
+                    if any(row)
+                    else "hangs on no motor: give its angle in stuck"
+                )
                 raise ProblemError(f"joint {joint} (counted from 0 at the tail) {what}.")
         if np.linalg.matrix_rank(self._gears) < self.n_joint:
-            raise ProblemError("two motors do the same, or one moves nothing: leave it out of gears.")
+            raise ProblemError(
+                "two motors do the same, or one moves nothing: leave it out of gears."
+            )
         if self.chain.crossing_depth(self._rest).any():
             raise ProblemError("links cross where joints are stuck.")
 
     force_names, law, largest_forces = map(_of_chain, ("force_names", "law", "largest_forces"))
     drawn_width, hinges, far_pairs = map(_of_chain, ("drawn_width", "hinges", "far_pairs"))
 
-    sliding, with_forces, forces, solve = map(_under_friction, ("sliding", "with_forces", "forces", "solve"))
-    motion, replayed, all_velocities = map(_under_friction, ("motion", "replayed", "all_velocities"))
+    sliding, with_forces, forces, solve = map(
+        _under_friction, ("sliding", "with_forces", "forces", "solve")
+    )
+    motion, replayed, all_velocities = map(
+        _under_friction, ("motion", "replayed", "all_velocities")
+    )
     slowness, rubbing = map(_under_friction, ("slowness", "rubbing"))
     speeds, seen_from_head = map(_in_motion, ("speeds", "seen_from_head"))
     crossing_depth, passing_depth = map(_at_shapes, ("crossing_depth", "passing_depth"))
-    outline, centre, footprints, imbalance = map(_at_shapes, ("outline", "centre", "footprints", "imbalance"))
+    outline, centre, footprints, imbalance = map(
+        _at_shapes, ("outline", "centre", "footprints", "imbalance")
+    )
 
     @property
     def _gears(self) -> np.ndarray:
@@ -159,12 +178,23 @@ class Coupled(Body):
         return super().symmetries
 
     def describe(self) -> str:
-        broken = "".join(f", joint {joint + 1} stuck at {angle:.4g} rad" for joint, angle in self.stuck)
+        broken = "".join(
+            f", joint {joint + 1} stuck at {angle:.4g} rad" for joint, angle in self.stuck
+        )
         many = f"{self.n_joint} motor{'s' * (self.n_joint > 1)}"
         return f"{self.chain.describe()}, on {many}{broken}"
 
-    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
-        slopes = self.chain.slopes(friction, self.joint_angles(angles), self.joint_rates(rates), delta, solved)
+    def slopes(
+        self,
+        friction: Law,
+        angles: np.ndarray,
+        rates: np.ndarray,
+        delta: float,
+        solved: BalanceSolution,
+    ) -> np.ndarray:
+        slopes = self.chain.slopes(
+            friction, self.joint_angles(angles), self.joint_rates(rates), delta, solved
+        )
         return np.einsum("ijt,jk->ikt", slopes, np.kron(np.eye(2), self._gears))
 
     @property
@@ -178,7 +208,9 @@ class Coupled(Body):
 
     @property
     def limit_names(self) -> tuple[str, ...]:
-        return tuple(name for name, moves in zip(self.chain.limit_names, self._moved, strict=True) if moves)
+        return tuple(
+            name for name, moves in zip(self.chain.limit_names, self._moved, strict=True) if moves
+        )
 
     def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
         return [contact.after(self.joint_angles) for contact in self.chain.contacts(far)]
@@ -196,16 +228,28 @@ class Coupled(Body):
         return np.linalg.pinv(self._gears) @ self.chain.laid(lengths)
 
 
-def _checked_stuck(stuck: Mapping[int, float] | Sequence[Sequence[float]], count: int) -> tuple[tuple[int, float], ...]:
+def _checked_stuck(
+    stuck: Mapping[int, float] | Sequence[Sequence[float]], count: int
+) -> tuple[tuple[int, float], ...]:
     try:
-        found = [(joint, angle) for joint, angle in (stuck.items() if isinstance(stuck, Mapping) else stuck)]
+        found = [
+            (joint, angle)
+            for joint, angle in (stuck.items() if isinstance(stuck, Mapping) else stuck)
+        ]
     except (TypeError, ValueError):
-        raise ProblemError(f"stuck gives joints and their angles, as {{1: 0.4}}, not {stuck!r}.") from None
+        raise ProblemError(
+            f"stuck gives joints and their angles, as {{1: 0.4}}, not {stuck!r}."
+        ) from None
     for joint, angle in found:
         if not is_whole(joint, 0, count - 1):
-            raise ProblemError(f"stuck names joint {joint!r}: the chain has joints 0 to {count - 1}, from the tail.")
+            raise ProblemError(
+                f"stuck names joint {joint!r}: the chain has joints 0 to {count - 1}, from "
+                f"the tail."
+            )
         if not (is_number(angle) and abs(angle) < np.pi):
-            raise ProblemError(f"joint {joint} is stuck at {angle!r}: give an angle between -pi and pi [rad].")
+            raise ProblemError(
+                f"joint {joint} is stuck at {angle!r}: give an angle between -pi and pi [rad]."
+            )
     if len({joint for joint, _ in found}) < len(found):
         raise ProblemError("stuck names a joint twice.")
     if len(found) == count:

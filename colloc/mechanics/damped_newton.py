@@ -1,15 +1,18 @@
-"""Damped Newton with a fixed-point safeguard, batched over instants, for three rigid velocities. No CasADi.
+"""Damped Newton with a fixed-point safeguard, batched over instants, for three rigid velocities. No
+CasADi.
 
-An associated law (`colloc.mechanics.law`) is the gradient of a strictly convex, coercive dissipation potential, so
-Armijo-damped Newton on that potential converges from any start. Other laws have no potential; there Newton steps are taken
-while they reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
-reweighted least squares) is the safeguard when a Newton step fails. What ends in a valley of the residual goes on by "natural"
-steps: one counts if the next one, taken with the same matrix, is shorter (Deuflhard, Numer. Math. 22, 1974), so the residual
-may rise.
+An associated law (`colloc.mechanics.law`) is the gradient of a strictly convex, coercive
+dissipation potential, so Armijo-damped Newton on that potential converges from any start. Other
+laws have no potential; there Newton steps are taken while they reduce the residual. In both cases
+the paper's fixed point (which minimises a majorant of the potential: iteratively reweighted least
+squares) is the safeguard when a Newton step fails. What ends in a valley of the residual goes on by
+"natural" steps: one counts if the next one, taken with the same matrix, is shorter (Deuflhard,
+Numer. Math. 22, 1974), so the residual may rise.
 
-What a body is made of (links, panels of a smooth curve) is the business of the `Batch`. Velocities are those of a
-*reference* of the body, and the iteration moves it to the slowest one, the *anchor*: a stretch at stick moves at speeds
-of order delta, which a velocity of order one could only represent to 1e-16 in absolute terms.
+What a body is made of (links, panels of a smooth curve) is the business of the `Batch`. Velocities
+are those of a *reference* of the body, and the iteration moves it to the slowest one, the *anchor*:
+a stretch at stick moves at speeds of order delta, which a velocity of order one could only
+represent to 1e-16 in absolute terms.
 """
 
 from __future__ import annotations
@@ -26,9 +29,9 @@ _ARMIJO = 1e-4
 _NATURAL_GAIN = 0.25
 _BACKTRACKING = (0.5,) * 4 + (0.1,) * 8
 _SHORT_BACKTRACKING = (0.5, 0.25)
-"""Without a potential a Newton direction may not descend at all, and shorter steps than these creep along a valley of the
-residual for a hundred iterations; the fixed point leaves it (2 to 3 times less time at (10, 1, 1), (0.5, 1, 5), (1.7, 1, 1.3)
-than with 0.25 and 0.1)."""
+"""Without a potential a Newton direction may not descend at all, and shorter steps than these creep
+along a valley of the residual for a hundred iterations; the fixed point leaves it (2 to 3 times
+less time at (10, 1, 1), (0.5, 1, 5), (1.7, 1, 1.3) than with 0.25 and 0.1)."""
 _ROUNDING = 8e-16
 _FIXED_POINT_STEPS_AFTER_FAILURE = 5
 _DIRECT_ITERATIONS = 40
@@ -40,8 +43,8 @@ METHODS = ("auto", "newton", "fixed_point", "direct", "natural")
 
 
 Evaluated = tuple[np.ndarray, np.ndarray, np.ndarray | None]
-"""Body state ``(k, n_body, n)``, net force ``(3, n)`` and, of an associated law, the potential ``(n,)`` whose gradient is minus
-that force."""
+"""Body state ``(k, n_body, n)``, net force ``(3, n)`` and, of an associated law, the potential
+``(n,)`` whose gradient is minus that force."""
 
 
 class Batch(Protocol):
@@ -54,16 +57,19 @@ class Batch(Protocol):
         """What there is at z ``(3, n)`` of the selected instants."""
 
     def matrix(self, state: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
-        """Minus the derivative of the net force, or the matrix of the paper's fixed point, ``(n, 3, 3)``."""
+        """Minus the derivative of the net force, or the matrix of the paper's fixed point, ``(n, 3,
+        3)``."""
 
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The slowest reference ``(n,)`` of every instant, and its velocity ``(3, n)``, for z in the batch's own."""
+        """The slowest reference ``(n,)`` of every instant, and its velocity ``(3, n)``, for z in
+        the batch's own."""
 
 
 def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
     """Regularisation ``(1, n_time)`` in units of the largest rate ``(n_time,)``.
 
-    Beyond the limits the law has reached its viscous or its dry limit to the last digit, but its squares would overflow.
+    Beyond the limits the law has reached its viscous or its dry limit to the last digit, but its
+    squares would overflow.
     """
     with np.errstate(over="ignore", under="ignore"):
         return np.clip(delta / speed, _DRY, _VISCOUS)[None]
@@ -72,8 +78,8 @@ def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
 def force_unit(friction: Law, delta: np.ndarray) -> np.ndarray:
     """Friction on a body that moves at unit speed: the largest coefficient where delta is small.
 
-    Above unit delta dry friction is viscous and falls with delta; a residual in units of the coefficient would then vanish
-    whatever the velocity.
+    Above unit delta dry friction is viscous and falls with delta; a residual in units of the
+    coefficient would then vanish whatever the velocity.
     """
     degree = 1.0 if friction.degree is None else friction.degree
     return friction.largest * np.hypot(1.0, delta) ** (degree - 1.0)
@@ -91,13 +97,14 @@ MakeBatch = Callable[[np.ndarray, int], Batch]
 
 @dataclass(eq=False)
 class State:
-    """Current anchors, anchor velocities, residuals and step counts of all instants; updated in place."""
+    """Current anchors, anchor velocities, residuals and step counts of all instants; updated in
+    place."""
 
     anchor: np.ndarray  # (n_time,)
     velocity: np.ndarray  # (3, n_time)
     residual: np.ndarray
-    """Largest of |net force| and |torque about the anchor| / body length, in units of the friction at unit speed (see
-    `force_unit`), ``(n_time,)``."""
+    """Largest of |net force| and |torque about the anchor| / body length, in units of the friction
+    at unit speed (see `force_unit`), ``(n_time,)``."""
     iterations: np.ndarray  # (n_time,)
 
 
@@ -107,14 +114,22 @@ def starting_state(anchor: np.ndarray, velocity: np.ndarray) -> State:
 
 
 def solve(
-    state: State, make_batch: MakeBatch, n_reference: int, delta: np.ndarray, tolerance: float, budget: int, method: str
+    state: State,
+    make_batch: MakeBatch,
+    n_reference: int,
+    delta: np.ndarray,
+    tolerance: float,
+    budget: int,
+    method: str,
 ) -> None:
-    """Bring every instant of `state` to a residual below `tolerance`, in up to four attempts of `budget` steps each.
+    """Bring every instant of `state` to a residual below `tolerance`, in up to four attempts of
+    `budget` steps each.
 
-    "auto" first damps Newton from where the state is; then, for instants that fail, from rest; then it follows the
-    regularisation down from 1 to `delta` ``(1, n_time)``, and at last takes fixed-point steps only. The second attempt begins
-    with the first anchor, since the failed one may have moved it to a link from which nothing converges. "direct" is the first
-    attempt alone; the other methods are for comparison.
+    "auto" first damps Newton from where the state is; then, for instants that fail, from rest; then
+    it follows the regularisation down from 1 to `delta` ``(1, n_time)``, and at last takes
+    fixed-point steps only. The second attempt begins with the first anchor, since the failed one
+    may have moved it to a link from which nothing converges. "direct" is the first attempt alone;
+    the other methods are for comparison.
     """
     everything, first_anchor = np.arange(state.residual.size), state.anchor.copy()
     direct = min(budget, _DIRECT_ITERATIONS) if method in ("auto", "direct", "natural") else budget
@@ -132,7 +147,16 @@ def solve(
         state.velocity[:, bad] = 0.0
         for level in _ladder(float(delta[0, bad].min())):
             now = np.maximum(delta, level)
-            _advance(state, make_batch, n_reference, bad, now, tolerance, min(budget, _LADDER_ITERATIONS), method)
+            _advance(
+                state,
+                make_batch,
+                n_reference,
+                bad,
+                now,
+                tolerance,
+                min(budget, _LADDER_ITERATIONS),
+                method,
+            )
         bad = np.flatnonzero(state.residual > tolerance)
         if bad.size:
             _advance(state, make_batch, n_reference, bad, delta, tolerance, budget, "fixed_point")
@@ -154,7 +178,8 @@ def _advance(
     max_iterations: int,
     method: str,
 ) -> None:
-    """Iterate the chosen instants, moving the anchor to the slowest reference as long as that still helps."""
+    """Iterate the chosen instants, moving the anchor to the slowest reference as long as that still
+    helps."""
     todo = chosen
     for _ in range(n_reference):
         moved = []
@@ -162,7 +187,12 @@ def _advance(
             members = todo[chosen_of_todo]
             batch = make_batch(members, reference)
             z, residual, iterations = iterate(
-                batch, state.velocity[:, members], delta[:, members], tolerance, max_iterations, method
+                batch,
+                state.velocity[:, members],
+                delta[:, members],
+                tolerance,
+                max_iterations,
+                method,
             )
             state.iterations[members] += iterations
             state.residual[members] = residual
@@ -180,17 +210,34 @@ def _advance(
 
 
 def iterate(
-    batch: Batch, z: np.ndarray, delta: np.ndarray, tolerance: float, max_iterations: int, method: str
+    batch: Batch,
+    z: np.ndarray,
+    delta: np.ndarray,
+    tolerance: float,
+    max_iterations: int,
+    method: str,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Damped Newton from z ``(3, n)``, with fixed-point steps where a Newton step fails; returns z, residual, iterations."""
+    """Damped Newton from z ``(3, n)``, with fixed-point steps where a Newton step fails; returns z,
+    residual, iterations."""
 
-    def evaluated(select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """With the merit ``(n,)`` that a step has to reduce: the potential if there is one, else half the squared residual."""
-        with np.errstate(over="ignore", invalid="ignore"):  # a step that leads so far away is not taken
+    def evaluated(
+        select: np.ndarray, z: np.ndarray, delta: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """With the merit ``(n,)`` that a step has to reduce: the potential if there is one, else
+        half the squared residual."""
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # a step that leads so far away is not taken
             state, force, potential = batch.evaluate(select, z, delta)
-            return state, force, 0.5 * np.sum(force * force, axis=0) if potential is None else potential
+            return (
+                state,
+                force,
+                0.5 * np.sum(force * force, axis=0) if potential is None else potential,
+            )
 
-    shares = _BACKTRACKING if batch.friction.associated or method == "natural" else _SHORT_BACKTRACKING
+    shares = (
+        _BACKTRACKING if batch.friction.associated or method == "natural" else _SHORT_BACKTRACKING
+    )
     n_time = z.shape[1]
     z = z.copy()
     residual, iterations = np.full(n_time, np.inf), np.zeros(n_time, dtype=int)
@@ -210,7 +257,12 @@ def iterate(
         else:
             slope, slack = -2.0 * merit, np.zeros_like(merit)
         alpha, failed = np.ones(active.size), np.ones(active.size, dtype=bool)
-        trial, new_links, new_force, new_merit = z[:, active], links.copy(), force.copy(), merit.copy()
+        trial, new_links, new_force, new_merit = (
+            z[:, active],
+            links.copy(),
+            force.copy(),
+            merit.copy(),
+        )
         for shrink in (1.0, *shares):
             retry = np.flatnonzero(failed)
             if not retry.size:
@@ -238,7 +290,8 @@ def iterate(
 def _step(
     batch: Batch, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``, and their matrices ``(n, 3, 3)``."""
+    """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``, and their
+    matrices ``(n, 3, 3)``."""
     matrix = np.empty((newton.size, 3, 3))
     for by_newton, chosen in ((True, newton), (False, ~newton)):
         if chosen.any():
@@ -247,7 +300,8 @@ def _step(
 
 
 def solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve ``matrix[t] x[:, t] = right[:, t]`` after symmetric scaling; where that is singular, the step is zero."""
+    """Solve ``matrix[t] x[:, t] = right[:, t]`` after symmetric scaling; where that is singular,
+    the step is zero."""
     diagonal = np.sqrt(np.clip(np.abs(np.einsum("tii->ti", matrix)), _TINY, _HUGE))
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = matrix / diagonal[:, :, None] / diagonal[:, None, :]

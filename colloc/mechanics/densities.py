@@ -1,7 +1,9 @@
-"""Functions of an instant, each one formula: what a period sums up besides its way and work, and what is limited all along.
+"""Functions of an instant, each one formula: what a period sums up besides its way and work, and
+what is limited all along.
 
-A formula speaks of every joint, or other shape coordinate, at an instant. It is text, so that files can hold it, and is
-evaluated with NumPy where a motion is replayed and with CasADi where derivatives are needed: there is no second statement.
+A formula speaks of every joint, or other shape coordinate, at an instant. It is text, so that files
+can hold it, and is evaluated with NumPy where a motion is replayed and with CasADi where
+derivatives are needed: there is no second statement.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ VARIABLES = {
     "rate": "of every joint [rad per period]",
     "moment": "that the actuator of every joint exerts [weight x body length]",
     "power": "that it delivers, moment times rate",
-    "idle": "power at an instant below which regularised friction does not tell who drives whom: friction at the speed delta",
+    "idle": "power at an instant below which regularised friction does not tell who drives whom: "
+    "friction at the speed delta",
 }
 """What a formula may speak of."""
 SUMMED = (*FUNCTIONS, "sum")
@@ -35,7 +38,8 @@ SUMMED = (*FUNCTIONS, "sum")
 _OF_FORCES = {"moment", "power", "idle"}
 _WITH_PACE, _WITH_FRICTION = ("rate", "power", "idle"), ("moment", "power", "idle")
 _DOUBLINGS = -20, 1, 4, 20
-"""By which powers of two a formula's degree is found: far enough to meet whatever scale it has of its own."""
+"""By which powers of two a formula's degree is found: far enough to meet whatever scale it has of
+its own."""
 _TAKEN = ("distance", "work", "rotation", "across", "period", "efficiency", "value", "instants")
 
 
@@ -52,7 +56,8 @@ class Instants:
     z : (3, n_time), optional
         Tail velocities that balance the body; or
     forces : (n_force, n_time), optional
-        Forces on its parts (`colloc.mechanics.bodies.Moved.forces`). Neither is needed where nobody asks for moments.
+        Forces on its parts (`colloc.mechanics.bodies.Moved.forces`). Neither is needed where nobody
+        asks for moments.
     unit : float
     load : (2, n_time), optional
         An outside force on its centre of mass, in its axes.
@@ -70,7 +75,10 @@ class Instants:
 
     def chosen(self, which: np.ndarray) -> Instants:
         """Some of them."""
-        some = (None if row is None else row[:, which] for row in (self.angles, self.rates, self.z, self.forces, self.load))
+        some = (
+            None if row is None else row[:, which]
+            for row in (self.angles, self.rates, self.z, self.forces, self.load)
+        )
         angles, rates, z, forces, load = some
         return replace(self, angles=angles, rates=rates, z=z, forces=forces, load=load)
 
@@ -95,7 +103,9 @@ class Instants:
 
     @property
     def idle(self) -> Array:
-        return self.unit * self.friction.largest * self.delta ** (1.0 + (self.friction.degree or 0.0))
+        return (
+            self.unit * self.friction.largest * self.delta ** (1.0 + (self.friction.degree or 0.0))
+        )
 
 
 def read(text: str) -> Formula:
@@ -130,7 +140,9 @@ class OfInstants:
         return "idle" in self._formula.names
 
     def _value(self, now: Instants) -> Array:
-        return self._formula({name: getattr(now, name) for name in VARIABLES if name in self._formula.names})
+        return self._formula(
+            {name: getattr(now, name) for name in VARIABLES if name in self._formula.names}
+        )
 
     @cached_property
     def friction_degree(self) -> float | None:
@@ -139,21 +151,28 @@ class OfInstants:
 
     @cached_property
     def pace_degree(self) -> float | None:
-        """The same of the pace, under dry friction. An integral of what grows like the pace itself belongs to a path, however
-        fast it is followed; so does the largest value of what does not grow."""
+        """The same of the pace, under dry friction. An integral of what grows like the pace itself
+        belongs to a path, however fast it is followed; so does the largest value of what does not
+        grow."""
         return self._degree(_WITH_PACE)
 
     def _degree(self, scaled: tuple[str, ...]) -> float | None:
         at = sample()
         before = self._formula(at)
         with np.errstate(all="ignore"):
-            after = [self._formula({k: v * 2.0**p if k in scaled else v for k, v in at.items()}) for p in _DOUBLINGS]
-            powers = np.concatenate([np.log2(a / before) / p for a, p in zip(after, _DOUBLINGS, strict=True)])
+            after = [
+                self._formula({k: v * 2.0**p if k in scaled else v for k, v in at.items()})
+                for p in _DOUBLINGS
+            ]
+            powers = np.concatenate(
+                [np.log2(a / before) / p for a, p in zip(after, _DOUBLINGS, strict=True)]
+            )
         near = float(np.round(powers.flat[0], 6)) + 0.0
         return near if np.allclose(powers, near, rtol=0, atol=1e-9) else None
 
     def _checked(self, what: str, rows: tuple[int, ...], instead: str) -> None:
-        """A `ProblemError` for a formula without as many rows, or without a finite value somewhere."""
+        """A `ProblemError` for a formula without as many rows, or without a finite value
+        somewhere."""
         with np.errstate(all="ignore"):
             value = self._formula(sample())
         if np.shape(value) not in [(n, 5) for n in rows]:
@@ -172,8 +191,9 @@ class Quantity(OfInstants):
     name : str
         By which objectives call it.
     density : str
-        Formula of ``angle``, ``rate``, ``moment``, ``power`` of every joint, and ``idle`` (`VARIABLES`): numbers,
-        ``+ - * / **``, `colloc.numerics.expression.FUNCTIONS`, and ``sum``, over the joints.
+        Formula of ``angle``, ``rate``, ``moment``, ``power`` of every joint, and ``idle``
+        (`VARIABLES`): numbers, ``+ - * / **``, `colloc.numerics.expression.FUNCTIONS`, and ``sum``,
+        over the joints.
     meaning : str, optional
         In words.
 
@@ -196,12 +216,17 @@ class Quantity(OfInstants):
     def __post_init__(self) -> None:
         name = self.name
         known = (
-            isinstance(name, str) and name.isidentifier() and not iskeyword(name) and not name.endswith(("_error", "_delta"))
+            isinstance(name, str)
+            and name.isidentifier()
+            and not iskeyword(name)
+            and not name.endswith(("_error", "_delta"))
         )
         if not known or name in (*_TAKEN, *SUMMED):
             raise ProblemError(f"a quantity needs a name of its own that is a word, not {name!r}.")
         object.__setattr__(self, "density", read(self.density).text)
-        self._checked(f"the quantity {name}", (1,), "is no sum over the joints; put sum(...) around it")
+        self._checked(
+            f"the quantity {name}", (1,), "is no sum over the joints; put sum(...) around it"
+        )
 
     @property
     def text(self) -> str:  # type: ignore[override]
@@ -223,13 +248,16 @@ class Quantity(OfInstants):
 LENGTH = Quantity("length", "sqrt(sum(rate**2) + 1e-24)", "length of the path in shape space [rad]")
 """The small number is for a derivative where a joint turns back."""
 DRIVEN_WORK = Quantity(
-    "driven_work", "sum(power + sqrt(power**2 + idle**2)) / 2", "work of the actuators where none takes energy back"
+    "driven_work",
+    "sum(power + sqrt(power**2 + idle**2)) / 2",
+    "work of the actuators where none takes energy back",
 )
-"""Work against friction is the sum of what all actuators do, and one that is driven backwards counts as a gain there. A real
-one brakes: it gives nothing back. The positive part of a power P has a corner at 0, which is smoothed at the scale of the
-regularised friction: below the speed delta friction is viscous, and so a power of delta times friction at that speed tells
-nothing about who drives whom. It vanishes with delta like friction's own regularisation, and the certificate's limit for
-delta -> 0 covers both."""
+"""Work against friction is the sum of what all actuators do, and one that is driven backwards
+counts as a gain there. A real one brakes: it gives nothing back. The positive part of a power P has
+a corner at 0, which is smoothed at the scale of the regularised friction: below the speed delta
+friction is viscous, and so a power of delta times friction at that speed tells nothing about who
+drives whom. It vanishes with delta like friction's own regularisation, and the certificate's limit
+for delta -> 0 covers both."""
 INTEGRALS = {each.name: each for each in (LENGTH, DRIVEN_WORK)}
 """Quantities that every objective may speak of."""
 
@@ -238,7 +266,9 @@ def quantities_of(asked: Any) -> tuple[Quantity, ...]:
     """Quantities by their names, or as they are. `ProblemError` for a name that is none."""
     for each in asked if isinstance(asked, Iterable) else (asked,):
         if not isinstance(each, Quantity) and each not in INTEGRALS:
-            raise ProblemError(f"{each!r} is no quantity: name one of {', '.join(INTEGRALS)}, or state a Quantity.")
+            raise ProblemError(
+                f"{each!r} is no quantity: name one of {', '.join(INTEGRALS)}, or state a Quantity."
+            )
     return tuple(each if isinstance(each, Quantity) else INTEGRALS[each] for each in asked)
 
 
@@ -279,11 +309,17 @@ class PathLimit(OfInstants):
         if not isinstance(self.name, str) or not self.name.strip():
             raise ProblemError(f"a path limit needs a name, not {self.name!r}.")
         object.__setattr__(self, "function", read(self.function).text)
-        self._checked(f"the limit {self.name}", (1, 3), "has no value at an instant: let it speak of joints")
+        self._checked(
+            f"the limit {self.name}", (1, 3), "has no value at an instant: let it speak of joints"
+        )
         each = tuple(np.ravel(np.asarray(self.most, dtype=object)).tolist())
         if not each or not all(is_number(a) and a > 0 for a in each):
-            raise ProblemError(f"the limit {self.name}: the most must be positive and finite, not {self.most!r}.")
-        object.__setattr__(self, "most", tuple(map(float, each)) if np.ndim(self.most) else float(each[0]))
+            raise ProblemError(
+                f"the limit {self.name}: the most must be positive and finite, not {self.most!r}."
+            )
+        object.__setattr__(
+            self, "most", tuple(map(float, each)) if np.ndim(self.most) else float(each[0])
+        )
 
     @property
     def text(self) -> str:  # type: ignore[override]
@@ -298,14 +334,18 @@ class PathLimit(OfInstants):
         """The same with a most for each of its values. `ProblemError` if there are others."""
         rows = n_joint if self.of_each else 1
         if np.size(self.most) not in (1, rows):
-            raise ProblemError(f"the limit {self.name} has {np.size(self.most)} values; give one, or {rows}.")
+            raise ProblemError(
+                f"the limit {self.name} has {np.size(self.most)} values; give one, or {rows}."
+            )
         return replace(self, most=tuple(np.broadcast_to(self.most, rows).tolist()))
 
     @property
     def names(self) -> tuple[str, ...]:
         """What the rows of `at` are, once there is a most for each."""
         rows = range(np.size(self.most))
-        return tuple(f"{self.name} of joint {j + 1}" for j in rows) if self.of_each else (self.name,)
+        return (
+            tuple(f"{self.name} of joint {j + 1}" for j in rows) if self.of_each else (self.name,)
+        )
 
     def at(self, now: Instants) -> Array:
         """Shares of what is allowed ``(n_row, n_time)``."""
@@ -314,7 +354,12 @@ class PathLimit(OfInstants):
     def fields(self) -> dict[str, Any]:
         """As plain numbers and text (JSON)."""
         most = list(self.most) if isinstance(self.most, tuple) else self.most
-        return {"name": self.name, "function": self.function, "most": most, "both_ways": self.both_ways}
+        return {
+            "name": self.name,
+            "function": self.function,
+            "most": most,
+            "both_ways": self.both_ways,
+        }
 
 
 @dataclass(frozen=True)
@@ -331,7 +376,9 @@ class PathLimits:
     @property
     def least(self) -> np.ndarray:
         """Of the shares, that are allowed ``(n_share,)``; the most is 1."""
-        return np.array([-1.0 if limit.both_ways else -np.inf for limit in self.each for _ in limit.names])
+        return np.array(
+            [-1.0 if limit.both_ways else -np.inf for limit in self.each for _ in limit.names]
+        )
 
     @property
     def needs_forces(self) -> bool:
@@ -347,23 +394,37 @@ class PathLimits:
 
     def in_units_of(self, unit: float) -> PathLimits:
         """The same for friction that is divided by a unit."""
-        scaled = [np.array(limit.most) / unit ** (limit.friction_degree or 0.0) for limit in self.each]
-        return PathLimits(tuple(replace(limit, most=tuple(most)) for limit, most in zip(self.each, scaled, strict=True)))
+        scaled = [
+            np.array(limit.most) / unit ** (limit.friction_degree or 0.0) for limit in self.each
+        ]
+        return PathLimits(
+            tuple(
+                replace(limit, most=tuple(most))
+                for limit, most in zip(self.each, scaled, strict=True)
+            )
+        )
 
 
 def stated_limit(stated: Any) -> PathLimit:
     """A limit, as it is or as `PathLimit.fields` wrote it. `ProblemError` if it is none."""
     if not isinstance(stated, (PathLimit, dict)):
-        raise ProblemError(f"limits are of the kind PathLimit(name, function, most), not {stated!r}.")
+        raise ProblemError(
+            f"limits are of the kind PathLimit(name, function, most), not {stated!r}."
+        )
     return stated if isinstance(stated, PathLimit) else PathLimit(**stated)
 
 
 def limits_of(asked: Iterable[PathLimit] | PathLimits, n_joint: int) -> PathLimits:
     """Limits of a body with so many joints, as they are stated or ready."""
-    return asked if isinstance(asked, PathLimits) else PathLimits(tuple(each.on(n_joint) for each in asked))
+    return (
+        asked
+        if isinstance(asked, PathLimits)
+        else PathLimits(tuple(each.on(n_joint) for each in asked))
+    )
 
 
 def torque_and_power(torque: tuple[float, ...], power: tuple[float, ...]) -> tuple[PathLimit, ...]:
-    """What motors can do, joint by joint, where it is limited: moments either way, and powers that they deliver, not brake."""
+    """What motors can do, joint by joint, where it is limited: moments either way, and powers that
+    they deliver, not brake."""
     stated = ("torque", "moment", torque, True), ("power", "power", power, False)
     return tuple(PathLimit(*each) for each in stated if each[2])

@@ -1,8 +1,8 @@
-"""Feet, wheels and pads: what of a chain touches the floor, each with its share of the weight and a friction of its own if it
-has one.
+"""Feet, wheels and pads: what of a chain touches the floor, each with its share of the weight and a
+friction of its own if it has one.
 
-A foot sits on a link, `place` along it from its tail end (0) to its head end (1), and `offset` to the left of its middle line.
-A pad is a foot that has an extent along its link.
+A foot sits on a link, `place` along it from its tail end (0) to its head end (1), and `offset` to
+the left of its middle line. A pad is a foot that has an extent along its link.
 `colloc.mechanics.floor_contact` says what friction does there.
 """
 
@@ -67,31 +67,50 @@ class Foot:
 
     def __post_init__(self) -> None:
         if not is_whole(self.link):
-            raise ProblemError(f"the link of a foot must be a whole number, 0 for the tail's, not {self.link!r}.")
+            raise ProblemError(
+                f"the link of a foot must be a whole number, 0 for the tail's, not {self.link!r}."
+            )
         if not (is_number(self.place) and 0 <= self.place <= 1):
             raise ProblemError(
-                f"the place of a foot must lie on its link, from 0 (the end towards the tail) to 1, not {self.place!r}."
+                f"the place of a foot must lie on its link, from 0 (the end towards the tail) to "
+                f"1, not {self.place!r}."
             )
         if self.weight is not None and not (is_number(self.weight) and 0 < self.weight <= 1):
-            raise ProblemError(f"the weight of a foot must be a positive part of the body's, at most 1, not {self.weight!r}.")
+            raise ProblemError(
+                f"the weight of a foot must be a positive part of the body's, at most 1, not "
+                f"{self.weight!r}."
+            )
         for name in ("offset", "angle"):
             if not is_number(getattr(self, name)):
-                raise ProblemError(f"the {name} of a foot must be a finite number, not {getattr(self, name)!r}.")
+                raise ProblemError(
+                    f"the {name} of a foot must be a finite number, not {getattr(self, name)!r}."
+                )
         if not (is_number(self.extent) and 0 <= self.extent <= 1):
-            raise ProblemError(f"the extent of a foot must be a part of its link, from 0 (a point) to 1, not {self.extent!r}.")
+            raise ProblemError(
+                f"the extent of a foot must be a part of its link, from 0 (a point) to 1, not "
+                f"{self.extent!r}."
+            )
         if abs(self.place - 0.5) + 0.5 * self.extent > 0.5 + _SAME:
             raise ProblemError(
                 "a pad must lie on its link, from 0 (the end towards the tail) to 1, "
                 f"not from {self.first:.6g} to {self.last:.6g}."
             )
         if self.extent and self.angle:
-            raise ProblemError("a pad presses along its link: only a foot, without extent, may be turned by an angle.")
+            raise ProblemError(
+                "a pad presses along its link: only a foot, without extent, may be turned by an "
+                "angle."
+            )
         if isinstance(self.friction, type) or not isinstance(self.friction, Law | None):
-            raise ProblemError(f"the friction of a foot must be a law of friction, as Friction(), not {shown(self.friction)}.")
+            raise ProblemError(
+                f"the friction of a foot must be a law of friction, as Friction(), not "
+                f"{shown(self.friction)}."
+            )
 
     def from_head(self, n_link: int) -> Foot:
         """The same foot on the body named from its other end."""
-        return replace(self, link=n_link - 1 - self.link, place=1.0 - self.place, offset=-self.offset)
+        return replace(
+            self, link=n_link - 1 - self.link, place=1.0 - self.place, offset=-self.offset
+        )
 
     @property
     def mirrored(self) -> Foot:
@@ -100,7 +119,8 @@ class Foot:
 
     @property
     def kind(self) -> str:
-        """What it is: "pad" with an extent, "wheel" if friction of its own is lower forwards and backwards, else "foot"."""
+        """What it is: "pad" with an extent, "wheel" if friction of its own is lower forwards and
+        backwards, else "foot"."""
         own = self.friction
         rolls = isinstance(own, Friction) and own.mu_f == own.mu_b < own.mu_t
         return PAD if self.extent else WHEEL if rolls else FOOT
@@ -117,7 +137,8 @@ class Foot:
 
     @property
     def point(self) -> tuple[float, float]:
-        """Where along the body, counted in links, and beside it: the head end of a link is the tail end of the next."""
+        """Where along the body, counted in links, and beside it: the head end of a link is the tail
+        end of the next."""
         return self.link + self.place, self.offset
 
     def is_like(self, other: Foot) -> bool:
@@ -125,10 +146,19 @@ class Foot:
         own, its = ((f.link, f.place, f.weight or 0.0, f.offset, f.extent) for f in (self, other))
         turns = 1 if self.friction is None or not self.friction.reversible else 2
         turned = abs(np.sin(0.5 * turns * (self.angle - other.angle)))
-        return self.friction == other.friction and bool(turned < _SAME and np.allclose(own, its, rtol=0, atol=_SAME))
+        return self.friction == other.friction and bool(
+            turned < _SAME and np.allclose(own, its, rtol=0, atol=_SAME)
+        )
 
 
-def Wheel(link: int, place: float = 0.5, rolling: float = 0.02, sideways: float = 1.0, angle: float = 0.0, **foot: Any) -> Foot:
+def Wheel(
+    link: int,
+    place: float = 0.5,
+    rolling: float = 0.02,
+    sideways: float = 1.0,
+    angle: float = 0.0,
+    **foot: Any,
+) -> Foot:
     """A passive wheel: a foot that slides easily along its rolling direction, and hardly across it.
 
     Parameters
@@ -154,8 +184,16 @@ def Wheel(link: int, place: float = 0.5, rolling: float = 0.02, sideways: float 
     """
     for name, value in (("rolling", rolling), ("sideways", sideways)):
         if not (is_number(value) and value > 0):
-            raise ProblemError(f"the coefficient {name} of a wheel must be positive and finite, not {value!r}.")
-    return Foot(link, place, friction=Friction(mu_t=sideways, mu_f=rolling, mu_b=rolling), angle=angle, **foot)
+            raise ProblemError(
+                f"the coefficient {name} of a wheel must be positive and finite, not {value!r}."
+            )
+    return Foot(
+        link,
+        place,
+        friction=Friction(mu_t=sideways, mu_f=rolling, mu_b=rolling),
+        angle=angle,
+        **foot,
+    )
 
 
 def Pad(link: int, first: float = 0.0, last: float = 1.0, **foot: Any) -> Foot:
@@ -182,21 +220,30 @@ def Pad(link: int, first: float = 0.0, last: float = 1.0, **foot: Any) -> Foot:
     """
     for name, value in (("begins", first), ("ends", last)):
         if not (is_number(value) and 0 <= value <= 1):
-            raise ProblemError(f"the place where a pad {name} must lie on its link, from 0 to 1, not {value!r}.")
+            raise ProblemError(
+                f"the place where a pad {name} must lie on its link, from 0 to 1, not {value!r}."
+            )
     if not first < last:
-        raise ProblemError(f"a pad must end behind where it begins, not at {last!r} and {first!r}: a point is a Foot.")
+        raise ProblemError(
+            f"a pad must end behind where it begins, not at {last!r} and {first!r}: a point is "
+            f"a Foot."
+        )
     return Foot(link, 0.5 * (first + last), extent=last - first, **foot)
 
 
 def whole_links(weights: np.ndarray) -> tuple[Foot, ...]:
     """The links of a body that lies on them: pads from end to end."""
-    return tuple(Foot(link, weight=float(weight), extent=1.0) for link, weight in enumerate(weights))
+    return tuple(
+        Foot(link, weight=float(weight), extent=1.0) for link, weight in enumerate(weights)
+    )
 
 
 def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot, ...]:
-    """The feet of a body whose links weigh `weights` ``(n_link,)``, from tail to head, each with its weight.
+    """The feet of a body whose links weigh `weights` ``(n_link,)``, from tail to head, each with
+    its weight.
 
-    A number means so many on each link, evenly spread. `ProblemError` for feet that no body can have.
+    A number means so many on each link, evenly spread. `ProblemError` for feet that no body can
+    have.
     """
     if is_whole(feet):
         if not 0 <= feet <= _MOST:
@@ -206,36 +253,54 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
     given = tuple(feet) if isinstance(feet, Iterable) else (feet,)
     stated = tuple(foot for foot in given if isinstance(foot, Foot))
     if len(stated) < len(given):
-        raise ProblemError("body.feet must be the number of feet on each link, or a sequence of Foot, Wheel and Pad.")
+        raise ProblemError(
+            "body.feet must be the number of feet on each link, or a sequence of Foot, Wheel "
+            "and Pad."
+        )
     if not stated:
         return ()
     for foot in stated:
         if not 0 <= foot.link < weights.size:
-            raise ProblemError(f"a foot stands on link {foot.link}, but the links are numbered 0 to {weights.size - 1}.")
+            raise ProblemError(
+                f"a foot stands on link {foot.link}, but the links are numbered 0 to "
+                f"{weights.size - 1}."
+            )
     borne = [_weight(foot, stated, weights) for foot in stated]
-    shared, total = tuple(replace(foot, weight=weight) for foot, weight in zip(stated, borne, strict=True)), sum(borne)
+    shared, total = (
+        tuple(replace(foot, weight=weight) for foot, weight in zip(stated, borne, strict=True)),
+        sum(borne),
+    )
     if abs(total - 1.0) > _SAME:
         carried = sorted(set(range(weights.size)) - {foot.link for foot in stated})
-        hint = f"; no foot is on link {', '.join(map(str, carried))}, so say who bears its weight" if carried else ""
+        hint = (
+            f"; no foot is on link {', '.join(map(str, carried))}, so say who bears its weight"
+            if carried
+            else ""
+        )
         raise ProblemError(f"the weights of the feet must add up to 1, not {total:.6g}{hint}.")
     if len({foot.point for foot in shared}) < 2 and not any(foot.extent for foot in shared):
         raise ProblemError("a body needs feet at two points at least: on one it would spin freely.")
     if not _same_set(shared, [foot.mirrored for foot in shared]):
         raise ProblemError(
-            "the feet differ between left and right (offset, angle), which the search takes for alike: give every foot that is "
+            "the feet differ between left and right (offset, angle), which the search takes for "
+            "alike: give every foot that is "
             "offset or turned its mirror image on the same link."
         )
     return tuple(sorted(shared, key=lambda foot: (foot.link, foot.place, foot.offset)))
 
 
 def _weight(foot: Foot, feet: tuple[Foot, ...], weights: np.ndarray) -> float:
-    """What a foot bears: as stated, or its part of what the other feet of its link leave of the link's weight."""
+    """What a foot bears: as stated, or its part of what the other feet of its link leave of the
+    link's weight."""
     if foot.weight is not None:
         return float(foot.weight)
     others = [other.weight for other in feet if other.link == foot.link]
     left = float(weights[foot.link]) - sum(weight for weight in others if weight is not None)
     if left <= 0:
-        raise ProblemError(f"the feet on link {foot.link} bear all that it weighs: give the last of them a weight, too.")
+        raise ProblemError(
+            f"the feet on link {foot.link} bear all that it weighs: give the last of them a "
+            f"weight, too."
+        )
     return left / others.count(None)
 
 
@@ -255,12 +320,16 @@ def read_alike_from_both_ends(feet: tuple[Foot, ...], n_link: int) -> bool:
 
 
 def _of_each_foot(*_: Any) -> Any:
-    raise ProblemError("feet have laws of friction of their own: this one is for none but a body that stands on them.")
+    raise ProblemError(
+        "feet have laws of friction of their own: this one is for none but a body that stands "
+        "on them."
+    )
 
 
 @dataclass(frozen=True)
 class FeetLaw:
-    """The laws of friction of feet that do not all have the same, foot by foot: a `colloc.mechanics.law.Law` of them all.
+    """The laws of friction of feet that do not all have the same, foot by foot: a
+    `colloc.mechanics.law.Law` of them all.
 
     What it says of forces is asked of each one (`colloc.mechanics.floor_contact`).
     """
@@ -304,7 +373,10 @@ class FeetLaw:
 
     def describe(self) -> str:
         counted = {law: self.laws.count(law) for law in self.laws}
-        return "; ".join(f"{count} {'foot' if count == 1 else 'feet'}: {law.describe()}" for law, count in counted.items())
+        return "; ".join(
+            f"{count} {'foot' if count == 1 else 'feet'}: {law.describe()}"
+            for law, count in counted.items()
+        )
 
     def in_units_of(self, unit: float) -> FeetLaw:
         return FeetLaw(tuple(law.in_units_of(unit) for law in self.laws))

@@ -1,10 +1,13 @@
-"""Solver of the balance, batched over instants: tail velocities from shape and shape rates. No CasADi.
+"""Solver of the balance, batched over instants: tail velocities from shape and shape rates. No
+CasADi.
 
-The method is that of `colloc.mechanics.damped_newton`. Velocities are solved for at the midpoint of the slowest link, the
-*anchor*: a link at stick moves at speeds of order delta, which the tail velocity could only represent to 1e-16 in absolute
-terms. So forces stay accurate down to delta = 1e-14.
+The method is that of `colloc.mechanics.damped_newton`. Velocities are solved for at the midpoint of
+the slowest link, the *anchor*: a link at stick moves at speeds of order delta, which the tail
+velocity could only represent to 1e-16 in absolute terms. So forces stay accurate down to delta =
+1e-14.
 
-The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.native_kernel`) takes the same ones.
+The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.native_kernel`) takes
+the same ones.
 """
 
 from __future__ import annotations
@@ -26,7 +29,14 @@ from colloc.mechanics.balance import (
     secant_matrix,
 )
 from colloc.mechanics.balance_results import BalanceSolution
-from colloc.mechanics.damped_newton import METHODS, Evaluated, groups, relative_delta, solve, starting_state
+from colloc.mechanics.damped_newton import (
+    METHODS,
+    Evaluated,
+    groups,
+    relative_delta,
+    solve,
+    starting_state,
+)
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import compiled_balance, native_kernel
@@ -36,46 +46,70 @@ from colloc.system.errors import ProblemError
 _SMOOTHER = 2.0
 """Times delta, at which a balance is solved first that cannot be solved at delta itself."""
 _AWAY = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
-"""How far from an instant a balance is followed to it, in the time in which velocities change by about delta."""
+"""How far from an instant a balance is followed to it, in the time in which velocities change by
+about delta."""
 
 
 Found = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3, n_time)``."""
+"""Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3,
+n_time)``."""
 
 
 class _Batch:
-    """Instants that share a reference link: what an iteration evaluates on subsets of them, at deltas that are given."""
+    """Instants that share a reference link: what an iteration evaluates on subsets of them, at
+    deltas that are given."""
 
     def __init__(self, moving: Moving, reference: int | None) -> None:
         self.body, self.friction, self.angles, self.rates, _, self.load = moving
         self.reference = reference
 
     def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
-        return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
+        return instant(
+            self.body,
+            self.friction,
+            self.angles[:, select],
+            self.rates[:, select],
+            z,
+            delta,
+            self.reference,
+        )
 
     def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
-        """Links ``(7, n_link, n)``, posture, then velocity; net force and potential at z, those of the load with them."""
+        """Links ``(7, n_link, n)``, posture, then velocity; net force and potential at z, those of
+        the load with them."""
         now, body = self.at(select, z, delta), self.body
         force = net_force(now.posture, now.force)
-        potential = dissipation_potential(body, self.friction, now.velocity, delta) if self.friction.associated else None
+        potential = (
+            dissipation_potential(body, self.friction, now.velocity, delta)
+            if self.friction.associated
+            else None
+        )
         if self.load is not None:
             load = self.load[:, select]
             force += load_wrench(body, now.posture, load)
-            potential = None if potential is None else potential - load_power(body, now.posture, now.velocity, load)
+            potential = (
+                None
+                if potential is None
+                else potential - load_power(body, now.posture, now.velocity, load)
+            )
         return np.stack([*now.posture, *now.velocity]), force, potential
 
     def matrix(self, links: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
         matrix = balance_jacobian if newton else secant_matrix
-        return matrix(self.body, self.friction, Posture(*links[:4]), LinkVelocity(*links[4:]), delta)
+        return matrix(
+            self.body, self.friction, Posture(*links[:4]), LinkVelocity(*links[4:]), delta
+        )
 
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
+        """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's
+        own reference."""
         velocity = self.at(np.arange(z.shape[1]), z, delta).velocity
         anchor = np.argmin(self.body.contact.slowest(velocity), axis=0)
         return anchor, self.rereferenced(z, delta, anchor)
 
     def rereferenced(self, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
-        """Velocity ``(3, n)`` of the midpoints of the links `anchor`, for z in the batch's own reference."""
+        """Velocity ``(3, n)`` of the midpoints of the links `anchor`, for z in the batch's own
+        reference."""
         now = self.at(np.arange(z.shape[1]), z, delta)
         vs, vn, w = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.velocity)
         c, s = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.posture[:2])
@@ -117,28 +151,32 @@ def solve_balance(
     delta : float
         Regularisation speed, > 0.
     load : (2, n_time), optional
-        An outside force on the body in body-frame axes [weight], which its links share as they share the weight. Friction
-        may be too weak to hold it: then nothing is found.
+        An outside force on the body in body-frame axes [weight], which its links share as they
+        share the weight. Friction may be too weak to hold it: then nothing is found.
     start : (3, n_time), optional
-        Tail velocities to start from; by default the links' mean rotation is taken out of a body at rest.
+        Tail velocities to start from; by default the links' mean rotation is taken out of a body at
+        rest.
     tolerance : float
         Largest `BalanceSolution.residual` at which an instant counts as converged.
     max_iterations : int
         Steps allowed to an instant in each attempt.
     method : {"auto", "newton", "fixed_point", "direct", "natural"}
-        "auto" damps Newton and falls back on the paper's fixed point: from the start, by natural steps, with each link at rest,
-        from the balance of a larger delta, followed from instants beside it, and at last from afar. "direct" and "natural" are
-        single attempts, the others are for comparison.
+        "auto" damps Newton and falls back on the paper's fixed point: from the start, by natural
+        steps, with each link at rest, from the balance of a larger delta, followed from instants
+        beside it, and at last from afar. "direct" and "natural" are single attempts, the others are
+        for comparison.
 
     Returns
     -------
     BalanceSolution
-        With ``converged`` per instant; nothing is raised for an instant that fails (see `BalanceSolution.require`).
+        With ``converged`` per instant; nothing is raised for an instant that fails (see
+        `BalanceSolution.require`).
 
     Raises
     ------
     ProblemError
-        For arrays of wrong shape or kind, non-finite numbers, or delta or tolerance that are not positive.
+        For arrays of wrong shape or kind, non-finite numbers, or delta or tolerance that are not
+        positive.
 
     Examples
     --------
@@ -153,7 +191,8 @@ def solve_balance(
     n_time = angles.shape[1]
     if body.n_joint != body.n_link - 1:
         raise ProblemError(
-            f"the shape coordinates of {type(body).__name__} are not its {body.n_link - 1} joints: use its solve()."
+            f"the shape coordinates of {type(body).__name__} are not its {body.n_link - 1} joints: "
+            f"use its solve()."
         )
     if angles.shape != (body.n_joint, n_time) or rates.shape != angles.shape:
         raise ProblemError(
@@ -179,9 +218,15 @@ def solve_balance(
 
     solved = _numpy_balance if library is None else partial(compiled_balance, library)
     moving = Moving(body, friction, angles, rates, float(delta), load)
-    found = _balanced(solved, moving, start, *settings) if method == "auto" else solved(moving, start, *settings)
+    found = (
+        _balanced(solved, moving, start, *settings)
+        if method == "auto"
+        else solved(moving, start, *settings)
+    )
     z, residual, iterations, anchor, velocity = found
-    return BalanceSolution(z, residual, iterations, residual <= _reachable(moving, tolerance), anchor, velocity)
+    return BalanceSolution(
+        z, residual, iterations, residual <= _reachable(moving, tolerance), anchor, velocity
+    )
 
 
 def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
@@ -194,25 +239,40 @@ def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
 
 
 def _balanced(
-    solved: Callable[..., Found], moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
+    solved: Callable[..., Found],
+    moving: Moving,
+    start: np.ndarray | None,
+    tolerance: float,
+    max_iterations: int,
+    method: str,
 ) -> Found:
-    """What `solved` finds directly, then by natural steps, with each link at rest, from where friction is smoother, from beside
-    it, and last by the method given."""
+    """What `solved` finds directly, then by natural steps, with each link at rest, from where
+    friction is smoother, from beside it, and last by the method given."""
     found = solved(moving, start, tolerance, max_iterations, "direct")
     enough, contact = _reachable(moving, tolerance), moving.body.contact
 
     def smoother(there: Moving) -> np.ndarray:
-        return _balanced(solved, there._replace(delta=_SMOOTHER * there.delta), None, tolerance, max_iterations, "direct")[0]
+        return _balanced(
+            solved,
+            there._replace(delta=_SMOOTHER * there.delta),
+            None,
+            tolerance,
+            max_iterations,
+            "direct",
+        )[0]
 
     def followed(there: Moving, side: float) -> np.ndarray | None:
         fastest, z = np.maximum(np.abs(there.rates).max(axis=0), there.delta), None
         for away in _AWAY:
-            beside = there._replace(angles=there.angles + side * away * there.delta / fastest**2 * there.rates)
+            beside = there._replace(
+                angles=there.angles + side * away * there.delta / fastest**2 * there.rates
+            )
             z = _balanced(solved, beside, z, tolerance, max_iterations, "direct")[0]
         return z
 
     def ways() -> Iterator[tuple[Callable[[Moving], np.ndarray | None], str]]:
-        # beside a fold, or with feet nearly on a line, the residual has valleys in which it must rise before it falls
+        # beside a fold, or with feet nearly on a line, the residual has valleys in which it must
+        # rise before it falls
         yield lambda there: found[0][:, failed], "natural"
         for how in ("direct", "natural"):
             for link in contact.rests:
@@ -221,7 +281,8 @@ def _balanced(
             # several rest nearly, each where the others let it
             yield smoother, "natural"
         if method != "direct":
-            # past a fold there is another balance, of which instants before or after it may know more
+            # past a fold there is another balance, of which instants before or after it may know
+            # more
             for side in (-1.0, 1.0):
                 yield partial(followed, side=side), "natural"
             yield lambda there: None, method
@@ -241,17 +302,22 @@ def _balanced(
 def _numpy_balance(
     moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Arguments and results as those of `colloc.mechanics.native_kernel.compiled_balance`, which it is the reference of."""
+    """Arguments and results as those of `colloc.mechanics.native_kernel.compiled_balance`, which it
+    is the reference of."""
     body, friction, angles, rates, delta, load = moving
     n_time = angles.shape[1]
     # work in units of the largest rate, where the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)
     if load is not None:
-        speed = np.maximum(speed, delta)  # at which a body creeps under a load, though its joints rest
+        # at which a body creeps under a load, though its joints rest
+        speed = np.maximum(speed, delta)
     speed[(speed == 0) | (friction.degree is None)] = 1.0
     if load is not None:
         load = load / speed ** (friction.degree or 0.0)
-    scaled, scaled_delta = moving._replace(rates=rates / speed, load=load), relative_delta(delta, speed)
+    scaled, scaled_delta = (
+        moving._replace(rates=rates / speed, load=load),
+        relative_delta(delta, speed),
+    )
     anchor = np.full(n_time, body.n_link // 2)
     velocity = np.zeros((3, n_time))
     if start is not None:
@@ -266,5 +332,7 @@ def _numpy_balance(
     tail_z = np.empty((3, n_time))
     for link, chosen in groups(state.anchor):
         posture = body.posture(angles[:, chosen], link)
-        tail_z[:, chosen] = body.tail_velocity(posture, scaled.rates[:, chosen], state.velocity[:, chosen], link)
+        tail_z[:, chosen] = body.tail_velocity(
+            posture, scaled.rates[:, chosen], state.velocity[:, chosen], link
+        )
     return tail_z * speed, state.residual, state.iterations, state.anchor, state.velocity * speed

@@ -1,8 +1,10 @@
-"""The usual law: delta-regularised Coulomb friction per unit length, at a point that slides with velocity (vs, vn).
+"""The usual law: delta-regularised Coulomb friction per unit length, at a point that slides with
+velocity (vs, vn).
 
-With ``r = sqrt(vs^2 + vn^2 + delta^2)`` the force per length is ``-(mu_s vs, mu_t vn)/r`` (paper, eqs. frictiondelta and
-delta). Smooth bodies integrate it by quadrature; straight links have it in closed form (`mechanics.link_friction`). All arrays
-are two-dimensional, ``(n_node, n_time)``, NumPy or CasADi.
+With ``r = sqrt(vs^2 + vn^2 + delta^2)`` the force per length is ``-(mu_s vs, mu_t vn)/r`` (paper,
+eqs. frictiondelta and delta). Smooth bodies integrate it by quadrature; straight links have it in
+closed form (`mechanics.link_friction`). All arrays are two-dimensional, ``(n_node, n_time)``, NumPy
+or CasADi.
 """
 
 from __future__ import annotations
@@ -53,7 +55,8 @@ class Coefficients:
         return self.mu_b == self.mu_f
 
     def tangential(self, vs: Array) -> Array:
-        """Coefficient mu_s of a part that slides along itself with velocity `vs`; no switch where mu_b = mu_f."""
+        """Coefficient mu_s of a part that slides along itself with velocity `vs`; no switch where
+        mu_b = mu_f."""
         if self.reversible:
             return self.mu_f
         return namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
@@ -67,7 +70,8 @@ class Friction(Coefficients):
     Parameters
     ----------
     mu_t, mu_f, mu_b : float
-        Transverse, forward (towards the head) and backward coefficient; all positive (paper, eq. friction).
+        Transverse, forward (towards the head) and backward coefficient; all positive (paper, eq.
+        friction).
 
     Examples
     --------
@@ -86,11 +90,14 @@ class Friction(Coefficients):
     def __post_init__(self) -> None:
         check_positive(self, "mu_t", "mu_f", "mu_b", of="friction.")
         if max(self.mu_t, self.mu_f, self.mu_b) > _LARGEST:
-            raise ProblemError(f"friction holds more than {_LARGEST:g} times what presses: no floor does.")
+            raise ProblemError(
+                f"friction holds more than {_LARGEST:g} times what presses: no floor does."
+            )
 
     @property
     def kernel_numbers(self) -> tuple[float, ...]:
-        """Coefficients, stretches of the tangential velocity forwards and backwards, and whether there is a potential."""
+        """Coefficients, stretches of the tangential velocity forwards and backwards, and whether
+        there is a potential."""
         stretches = [float(self.stretch(np.array(side))) for side in (1.0, -1.0)]
         return self.mu_t, self.mu_f, self.mu_b, *stretches, float(self.associated)
 
@@ -99,7 +106,10 @@ class Friction(Coefficients):
         return f"friction ({self.mu_t:g}, {self.mu_f:g}, {self.mu_b:g})"
 
     def describe(self) -> str:
-        return f"μt = {self.mu_t:g} sideways, μf = {self.mu_f:g} forwards, μb = {self.mu_b:g} backwards"
+        return (
+            f"μt = {self.mu_t:g} sideways, μf = {self.mu_f:g} forwards, μb = {self.mu_b:g} "
+            f"backwards"
+        )
 
     def in_units_of(self, unit: float) -> Friction:
         return type(self)(mu_t=self.mu_t / unit, mu_f=self.mu_f / unit, mu_b=self.mu_b / unit)
@@ -151,9 +161,13 @@ class ClosedForm(LineIntegrals):
         return link_friction.link_secant(vs, vn, w, length, delta, self.law)
 
     def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-        return self.law.mu_t * link_friction.link_dissipation(self.law.stretch(vs) * vs, vn, w, length, delta)
+        return self.law.mu_t * link_friction.link_dissipation(
+            self.law.stretch(vs) * vs, vn, w, length, delta
+        )
 
-    def scaled_laws(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
+    def scaled_laws(
+        self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce
+    ) -> list[Array]:
         return link_friction.scaled_laws(vs, vn, w, length, delta, self.law, force)
 
     def largest_forces(self, length: np.ndarray) -> np.ndarray:
@@ -162,5 +176,6 @@ class ClosedForm(LineIntegrals):
 
 
 def regularised_speed(vs: Array, vn: Array, delta: Array) -> Array:
-    """r; it is also the density of the isotropic dissipation potential, whose gradient is minus the force at mu = 1."""
+    """r; it is also the density of the isotropic dissipation potential, whose gradient is minus the
+    force at mu = 1."""
     return namespace(vs, vn, delta).sqrt(vs * vs + vn * vn + delta * delta)

@@ -1,12 +1,13 @@
-r"""How a balanced body changes with its shape and rates, whatever its parts: links of a chain or nodes of a smooth curve.
+r"""How a balanced body changes with its shape and rates, whatever its parts: links of a chain or
+nodes of a smooth curve.
 
 A balanced velocity z solves R(z, y) = 0 with y = (shape, rates) and R the net force and torque, so
 
     dz/dy = -R_z^-1 R_y
 
-and whatever depends on (z, y) changes by the chain rule (implicit function theorem). R and z are those of the anchor, the
-slowest part, whose speed keeps its relative precision at any delta. The switch of a directional law is differentiated on
-its current side.
+and whatever depends on (z, y) changes by the chain rule (implicit function theorem). R and z are
+those of the anchor, the slowest part, whose speed keeps its relative precision at any delta. The
+switch of a directional law is differentiated on its current side.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Changes(NamedTuple):
-    """Derivatives along (shape, rates), or a load: of the anchor's velocity ``(3, n, n_time)``; of the parts' velocities in
-    the body's axes, along and across the part, and of their rotation rates, ``(n_part, n, n_time)``; of the power
-    ``(n, n_time)``."""
+    """Derivatives along (shape, rates), or a load: of the anchor's velocity ``(3, n, n_time)``; of
+    the parts' velocities in the body's axes, along and across the part, and of their rotation
+    rates, ``(n_part, n, n_time)``; of the power ``(n, n_time)``."""
 
     anchor: np.ndarray
     vx: np.ndarray
@@ -37,7 +38,8 @@ class Changes(NamedTuple):
 
 
 class Load(NamedTuple):
-    """Outside forces on the parts, in the body's axes, and their derivatives; broadcast to ``(n_part, n, n_time)``."""
+    """Outside forces on the parts, in the body's axes, and their derivatives; broadcast to
+    ``(n_part, n, n_time)``."""
 
     x: np.ndarray
     y: np.ndarray
@@ -95,7 +97,10 @@ def implicit_changes(
     dz = np.stack([solve3(left, net[:, j]) for j in range(net.shape[1])], axis=1)
 
     dvx, dvy = dvx + dz[0] - y * dz[2], dvy + dz[1] + x * dz[2]
-    dvs, dvn = dvs + c * dz[0] + s * dz[1] + (x * s - y * c) * dz[2], dvn + c * dz[1] - s * dz[0] + (x * c + y * s) * dz[2]
+    dvs, dvn = (
+        dvs + c * dz[0] + s * dz[1] + (x * s - y * c) * dz[2],
+        dvn + c * dz[1] - s * dz[0] + (x * c + y * s) * dz[2],
+    )
     dw = dw + dz[2]
     dfs, dfn, dcouple = force_change(dvs, dvn, dw)
     power = -(dfs * vs + dfn * vn + dcouple * w + fs * dvs + fn * dvn + couple * dw).sum(axis=0)

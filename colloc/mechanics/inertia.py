@@ -1,14 +1,15 @@
 r"""Inertia of a chain: its momenta, and how friction changes them.
 
-The states are the velocity (Vx, Vy) of the centre of mass in the axes of the tail link, and the angular momentum H about it, of
-a body of mass 1. With friction's force F and moment M about the centre of mass, and the Froude number Fr = L/(g T^2),
+The states are the velocity (Vx, Vy) of the centre of mass in the axes of the tail link, and the
+angular momentum H about it, of a body of mass 1. With friction's force F and moment M about the
+centre of mass, and the Froude number Fr = L/(g T^2),
 
     Fr (dVx/dt - omega Vy) = Fx,    Fr (dVy/dt + omega Vx) = Fy,    Fr dH/dt = M,    omega = (H - H_0) / I,
 
-where H_0 is the angular momentum that the joints' motion has while the tail rests, and I the moment of inertia. For Fr = 0 this
-is the balance of forces. Masses and moments of inertia are the chain's; by default its links are uniform rods, as heavy as they
-press on the floor.
-"""
+where H_0 is the angular momentum that the joints' motion has while the tail rests, and I the moment
+of inertia. For Fr = 0 this is the balance of forces. Masses and moments of inertia are the chain's;
+by default its links are uniform rods, as heavy as they press on the floor.
+"""  # noqa: E501
 
 from __future__ import annotations
 
@@ -45,7 +46,8 @@ class MomentumRates(NamedTuple):
 
 
 def momenta(body: Chain, posture: Posture, link: LinkVelocity) -> Array:
-    """Velocity of the centre of mass and angular momentum about it, of links that move so, ``(3, n_time)``."""
+    """Velocity of the centre of mass and angular momentum about it, of links that move so, ``(3,
+    n_time)``."""
     xp, mass = namespace(link.vs), body.mass_column()
     (x, y), (vx, vy) = body.centre_of_mass(posture), body.centre_velocity(posture, link)
     own_x = link.vs * posture.cos - link.vn * posture.sin
@@ -73,11 +75,15 @@ def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
     return 0.5 * namespace(link.vs).sum_rows(twice)
 
 
-def inertial_moments(body: Chain, angles: np.ndarray, link: LinkVelocity, growth: LinkVelocity) -> np.ndarray:
-    """What the motors of the joints spend on changing how the links of a body of mass 1 move, ``(n_joint, n_time)``.
+def inertial_moments(
+    body: Chain, angles: np.ndarray, link: LinkVelocity, growth: LinkVelocity
+) -> np.ndarray:
+    """What the motors of the joints spend on changing how the links of a body of mass 1 move,
+    ``(n_joint, n_time)``.
 
-    By virtual power: that of mass times acceleration while one joint turns alone and the tail rests. `growth` is what the
-    velocities `link`, in the axes of the links, change by in a unit of time; these axes turn.
+    By virtual power: that of mass times acceleration while one joint turns alone and the tail
+    rests. `growth` is what the velocities `link`, in the axes of the links, change by in a unit of
+    time; these axes turn.
     """
     mass, posture, still = body.mass_column(), body.posture(angles), np.zeros((3, angles.shape[1]))
     along, across = growth.vs - link.w * link.vn, growth.vn + link.w * link.vs
@@ -94,26 +100,44 @@ def tail_velocity(body: Chain, angles: Array, rates: Array, states: Array) -> Ar
     posture = body.posture(angles)
     left = states - momenta(body, posture, body.velocity(posture, rates, 0 * states))
     omega, (x, y) = left[2:3, :] / moment_of_inertia(body, posture), body.centre_of_mass(posture)
-    return namespace(angles, states).stack([left[0:1, :] + omega * y, left[1:2, :] - omega * x, omega])
+    return namespace(angles, states).stack(
+        [left[0:1, :] + omega * y, left[1:2, :] - omega * x, omega]
+    )
 
 
 def momentum_rates(
-    body: Chain, friction: Law, angles: Array, rates: Array, states: Array, *, delta: Array, froude: Array
+    body: Chain,
+    friction: Law,
+    angles: Array,
+    rates: Array,
+    states: Array,
+    *,
+    delta: Array,
+    froude: Array,
 ) -> MomentumRates:
-    """How friction changes the momenta `states` ``(3, n_time)`` of a chain with such joint angles and rates; NumPy, CasADi."""
+    """How friction changes the momenta `states` ``(3, n_time)`` of a chain with such joint angles
+    and rates; NumPy, CasADi."""
     z = tail_velocity(body, angles, rates, states)
     slides = body.sliding(friction, angles, rates, z, delta)
-    return MomentumRates(about_centre(body, angles, slides.force) / froude + turning(z, states), z, slides.power)
+    return MomentumRates(
+        about_centre(body, angles, slides.force) / froude + turning(z, states), z, slides.power
+    )
 
 
 def about_centre(body: Chain, angles: Array, force: Array) -> Array:
-    """Force and moment about the centre of mass, from force and torque about the tail, ``(3, n_time)`` both."""
-    return namespace(angles, force).stack([force[0:2, :], force[2:3, :] - _lever(body, angles, force)])
+    """Force and moment about the centre of mass, from force and torque about the tail, ``(3,
+    n_time)`` both."""
+    return namespace(angles, force).stack(
+        [force[0:2, :], force[2:3, :] - _lever(body, angles, force)]
+    )
 
 
 def about_tail(body: Chain, angles: Array, force: Array) -> Array:
-    """Force and torque about the tail, from force and moment about the centre of mass, ``(3, n_time)`` both."""
-    return namespace(angles, force).stack([force[0:2, :], force[2:3, :] + _lever(body, angles, force)])
+    """Force and torque about the tail, from force and moment about the centre of mass, ``(3,
+    n_time)`` both."""
+    return namespace(angles, force).stack(
+        [force[0:2, :], force[2:3, :] + _lever(body, angles, force)]
+    )
 
 
 def _lever(body: Chain, angles: Array, force: Array) -> Array:
@@ -131,12 +155,18 @@ def turning(z: Array, states: Array) -> Array:
 def checked_mass(body: Body) -> Chain:
     """The body, if its parts have masses; else a `ProblemError` that says so."""
     if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
-        raise ProblemError(f"inertia is known of a Chain, whose links have masses, not of a {type(body).__name__}.")
+        raise ProblemError(
+            f"inertia is known of a Chain, whose links have masses, not of a {type(body).__name__}."
+        )
     return body
 
 
 def checked_inertia(body: Body, gait: Callable[..., Any]) -> tuple[Chain, JointPath]:
-    """The chain and its joint angles and rates, if the body can play the gait with inertia; else a `ProblemError` that says why
-    not."""
-    chain, joints = (body.chain, body.joint_path(gait)) if isinstance(body, Coupled) else (checked_mass(body), gait)
+    """The chain and its joint angles and rates, if the body can play the gait with inertia; else a
+    `ProblemError` that says why not."""
+    chain, joints = (
+        (body.chain, body.joint_path(gait))
+        if isinstance(body, Coupled)
+        else (checked_mass(body), gait)
+    )
     return chain, joints

@@ -1,9 +1,10 @@
 """What a law of friction has to answer for: the force on a point that slides, and its traits.
 
-`colloc.mechanics.friction.Friction` is Coulomb's law, the usual one; the package `colloc.laws` has others (docs/howto/laws.md).
-Everything else, from the balance to the report, asks only these questions; what touches the floor integrates
-(`colloc.mechanics.floor_contact`). Velocities are those along and across the body at a point. All arrays are two-dimensional,
-``(n_part, n_time)``, NumPy or CasADi; forces are per length.
+`colloc.mechanics.friction.Friction` is Coulomb's law, the usual one; the package `colloc.laws` has
+others (docs/howto/laws.md). Everything else, from the balance to the report, asks only these
+questions; what touches the floor integrates (`colloc.mechanics.floor_contact`). Velocities are
+those along and across the body at a point. All arrays are two-dimensional, ``(n_part, n_time)``,
+NumPy or CasADi; forces are per length.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ class Law(Protocol):
 
     @property
     def degree(self) -> float | None:
-        """Of homogeneity: t times the velocity (and delta) makes t^degree times the force. 0 for dry friction, 1 for viscous
-        drag, None for a law that has none."""
+        """Of homogeneity: t times the velocity (and delta) makes t^degree times the force. 0 for
+        dry friction, 1 for viscous drag, None for a law that has none."""
 
     @property
     def reversible(self) -> bool:
@@ -33,7 +34,8 @@ class Law(Protocol):
 
     @property
     def associated(self) -> bool:
-        """Minus the force is the gradient of a convex function of the velocity: a balance has exactly one solution."""
+        """Minus the force is the gradient of a convex function of the velocity: a balance has
+        exactly one solution."""
 
     @property
     def regularised(self) -> bool:
@@ -41,7 +43,8 @@ class Law(Protocol):
 
     @property
     def smallest(self) -> float:
-        """Smallest dissipation at unit speed, over all directions: an upper bound of distance per work is its inverse."""
+        """Smallest dissipation at unit speed, over all directions: an upper bound of distance per
+        work is its inverse."""
 
     @property
     def largest(self) -> float:
@@ -67,17 +70,19 @@ class Law(Protocol):
         """Minus its derivative with respect to (vs, vn)."""
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        """A matrix that turns a velocity into minus the force, or a larger one: the safeguard of Newton's method steps with
-        it, as the paper's fixed point (eq. deltatilde)."""
+        """A matrix that turns a velocity into minus the force, or a larger one: the safeguard of
+        Newton's method steps with it, as the paper's fixed point (eq. deltatilde)."""
 
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         """The function whose gradient is minus the force; of associated laws only."""
 
     @property
     def kernel_numbers(self) -> tuple[float, ...]:
-        """The law as the compiled kernel takes it; empty where that does not have it in closed form."""
+        """The law as the compiled kernel takes it; empty where that does not have it in closed
+        form."""
 
 
 def rate_independent(law: Law) -> bool:
-    """The force does not depend on the speed: distance and work belong to the path, and its pacing is a gauge."""
+    """The force does not depend on the speed: distance and work belong to the path, and its pacing
+    is a gauge."""
     return law.degree == 0

@@ -1,9 +1,11 @@
-"""Chains of straight links: where the links are and how fast they move, given shape, rates and one velocity.
+"""Chains of straight links: where the links are and how fast they move, given shape, rates and one
+velocity.
 
-Frame: the body frame of the paper, tail link along +x. Link tangent angles are ``phi_i = sum of the first i joint angles``
-(the paper's Theta); joint angles are its Delta-theta, positive counter-clockwise, counted from the tail.
-The rigid velocity ``z = (u, v, omega)`` is that of a *reference*: the tail point, or the midpoint of a link. The second
-choice keeps the relative precision of a link at rest, which the first loses by cancellation.
+Frame: the body frame of the paper, tail link along +x. Link tangent angles are ``phi_i = sum of the
+first i joint angles`` (the paper's Theta); joint angles are its Delta-theta, positive
+counter-clockwise, counted from the tail. The rigid velocity ``z = (u, v, omega)`` is that of a
+*reference*: the tail point, or the midpoint of a link. The second choice keeps the relative
+precision of a link at rest, which the first loses by cancellation.
 """
 
 from __future__ import annotations
@@ -25,13 +27,15 @@ from colloc.system.errors import ProblemError
 _SHORTEST = 1e-6
 """Of a link, over the body: shorter ones move nothing, and drown in rounding."""
 TAIL = None
-"""The reference of `Links.posture`: the free end of link 0; an integer means the midpoint of that link."""
+"""The reference of `Links.posture`: the free end of link 0; an integer means the midpoint of that
+link."""
 _WHOLES = {"weights": "the body's weight", "masses": "the body's mass"}
 """What adds up to 1."""
 
 
 class Posture(NamedTuple):
-    """Links in the body frame, each ``(n_link, n_time)``: direction cosines, and midpoints seen from the reference."""
+    """Links in the body frame, each ``(n_link, n_time)``: direction cosines, and midpoints seen
+    from the reference."""
 
     cos: Array
     sin: Array
@@ -40,7 +44,8 @@ class Posture(NamedTuple):
 
 
 class LinkVelocity(NamedTuple):
-    """Velocity of each link, ``(n_link, n_time)``: tangential and normal at its midpoint, and rotation rate."""
+    """Velocity of each link, ``(n_link, n_time)``: tangential and normal at its midpoint, and
+    rotation rate."""
 
     vs: Array
     vn: Array
@@ -49,20 +54,24 @@ class LinkVelocity(NamedTuple):
 
 @dataclass(frozen=True)
 class Links:
-    """Straight links joined end to end: their geometry. `colloc.mechanics.chain.Chain` is the body."""
+    """Straight links joined end to end: their geometry. `colloc.mechanics.chain.Chain` is the
+    body."""
 
     lengths: tuple[float, ...] = (1 / 3, 1 / 3, 1 / 3)
     """Link lengths from tail to head; they add up to the body length, 1."""
     width: float = field(default=0.0, metadata=STATED_IF_SET)
     """Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines."""
     weights: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
-    """By which the links press on the floor, in parts of the body's; by default they press evenly everywhere."""
+    """By which the links press on the floor, in parts of the body's; by default they press evenly
+    everywhere."""
     feet: tuple[Foot, ...] | int = field(default=(), metadata=STATED_IF_SET)
-    """What it stands on, from tail to head; by default the links lie on the floor along their length."""
+    """What it stands on, from tail to head; by default the links lie on the floor along their
+    length."""
     masses: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
     """Of the links, in parts of the body's; by default they are as heavy as they press."""
     inertias: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
-    """Of the links about their midpoints [body mass x length^2]; by default those of uniform rods."""
+    """Of the links about their midpoints [body mass x length^2]; by default those of uniform
+    rods."""
 
     def __post_init__(self) -> None:
         lengths, width = _numbers("lengths", self.lengths), self.width
@@ -71,18 +80,28 @@ class Links:
         _check_parts("lengths", lengths, "the body length")
         if min(lengths) < _SHORTEST:
             raise ProblemError(
-                f"body.lengths has a link of {min(lengths):g}: no link may be shorter than {_SHORTEST:g} of the body."
+                f"body.lengths has a link of {min(lengths):g}: no link may be shorter than "
+                f"{_SHORTEST:g} of the body."
             )
         if not (is_number(width) and 0 <= width < min(lengths)):
-            raise ProblemError(f"body.width must be a number from 0 to below the shortest link, not {width!r}.")
-        parts = {name: _numbers(name, getattr(self, name)) for name in ("weights", "masses", "inertias")}
+            raise ProblemError(
+                f"body.width must be a number from 0 to below the shortest link, not {width!r}."
+            )
+        parts = {
+            name: _numbers(name, getattr(self, name)) for name in ("weights", "masses", "inertias")
+        }
         for name, values in parts.items():
             if values and len(values) != len(lengths):
-                raise ProblemError(f"body.{name} has {len(values)} values; give one for each of the {len(lengths)} links.")
+                raise ProblemError(
+                    f"body.{name} has {len(values)} values; give one for each of the "
+                    f"{len(lengths)} links."
+                )
             if values and name in _WHOLES:
                 _check_parts(name, values, _WHOLES[name])
         if not all(0 <= inertia < np.inf for inertia in parts["inertias"]):
-            raise ProblemError(f"body.inertias must be finite and not negative, not {parts['inertias']}.")
+            raise ProblemError(
+                f"body.inertias must be finite and not negative, not {parts['inertias']}."
+            )
         for name, value in {"lengths": lengths, "width": float(width), **parts}.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "feet", checked_feet(self.feet, self.weight_column()[:, 0]))
@@ -106,7 +125,8 @@ class Links:
 
     @property
     def in_series(self) -> bool:
-        """Every link hangs on the one before it, as the compiled kernel takes for granted; a tree of links says no."""
+        """Every link hangs on the one before it, as the compiled kernel takes for granted; a tree
+        of links says no."""
         return True
 
     @property
@@ -129,8 +149,13 @@ class Links:
         return np.array(self.lengths)[:, None]
 
     def pressure_column(self) -> np.ndarray:
-        """Weight per length of the links, over that of a body which is as heavy everywhere, ``(n_link, 1)``."""
-        return np.array(self.weights)[:, None] / self.length_column() if self.weights else np.ones((self.n_link, 1))
+        """Weight per length of the links, over that of a body which is as heavy everywhere,
+        ``(n_link, 1)``."""
+        return (
+            np.array(self.weights)[:, None] / self.length_column()
+            if self.weights
+            else np.ones((self.n_link, 1))
+        )
 
     def weight_column(self) -> np.ndarray:
         """Weights by which the links press, as an ``(n_link, 1)`` column."""
@@ -142,10 +167,15 @@ class Links:
 
     def inertia_column(self) -> np.ndarray:
         """Moments of inertia of the links about their midpoints, as an ``(n_link, 1)`` column."""
-        return np.array(self.inertias)[:, None] if self.inertias else self.mass_column() * self.length_column() ** 2 / 12
+        return (
+            np.array(self.inertias)[:, None]
+            if self.inertias
+            else self.mass_column() * self.length_column() ** 2 / 12
+        )
 
     def _joint_sum(self, reference: int | None) -> np.ndarray:
-        """``(n_link, n_joint)``: joint quantities to link angles, relative to the reference link (the tail link: 0)."""
+        """``(n_link, n_joint)``: joint quantities to link angles, relative to the reference link
+        (the tail link: 0)."""
         full = np.tril(np.ones((self.n_link, self.n_joint)), -1)
         return full if reference is TAIL else full - full[reference]
 
@@ -155,32 +185,43 @@ class Links:
         return full if reference is TAIL else full - full[reference]
 
     def weighted_path(self, reference: int | None) -> np.ndarray:
-        """``(n_link, n_link)``: directions of links to midpoints, relative to the reference point."""
+        """``(n_link, n_link)``: directions of links to midpoints, relative to the reference
+        point."""
         return self._path(reference) * self.lengths
 
     def tangent_angles(self, angles: Array) -> Array:
-        """Link tangent angles in the body frame, ``(n_link, n_time)``, from joint angles ``(n_joint, n_time)``."""
+        """Link tangent angles in the body frame, ``(n_link, n_time)``, from joint angles
+        ``(n_joint, n_time)``."""
         return namespace(angles).matmul(self._joint_sum(TAIL), angles)
 
     def posture(self, angles: Array, reference: int | None = TAIL) -> Posture:
-        """Directions and midpoints of the links in the body frame, from joint angles ``(n_joint, n_time)``."""
+        """Directions and midpoints of the links in the body frame, from joint angles ``(n_joint,
+        n_time)``."""
         xp = namespace(angles)
         phi = self.tangent_angles(angles)
         cos, sin = xp.cos(phi), xp.sin(phi)
         path = self.weighted_path(reference)
         return Posture(cos, sin, xp.matmul(path, cos), xp.matmul(path, sin))
 
-    def velocity(self, posture: Posture, rates: Array, z: Array, reference: int | None = TAIL) -> LinkVelocity:
-        """Link velocities (paper, eq. dtz0) for joint rates ``(n_joint, n_time)`` and rigid velocity z ``(3, n_time)``."""
+    def velocity(
+        self, posture: Posture, rates: Array, z: Array, reference: int | None = TAIL
+    ) -> LinkVelocity:
+        """Link velocities (paper, eq. dtz0) for joint rates ``(n_joint, n_time)`` and rigid
+        velocity z ``(3, n_time)``."""
         xp = namespace(rates, z, posture.cos)
         path = self.weighted_path(reference)
         w = xp.matmul(self._joint_sum(reference), rates) + z[2:3, :]
         vx = z[0:1, :] - xp.matmul(path, w * posture.sin)
         vy = z[1:2, :] + xp.matmul(path, w * posture.cos)
-        return LinkVelocity(vx * posture.cos + vy * posture.sin, vy * posture.cos - vx * posture.sin, w)
+        return LinkVelocity(
+            vx * posture.cos + vy * posture.sin, vy * posture.cos - vx * posture.sin, w
+        )
 
-    def tail_velocity(self, posture: Posture, rates: np.ndarray, z: np.ndarray, reference: int | None) -> np.ndarray:
-        """Velocity of the tail, ``(3, n_time)``, when `z` is that of `reference` (whose posture is given)."""
+    def tail_velocity(
+        self, posture: Posture, rates: np.ndarray, z: np.ndarray, reference: int | None
+    ) -> np.ndarray:
+        """Velocity of the tail, ``(3, n_time)``, when `z` is that of `reference` (whose posture is
+        given)."""
         if reference is TAIL:
             return z
         link = self.velocity(posture, rates, z, reference)

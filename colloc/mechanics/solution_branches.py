@@ -1,10 +1,12 @@
-"""All velocities that balance a chain at an instant: with unequal coefficients there may be several.
+"""All velocities that balance a chain at an instant: with unequal coefficients there may be
+several.
 
-Coulomb friction whose coefficients differ is no gradient and not monotone, so nothing forbids several balanced velocities
-(docs/theory.md). Where they exist, a link is at rest in one of them, or nearly; so solving from every link at rest, one after
-the other, finds them. Whether any is missing can be counted: far away the net force opposes the velocity, so the signs of the
-determinant of minus its derivative add up to 1 over all solutions (the degree of the map). A negative one belongs to a motion
-that the slightest inertia leaves.
+Coulomb friction whose coefficients differ is no gradient and not monotone, so nothing forbids
+several balanced velocities (docs/theory.md). Where they exist, a link is at rest in one of them, or
+nearly; so solving from every link at rest, one after the other, finds them. Whether any is missing
+can be counted: far away the net force opposes the velocity, so the signs of the determinant of
+minus its derivative add up to 1 over all solutions (the degree of the map). A negative one belongs
+to a motion that the slightest inertia leaves.
 """
 
 from __future__ import annotations
@@ -22,14 +24,23 @@ DISTINCT = 1e-5
 """Velocities that differ by less, in units of the largest rate, are one."""
 _TOLERANCE, _ACCEPTED = 1e-12, 1e-11
 """What the solver is asked for, and what will do where rounding stops it: its own tolerance."""
-_BESIDE = tuple(side * size for size in (0.8, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005) for side in (-1, 1))
-"""Where more solutions are looked for along the softest direction of one, in units of the largest rate."""
+_BESIDE = tuple(
+    side * size for size in (0.8, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005) for side in (-1, 1)
+)
+"""Where more solutions are looked for along the softest direction of one, in units of the largest
+rate."""
 _BETWEEN = (0.5, 0.2, 0.8, 0.05, 0.95, 0.02, 0.98, 0.005, 0.995)
-"""The same from one solution to another, as parts of the way: the third often lies next to one of them."""
+"""The same from one solution to another, as parts of the way: the third often lies next to one of
+them."""
 
 
 def all_balanced_velocities(
-    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, load: np.ndarray | None = None
+    body: Links,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    load: np.ndarray | None = None,
 ) -> Branches:
     """Every balanced velocity that can be found, the one of `solve_balance` first.
 
@@ -69,7 +80,8 @@ def all_balanced_velocities(
     doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
     if not doubtful.size:
         return found
-    # where a branch has just ended the solver may hang with a small residual; the solution then lies beside
+    # where a branch has just ended the solver may hang with a small residual; the solution then
+    # lies beside
     part, known = moving.at(doubtful), Branches(z[:, :, doubtful], sign[:, doubtful])
     more = _solved(part, _between_and_beside(part, known.z))
     z, sign = (np.concatenate(pair) for pair in zip(known, more, strict=True))
@@ -78,7 +90,11 @@ def all_balanced_velocities(
     if not missed.size:
         return found
     part = moving.at(missed)  # the long way, which hardly ever has to be gone
-    return _merged(found, missed, _distinct(*_solved(part, np.zeros((1, 3, missed.size)), "auto"), _speed(part.rates)))
+    return _merged(
+        found,
+        missed,
+        _distinct(*_solved(part, np.zeros((1, 3, missed.size)), "auto"), _speed(part.rates)),
+    )
 
 
 def _speed(rates: np.ndarray) -> np.ndarray:
@@ -86,19 +102,30 @@ def _speed(rates: np.ndarray) -> np.ndarray:
     return np.maximum(np.abs(rates).max(axis=0), np.finfo(float).tiny)
 
 
-def _solved(moving: Moving, starts: np.ndarray, method: str = "direct") -> tuple[np.ndarray, np.ndarray]:
-    """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where none is, or one again."""
+def _solved(
+    moving: Moving, starts: np.ndarray, method: str = "direct"
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where none is,
+    or one again."""
     count, n_time = starts.shape[0], starts.shape[2]
-    body, friction, angles, rates, delta, load = tiled = moving.at(np.tile(np.arange(n_time), count))
+    body, friction, angles, rates, delta, load = tiled = moving.at(
+        np.tile(np.arange(n_time), count)
+    )
     at, start = (body, friction, angles, rates, delta), np.concatenate(list(starts), axis=1)
     solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, method=method)
-    z, found = np.stack(np.split(solved.z, count, axis=1)), (solved.residual <= _ACCEPTED) | solved.converged
-    new = found.reshape(count, -1) & ~_repeated(np.where(found.reshape(count, 1, -1), z, np.nan), _speed(moving.rates))
+    z, found = (
+        np.stack(np.split(solved.z, count, axis=1)),
+        (solved.residual <= _ACCEPTED) | solved.converged,
+    )
+    new = found.reshape(count, -1) & ~_repeated(
+        np.where(found.reshape(count, 1, -1), z, np.nan), _speed(moving.rates)
+    )
     return z, np.sign(_determinant(tiled, solved, np.flatnonzero(new))).reshape(count, -1)
 
 
 def _determinant(moving: Moving, solved: BalanceSolution, where: np.ndarray) -> np.ndarray:
-    """Of `balance_jacobian`, ``(n_time,)``, else 0; the reference does not matter, but the slowest link loses no digits."""
+    """Of `balance_jacobian`, ``(n_time,)``, else 0; the reference does not matter, but the slowest
+    link loses no digits."""
     result = np.zeros(solved.anchor.size)
     for link, chosen in groups(solved.anchor[where]):
         at = where[chosen]
@@ -110,12 +137,17 @@ def _jacobian(moving: Moving, z: np.ndarray, reference: int | None = TAIL) -> np
     """`balance_jacobian` at velocities z of a reference."""
     body, friction, angles, rates, delta, _ = moving
     now = instant(body, friction, angles, rates, z, delta, reference)
-    return balance_jacobian(body, friction, now.posture, now.velocity, np.full((1, z.shape[1]), delta))
+    return balance_jacobian(
+        body, friction, now.posture, now.velocity, np.full((1, z.shape[1]), delta)
+    )
 
 
 def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
-    """Starts ``(n_start, 3, n_time)``: on the way between some velocities, and along the softest direction of each."""
-    starts = [z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN]
+    """Starts ``(n_start, 3, n_time)``: on the way between some velocities, and along the softest
+    direction of each."""
+    starts = [
+        z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN
+    ]
     for root in z:
         softest = np.linalg.svd(_jacobian(moving, root))[2][:, 2].T
         starts += [root + size * _speed(moving.rates) * softest for size in _BESIDE]
@@ -123,7 +155,8 @@ def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
 
 
 def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
-    """Solutions less their repetitions, those that remain in their order, and no longer than needed."""
+    """Solutions less their repetitions, those that remain in their order, and no longer than
+    needed."""
     z = np.where(sign[:, None] == 0, np.nan, z)
     again = _repeated(z, speed)
     z, sign = np.where(again[:, None], np.nan, z), np.where(again, 0.0, sign)
@@ -134,14 +167,20 @@ def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
 
 
 def _repeated(z: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Which of velocities ``(n, 3, n_time)`` one before is already, ``(n, n_time)``; NaN is none."""
-    return np.stack([(np.abs(z[:i] - z[i]).max(axis=1) < DISTINCT * speed).any(axis=0) for i in range(len(z))])
+    """Which of velocities ``(n, 3, n_time)`` one before is already, ``(n, n_time)``; NaN is
+    none."""
+    return np.stack(
+        [(np.abs(z[:i] - z[i]).max(axis=1) < DISTINCT * speed).any(axis=0) for i in range(len(z))]
+    )
 
 
 def _merged(everywhere: Branches, chosen: np.ndarray, there: Branches) -> Branches:
     """The branches `everywhere`, with those at the `chosen` instants replaced."""
     most = max(len(everywhere.z), len(there.z))
-    z, sign = np.full((most, *everywhere.z.shape[1:]), np.nan), np.zeros((most, everywhere.sign.shape[1]))
+    z, sign = (
+        np.full((most, *everywhere.z.shape[1:]), np.nan),
+        np.zeros((most, everywhere.sign.shape[1])),
+    )
     z[: len(everywhere.z)], sign[: len(everywhere.z)] = everywhere
     z[:, :, chosen], sign[:, chosen] = np.nan, 0.0
     z[: len(there.z), :, chosen], sign[: len(there.z), chosen] = there.z, there.sign

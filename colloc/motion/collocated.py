@@ -1,12 +1,14 @@
 r"""Orientation and place of a body along the intervals of a collocation scheme, with derivatives.
 
-The scheme (A, b) integrates ``theta' = omega`` and ``x' = e^(i theta) c``, where omega is the rotation rate and c the velocity
-of the centre of mass in the axes of the body, from their values at the stages i of the intervals k of length h:
+The scheme (A, b) integrates ``theta' = omega`` and ``x' = e^(i theta) c``, where omega is the
+rotation rate and c the velocity of the centre of mass in the axes of the body, from their values at
+the stages i of the intervals k of length h:
 
     theta_ki = theta_0 + sum_(l<k) h_l b.omega_l + h_k (A omega_k)_i,      x = sum_ki h_k b_i e^(i theta_ki) c_ki.
 
-Everything that is said of a collocated motion on the level follows from here. What a replay says does not.
-"""
+Everything that is said of a collocated motion on the level follows from here. What a replay says
+does not.
+"""  # noqa: E501
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ def stage_weights(mesh: Mesh) -> np.ndarray:
 
 
 def point_weights(mesh: Mesh) -> np.ndarray:
-    """Weights ``(n_point,)`` of the points of a mesh in an integral over it; neighbours may share a point."""
+    """Weights ``(n_point,)`` of the points of a mesh in an integral over it; neighbours may share a
+    point."""
     weights = np.zeros(mesh.n_point)
     np.add.at(weights, mesh.points, stage_weights(mesh))
     return weights
@@ -44,7 +47,8 @@ class CollocatedPose:
     scheme
         The collocation scheme.
     h
-        Lengths of the intervals, ``(n,)``. They follow one another, unless only `rotations` and `displacements` are used.
+        Lengths of the intervals, ``(n,)``. They follow one another, unless only `rotations` and
+        `displacements` are used.
     omega
         Rotation rate at the stages [rad per unit of h], ``(n, s)``.
     centre
@@ -64,7 +68,14 @@ class CollocatedPose:
     place: np.ndarray
     """Centre of mass in the plane at the edges, complex, from 0, ``(n + 1,)``."""
 
-    def __init__(self, scheme: Scheme, h: np.ndarray, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0) -> None:
+    def __init__(
+        self,
+        scheme: Scheme,
+        h: np.ndarray,
+        omega: np.ndarray,
+        centre: np.ndarray,
+        theta_0: float = 0.0,
+    ) -> None:
         self._scheme, self._h, self._omega, self._centre = scheme, h, omega, centre
         self._weight = h[:, None] * scheme.b
         # searches make one for every gait they try
@@ -77,8 +88,11 @@ class CollocatedPose:
         self.place = sums((self._weight * self.velocity).sum(axis=1))
 
     @classmethod
-    def on_mesh(cls, mesh: Mesh, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0) -> CollocatedPose:
-        """The pose along a mesh, from rates ``(n_point,)`` at its points; `centre` has two rows, forward and to the left."""
+    def on_mesh(
+        cls, mesh: Mesh, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0
+    ) -> CollocatedPose:
+        """The pose along a mesh, from rates ``(n_point,)`` at its points; `centre` has two rows,
+        forward and to the left."""
         c = centre[0] + 1j * centre[1]
         return cls(mesh.scheme, mesh.h, omega[mesh.points], c[mesh.points], theta_0)
 
@@ -90,20 +104,28 @@ class CollocatedPose:
 
     @property
     def displacements(self) -> np.ndarray:
-        """Displacement over each interval in the axes the body has at its begin, complex, ``(n,)``."""
+        """Displacement over each interval in the axes the body has at its begin, complex,
+        ``(n,)``."""
         return (self._weight * np.exp(1j * self._turned) * self._centre).sum(axis=1)
 
     def at(self, k: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Orientation and place, complex, at fractions tau of intervals k, ``(n_time,)`` each, by the scheme's polynomials."""
+        """Orientation and place, complex, at fractions tau of intervals k, ``(n_time,)`` each, by
+        the scheme's polynomials."""
         weights = self._h[k][:, None] * self._scheme.integrals(tau)
-        turned, moved = (weights * self._omega[k]).sum(axis=1), (weights * self.velocity[k]).sum(axis=1)
+        turned, moved = (
+            (weights * self._omega[k]).sum(axis=1),
+            (weights * self.velocity[k]).sum(axis=1),
+        )
         return self.theta[k] + turned, self.place[k] + moved
 
     def on_pose(self, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the displacements along directions ``(m,)``, complex, whose size counts: with respect to the
-        orientation at the stages, ``(m, n, s)``, and to both components of the velocity of the centre of mass in the axes of
-        the body, ``(m, 2, n, s)``."""
-        on_theta, on_centre = np.zeros((sides.size, *self._weight.shape)), np.zeros((sides.size, 2, *self._weight.shape))
+        """Derivatives of the displacements along directions ``(m,)``, complex, whose size counts:
+        with respect to the orientation at the stages, ``(m, n, s)``, and to both components of the
+        velocity of the centre of mass in the axes of the body, ``(m, 2, n, s)``."""
+        on_theta, on_centre = (
+            np.zeros((sides.size, *self._weight.shape)),
+            np.zeros((sides.size, 2, *self._weight.shape)),
+        )
         for row in np.flatnonzero(sides):
             back = self._weight * np.conj(sides[row])
             along = np.conj(self._turn * back)
@@ -111,7 +133,8 @@ class CollocatedPose:
         return on_theta, on_centre
 
     def on_rates(self, on_theta: np.ndarray) -> np.ndarray:
-        """Derivatives with respect to the rotation rate, from those with respect to the orientation, ``(m, n, s)`` both."""
+        """Derivatives with respect to the rotation rate, from those with respect to the
+        orientation, ``(m, n, s)`` both."""
         # the rotation over an interval turns all that come later
         after = np.cumsum(on_theta.sum(axis=2)[:, ::-1], axis=1)[:, ::-1]
         later = np.concatenate([after[:, 1:], np.zeros((len(after), 1))], axis=1)

@@ -1,5 +1,6 @@
-"""How a chain's momenta change (`colloc.mechanics.inertia`), with exact derivatives at many instants, by the compiled kernel;
-and at one instant after another, by its symbolic statement, which does where there is no kernel."""
+"""How a chain's momenta change (`colloc.mechanics.inertia`), with exact derivatives at many
+instants, by the compiled kernel; and at one instant after another, by its symbolic statement, which
+does where there is no kernel."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ N_OUT = 9
 
 @lru_cache(maxsize=32)
 def _function(body: Chain, friction: Law, *, differentiated: bool) -> Any:
-    """(angles, rates, momenta, delta, Froude number) to the outputs, and their derivatives along the first three."""
+    """(angles, rates, momenta, delta, Froude number) to the outputs, and their derivatives along
+    the first three."""
     import casadi as ca  # which nothing slow needs, nor a search
 
     sizes = {"angles": body.n_joint, "rates": body.n_joint, "momenta": len(STATES)}
@@ -28,14 +30,23 @@ def _function(body: Chain, friction: Law, *, differentiated: bool) -> Any:
     delta, froude = ca.SX.sym("delta"), ca.SX.sym("froude")
     now = momentum_rates(body, friction, *given.values(), delta=delta, froude=froude)
     out = ca.vertcat(now.z, given["momenta"][:2], now.power, now.rates)
-    slopes = ca.vec(ca.densify(ca.jacobian(out, ca.vertcat(*given.values())).T)) if differentiated else ca.SX(0, 1)
+    slopes = (
+        ca.vec(ca.densify(ca.jacobian(out, ca.vertcat(*given.values())).T))
+        if differentiated
+        else ca.SX(0, 1)
+    )
     return ca.Function("momenta", [*given.values(), delta, froude], [out, slopes], {"cse": True})
 
 
 def momenta_at(
-    body: Chain, friction: Law, shapes: tuple[np.ndarray, np.ndarray, float], states: np.ndarray, froude: float
+    body: Chain,
+    friction: Law,
+    shapes: tuple[np.ndarray, np.ndarray, float],
+    states: np.ndarray,
+    froude: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The outputs ``(9, n_time)``, and their derivatives ``(9, 2 n_joint + 3, n_time)`` along angles, rates and momenta.
+    """The outputs ``(9, n_time)``, and their derivatives ``(9, 2 n_joint + 3, n_time)`` along
+    angles, rates and momenta.
 
     Parameters
     ----------
@@ -49,7 +60,11 @@ def momenta_at(
 
 
 def momenta_along_states(
-    body: Chain, friction: Law, shapes: tuple[np.ndarray, np.ndarray, float], states: np.ndarray, froude: float
+    body: Chain,
+    friction: Law,
+    shapes: tuple[np.ndarray, np.ndarray, float],
+    states: np.ndarray,
+    froude: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same with derivatives along the momenta alone, ``(9, 3, n_time)``."""
     return _momenta(body, friction, shapes, states, froude, len(STATES))
@@ -65,16 +80,31 @@ def _momenta(
 ) -> tuple[np.ndarray, np.ndarray]:
     library, (angles, rates, delta) = native_kernel(body, friction), shapes
     if library is not None:
-        return kernel_momenta(library, Moving(body, friction, angles, rates, delta, None), states, froude, columns=columns)
-    out, slopes = _function(body, friction, differentiated=True)(angles, rates, states, delta, froude)
-    return np.asarray(out.full()), np.asarray(slopes.full()).reshape(N_OUT, -1, states.shape[1])[:, -columns:]
+        return kernel_momenta(
+            library,
+            Moving(body, friction, angles, rates, delta, None),
+            states,
+            froude,
+            columns=columns,
+        )
+    out, slopes = _function(body, friction, differentiated=True)(
+        angles, rates, states, delta, froude
+    )
+    return np.asarray(out.full()), np.asarray(slopes.full()).reshape(N_OUT, -1, states.shape[1])[
+        :, -columns:
+    ]
 
 
 class MomentaAt:
-    """The outputs at one instant after another, of n momenta each, ``(n, 9)``: a few microseconds."""
+    """The outputs at one instant after another, of n momenta each, ``(n, 9)``: a few
+    microseconds."""
 
     def __init__(self, body: Chain, friction: Law, delta: float, froude: float, n: int = 1) -> None:
-        shapes, momenta, numbers = np.zeros((2, body.n_joint)), np.zeros((n, len(STATES))), np.array([[delta], [froude]])
+        shapes, momenta, numbers = (
+            np.zeros((2, body.n_joint)),
+            np.zeros((n, len(STATES))),
+            np.array([[delta], [froude]]),
+        )
         self._given, self._out = (*shapes, momenta, *numbers), np.zeros((n, N_OUT))
         one = _function(body, friction, differentiated=False)
         self._function = one.map("momenta", "serial", n, [0, 1, 3, 4], list[int]())

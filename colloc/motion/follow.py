@@ -1,6 +1,8 @@
-"""A differential equation followed through a period by Adams' method, with steps of its own: how a motion is checked.
+"""A differential equation followed through a period by Adams' method, with steps of its own: how a
+motion is checked.
 
-It knows nothing of meshes and of collocation. Rates may jump at given phases, and are one-sided there.
+It knows nothing of meshes and of collocation. Rates may jump at given phases, and are one-sided
+there.
 """
 
 from __future__ import annotations
@@ -20,15 +22,18 @@ if TYPE_CHECKING:
     from scipy.integrate import OdeSolution
 
 STEP = 1 / 100
-"""Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and then skip one unnoticed
-(Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams' takes short ones, and errs by 8 to 40 times a step."""
+"""Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and
+then skip one unnoticed (Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams'
+takes short ones, and errs by 8 to 40 times a step."""
 _METHODS = ("LSODA", 50_000), ("Radau", np.inf)
-"""Adams' and Gear's, and how often they may ask for rates; and where these give up, as where friction is stiff beside little
-inertia, one that costs more. Adams' may not see that his steps are as short as stability, not accuracy, wants them: 1e-8."""
+"""Adams' and Gear's, and how often they may ask for rates; and where these give up, as where
+friction is stiff beside little inertia, one that costs more. Adams' may not see that his steps are
+as short as stability, not accuracy, wants them: 1e-8."""
 ONE_SIDED = 1e-12
 """How far beside a jump of the rates they are asked for on its side, in phase."""
 _ONE_AT_A_TIME = threading.RLock()
-"""Older ones of SciPy's LSODA can do no more in a process, and which warnings are ignored is the same for all its threads."""
+"""Older ones of SciPy's LSODA can do no more in a process, and which warnings are ignored is the
+same for all its threads."""
 
 
 class _TooOften(Exception):
@@ -49,7 +54,9 @@ class Course(NamedTuple):
         """States at ascending phases, ``(n_state, n_time)``."""
         ends = np.array([piece.t_max for piece in self.between[:-1]])
         parts = np.split(t, np.searchsorted(t, ends))
-        return np.concatenate([piece(part) for piece, part in zip(self.between, parts, strict=True)], axis=1)
+        return np.concatenate(
+            [piece(part) for piece, part in zip(self.between, parts, strict=True)], axis=1
+        )
 
 
 def followed(
@@ -64,8 +71,8 @@ def followed(
     Parameters
     ----------
     rates : callable
-        Of a phase, the states ``(n_state,)`` and what it last said to remember (None at first): their rates, and what to
-        remember, such as velocities from which the next balance may start.
+        Of a phase, the states ``(n_state,)`` and what it last said to remember (None at first):
+        their rates, and what to remember, such as velocities from which the next balance may start.
     begin : (n_state,)
     tolerance : (n_state,) or float
         About the error of each at the end.
@@ -111,11 +118,15 @@ def followed(
                 giving_up,
                 np.errstate(over="ignore"),
             ):  # of the steps of Radau's differences
-                run = solve_ivp(slope, (first, last), state, method=method, dense_output=True, **accuracy)
+                run = solve_ivp(
+                    slope, (first, last), state, method=method, dense_output=True, **accuracy
+                )
                 if run.success:
                     break
         else:
-            raise NotConvergedError(f"the motion could not be followed beyond phase {run.t[-1]:.4f}.")
+            raise NotConvergedError(
+                f"the motion could not be followed beyond phase {run.t[-1]:.4f}."
+            )
         state = run.y[:, -1]
         phases.append(run.t)
         states.append(run.y)

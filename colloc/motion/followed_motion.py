@@ -1,8 +1,9 @@
 """Which of several balanced motions a gait follows, and how much the others differ from it.
 
-Where the law of friction allows several velocities at an instant, a body with a little inertia keeps to the branch it is on
-until that ends in a fold, and then jumps. Followed forwards and backwards in time, a gait may so run through one shape in two
-ways. Both, and every other choice, differ from each other by no more than the solutions do, instant by instant.
+Where the law of friction allows several velocities at an instant, a body with a little inertia
+keeps to the branch it is on until that ends in a fold, and then jumps. Followed forwards and
+backwards in time, a gait may so run through one shape in two ways. Both, and every other choice,
+differ from each other by no more than the solutions do, instant by instant.
 """
 
 from __future__ import annotations
@@ -29,10 +30,12 @@ class FollowedMotion(NamedTuple):
     """One motion through the branches at instants, and the range of all of them."""
 
     z: np.ndarray
-    """``(3, n_time)``: tail velocities of the branch that is followed; NaN where no solution was found."""
+    """``(3, n_time)``: tail velocities of the branch that is followed; NaN where no solution was
+    found."""
     apart: np.ndarray
-    """``(3 + k, n_time)``: how far the velocities of the centre of mass, the rotation rates, the powers and the densities of k
-    quantities lie apart among the stable solutions; 0 where there is one."""
+    """``(3 + k, n_time)``: how far the velocities of the centre of mass, the rotation rates, the
+    powers and the densities of k quantities lie apart among the stable solutions; 0 where there is
+    one."""
 
 
 def followed_motion(
@@ -46,7 +49,8 @@ def followed_motion(
     sense: int = FORWARDS,
     quantities: Sequence[Quantity] = (),
 ) -> FollowedMotion | None:
-    """The motion of a gait where its law may allow several; None for a body whose other motions are not looked for.
+    """The motion of a gait where its law may allow several; None for a body whose other motions are
+    not looked for.
 
     Parameters
     ----------
@@ -56,7 +60,8 @@ def followed_motion(
     delta : float
         Regularisation speed.
     before : (3, n_time), optional
-        Tail velocities shortly before each instant; by default those of its neighbour in the order of time.
+        Tail velocities shortly before each instant; by default those of its neighbour in the order
+        of time.
     sense : {FORWARDS, BACKWARDS}
         Which neighbour: the branches are followed with or against time.
     quantities : sequence of Quantity
@@ -67,31 +72,46 @@ def followed_motion(
         return None
     if not found.number.all():
         lost = int((found.number == 0).sum())
-        raise NotConvergedError(f"no velocity that balances the body was found at {lost} of {found.number.size} instants.")
+        raise NotConvergedError(
+            f"no velocity that balances the body was found at {lost} of {found.number.size} "
+            f"instants."
+        )
     apart = np.zeros((3 + len(quantities), angles.shape[1]))
     several = np.flatnonzero(found.number > 1)
     if not several.size:
         return FollowedMotion(found.z[0], apart)
     chosen = Branches(found.z[:, :, several], found.sign[:, several])
-    apart[:, several] = _ranges(Instants(body, friction, angles[:, several], rates[:, several], delta), chosen, quantities)
+    apart[:, several] = _ranges(
+        Instants(body, friction, angles[:, several], rates[:, several], delta), chosen, quantities
+    )
     z = found.z[0].copy()
     for now, previous in _order(found.number > 1, sense):
-        z[:, now] = _nearest(found.z[:, :, now], found.sign[:, now], z[:, previous] if before is None else before[:, now])
+        z[:, now] = _nearest(
+            found.z[:, :, now],
+            found.sign[:, now],
+            z[:, previous] if before is None else before[:, now],
+        )
     return FollowedMotion(z, apart)
 
 
-def on_one_branch(body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
-    """The motion followed in time, ``(3, n_time)``, from balanced velocities z that were solved for one by one.
+def on_one_branch(
+    body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
+) -> np.ndarray:
+    """The motion followed in time, ``(3, n_time)``, from balanced velocities z that were solved for
+    one by one.
 
-    Each is solved for again from the one before, round the period, until none changes: where several motions are balanced, some
-    lay on one branch and some on another, as a solver's steps fell. Of those that change all balanced velocities are found, and
-    the nearest that lasts is taken. Where none changes, z itself is given back.
+    Each is solved for again from the one before, round the period, until none changes: where
+    several motions are balanced, some lay on one branch and some on another, as a solver's steps
+    fell. Of those that change all balanced velocities are found, and the nearest that lasts is
+    taken. Where none changes, z itself is given back.
     """
     if friction.associated or not body.looks_for_all_velocities:
         return z
     followed, at, moves = z.copy(), np.arange(z.shape[1]), np.zeros(z.shape[1], dtype=bool)
     for _ in range(2 * z.shape[1]):
-        found = body.solve(friction, angles[:, at], rates[:, at], delta, start=followed[:, at - 1]).z
+        found = body.solve(
+            friction, angles[:, at], rates[:, at], delta, start=followed[:, at - 1]
+        ).z
         moved = np.abs(found - followed[:, at]).max(axis=0) > _SAME * np.abs(z).max()
         if not moved.any():
             break
@@ -121,7 +141,8 @@ def _order(several: np.ndarray, sense: int) -> Iterator[tuple[int, int]]:
 
 
 def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """The solution, among the stable ones if there are any, that is nearest to a velocity ``(3,)``."""
+    """The solution, among the stable ones if there are any, that is nearest to a velocity
+    ``(3,)``."""
     distance = np.abs(z - before[:, None].T).max(axis=1)
     stable = np.where(sign > 0, distance, np.inf)
     return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]
@@ -132,7 +153,9 @@ def _ranges(at: Instants, found: Branches, quantities: Sequence[Quantity]) -> np
     rows = []
     for z, sign in zip(found.z, found.sign, strict=True):
         now = at.body.sliding(at.friction, at.angles, at.rates, z, at.delta)
-        row = np.concatenate([now.centre, z[2:], now.power, *(each.at(replace(at, z=z)) for each in quantities)])
+        row = np.concatenate(
+            [now.centre, z[2:], now.power, *(each.at(replace(at, z=z)) for each in quantities)]
+        )
         rows.append(np.where(sign > 0, row, np.nan))
     apart = np.nanmax(rows, axis=0) - np.nanmin(rows, axis=0)
     return np.stack([np.hypot(apart[0], apart[1]), *apart[2:]])

@@ -1,4 +1,5 @@
-r"""Kinds of motion: which states a period has besides the shape, their rates at an instant, and what a period comes to.
+r"""Kinds of motion: which states a period has besides the shape, their rates at an instant, and
+what a period comes to.
 
 | kind | states that are solved for | summed up |
 |---|---|---|
@@ -7,9 +8,9 @@ r"""Kinds of motion: which states a period has besides the shape, their rates at
 | with inertia, on the level | the momenta Vx, Vy, H, which repeat every period | orientation, place, work |
 | with inertia, on a slope | momenta and orientation | place, work |
 
-A kind answers for a balance with its derivatives, for the motion along a mesh, and for the numbers of a period. Whoever
-collocates a motion asks it, and not whether there is a slope.
-"""
+A kind answers for a balance with its derivatives, for the motion along a mesh, and for the numbers
+of a period. Whoever collocates a motion asks it, and not whether there is a slope.
+"""  # noqa: E501
 
 from __future__ import annotations
 
@@ -44,19 +45,23 @@ from colloc.numerics.mesh import Mesh
 
 _MORE = slice(-len(STATES), None)
 _VISCOUS, _WETTER = 3.0, 10**0.5
-"""Delta [body lengths per period] at which friction is as good as viscous, and the factor from each tried to the next."""
+"""Delta [body lengths per period] at which friction is as good as viscous, and the factor from each
+tried to the next."""
 Near = tuple[np.ndarray | None, np.ndarray | None]
 """States and tail velocities to start from, as far as they are known."""
 NOWHERE: Near = (None, None)
 TOLERANCE = 1e-12
 _ACCEPTED = 1e3
-"""Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
+"""Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance
+will do."""
 OMEGA, OUTPUTS = 2, slice(2, None)
-"""Among the rows of `Kind.slopes`: rotation rate; the same, velocity of the centre, power, and what there is more."""
+"""Among the rows of `Kind.slopes`: rotation rate; the same, velocity of the centre, power, and what
+there is more."""
 
 
 class Shapes(NamedTuple):
-    """Angles and rates ``(n_joint, n_point)`` at the points of a mesh, per time divided by `unit`, and delta in that unit."""
+    """Angles and rates ``(n_joint, n_point)`` at the points of a mesh, per time divided by `unit`,
+    and delta in that unit."""
 
     angles: np.ndarray
     rates: np.ndarray
@@ -84,13 +89,15 @@ class Along(NamedTuple):
     solved: BalanceSolution | None = None
     """The balance, where it holds instant by instant."""
     edges: np.ndarray = np.empty((0, 0))
-    """States that are variables of a full program, at the edges of the mesh, ``(n_state, n + 1)``."""
+    """States that are variables of a full program, at the edges of the mesh, ``(n_state, n +
+    1)``."""
 
 
 class Passed(NamedTuple):
-    """What the solved part of a period comes to: displacement from the initial orientation 0 or, where the orientation is a
-    state, in the plane; rotation [rad], work against friction. Displacement and rotation
-    are seen from axes that turn evenly (`Kind.turn`). And what the gait tells of it."""
+    """What the solved part of a period comes to: displacement from the initial orientation 0 or,
+    where the orientation is a state, in the plane; rotation [rad], work against friction.
+    Displacement and rotation are seen from axes that turn evenly (`Kind.turn`). And what the gait
+    tells of it."""
 
     displacement: complex
     rotation: float
@@ -99,8 +106,8 @@ class Passed(NamedTuple):
 
 
 class Share(NamedTuple):
-    """What makes a number of a period grow: a way along a direction, the size of which counts; rotation, work; and the
-    first that the gait tells."""
+    """What makes a number of a period grow: a way along a direction, the size of which counts;
+    rotation, work; and the first that the gait tells."""
 
     side: complex = 0.0
     rotation: float = 0.0
@@ -116,7 +123,8 @@ class Kind(Protocol):
     states: tuple[str, ...]
     """States of a period that are solved for."""
     told: tuple[str, ...]
-    """What a gait says in its last parameters: the begin of some of them, a period closing the others, or its pace."""
+    """What a gait says in its last parameters: the begin of some of them, a period closing the
+    others, or its pace."""
     periods: float
     """A whole period over the part that is solved."""
     lack: str
@@ -124,26 +132,43 @@ class Kind(Protocol):
     turn: float
     """By which a period is asked to turn the body [rad]."""
     followed: bool
-    """Whether what a mesh misses is told by a differential equation (`colloc.verification.collocated_course.course_in`)."""
+    """Whether what a mesh misses is told by a differential equation
+    (`colloc.verification.collocated_course.course_in`)."""
 
-    def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
+    def along(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        begin: np.ndarray,
+        near: Near = NOWHERE,
+        tolerance: float = TOLERANCE,
+    ) -> Along:
         """The motion along a mesh from the begin of its states."""
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
-        """What formulas see of shapes ``(n_joint, n)`` at orientations ``(n,)`` and tail velocities ``(3, n)``; unless these
-        are given, those that balance the body, if no other state counts."""
+        """What formulas see of shapes ``(n_joint, n)`` at orientations ``(n,)`` and tail velocities
+        ``(3, n)``; unless these are given, those that balance the body, if no other state
+        counts."""
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles, rates), ``(6, 2 n_joint,
-        n_point)``, and to the states, ``(6, n_state, n_point)``; then of the rates of states, where they are none of these."""
+        """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles,
+        rates), ``(6, 2 n_joint, n_point)``, and to the states, ``(6, n_state, n_point)``; then of
+        the rates of states, where they are none of these."""
 
     def through_pose(
-        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
+        self,
+        mesh: Mesh,
+        pose: CollocatedPose,
+        on_theta: np.ndarray,
+        on_out: np.ndarray,
+        on_states: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Add what m numbers owe to the orientation to their derivatives `on_out` with respect to (rotation rate, velocity of
-        the centre, power, and rates of states) at the stages, ``(m, 4 + more, n, s)``, from those with respect to the
-        orientation, ``(m, n, s)``, and those of the outputs with respect to the states; and give those with respect to what
-        is told, ``(m, n_told)``, and to what is added to the states at the ends of the intervals, ``(m, n_state, n)``."""
+        """Add what m numbers owe to the orientation to their derivatives `on_out` with respect to
+        (rotation rate, velocity of the centre, power, and rates of states) at the stages, ``(m, 4 +
+        more, n, s)``, from those with respect to the orientation, ``(m, n, s)``, and those of the
+        outputs with respect to the states; and give those with respect to what is told, ``(m,
+        n_told)``, and to what is added to the states at the ends of the intervals, ``(m, n_state,
+        n)``."""
 
     def counted(self, passed: Passed) -> dict[str, float]:
         """What a whole period comes to."""
@@ -153,7 +178,8 @@ class Kind(Protocol):
 
 
 class SlowOnLevel:
-    """No state: the balance holds instant by instant, wherever the body points. Distance is along the direction of travel."""
+    """No state: the balance holds instant by instant, wherever the body points. Distance is along
+    the direction of travel."""
 
     states: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
@@ -165,26 +191,53 @@ class SlowOnLevel:
         self.periods = 1.0 / fraction(symmetry)
         self._chords = self.periods * chord_per_way(turn)
 
-    def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
+    def along(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        begin: np.ndarray,
+        near: Near = NOWHERE,
+        tolerance: float = TOLERANCE,
+    ) -> Along:
         at = self.friction, shapes.angles, shapes.rates, shapes.delta
         solved = self.body.solve(*at, start=near[1], tolerance=tolerance)
         if near[1] is None and solved.converged.all():
             followed = on_one_branch(self.body, *at, solved.z)
-            solved = solved if followed is solved.z else self.body.solve(*at, start=followed, tolerance=tolerance)
+            solved = (
+                solved
+                if followed is solved.z
+                else self.body.solve(*at, start=followed, tolerance=tolerance)
+            )
         held = solved.residual < _ACCEPTED * tolerance
-        return Along(begin, np.empty((0, held.size)), solved.z, self.body.motion(*at, solved), held, solved=solved)
+        return Along(
+            begin,
+            np.empty((0, held.size)),
+            solved.z,
+            self.body.motion(*at, solved),
+            held,
+            solved=solved,
+        )
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
         at = self.friction, shapes.angles, shapes.rates, shapes.delta
-        return Instants(self.body, *at, z=self.body.solve(*at).z if z is None else z, unit=shapes.unit)
+        return Instants(
+            self.body, *at, z=self.body.solve(*at).z if z is None else z, unit=shapes.unit
+        )
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         assert along.solved is not None
-        found = self.body.slopes(self.friction, shapes.angles, shapes.rates, shapes.delta, along.solved)
+        found = self.body.slopes(
+            self.friction, shapes.angles, shapes.rates, shapes.delta, along.solved
+        )
         return found, found[:, :0]
 
     def through_pose(
-        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
+        self,
+        mesh: Mesh,
+        pose: CollocatedPose,
+        on_theta: np.ndarray,
+        on_out: np.ndarray,
+        on_states: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         on_out[:, 0] += pose.on_rates(on_theta)
         return np.empty((len(on_out), 0)), np.empty((len(on_out), 0, mesh.n))
@@ -200,9 +253,14 @@ class SlowOnLevel:
     def shares(self, passed: Passed) -> dict[str, Share]:
         axis = self._axis(passed)
         aside = self._chords * (passed.displacement * np.conj(axis)).imag
-        turns = 0.5 if self._symmetry == ANTIPODAL else 0.0  # how far the axis turns with the solved part
+        # how far the axis turns with the solved part
+        turns = 0.5 if self._symmetry == ANTIPODAL else 0.0
         distance = Share(self._chords * axis, turns * aside)
-        return {"distance": distance, "work": Share(work=self.periods), "rotation": Share(rotation=1.0)}
+        return {
+            "distance": distance,
+            "work": Share(work=self.periods),
+            "rotation": Share(rotation=1.0),
+        }
 
 
 class _WithStates:
@@ -218,25 +276,38 @@ class _WithStates:
         return CollocatedStates(mesh, unit=unit)
 
     def through_pose(
-        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
+        self,
+        mesh: Mesh,
+        pose: CollocatedPose,
+        on_theta: np.ndarray,
+        on_out: np.ndarray,
+        on_states: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         m, k, turns = len(on_out), len(self.states), [name == "theta" for name in self.states]
         if not any(turns):
             on_out[:, 0] += pose.on_rates(on_theta)
-        of_states = np.einsum("mrt,rkt->mkt", on_out[:, :4].reshape(m, 4, -1), on_states[OUTPUTS, :k][:4])
+        of_states = np.einsum(
+            "mrt,rkt->mkt", on_out[:, :4].reshape(m, 4, -1), on_states[OUTPUTS, :k][:4]
+        )
         of_states[:, turns] += on_theta.reshape(m, 1, -1)
-        on_begin, on_rates, on_ends = self._equations(mesh).pulled_back(on_states[self._grow, :k], of_states)
+        on_begin, on_rates, on_ends = self._equations(mesh).pulled_back(
+            on_states[self._grow, :k], of_states
+        )
         on_out[:, self._grow - OMEGA] += on_rates.reshape(m, k, *on_theta.shape[1:])
         on_more = np.einsum("mrt,rkt->mk", on_rates, on_states[self._grow, k:])
         return np.concatenate([on_more, on_begin[:, turns]], axis=1), on_ends
 
 
 class SlowOnSlope(_WithStates):
-    """One state, the orientation, from straight uphill. Distance is along the direction that counts; joints lift the body."""
+    """One state, the orientation, from straight uphill. Distance is along the direction that
+    counts; joints lift the body."""
 
     states: tuple[str, ...] = ("theta",)
     told: tuple[str, ...] = ("theta",)
-    lack: str = "friction does not hold the body on the slope all the way, or its joints brake; take a gentler one"
+    lack: str = (
+        "friction does not hold the body on the slope all the way, or its joints brake; "
+        "take a gentler one"
+    )
     periods: float = 1.0
     turn: float = 0.0
     _grow = np.array([OMEGA])
@@ -245,7 +316,14 @@ class SlowOnSlope(_WithStates):
         self.body, self.friction, self._slope = body, friction, slope
         self._chain = checked_chain(body, friction, slope.grade)
 
-    def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
+    def along(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        begin: np.ndarray,
+        near: Near = NOWHERE,
+        tolerance: float = TOLERANCE,
+    ) -> Along:
         states, z = near
         z = np.zeros((3, mesh.n_point)) if z is None else z
         at = shapes.angles, shapes.rates, shapes.delta
@@ -253,17 +331,26 @@ class SlowOnSlope(_WithStates):
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal now, z
-            now = balance_on_slope(self._chain, self.friction, self._slope, at, states[0], start=z, tolerance=tolerance)
+            now = balance_on_slope(
+                self._chain, self.friction, self._slope, at, states[0], start=z, tolerance=tolerance
+            )
             z = now.solved.z
             balanced = bool((now.solved.residual < _ACCEPTED * tolerance).all())
-            return Rates(shapes.pace * z[None, OMEGA], shapes.pace * now.on_theta[None, None, OMEGA], balanced)
+            return Rates(
+                shapes.pace * z[None, OMEGA],
+                shapes.pace * now.on_theta[None, None, OMEGA],
+                balanced,
+            )
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, begin, states)
         slopes = now.on_shape, now.on_theta[:, None]
         return Along(begin, states, now.solved.z, now.now, np.full(mesh.n_point, held), slopes)
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
-        at, load = (self.friction, shapes.angles, shapes.rates, shapes.delta), self._slope.pull(theta[None])
+        at, load = (
+            (self.friction, shapes.angles, shapes.rates, shapes.delta),
+            self._slope.pull(theta[None]),
+        )
         z = solve_balance(self._chain, *at, load=load).z if z is None else z
         return Instants(self.body, *at, z=z, unit=shapes.unit, load=load)
 
@@ -275,70 +362,122 @@ class SlowOnSlope(_WithStates):
         """Not a number where the joints brake."""
         way = self._slope.counted(passed.displacement)
         work = passed.work + self._slope.grade * passed.displacement.real
-        found = {"distance": way.real, "work": work, "rotation": passed.rotation, "across": way.imag}
+        found = {
+            "distance": way.real,
+            "work": work,
+            "rotation": passed.rotation,
+            "across": way.imag,
+        }
         return {name: float(value) if work > 0 else np.nan for name, value in found.items()}
 
     def shares(self, passed: Passed) -> dict[str, Share]:
         ahead = np.exp(1j * self._slope.ahead)
         across, turned = Share(1j * ahead), Share(rotation=1.0)
-        return {"distance": Share(ahead), "work": Share(self._slope.grade, work=1.0), "rotation": turned, "across": across}
+        return {
+            "distance": Share(ahead),
+            "work": Share(self._slope.grade, work=1.0),
+            "rotation": turned,
+            "across": across,
+        }
 
 
 class WithInertia(_WithStates):
-    """Three states, the momenta, and on a slope the orientation: what friction and weight change momenta by over a period is
-    nothing. They are those of `colloc.mechanics.inertia`, in the axes of the tail link, so that on the level it does not matter
-    where the body points."""
+    """Three states, the momenta, and on a slope the orientation: what friction and weight change
+    momenta by over a period is nothing. They are those of `colloc.mechanics.inertia`, in the axes
+    of the tail link, so that on the level it does not matter where the body points."""
 
-    lack: str = "no period with inertia was found that repeats itself; give another guess, or a smaller froude"
+    lack: str = (
+        "no period with inertia was found that repeats itself; give another guess, or a "
+        "smaller froude"
+    )
 
-    def __init__(self, slow: SlowOnLevel | SlowOnSlope, regime: Regime, image: np.ndarray | None = None) -> None:
+    def __init__(
+        self, slow: SlowOnLevel | SlowOnSlope, regime: Regime, image: np.ndarray | None = None
+    ) -> None:
         """Of a body that would move as the kind `slow` says if it had no mass; `image` as of
         `colloc.motion.heading.momenta_image`."""
-        self.body, self.friction, self.turn, self.periods = slow.body, slow.friction, slow.turn, slow.periods
-        self._slow, self._regime, self._image, self._chain = slow, regime, image, checked_mass(slow.body)
+        self.body, self.friction, self.turn, self.periods = (
+            slow.body,
+            slow.friction,
+            slow.turn,
+            slow.periods,
+        )
+        self._slow, self._regime, self._image, self._chain = (
+            slow,
+            regime,
+            image,
+            checked_mass(slow.body),
+        )
         self._timed = ("period",) if regime.free_pace else ()
-        self.states, self.told = STATES + slow.states, ("log_period",) * regime.free_pace + slow.told
+        self.states, self.told = (
+            STATES + slow.states,
+            ("log_period",) * regime.free_pace + slow.told,
+        )
         self._grow = np.array([6, 7, 8] + [OMEGA] * len(slow.states))
         self.instants = slow.instants
 
     def counted(self, passed: Passed) -> dict[str, float]:
-        return self._slow.counted(passed) | {name: float(np.exp(passed.told[0])) for name in self._timed}
+        return self._slow.counted(passed) | {
+            name: float(np.exp(passed.told[0])) for name in self._timed
+        }
 
     def shares(self, passed: Passed) -> dict[str, Share]:
-        return self._slow.shares(passed) | {name: Share(told=float(np.exp(passed.told[0]))) for name in self._timed}
+        return self._slow.shares(passed) | {
+            name: Share(told=float(np.exp(passed.told[0]))) for name in self._timed
+        }
 
-    def along(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray, near: Near = NOWHERE, tolerance: float = TOLERANCE) -> Along:
+    def along(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        begin: np.ndarray,
+        near: Near = NOWHERE,
+        tolerance: float = TOLERANCE,
+    ) -> Along:
         near_states = self._slow_states(mesh, shapes, begin) if near[0] is None else near[0]
         states, out, held = self._closed(mesh, shapes, near_states, begin)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
-        first = states[: len(STATES), 0] - CollocatedStates(mesh, unit=shapes.unit).integrals(rates)[0][:, 0]
+        first = (
+            states[: len(STATES), 0]
+            - CollocatedStates(mesh, unit=shapes.unit).integrals(rates)[0][:, 0]
+        )
         edges = np.stack([sums(row, start) for row, start in zip(gained, first, strict=True)])
         return Along(begin, states, z, now, np.full(mesh.n_point, held), edges=edges)
 
     def _slow_states(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray) -> np.ndarray:
         body, slow = self._chain, self._slow.along(mesh, shapes, begin[len(self._timed) :])
         posture = body.posture(shapes.angles)
-        return np.concatenate([momenta(body, posture, body.velocity(posture, shapes.rates, slow.z)), slow.states])
+        return np.concatenate(
+            [momenta(body, posture, body.velocity(posture, shapes.rates, slow.z)), slow.states]
+        )
 
-    def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
-        """The states with momenta that repeat every period, sought from others ``(n_state, n_point)``; what the body does with
-        them (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any. Where Newton's method does not lead to them,
-        as on feet that hold, they are reached through more viscous friction."""
+    def _closed(
+        self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
+        """The states with momenta that repeat every period, sought from others ``(n_state,
+        n_point)``; what the body does with them (`colloc.motion.compiled_momenta.N_OUT`); and
+        whether there are any. Where Newton's method does not lead to them, as on feet that hold,
+        they are reached through more viscous friction."""
         found = self._newton(mesh, shapes, near, begin)
         if found[-1] or shapes.delta * shapes.unit > _VISCOUS:
             return found
         wetter = self._closed(mesh, shapes._replace(delta=_WETTER * shapes.delta), near, begin)
         return self._newton(mesh, shapes, wetter[0], begin) if wetter[-1] else wetter
 
-    def _newton(self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    def _newton(
+        self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
         """The same by Newton's method alone."""
         out, first = near, np.append(near[: len(STATES), 0], begin[len(self._timed) :])
         froude, equations = self._froude_at(shapes, begin), self._equations(mesh, shapes.unit)
         library = None if self._slow.states else native_kernel(self._chain, self.friction)
         if library is not None:
-            moving, begun = Moving(self._chain, self.friction, *shapes[:3], None), np.column_stack([near, first])
+            moving, begun = (
+                Moving(self._chain, self.friction, *shapes[:3], None),
+                np.column_stack([near, first]),
+            )
             return kernel_repeating(library, moving, begun, froude, equations.scheme)
 
         def rates(states: np.ndarray) -> Rates:
@@ -352,10 +491,13 @@ class WithInertia(_WithStates):
     def alone(
         self, mesh: Mesh, shapes: Shapes, along: Along, begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Every interval by itself, from given states at its begin ``(n_state, n)``: what the body does with those at the
-        points, the states at its end ``(n_state, n)``, and where there are any, ``(n,)``; sought near states at the points."""
+        """Every interval by itself, from given states at its begin ``(n_state, n)``: what the body
+        does with those at the points, the states at its end ``(n_state, n)``, and where there are
+        any, ``(n,)``; sought near states at the points."""
         equations, froude = self._equations(mesh, shapes.unit), self._froude_at(shapes, along.begin)
-        states, ends, found = equations.alone(lambda states: self._rates(shapes, states, froude)[1], begins, near)
+        states, ends, found = equations.alone(
+            lambda states: self._rates(shapes, states, froude)[1], begins, near
+        )
         return self._rates(shapes, states, froude)[0], ends, found
 
     def _rates(self, shapes: Shapes, states: np.ndarray, froude: float) -> tuple[np.ndarray, Rates]:
@@ -363,8 +505,11 @@ class WithInertia(_WithStates):
         out, slopes = self._pulled(*momenta_along_states(*at), states, froude)
         return out, Rates(out[self._grow], slopes[self._grow], bool(np.isfinite(out).all()))
 
-    def _pulled(self, out: np.ndarray, slopes: np.ndarray, states: np.ndarray, froude: float) -> tuple[np.ndarray, np.ndarray]:
-        """With the weight's pull, and derivatives along the orientation after those along momenta."""
+    def _pulled(
+        self, out: np.ndarray, slopes: np.ndarray, states: np.ndarray, froude: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """With the weight's pull, and derivatives along the orientation after those along
+        momenta."""
         for theta in states[len(STATES) :]:
             pull: Any = self._regime.pull(theta[None]) / froude  # type: ignore[operator]
             out[_MORE][:2] += pull
@@ -374,7 +519,9 @@ class WithInertia(_WithStates):
         return out, slopes
 
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
-        return CollocatedStates(mesh, np.array([name in STATES for name in self.states]), self._image, unit)
+        return CollocatedStates(
+            mesh, np.array([name in STATES for name in self.states]), self._image, unit
+        )
 
     def _froude_at(self, shapes: Shapes, begin: np.ndarray) -> float:
         """Momentum grows by what friction gives it in a unit of time, and has as much to grow."""
@@ -382,8 +529,13 @@ class WithInertia(_WithStates):
         return froude * shapes.unit**2
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
-        """A pace that is told has a column after those of the momenta: in a longer period friction changes them by more."""
-        froude, momenta, k = self._froude_at(shapes, along.begin), along.states[: len(STATES)], 2 * self._chain.n_joint
+        """A pace that is told has a column after those of the momenta: in a longer period friction
+        changes them by more."""
+        froude, momenta, k = (
+            self._froude_at(shapes, along.begin),
+            along.states[: len(STATES)],
+            2 * self._chain.n_joint,
+        )
         now = momenta_at(self._chain, self.friction, shapes[:3], momenta, froude)
         out, slopes = self._pulled(*now, along.states, froude)
         on_pace = np.zeros((len(out), len(self._timed), out.shape[1]))
@@ -399,9 +551,10 @@ def through_motion(
     on_states: np.ndarray,
     by_theta: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives of m numbers of a period with respect to (rotation rate, velocity of the centre, power, rates of states) at
-    the stages, ``(m, 4 + more, n, s)``, then those that `Kind.through_pose` gives; `on_states` as of `Kind.slopes`, `by_theta`
-    is what they depend on the orientation by themselves, ``(m, n, s)``."""
+    """Derivatives of m numbers of a period with respect to (rotation rate, velocity of the centre,
+    power, rates of states) at the stages, ``(m, 4 + more, n, s)``, then those that
+    `Kind.through_pose` gives; `on_states` as of `Kind.slopes`, `by_theta` is what they depend on
+    the orientation by themselves, ``(m, n, s)``."""
     side, rotation, work, _ = (np.array(column) for column in zip(*shares, strict=True))
     weight = stage_weights(mesh)
     on_theta, on_centre = pose.on_pose(side)
@@ -424,7 +577,9 @@ def _on_slope(regime: Slope, of: Dynamics) -> Kind:
 
 @kind_in.register
 def _with_inertia(regime: Paced, of: Dynamics) -> Kind:
-    return WithInertia(SlowOnLevel(of.body, of.law, of.symmetry, of.turn), regime, momenta_image(of.symmetry))
+    return WithInertia(
+        SlowOnLevel(of.body, of.law, of.symmetry, of.turn), regime, momenta_image(of.symmetry)
+    )
 
 
 @kind_in.register

@@ -1,4 +1,5 @@
-"""The balance of a body on a slope at given orientations, with derivatives: what every motion on a slope is made from."""
+"""The balance of a body on a slope at given orientations, with derivatives: what every motion on a
+slope is made from."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ class OnSlope(NamedTuple):
     solved: BalanceSolution
     now: BalancedMotion
     on_shape: np.ndarray
-    """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles, rates), ``(6, 2 n_joint, n)``."""
+    """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles,
+    rates), ``(6, 2 n_joint, n)``."""
     on_theta: np.ndarray
     """The same with respect to the orientation, ``(6, n)``."""
 
@@ -52,4 +54,6 @@ def balance_on_slope(
     now, slopes = chain_slopes(body, friction, *shapes, solved, load)
     on_load = slopes[:, _LOAD]
     # the pull turns against theta
-    return OnSlope(solved, now, slopes[:, : _LOAD.start], on_load[:, 0] * load[1] - on_load[:, 1] * load[0])
+    return OnSlope(
+        solved, now, slopes[:, : _LOAD.start], on_load[:, 0] * load[1] - on_load[:, 1] * load[0]
+    )

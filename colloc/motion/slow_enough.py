@@ -1,4 +1,5 @@
-"""How slow is slow enough: a gait played at any pace on a mesh, and what inertia changes of its efficiency."""
+"""How slow is slow enough: a gait played at any pace on a mesh, and what inertia changes of its
+efficiency."""
 
 from __future__ import annotations
 
@@ -27,15 +28,17 @@ _INTERVALS, _DOUBLED = 50, 6
 _ACCURACY = 0.02
 """Relative, of a loss, and of what a finer mesh may change in the Froude number for it."""
 _POWER = 1.5
-"""Of the Froude number, to which the change of the efficiency is in proportion; between 1 and 2 where it is small."""
+"""Of the Froude number, to which the change of the efficiency is in proportion; between 1 and 2
+where it is small."""
 _FIRST, _FASTEST, _FARTHEST = 0.3, 10.0, np.log(5.0)
-"""The first Froude number tried, over loss times friction; the largest, over friction, beyond which nobody is slow; and the
-farthest step between the logarithms of two."""
+"""The first Froude number tried, over loss times friction; the largest, over friction, beyond which
+nobody is slow; and the farthest step between the logarithms of two."""
 
 
 class Played(NamedTuple):
-    """A period of a gait played at some pace, and its states at the points of the mesh, ``(n_state, n_point)``. Its distance is
-    the chord of the arc that it crawls, which does not depend on the phase at which it begins (`colloc.gaits.period`)."""
+    """A period of a gait played at some pace, and its states at the points of the mesh, ``(n_state,
+    n_point)``. Its distance is the chord of the arc that it crawls, which does not depend on the
+    phase at which it begins (`colloc.gaits.period`)."""
 
     efficiency: float
     states: np.ndarray
@@ -56,7 +59,8 @@ class GaitOnMesh:
         self._angles, self._rates = gait(self.times)
 
     def played(self, delta: float, froude: float = 0.0, near: Played | None = None) -> Played:
-        """The motion in which all periods are alike, sought near another one with inertia, or the slow one.
+        """The motion in which all periods are alike, sought near another one with inertia, or the
+        slow one.
 
         Raises
         ------
@@ -66,9 +70,14 @@ class GaitOnMesh:
         slow = SlowOnLevel(self._body, self._friction, NONE)
         kind = WithInertia(slow, Paced(froude)) if froude else slow
         states = None if near is None or not near.states.size else near.states
-        along = kind.along(self._mesh, Shapes(self._angles, self._rates, delta), np.empty(0), (states, None))
+        along = kind.along(
+            self._mesh, Shapes(self._angles, self._rates, delta), np.empty(0), (states, None)
+        )
         if not along.held.all():
-            raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
+            raise NotConvergedError(
+                f"at a Froude number of {froude:g} no motion was found in which all periods are "
+                f"alike."
+            )
         turn, work = point_weights(self._mesh) @ np.array([along.z[OMEGA], along.now.power]).T
         pose = CollocatedPose.on_mesh(self._mesh, along.z[OMEGA] - turn, along.now.centre)
         return Played(chord_per_way(turn) * float(abs(pose.place[-1]) / work), along.states)
@@ -83,11 +92,13 @@ def slow_enough(
     *,
     breaks: np.ndarray | tuple[float, ...] = (),
 ) -> float:
-    """The Froude number L/(g T^2) up to which inertia changes the efficiency of a gait by no more than the part `loss`.
+    """The Froude number L/(g T^2) up to which inertia changes the efficiency of a gait by no more
+    than the part `loss`.
 
-    A body of length L [m] that takes T [s] a period has the Froude number L / (9.81 T^2); so T must be sqrt(L / (9.81 Fr)) or
-    more. Played faster a gait may be better or worse: either is a change. Paces are tried from slow to fast, each at most five
-    times the one before in Fr, so a change that comes and goes between two of them is not seen.
+    A body of length L [m] that takes T [s] a period has the Froude number L / (9.81 T^2); so T must
+    be sqrt(L / (9.81 Fr)) or more. Played faster a gait may be better or worse: either is a change.
+    Paces are tried from slow to fast, each at most five times the one before in Fr, so a change
+    that comes and goes between two of them is not seen.
 
     Parameters
     ----------
@@ -123,9 +134,17 @@ def slow_enough(
     (chain, joints), accurate = checked_inertia(body, gait), _ACCURACY
     law = chain.law(friction)
     if not rate_independent(law):
-        raise ProblemError(f"under {law.label} the pace is part of every gait: how slow is slow enough has no one answer.")
+        raise ProblemError(
+            f"under {law.label} the pace is part of every gait: how slow is slow enough has no one "
+            f"answer."
+        )
     return _refined(
-        chain, law, joints, breaks, lambda on_mesh: _froude(on_mesh, law, delta, loss), lambda froude: accurate * froude
+        chain,
+        law,
+        joints,
+        breaks,
+        lambda on_mesh: _froude(on_mesh, law, delta, loss),
+        lambda froude: accurate * froude,
     )
 
 
@@ -144,14 +163,20 @@ def _refined(
         before, known = known, number(GaitOnMesh(body, friction, gait, Mesh(scheme(SCHEME), edges)))
         if abs(known - before) < allowed(known):
             return known
-    raise NotConvergedError("finer and finer meshes do not agree on what inertia does to this gait; try a larger delta.")
+    raise NotConvergedError(
+        "finer and finer meshes do not agree on what inertia does to this gait; try a larger delta."
+    )
 
 
 def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float:
     """At which inertia first changes the efficiency of a gait on a mesh by the part `loss`."""
     last = slow = gait.played(delta)
     # the change is a power of the Froude number where both are small
-    low, high, at = -np.inf, np.log(_FASTEST * friction.largest), np.log(_FIRST * loss * friction.largest)
+    low, high, at = (
+        -np.inf,
+        np.log(_FASTEST * friction.largest),
+        np.log(_FIRST * loss * friction.largest),
+    )
     fastest, power = high, _POWER
     tried: list[tuple[float, float]] = []
     while high - low > _ACCURACY / _POWER:
@@ -169,5 +194,6 @@ def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float
     if high < fastest:
         return float(np.exp(low))
     raise NotConvergedError(
-        f"inertia changes the efficiency by less than {loss:g} up to a Froude number of {np.exp(fastest):g}."
+        f"inertia changes the efficiency by less than {loss:g} up to a Froude number of "
+        f"{np.exp(fastest):g}."
     )

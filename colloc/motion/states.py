@@ -1,13 +1,15 @@
-r"""Periodic states along the intervals of a collocation scheme: ``s' = r(t, s)`` for any number of them, with an adjoint.
+r"""Periodic states along the intervals of a collocation scheme: ``s' = r(t, s)`` for any number of
+them, with an adjoint.
 
 At the stages i of the intervals k of length h the scheme (A, b) says
 
     s_ki = s_0 + sum_(l<k) h_l sum_j b_j r_lj + h_k sum_j A_ij r_kj,
 
-in short ``s = s_0 + H r(s)``. A state either starts where it is told to, or is *free*: then it ends a period, or the part of
-one that is solved, where a symmetry sends its start, ``s_end = M s_0``. Newton's method, and derivatives of what follows from
-the states, need solutions with ``I - H R``, R being the derivatives of the rates with respect to the states. Interval by
-interval that is a small system in the stages; the states at its begin are handed on.
+in short ``s = s_0 + H r(s)``. A state either starts where it is told to, or is *free*: then it ends
+a period, or the part of one that is solved, where a symmetry sends its start, ``s_end = M s_0``.
+Newton's method, and derivatives of what follows from the states, need solutions with ``I - H R``, R
+being the derivatives of the rates with respect to the states. Interval by interval that is a small
+system in the stages; the states at its begin are handed on.
 """
 
 from __future__ import annotations
@@ -21,16 +23,19 @@ from colloc.numerics.mesh import Mesh
 
 _CLOSED, _STEPS = 1e-12, 200
 _ROUNDED = 1e-11
-"""Newton's step that counts as none: where rates are steep, rounding leaves more of the equations than `_CLOSED`."""
+"""Newton's step that counts as none: where rates are steep, rounding leaves more of the equations
+than `_CLOSED`."""
 _SHARES, _ASTRAY = 0.5 ** np.arange(7), 5
-"""Of Newton's step, tried until the equations are off by less; steps in a row of which none does, after which there is no
-motion near here."""
+"""Of Newton's step, tried until the equations are off by less; steps in a row of which none does,
+after which there is no motion near here."""
 _LEAST_SHARE = 1 / 16
-"""Of a step that is to make the next one shorter; where less is asked for the search had better come another way."""
+"""Of a step that is to make the next one shorter; where less is asked for the search had better
+come another way."""
 _FAR = np.errstate(over="ignore", invalid="ignore")
 """Far from any motion, what grows from interval to interval has no number at the end."""
 _ALONE, _FOUND = 60, 1e-9
-"""Steps by which the states of single intervals are found, and what their equations may be off by then."""
+"""Steps by which the states of single intervals are found, and what their equations may be off by
+then."""
 
 
 class Rates(NamedTuple):
@@ -45,7 +50,8 @@ class Rates(NamedTuple):
 
 
 class CollocatedStates:
-    """The equations of states on a mesh whose neighbours share no stage; points are in order of the stages.
+    """The equations of states on a mesh whose neighbours share no stage; points are in order of the
+    stages.
 
     Parameters
     ----------
@@ -58,19 +64,30 @@ class CollocatedStates:
         Rates are per time divided by this.
     """
 
-    def __init__(self, mesh: Mesh, free: np.ndarray | None = None, image: np.ndarray | None = None, unit: float = 1.0) -> None:
+    def __init__(
+        self,
+        mesh: Mesh,
+        free: np.ndarray | None = None,
+        image: np.ndarray | None = None,
+        unit: float = 1.0,
+    ) -> None:
         self._shape = mesh.n, mesh.scheme.s
-        self._a, self._b = unit * mesh.h[:, None, None] * mesh.scheme.A, unit * mesh.h[:, None] * mesh.scheme.b
+        self._a, self._b = (
+            unit * mesh.h[:, None, None] * mesh.scheme.A,
+            unit * mesh.h[:, None] * mesh.scheme.b,
+        )
         self._free = np.flatnonzero(np.zeros(0, dtype=bool) if free is None else free)
         self._image = image
 
     @property
     def scheme(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A ``(n, s, s)`` and b ``(n, s)`` times the lengths of the intervals, and the image of the start."""
+        """A ``(n, s, s)`` and b ``(n, s)`` times the lengths of the intervals, and the image of the
+        start."""
         return self._a, self._b, np.eye(len(self._free)) if self._image is None else self._image
 
     def integrals(self, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``, of rates ``(n_state, n_point)``."""
+        """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``, of rates
+        ``(n_state, n_point)``."""
         stages = rates.reshape(len(rates), *self._shape)
         gained = np.cumsum((self._b * stages).sum(axis=2), axis=1)
         before = np.concatenate([np.zeros((len(rates), 1)), gained[:, :-1]], axis=1)
@@ -82,7 +99,8 @@ class CollocatedStates:
         start: np.ndarray,
         near: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """States at the points by Newton's method: as much of a step is taken as makes the equations be off by less.
+        """States at the points by Newton's method: as much of a step is taken as makes the
+        equations be off by less.
 
         Parameters
         ----------
@@ -127,11 +145,13 @@ class CollocatedStates:
     def settled(
         self, rates: Callable[[np.ndarray], Rates], start: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """The same, damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3): a share of a step
-        is taken if the next step, of the same derivatives, is a shorter one.
+        """The same, damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear Problems*,
+        section 3.3): a share of a step is taken if the next step, of the same derivatives, is a
+        shorter one.
 
-        For momenta, which friction as steep as 1/delta pulls to and fro: their equations may well be off by more on the way. On
-        a slow slope rates are not known everywhere, and it does worse.
+        For momenta, which friction as steep as 1/delta pulls to and fro: their equations may well
+        be off by more on the way. On a slow slope rates are not known everywhere, and it does
+        worse.
         """
         x = self._begun(start, near)
         now, residual, off = self._residual(rates, x)
@@ -161,7 +181,12 @@ class CollocatedStates:
                     trusted = share * size * float(np.linalg.norm(next_step))
                     if np.linalg.norm(next_step) < size:
                         break
-                    closer = 0.5 * share**2 * size / float(np.linalg.norm(next_step - (1.0 - share) * step))
+                    closer = (
+                        0.5
+                        * share**2
+                        * size
+                        / float(np.linalg.norm(next_step - (1.0 - share) * step))
+                    )
                 if share <= _LEAST_SHARE:
                     return trial[:, :-1], trial[:, -1], False
                 share = max(_LEAST_SHARE, min(closer, 0.5 * share))
@@ -177,14 +202,17 @@ class CollocatedStates:
     def alone(
         self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States at the points of every interval by itself, from given ones at its begin ``(n_state, n)``; those at its end,
-        ``(n_state, n)``; and where they were found, ``(n,)``. `near` is where Newton's method begins, as in `solved`."""
+        """States at the points of every interval by itself, from given ones at its begin
+        ``(n_state, n)``; those at its end, ``(n_state, n)``; and where they were found, ``(n,)``.
+        `near` is where Newton's method begins, as in `solved`."""
         n, s = self._shape
         begin, share = np.repeat(begins, s, axis=1), np.ones(n)
 
         def residual(states: np.ndarray) -> tuple[Rates, np.ndarray, np.ndarray]:
             now = rates(states)
-            left_over = states - begin - self._within(now.value.reshape(-1, n, s)).reshape(states.shape)
+            left_over = (
+                states - begin - self._within(now.value.reshape(-1, n, s)).reshape(states.shape)
+            )
             return now, left_over, np.abs(left_over).reshape(-1, n, s).max(axis=(0, 2))
 
         (now, left_over, off), states = residual(near), near
@@ -192,7 +220,9 @@ class CollocatedStates:
             if (off < _CLOSED).all():
                 break
             linear = _Linear(self._a, self._b, now.on_states)
-            step = np.repeat(share, s) * linear.at_points(linear.own(left_over), np.zeros_like(begins.T))
+            step = np.repeat(share, s) * linear.at_points(
+                linear.own(left_over), np.zeros_like(begins.T)
+            )
             trial = states - step
             *_, off_then = residual(trial)
             nearer = (off_then < off) | (np.abs(step).reshape(-1, n, s).max(axis=(0, 2)) < _ROUNDED)
@@ -203,12 +233,15 @@ class CollocatedStates:
         return states, begins + (self._b * found).sum(axis=2), off < _FOUND
 
     def _within(self, stages: np.ndarray) -> np.ndarray:
-        """What states gain from the begin of an interval to its stages, of rates ``(n_state, n, s)`` there."""
+        """What states gain from the begin of an interval to its stages, of rates ``(n_state, n,
+        s)`` there."""
         return np.einsum("nij,anj->ani", self._a, stages)
 
-    def _residual(self, rates: Callable[[np.ndarray], Rates], x: np.ndarray) -> tuple[Rates, np.ndarray, float]:
-        """Rates at states and start, the last column of x; what the equations are off by at the points and, of the free
-        states, at the end; and the largest of these."""
+    def _residual(
+        self, rates: Callable[[np.ndarray], Rates], x: np.ndarray
+    ) -> tuple[Rates, np.ndarray, float]:
+        """Rates at states and start, the last column of x; what the equations are off by at the
+        points and, of the free states, at the end; and the largest of these."""
         states, start = x[:, :-1], x[:, -1]
         now = rates(states)
         gained, whole = self.integrals(now.value)
@@ -222,7 +255,8 @@ class CollocatedStates:
 
     @_FAR
     def _newton(self, on_states: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """Of what the equations are off by, the change of the states and of their start that does it to first order."""
+        """Of what the equations are off by, the change of the states and of their start that does
+        it to first order."""
         within, free = _Linear(self._a, self._b, on_states), self._free
 
         @_FAR
@@ -230,8 +264,12 @@ class CollocatedStates:
             own, through, gained = within.handed_on(residual[:, :-1])
             start = np.zeros(len(residual))
             if free.size:
-                start[free] = np.linalg.solve(self._open(through[-1]), residual[free, -1] - gained[-1, free])
-            return np.column_stack([within.at_points(own, through[:-1] @ start + gained[:-1]), start])
+                start[free] = np.linalg.solve(
+                    self._open(through[-1]), residual[free, -1] - gained[-1, free]
+                )
+            return np.column_stack(
+                [within.at_points(own, through[:-1] @ start + gained[:-1]), start]
+            )
 
         return step
 
@@ -240,7 +278,9 @@ class CollocatedStates:
         image = np.eye(len(through)) if self._image is None else self._image
         return (through - image)[np.ix_(self._free, self._free)]
 
-    def pulled_back(self, on_states: np.ndarray, of_states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def pulled_back(
+        self, on_states: np.ndarray, of_states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Derivatives of numbers by way of the states.
 
         Parameters
@@ -263,7 +303,9 @@ class CollocatedStates:
         on_start, on_rates, on_ends = within.pulled_back(of_states)
         if self._free.size:
             free = self._free
-            through, *_ = within.pulled_back(np.zeros((on_start.shape[1], *of_states.shape[1:])), np.eye(on_start.shape[1]))
+            through, *_ = within.pulled_back(
+                np.zeros((on_start.shape[1], *of_states.shape[1:])), np.eye(on_start.shape[1])
+            )
             closing = np.zeros_like(on_start)
             closing[:, free] = -np.linalg.solve(self._open(through).T, on_start[:, free].T).T
             image = np.eye(len(through)) if self._image is None else self._image
@@ -273,7 +315,8 @@ class CollocatedStates:
 
 
 class _Linear:
-    """``I - H R``, condensed to the begins of the intervals: their stages are ``own + response @ begin``."""
+    """``I - H R``, condensed to the begins of the intervals: their stages are ``own + response @
+    begin``."""
 
     def __init__(self, a: np.ndarray, b: np.ndarray, on_states: np.ndarray) -> None:
         (n, s), k = b.shape, len(on_states)
@@ -288,7 +331,9 @@ class _Linear:
 
     def _by_interval(self, at_points: np.ndarray) -> np.ndarray:
         n, s, k = self._shape
-        return np.moveaxis(at_points.reshape(*at_points.shape[:-2], k, n, s), -3, -1).reshape(*at_points.shape[:-2], n, s * k)
+        return np.moveaxis(at_points.reshape(*at_points.shape[:-2], k, n, s), -3, -1).reshape(
+            *at_points.shape[:-2], n, s * k
+        )
 
     def _by_point(self, by_interval: np.ndarray) -> np.ndarray:
         n, s, k = self._shape
@@ -301,37 +346,48 @@ class _Linear:
         return (self._inverse @ self._by_interval(right)[:, :, None])[:, :, 0]
 
     def handed_on(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """``(I - H R) x = begin + right``: `own` of the right side ``(k, n_point)``, and the states at the edges as
-        ``through @ begin + gained``, ``(n + 1, k, k)`` and ``(n + 1, k)``."""
+        """``(I - H R) x = begin + right``: `own` of the right side ``(k, n_point)``, and the states
+        at the edges as ``through @ begin + gained``, ``(n + 1, k, k)`` and ``(n + 1, k)``."""
         own, k = self.own(right), len(right)
         more = self._gain @ own[:, :, None]
-        through, gained = _one_after_another(self._through.transpose(0, 2, 1), more.transpose(0, 2, 1))
+        through, gained = _one_after_another(
+            self._through.transpose(0, 2, 1), more.transpose(0, 2, 1)
+        )
         begin = np.eye(k, k + 1)[None]
-        edges = np.concatenate([begin, np.concatenate([through, gained], axis=1).transpose(0, 2, 1)])
+        edges = np.concatenate(
+            [begin, np.concatenate([through, gained], axis=1).transpose(0, 2, 1)]
+        )
         return own, edges[:, :, :-1], edges[:, :, -1]
 
     def at_points(self, own: np.ndarray, begins: np.ndarray) -> np.ndarray:
         """x ``(k, n_point)``, from the states at the begins of the intervals, ``(n, k)``."""
         return self._by_point(own + (self._response @ begins[:, :, None])[:, :, 0])
 
-    def pulled_back(self, of_states: np.ndarray, of_end: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of numbers with derivatives ``(m, k, n_point)`` with respect to the states and ``(m, k)`` to those at the end: to
-        their begin, ``(m, k)``, to the rates, ``(m, k, n_point)``, as ``H'(I - H R)'^-1``, and to the states at the ends of
-        the intervals, ``(m, k, n)``."""
+    def pulled_back(
+        self, of_states: np.ndarray, of_end: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of numbers with derivatives ``(m, k, n_point)`` with respect to the states and ``(m, k)``
+        to those at the end: to their begin, ``(m, k)``, to the rates, ``(m, k, n_point)``, as
+        ``H'(I - H R)'^-1``, and to the states at the ends of the intervals, ``(m, k, n)``."""
         (n, s, k), given = self._shape, self._by_interval(of_states)
         through = np.einsum("mni,nia->mna", given, self._response)
         end = np.zeros((len(given), k)) if of_end is None else of_end
         back, gained = _one_after_another(self._through[::-1], through.transpose(1, 0, 2)[::-1])
         before = end @ back + gained
         later = np.concatenate([end[None], before[:-1]])[::-1].transpose(1, 0, 2)
-        mu = np.einsum("mni,nij->mnj", given + np.einsum("mna,nai->mni", later, self._gain), self._inverse)
+        mu = np.einsum(
+            "mni,nij->mnj", given + np.einsum("mna,nai->mni", later, self._gain), self._inverse
+        )
         stages = mu.reshape(-1, n, s, k)
-        on_rates = np.einsum("mnia,nij->mnja", stages, self._a) + self._b[:, :, None] * later[:, :, None]
+        on_rates = (
+            np.einsum("mnia,nij->mnja", stages, self._a) + self._b[:, :, None] * later[:, :, None]
+        )
         return before[-1], self._by_point(on_rates.reshape(-1, n, s * k)), later.transpose(0, 2, 1)
 
 
 def _one_after_another(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of maps ``x -> x t + c``, ``(n, k, k)`` and ``(n, m, k)``, what all up to each do, in log2 n steps for all of them."""
+    """Of maps ``x -> x t + c``, ``(n, k, k)`` and ``(n, m, k)``, what all up to each do, in log2 n
+    steps for all of them."""
     t, c, reach = t.copy(), c.copy(), 1
     while reach < len(t):
         c[reach:] += c[:-reach] @ t[reach:]

@@ -1,13 +1,14 @@
 """Circular arcs: where one leads and which way, in closed form, from the tangents at its ends.
 
-An arc of unit length (curvature = turn) runs from tangent T0 to tangent T1; at a fraction ``tau`` of it the tangent has
-turned by that fraction of the way. For two joints a tangent is its heading psi, one row, and may turn by any angle; for
-more joints it is a unit vector, ``(n_joint, n_time)``, and turns along the great circle, by less than pi:
+An arc of unit length (curvature = turn) runs from tangent T0 to tangent T1; at a fraction ``tau``
+of it the tangent has turned by that fraction of the way. For two joints a tangent is its heading
+psi, one row, and may turn by any angle; for more joints it is a unit vector, ``(n_joint, n_time)``,
+and turns along the great circle, by less than pi:
 
     T(tau) = [ sin((1 - tau) phi) T0 + sin(tau phi) T1 ] / sin(phi),      phi the angle between T0 and T1.
 
 The same functions run on NumPy arrays and on CasADi matrices.
-"""
+"""  # noqa: E501
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ _SMALL = 1e-2
 
 
 def _series(y: Array, first: float, start: int) -> Array:
-    """``sum over k of (-y)^k first / (start (start + 1)) / ...``: the tail of a sine's or cosine's series."""
+    """``sum over k of (-y)^k first / (start (start + 1)) / ...``: the tail of a sine's or cosine's
+    series."""
     terms = [first]
     for k in range(5):
         terms.append(terms[-1] / ((start + 2 * k) * (start + 2 * k + 1)))
@@ -69,8 +71,11 @@ def advance_weights(m: Array, tau: Array) -> tuple[Array, Array]:
     """The integrals of `tangent_weights`."""
     y, rest = _squared_angle(m), 1.0 - tau
     whole = _sinc(y)
-    # integral of sin((1 - tau) phi) is (cos((1 - tau) phi) - cos phi)/phi, of sin(tau phi) it is (1 - cos(tau phi))/phi
-    return (_versine(y) - rest * rest * _versine(rest * rest * y)) / whole, tau * tau * _versine(tau * tau * y) / whole
+    # integral of sin((1 - tau) phi) is (cos((1 - tau) phi) - cos phi)/phi, of sin(tau phi) it is (1
+    # - cos(tau phi))/phi
+    return (_versine(y) - rest * rest * _versine(rest * rest * y)) / whole, tau * tau * _versine(
+        tau * tau * y
+    ) / whole
 
 
 def direction(t0: Array, t1: Array, tau: Array) -> Array:
@@ -83,7 +88,8 @@ def direction(t0: Array, t1: Array, tau: Array) -> Array:
 
 
 def advance(t0: Array, t1: Array, tau: Array) -> Array:
-    """Displacement ``(n_joint, n_time)`` up to fractions tau of arcs of unit length: the integral of `direction`."""
+    """Displacement ``(n_joint, n_time)`` up to fractions tau of arcs of unit length: the integral
+    of `direction`."""
     if t0.shape[0] == 1:
         xp, half = namespace(t0, t1, tau), 0.5 * tau * (t1 - t0)
         chord = tau * _sinc(half * half)

@@ -1,8 +1,9 @@
 """The array namespace that lets one statement of the physics serve NumPy and CasADi.
 
-A kernel asks ``xp = namespace(*arrays)`` and then uses arithmetic and the few functions below. Every array is
-two-dimensional, ``(n_body, n_time)``: rows are links (or joints), columns are instants, and columns never mix. With
-CasADi a kernel is built for one instant, ``(n_body, 1)``, and mapped over the mesh by the caller.
+A kernel asks ``xp = namespace(*arrays)`` and then uses arithmetic and the few functions below.
+Every array is two-dimensional, ``(n_body, n_time)``: rows are links (or joints), columns are
+instants, and columns never mix. With CasADi a kernel is built for one instant, ``(n_body, 1)``, and
+mapped over the mesh by the caller.
 """
 
 from __future__ import annotations
@@ -56,8 +57,9 @@ _CASADI: list[SimpleNamespace] = []
 def namespace(*arrays: Array) -> SimpleNamespace:
     """The functions to apply to `arrays`: CasADi's if any of them is a CasADi matrix, else NumPy's.
 
-    ``matmul(a, b)`` takes a constant NumPy or SciPy sparse matrix on the left; ``where(condition, a, b)`` evaluates both
-    sides, so the side that is not taken must still be finite, with finite derivatives.
+    ``matmul(a, b)`` takes a constant NumPy or SciPy sparse matrix on the left; ``where(condition,
+    a, b)`` evaluates both sides, so the side that is not taken must still be finite, with finite
+    derivatives.
     """
     if not any(type(a).__module__.startswith("casadi") for a in arrays):
         return _NUMPY

@@ -1,7 +1,7 @@
 """CasADi functions of columns, evaluated at many columns straight from and into NumPy's memory.
 
-A search asks for the same small functions some ten thousand times. CasADi's own arrays go there and back through lists, which
-takes longer than the functions themselves.
+A search asks for the same small functions some ten thousand times. CasADi's own arrays go there and
+back through lists, which takes longer than the functions themselves.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ class ColumnFunction:
         self._n = -1
 
     def __call__(self, *arguments: np.ndarray) -> np.ndarray:
-        """The outputs ``(n_out, n)`` at arguments of n columns each; the array is overwritten by the next call."""
+        """The outputs ``(n_out, n)`` at arguments of n columns each; the array is overwritten by
+        the next call."""
         n = arguments[0].shape[1]
         if n != self._n:
             self._make_room(n)
@@ -50,11 +51,15 @@ class ColumnFunction:
 
 
 class ChosenRows:
-    """The rows `kept` of a linear part and of blocks, none implicit, with the instance parameters ``(n_given, n_instance)`` of
-    every block as they are now."""
+    """The rows `kept` of a linear part and of blocks, none implicit, with the instance parameters
+    ``(n_given, n_instance)`` of every block as they are now."""
 
     def __init__(
-        self, linear: sparse.csr_matrix, of_blocks: Sequence[Block], kept: np.ndarray, parameters: Sequence[np.ndarray]
+        self,
+        linear: sparse.csr_matrix,
+        of_blocks: Sequence[Block],
+        kept: np.ndarray,
+        parameters: Sequence[np.ndarray],
     ) -> None:
         self._linear, blocks = linear[kept], []
         for block, given in zip(of_blocks, parameters, strict=True):
@@ -63,7 +68,9 @@ class ChosenRows:
             scatter, n_out = block.scatter[kept], block.function.n_out
             used = np.unique(scatter.indices // n_out)
             columns = (used[:, None] * n_out + np.arange(n_out)).ravel()
-            blocks.append(Block(block.function, block.gather[:, used], scatter[:, columns], given[:, used]))
+            blocks.append(
+                Block(block.function, block.gather[:, used], scatter[:, columns], given[:, used])
+            )
         terms = jacobian_terms(self._linear, blocks)
         key = terms.row.astype(int) * linear.shape[1] + terms.column
         self._places, self._weights = summed(key, terms.source, terms.weight, terms.n_source)
@@ -76,7 +83,9 @@ class ChosenRows:
     def slopes(self, x: np.ndarray) -> np.ndarray:
         """Derivatives ``(n_row, n_variable)``."""
         found = np.zeros(self._linear.shape)
-        found.ravel()[self._places] = self._weights @ np.concatenate([[1.0], *(part.nonzeros(x) for part in self._parts)])
+        found.ravel()[self._places] = self._weights @ np.concatenate(
+            [[1.0], *(part.nonzeros(x) for part in self._parts)]
+        )
         return found
 
 
@@ -85,7 +94,10 @@ class _Part:
 
     def __init__(self, block: Block) -> None:
         self._block, self._no_delta = block, np.zeros((1, block.n_instance))
-        self._value, self._jacobian = ColumnFunction(block.function.value), ColumnFunction(block.function.jacobian)
+        self._value, self._jacobian = (
+            ColumnFunction(block.function.value),
+            ColumnFunction(block.function.jacobian),
+        )
 
     def _arguments(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return x[self._block.gather], self._block.parameters, self._no_delta

@@ -1,7 +1,9 @@
-"""Formulas written as text: evaluated with floats, NumPy or CasADi, and differentiated, from the one statement.
+"""Formulas written as text: evaluated with floats, NumPy or CasADi, and differentiated, from the
+one statement.
 
-Text rather than functions, so that files can hold them; nothing but arithmetic of known variables is ever evaluated.
-Derivatives are carried along with the values (forward mode), so they need no second statement and no CasADi.
+Text rather than functions, so that files can hold them; nothing but arithmetic of known variables
+is ever evaluated. Derivatives are carried along with the values (forward mode), so they need no
+second statement and no CasADi.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ _LONGEST = 500
 """Characters of a formula."""
 _NODES = (
     ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, ast.Compare,
-    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd, ast.Gt, ast.GtE, ast.Lt, ast.LtE,
+    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd, ast.Gt, ast.GtE, ast.Lt,
+    ast.LtE,
 )  # fmt: skip
 
 
@@ -36,7 +39,10 @@ class Dual:
         """The result of an operation with given partial derivatives."""
         if not isinstance(other, Dual):
             return Dual(value, tuple(own * a for a in self.slopes))
-        return Dual(value, tuple(own * a + others * b for a, b in zip(self.slopes, other.slopes, strict=True)))
+        return Dual(
+            value,
+            tuple(own * a + others * b for a, b in zip(self.slopes, other.slopes, strict=True)),
+        )
 
     def __add__(self, other: Any) -> Dual:
         return self._with(other, self.value + _value(other), 1.0, 1.0)
@@ -52,7 +58,9 @@ class Dual:
         return self.scaled(other / self.value, -other / (self.value * self.value))
 
     def __pow__(self, power: float) -> Dual:
-        return self.scaled(self.value**power, power * self.value ** (power - 1) if power else 0.0 * self.value)
+        return self.scaled(
+            self.value**power, power * self.value ** (power - 1) if power else 0.0 * self.value
+        )
 
     def scaled(self, value: Array, slope: Array) -> Dual:
         """A function of this one, with its value and derivative."""
@@ -94,9 +102,14 @@ def _dual_functions(xp: SimpleNamespace, count: int) -> dict[str, Callable[..., 
 
     def where(condition: Array, a: Any, b: Any) -> Dual:
         slopes = zip(*(x.slopes if isinstance(x, Dual) else none for x in (a, b)), strict=True)
-        return Dual(xp.where(condition, _value(a), _value(b)), tuple(xp.where(condition, p, q) for p, q in slopes))
+        return Dual(
+            xp.where(condition, _value(a), _value(b)),
+            tuple(xp.where(condition, p, q) for p, q in slopes),
+        )
 
-    def of(function: Callable[[Array], Array], slope: Callable[[Array, Array], Array]) -> Callable[[Any], Any]:
+    def of(
+        function: Callable[[Array], Array], slope: Callable[[Array, Array], Array]
+    ) -> Callable[[Any], Any]:
         def applied(a: Any) -> Any:
             value = function(_value(a))
             return a.scaled(value, slope(a.value, value)) if isinstance(a, Dual) else value
@@ -145,10 +158,13 @@ class Formula:
 
 
 @lru_cache(maxsize=64)
-def formula(text: str, variables: tuple[str, ...], functions: tuple[str, ...] = FUNCTIONS) -> Formula:
-    """A formula of some variables, ready to be evaluated. Objects that hold one keep its text: code cannot be pickled.
-    Of functions there may be ``sum`` besides, over the rows of arrays; such a formula cannot be `differentiated`.
-    `ProblemError` if it is no formula, or speaks of anything but the variables, numbers and functions."""
+def formula(
+    text: str, variables: tuple[str, ...], functions: tuple[str, ...] = FUNCTIONS
+) -> Formula:
+    """A formula of some variables, ready to be evaluated. Objects that hold one keep its text: code
+    cannot be pickled. Of functions there may be ``sum`` besides, over the rows of arrays; such a
+    formula cannot be `differentiated`. `ProblemError` if it is no formula, or speaks of anything
+    but the variables, numbers and functions."""
     if not isinstance(text, str):
         raise ProblemError(f"a formula must be text, not {text!r}.")
     if len(text) > _LONGEST:
@@ -159,7 +175,11 @@ def formula(text: str, variables: tuple[str, ...], functions: tuple[str, ...] = 
         raise ProblemError(f"'{text}' is no formula: {getattr(error, 'msg', error)}.") from None
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     for node in ast.walk(tree):
-        exponent = node.right if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) else ast.Constant(1)
+        exponent = (
+            node.right
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
+            else ast.Constant(1)
+        )
         if any(isinstance(part, ast.Name) for part in ast.walk(exponent)):
             raise ProblemError(f"'{text}' has an exponent that is no number.")
         known = functions if id(node) in called else variables
@@ -167,24 +187,40 @@ def formula(text: str, variables: tuple[str, ...], functions: tuple[str, ...] = 
             raise ProblemError(f"'{text}' speaks of {node.id}; it may use {', '.join(known)}.")
         number = not isinstance(node, ast.Constant) or type(node.value) in (int, float)
         plain = not isinstance(node, ast.Compare) or len(node.ops) == 1
-        single = not isinstance(node, ast.Call) or (isinstance(node.func, ast.Name) and not node.keywords)
+        single = not isinstance(node, ast.Call) or (
+            isinstance(node.func, ast.Name) and not node.keywords
+        )
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             name, count = node.func.id, 3 if node.func.id == "where" else 1
             if len(node.args) != count:
-                raise ProblemError(f"'{text}': {name} takes {count} argument{'s' * (count > 1)}, not {len(node.args)}.")
+                raise ProblemError(
+                    f"'{text}': {name} takes {count} argument{'s' * (count > 1)}, not "
+                    f"{len(node.args)}."
+                )
         if not (isinstance(node, _NODES) and number and plain and single):
-            allowed = f"numbers, + - * / **, comparisons within where(condition, a, b), and {', '.join(functions)}"
-            raise ProblemError(f"'{text}' is no formula that can be differentiated; it may use {allowed}.")
+            allowed = (
+                f"numbers, + - * / **, comparisons within where(condition, a, b), and "
+                f"{', '.join(functions)}"
+            )
+            raise ProblemError(
+                f"'{text}' is no formula that can be differentiated; it may use {allowed}."
+            )
     names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
     try:
         written, tree = ast.unparse(tree), _Floats().visit(tree)
         for node in ast.walk(tree):
-            if isinstance(node, ast.BinOp) and not any(isinstance(part, ast.Name) for part in ast.walk(node)):
-                value = eval(compile(ast.Expression(node), "<formula>", "eval"), {"__builtins__": {}})
+            if isinstance(node, ast.BinOp) and not any(
+                isinstance(part, ast.Name) for part in ast.walk(node)
+            ):
+                value = eval(
+                    compile(ast.Expression(node), "<formula>", "eval"), {"__builtins__": {}}
+                )
                 if not isinstance(value, float):  # a root of what is negative
                     raise ArithmeticError
         return Formula(written, names, compile(tree, "<formula>", "eval"))
     except RecursionError:
         raise ProblemError(f"'{text}' is nested too deeply.") from None
     except ArithmeticError:
-        raise ProblemError(f"'{text}' has numbers in it that come to no finite real number.") from None
+        raise ProblemError(
+            f"'{text}' has numbers in it that come to no finite real number."
+        ) from None

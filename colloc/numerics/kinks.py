@@ -1,10 +1,12 @@
-"""First-order conditions at a kink: some mean of the gradients around the point vanishes, where no single one does.
+"""First-order conditions at a kink: some mean of the gradients around the point vanishes, where no
+single one does.
 
-An objective that is the larger of two smooth ones may have its least value where they meet, and both gradients point away from
-the kink there. Such a point is stationary in the sense of Clarke and Goldstein: 0 is a convex combination of gradients at
-points near it (Goldstein, Math. Program. 13, 1977). With points drawn by chance within a small radius this can be measured
-(Burke, Lewis and Overton, SIAM J. Optim. 15, 2005). Where several kinks meet, chance misses sides: points a step down the mean
-that is nearest to 0 find them.
+An objective that is the larger of two smooth ones may have its least value where they meet, and
+both gradients point away from the kink there. Such a point is stationary in the sense of Clarke and
+Goldstein: 0 is a convex combination of gradients at points near it (Goldstein, Math. Program. 13,
+1977). With points drawn by chance within a small radius this can be measured (Burke, Lewis and
+Overton, SIAM J. Optim. 15, 2005). Where several kinks meet, chance misses sides: points a step down
+the mean that is nearest to 0 find them.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ from colloc.numerics.nonnegative import nonnegative
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, binding
 
 _LOWER = 0.1
-"""A kink that bends down has the same gradients. There, points are lower by more than this part of what they would be higher by
-where it bends up."""
+"""A kink that bends down has the same gradients. There, points are lower by more than this part of
+what they would be higher by where it bends up."""
 _STEPS_DOWN = 4
 """Points down the nearest mean, per unknown, at most."""
 
@@ -33,7 +35,8 @@ def stationarity_around(
     points: int = 4,
     seed: int = 0,
 ) -> Stationarity:
-    """The conditions at v, with the mean of the gradients around it that comes closest to them in place of the one at v.
+    """The conditions at v, with the mean of the gradients around it that comes closest to them in
+    place of the one at v.
 
     Parameters
     ----------
@@ -46,7 +49,8 @@ def stationarity_around(
     enough : float
         No further gradients are taken once some mean is that close to 0.
     points : int
-        How many are drawn, per unknown: on both sides of a kink, and in all corners of a few that meet.
+        How many are drawn, per unknown: on both sides of a kink, and in all corners of a few that
+        meet.
     seed : int
         Of the points.
 
@@ -61,20 +65,25 @@ def stationarity_around(
     >>> class Vee:  # |v| is least at 0
     ...     lower, upper = -np.ones(1), np.ones(1)
     ...     row_lower = row_upper = np.empty(0)
-    ...     objective, gradient = staticmethod(lambda v: abs(v[0])), staticmethod(lambda v: np.sign(v) + (v == 0))
-    ...     rows, row_slopes = staticmethod(lambda v: np.empty(0)), staticmethod(lambda v: np.empty((0, 1)))
+    ...     objective = staticmethod(lambda v: abs(v[0]))
+    ...     gradient = staticmethod(lambda v: np.sign(v) + (v == 0))
+    ...     rows = staticmethod(lambda v: np.empty(0))
+    ...     row_slopes = staticmethod(lambda v: np.empty((0, 1)))
     >>> at = stationarity(Vee, np.zeros(1))
-    >>> at.kkt_error, round(stationarity_around(Vee, np.zeros(1), at, 1e-6, enough=1e-9).kkt_error, 12)
+    >>> around = stationarity_around(Vee, np.zeros(1), at, 1e-6, enough=1e-9)
+    >>> at.kkt_error, round(around.kkt_error, 12)
     (1.0, 0.0)
     """
     rows, slopes, columns = program.rows(v), program.row_slopes(v), binding(program, v)[2]
     rng = np.random.default_rng(seed)
 
     def on_sides(u: np.ndarray) -> tuple[np.ndarray, float]:
-        """Gradient and height of the Lagrangian; rows have kinks too: what is not linear in them counts, with the multipliers
-        that are known."""
+        """Gradient and height of the Lagrangian; rows have kinks too: what is not linear in them
+        counts, with the multipliers that are known."""
         bent = program.rows(u) - rows - slopes @ (u - v)
-        return program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes), program.objective(u) + at.on_rows @ bent
+        return program.gradient(u) + at.on_rows @ (
+            program.row_slopes(u) - slopes
+        ), program.objective(u) + at.on_rows @ bent
 
     drawn = v + radius * rng.uniform(-1.0, 1.0, (points * v.size, v.size))
     places = [*np.clip(np.vstack([v, drawn]), program.lower, program.upper)]
@@ -85,7 +94,11 @@ def stationarity_around(
     for step in rng.uniform(0.0, 1.0, _STEPS_DOWN * v.size) ** 2:
         if np.abs(hull.nearest).max() < enough:
             break
-        u = np.clip(v - radius * step * hull.nearest / np.abs(hull.nearest).max(), program.lower, program.upper)
+        u = np.clip(
+            v - radius * step * hull.nearest / np.abs(hull.nearest).max(),
+            program.lower,
+            program.upper,
+        )
         side = on_sides(u)
         if not (np.isfinite(side[0]).all() and np.isfinite(side[1])):
             break
@@ -99,21 +112,30 @@ def stationarity_around(
 
 
 class _Hull:
-    """The mean of gradients ``(m, n)``, with the `columns` ``(n, k)`` of what binds, that is nearest to 0."""
+    """The mean of gradients ``(m, n)``, with the `columns` ``(n, k)`` of what binds, that is
+    nearest to 0."""
 
     def __init__(self, gradients: np.ndarray, columns: np.ndarray) -> None:
-        self._gradients, self._columns, self._size = gradients, columns, float(np.abs(gradients).max())
+        self._gradients, self._columns, self._size = (
+            gradients,
+            columns,
+            float(np.abs(gradients).max()),
+        )
         self._solve()
 
     def add(self, gradient: np.ndarray) -> None:
-        """Take one more: those without a share in the nearest mean so far are not needed for a nearer one."""
+        """Take one more: those without a share in the nearest mean so far are not needed for a
+        nearer one."""
         self._gradients = np.vstack([self._gradients[self._shares > 0], gradient])
         self._solve()
 
     def _solve(self) -> None:
         m, k = len(self._gradients), self._columns.shape[1]
-        # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
-        matrix = np.vstack([np.hstack([self._gradients.T, self._columns]), np.repeat([self._size, 0.0], [m, k])])
+        # the weight of the last row does not matter: shares and multipliers are divided by the sum
+        # of the shares
+        matrix = np.vstack(
+            [np.hstack([self._gradients.T, self._columns]), np.repeat([self._size, 0.0], [m, k])]
+        )
         parts = nonnegative(matrix, np.append(np.zeros(len(matrix) - 1), self._size))
         self._shares = parts[:m] / parts[:m].sum()
         self.multipliers = parts[m:] / parts[:m].sum()

@@ -1,4 +1,5 @@
-"""Linear programs with few equations, by HiGHS through CasADi: SciPy has it too, and takes as long to load as 200 of them."""
+"""Linear programs with few equations, by HiGHS through CasADi: SciPy has it too, and takes as long
+to load as 200 of them."""
 
 from __future__ import annotations
 
@@ -11,12 +12,15 @@ import numpy as np
 from colloc.system.errors import NotConvergedError
 
 _ONE_AT_A_TIME = Lock()
-"""CasADi lets other threads run while HiGHS does, and a second one in the same solver ends the process."""
+"""CasADi lets other threads run while HiGHS does, and a second one in the same solver ends the
+process."""
 
 
-def linear_maximum(gain: np.ndarray, equations: np.ndarray, right: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """The largest ``gain @ x`` with ``equations @ x == right`` and x >= 0; x at a corner ``(n,)``; the equations' multipliers
-    ``(m,)``, what a unit of their right sides adds.
+def linear_maximum(
+    gain: np.ndarray, equations: np.ndarray, right: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """The largest ``gain @ x`` with ``equations @ x == right`` and x >= 0; x at a corner ``(n,)``;
+    the equations' multipliers ``(m,)``, what a unit of their right sides adds.
 
     Raises
     ------
@@ -25,7 +29,8 @@ def linear_maximum(gain: np.ndarray, equations: np.ndarray, right: np.ndarray) -
 
     Examples
     --------
-    >>> value, x, multipliers = linear_maximum(np.array([1.0, 3.0]), np.array([[1.0, 2.0]]), np.array([1.0]))
+    >>> value, x, multipliers = linear_maximum(np.array([1.0, 3.0]), np.array([[1.0, 2.0]]),
+    ...     np.array([1.0]))
     >>> value, x.tolist(), multipliers.tolist()
     (1.5, [0.0, 0.5], [1.5])
     """

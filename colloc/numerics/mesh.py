@@ -1,7 +1,8 @@
 """The periodic time grid of a collocation scheme: where its nodes, stage points and states sit.
 
-An interval k runs from edges[k] to edges[k+1]. *Points* are the stages, where the equations hold; schemes whose first
-stage is the left end share it with the neighbour. *Sites* carry a state: every edge and every interior stage.
+An interval k runs from edges[k] to edges[k+1]. *Points* are the stages, where the equations hold;
+schemes whose first stage is the left end share it with the neighbour. *Sites* carry a state: every
+edge and every interior stage.
 """
 
 from __future__ import annotations
@@ -55,7 +56,11 @@ class Mesh:
     @property
     def sites(self) -> np.ndarray:
         """``(n, s)``: index of each interval's stages among the sites."""
-        return np.arange(self.n)[:, None] * self._stride + np.arange(self.scheme.s) + (0 if self.scheme.left else 1)
+        return (
+            np.arange(self.n)[:, None] * self._stride
+            + np.arange(self.scheme.s)
+            + (0 if self.scheme.left else 1)
+        )
 
     @property
     def edge_sites(self) -> np.ndarray:
@@ -67,7 +72,8 @@ class Mesh:
         return self.n * self._stride + 1
 
     def integration(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """Matrices (L, Q) of the equations ``L X - Q X' = 0`` of a state at the sites, from its rate at the points.
+        """Matrices (L, Q) of the equations ``L X - Q X' = 0`` of a state at the sites, from its
+        rate at the points.
 
         One row per stage that is not a left end, and one per right edge that is not a stage.
         """
@@ -78,11 +84,14 @@ class Mesh:
         return self._defects(targets, self.edge_sites, self.n_site)
 
     def quadrature(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """The same for a state that is kept at the edges only: ``X_(k+1) - X_k - h sum_j b_j X'_j``."""
+        """The same for a state that is kept at the edges only: ``X_(k+1) - X_k - h sum_j b_j
+        X'_j``."""
         edges = np.arange(self.n + 1)
         return self._defects([(edges[1:], self.scheme.b)], edges, self.n + 1)
 
-    def _defects(self, targets, left: np.ndarray, n_state: int) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    def _defects(
+        self, targets, left: np.ndarray, n_state: int
+    ) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         n, s = self.n, self.scheme.s
         state_row, state_col, state_value, rate_row, rate_col, rate_value = [], [], [], [], [], []
         for order, (target, weights) in enumerate(targets):
@@ -94,9 +103,14 @@ class Mesh:
             rate_col.append(self.points.ravel())
             rate_value.append((self.h[:, None] * weights).ravel())
         m = n * len(targets)
-        state = (np.concatenate(state_value), (np.concatenate(state_row), np.concatenate(state_col)))
+        state = (
+            np.concatenate(state_value),
+            (np.concatenate(state_row), np.concatenate(state_col)),
+        )
         rate = (np.concatenate(rate_value), (np.concatenate(rate_row), np.concatenate(rate_col)))
-        return sparse.csr_matrix(state, shape=(m, n_state)), sparse.csr_matrix(rate, shape=(m, self.n_point))
+        return sparse.csr_matrix(state, shape=(m, n_state)), sparse.csr_matrix(
+            rate, shape=(m, self.n_point)
+        )
 
 
 def uniform_mesh(scheme: Scheme, n: int, length: float) -> Mesh:

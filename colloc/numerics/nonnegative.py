@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 _FEW = 8
-"""Columns up to which the steps are taken here: SciPy's are compiled, in a package that takes a sixth of a second to load."""
+"""Columns up to which the steps are taken here: SciPy's are compiled, in a package that takes a
+sixth of a second to load."""
 
 
 def nonnegative(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The x >= 0, ``(n,)``, that minimises ``|matrix @ x - right|`` (Lawson and Hanson, Solving Least Squares Problems, 1974).
+    """The x >= 0, ``(n,)``, that minimises ``|matrix @ x - right|`` (Lawson and Hanson, Solving
+    Least Squares Problems, 1974).
 
     Examples
     --------
@@ -22,7 +24,9 @@ def nonnegative(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
         return nnls(matrix, right, maxiter=30 * n)[0]
     x, free = np.zeros(n), np.zeros(n, dtype=bool)
-    tolerance = 10 * max(matrix.shape) * np.finfo(float).eps * np.abs(matrix).sum(axis=0).max(initial=0.0)
+    tolerance = (
+        10 * max(matrix.shape) * np.finfo(float).eps * np.abs(matrix).sum(axis=0).max(initial=0.0)
+    )
     for _ in range(30 * n):
         falls = np.where(free, -np.inf, matrix.T @ (right - matrix @ x))
         if falls.max() <= tolerance:

@@ -1,8 +1,8 @@
 """Where functions of time are largest, and what their largest values add to second derivatives.
 
-A constraint that holds at every instant is laid on the instants at which it comes closest to its bound; repeated, this is the
-exchange method for semi-infinite programs (Hettich and Kortanek, SIAM Review 35, 1993). Such an instant moves with whatever the
-function depends on.
+A constraint that holds at every instant is laid on the instants at which it comes closest to its
+bound; repeated, this is the exchange method for semi-infinite programs (Hettich and Kortanek, SIAM
+Review 35, 1993). Such an instant moves with whatever the function depends on.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ SAMPLES = 16
 
 
 def vertex(low: np.ndarray, here: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Where the parabola through three equally spaced values has its maximum, from the middle one, in spacings; 0
-    where it has none.
+    """Where the parabola through three equally spaced values has its maximum, from the middle one,
+    in spacings; 0 where it has none.
 
     Examples
     --------
@@ -30,12 +30,16 @@ def vertex(low: np.ndarray, here: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def peaks(
-    function: Callable[[np.ndarray], np.ndarray], left: np.ndarray, width: np.ndarray, zooms: int = 3
+    function: Callable[[np.ndarray], np.ndarray],
+    left: np.ndarray,
+    width: np.ndarray,
+    zooms: int = 3,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The instant in each of n stretches at which a function of its own is largest ``(n,)``, and the largest sample ``(n,)``.
+    """The instant in each of n stretches at which a function of its own is largest ``(n,)``, and
+    the largest sample ``(n,)``.
 
-    It is sampled finer and finer around the highest sample, since peaks may have kinks; at last one parabola places a smooth
-    maximum between the samples to fourth order in their distance.
+    It is sampled finer and finer around the highest sample, since peaks may have kinks; at last one
+    parabola places a smooth maximum between the samples to fourth order in their distance.
 
     Parameters
     ----------
@@ -58,15 +62,21 @@ def peaks(
         inner = np.clip(best, 1, SAMPLES - 1)
         if zoom < zooms:
             left, width = times[rows, inner - 1], 2 * width / SAMPLES
-    offset = np.where(best == inner, np.clip(vertex(*(values[rows, inner + k] for k in (-1, 0, 1))), -1, 1), 0.0)
+    offset = np.where(
+        best == inner, np.clip(vertex(*(values[rows, inner + k] for k in (-1, 0, 1))), -1, 1), 0.0
+    )
     return times[rows, best] + offset * width / SAMPLES, values[rows, best]
 
 
-def curvature_of_moving(multipliers: np.ndarray, values: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """What is added to the second derivatives ``(n, n)`` of multipliers times functions c(t, v) held at their peaks in time, as
-    these move with v: the largest value of c has the second derivative c_vv - c_tv c_tv' / c_tt.
+def curvature_of_moving(
+    multipliers: np.ndarray, values: np.ndarray, slopes: np.ndarray
+) -> np.ndarray:
+    """What is added to the second derivatives ``(n, n)`` of multipliers times functions c(t, v)
+    held at their peaks in time, as these move with v: the largest value of c has the second
+    derivative c_vv - c_tv c_tv' / c_tt.
 
-    A peak that lies on an edge, where the parabola through the three values has no vertex beside the middle one, stays there.
+    A peak that lies on an edge, where the parabola through the three values has no vertex beside
+    the middle one, stays there.
 
     Parameters
     ----------
@@ -81,7 +91,8 @@ def curvature_of_moving(multipliers: np.ndarray, values: np.ndarray, slopes: np.
     The largest value of -(t - v)^2 is 0 whatever v is, and held at t it bends by -2:
 
     >>> h, one = 0.1, np.ones(1)
-    >>> curvature_of_moving(one, -np.array([[h**2], [0], [h**2]]), 2 * np.array([[[-h]], [[0.0]], [[h]]]))
+    >>> curvature_of_moving(one, -np.array([[h**2], [0], [h**2]]), 2 * np.array([[[-h]], [[0.0]],
+    ...     [[h]]]))
     array([[2.]])
     """
     low, here, high = values

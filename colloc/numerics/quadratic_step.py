@@ -1,8 +1,10 @@
-"""The step of sequential quadratic programming: a dense convex quadratic program, by DAQP through CasADi.
+"""The step of sequential quadratic programming: a dense convex quadratic program, by DAQP through
+CasADi.
 
     minimise  d.B d / 2 + g.d   with  low <= d <= high,  row_low <= R d <= row_high
 
-DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill, IEEE TAC 67, 2022); its steps are exact to rounding.
+DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill, IEEE TAC 67, 2022); its steps are
+exact to rounding.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ _UNMET = 1e3
 
 
 class QuadraticStep(NamedTuple):
-    """The step d ``(n,)``, multipliers of the rows, positive at upper limits, and the share of the violations it removes."""
+    """The step d ``(n,)``, multipliers of the rows, positive at upper limits, and the share of the
+    violations it removes."""
 
     d: np.ndarray
     on_rows: np.ndarray
@@ -37,10 +40,11 @@ def quadratic_step(
     low: np.ndarray,
     high: np.ndarray,
 ) -> QuadraticStep | None:
-    """The minimum of the quadratic model; where the rows contradict each other, their violations are removed in part.
+    """The minimum of the quadratic model; where the rows contradict each other, their violations
+    are removed in part.
 
-    b ``(n, n)`` is positive definite, the slopes ``(m, n)`` are those of the rows. None if there is no step, or no finite
-    model.
+    b ``(n, n)`` is positive definite, the slopes ``(m, n)`` are those of the rows. None if there is
+    no step, or no finite model.
     """
     if not (np.isfinite(gradient).all() and np.isfinite(slopes).all() and np.isfinite(b).all()):
         return None
@@ -51,7 +55,11 @@ def quadratic_step(
     short = np.where(row_low > 0, row_low, np.where(row_high < 0, row_high, 0.0))
     wide = np.zeros((gradient.size + 1, gradient.size + 1))
     wide[:-1, :-1], wide[-1, -1] = b, _UNMET
-    relaxed = {"a": np.column_stack([slopes, short]), "lbx": np.append(low, 0.0), "ubx": np.append(high, 1.0)}
+    relaxed = {
+        "a": np.column_stack([slopes, short]),
+        "lbx": np.append(low, 0.0),
+        "ubx": np.append(high, 1.0),
+    }
     found = _minimum(h=wide, g=np.append(gradient, 0.0), **relaxed, **rows)
     return None if found is None else QuadraticStep(found[0][:-1], found[1], 1.0 - found[0][-1])
 
@@ -61,12 +69,15 @@ def _minimum(**program: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 class _Solver:
-    """DAQP for m rows and n unknowns, in memory of its own: CasADi's arrays take five times as long as a small step."""
+    """DAQP for m rows and n unknowns, in memory of its own: CasADi's arrays take five times as long
+    as a small step."""
 
     def __init__(self, m: int, n: int) -> None:
         shapes = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(m, n)}
         with _MAKING:
-            function = ca.conic("step", "daqp", shapes, {"error_on_fail": False, "daqp": {"primal_tol": _TOLERANCE}})
+            function = ca.conic(
+                "step", "daqp", shapes, {"error_on_fail": False, "daqp": {"primal_tol": _TOLERANCE}}
+            )
         self._buffer, self._solve = function.buffer()
         self._room = {name: np.empty(function.sparsity_in(name).shape[::-1]) for name in _GIVEN}
         self._d, self._on_rows = np.empty(n), np.empty(m)
@@ -83,7 +94,9 @@ class _Solver:
         self._solve()
         # a dual method that fails ends outside of some limit
         d, rows = self._d.copy(), program["a"] @ self._d
-        within = _within(d, program["lbx"], program["ubx"]) and _within(rows, program["lba"], program["uba"])
+        within = _within(d, program["lbx"], program["ubx"]) and _within(
+            rows, program["lba"], program["uba"]
+        )
         return (d, self._on_rows.copy()) if within else None
 
 

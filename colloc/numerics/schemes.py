@@ -1,8 +1,9 @@
 """Time-collocation schemes as data: tableaux of Lobatto IIIA, Gauss-Legendre and Radau IIA type.
 
-A scheme is its nodes ``c`` in [0, 1]; on an interval the derivative is the polynomial through its values at the nodes,
-so ``A[i, j] = integral of L_j from 0 to c_i``, ``b[j] = integral of L_j from 0 to 1`` with Lagrange polynomials L_j
-(Hairer, Norsett and Wanner, Solving ODEs I, section II.7). The same integrals up to any tau are the interpolant.
+A scheme is its nodes ``c`` in [0, 1]; on an interval the derivative is the polynomial through its
+values at the nodes, so ``A[i, j] = integral of L_j from 0 to c_i``, ``b[j] = integral of L_j from 0
+to 1`` with Lagrange polynomials L_j (Hairer, Norsett and Wanner, Solving ODEs I, section II.7). The
+same integrals up to any tau are the interpolant.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ class Scheme:
 
     @property
     def left(self) -> bool:
-        """The first node is the left end of the interval (then neighbours share their end nodes)."""
+        """The first node is the left end of the interval (then neighbours share their end
+        nodes)."""
         return bool(self.c[0] == 0.0)
 
     @property
@@ -90,12 +92,13 @@ def _radau_nodes(s: int) -> np.ndarray:
 
 
 def scheme(name: str) -> Scheme:
-    """The scheme called `name`: "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N nodes. `ProblemError` for any
-    other name."""
+    """The scheme called `name`: "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N
+    nodes. `ProblemError` for any other name."""
     known = _known(name) if isinstance(name, str) else None
     if known is None:
         raise ProblemError(
-            f"unknown scheme {name!r}; choose trapezoid, hermite-simpson, gauss-N or radau-N with N from 1 to {_LARGEST}."
+            f"unknown scheme {name!r}; choose trapezoid, hermite-simpson, gauss-N or radau-N with "
+            f"N from 1 to {_LARGEST}."
         )
     return known
 
@@ -109,5 +112,9 @@ def _known(name: str) -> Scheme | None:
     match = re.fullmatch(r"(gauss|radau)-(\d{1,3})", name)
     if match and 1 <= int(match[2]) <= _LARGEST:
         s = int(match[2])
-        return Scheme(name, _gauss_nodes(s), 2 * s) if match[1] == "gauss" else Scheme(name, _radau_nodes(s), 2 * s - 1)
+        return (
+            Scheme(name, _gauss_nodes(s), 2 * s)
+            if match[1] == "gauss"
+            else Scheme(name, _radau_nodes(s), 2 * s - 1)
+        )
     return None

@@ -1,8 +1,10 @@
-"""Small programs with bounds and rows by sequential quadratic programming with dense quasi-Newton updates.
+"""Small programs with bounds and rows by sequential quadratic programming with dense quasi-Newton
+updates.
 
-The second derivatives of a reduced gait program jump where narrow bands of stick cross a mesh point, so they are not asked
-for: damped BFGS updates (Powell, 1978) build them from gradients, and do not mind. What comes back is measured here. SciPy's
-SLSQP takes the same steps (150 to 600 ms each with 250 parameters, where this takes 12), but begins anew at every call.
+The second derivatives of a reduced gait program jump where narrow bands of stick cross a mesh
+point, so they are not asked for: damped BFGS updates (Powell, 1978) build them from gradients, and
+do not mind. What comes back is measured here. SciPy's SLSQP takes the same steps (150 to 600 ms
+each with 250 parameters, where this takes 12), but begins anew at every call.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ Value = TypeVar("Value")
 _NOWHERE = 1e3
 """Objective where the balance cannot be solved: a line search steps back from it."""
 _ACTIVE = 1e-6
-"""Slack below which an inequality may carry a multiplier; its product with the slack is measured too."""
+"""Slack below which an inequality may carry a multiplier; its product with the slack is measured
+too."""
 _EDGE = 1e-9
 _FEASIBLE = 1e-10
 """Sum of the violations that no accuracy asks to be below."""
@@ -30,8 +33,8 @@ _TRIED, _DAMPED = 12, 0.2
 
 
 class NonlinearProgram(Protocol):
-    """Minimise ``objective(v)`` with v within ``lower, upper`` and ``rows(v)`` within ``row_lower, row_upper``; where those are
-    equal, rows are equations."""
+    """Minimise ``objective(v)`` with v within ``lower, upper`` and ``rows(v)`` within ``row_lower,
+    row_upper``; where those are equal, rows are equations."""
 
     @property
     def lower(self) -> np.ndarray: ...
@@ -70,18 +73,28 @@ class Stationarity:
 
 
 def binding(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which rows and bounds, counted on, may carry a multiplier at their upper and at their lower ends; and their slopes,
-    ``(n, n_binding)``, those at lower ends reversed."""
-    values, unit = np.concatenate([program.rows(v), v]), np.vstack([program.row_slopes(v), np.eye(v.size)])
-    lower, upper = np.concatenate([program.row_lower, program.lower]), np.concatenate([program.row_upper, program.upper])
+    """Which rows and bounds, counted on, may carry a multiplier at their upper and at their lower
+    ends; and their slopes, ``(n, n_binding)``, those at lower ends reversed."""
+    values, unit = (
+        np.concatenate([program.rows(v), v]),
+        np.vstack([program.row_slopes(v), np.eye(v.size)]),
+    )
+    lower, upper = (
+        np.concatenate([program.row_lower, program.lower]),
+        np.concatenate([program.row_upper, program.upper]),
+    )
     high, low = np.flatnonzero(values > upper - _ACTIVE), np.flatnonzero(values < lower + _ACTIVE)
     return high, low, np.concatenate([unit[high], -unit[low]]).T
 
 
 def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
-    """Measure the first-order conditions at v, with the non-negative multipliers that minimise the Lagrangian's gradient."""
+    """Measure the first-order conditions at v, with the non-negative multipliers that minimise the
+    Lagrangian's gradient."""
     gradient, values = program.gradient(v), np.concatenate([program.rows(v), v])
-    lower, upper = np.concatenate([program.row_lower, program.lower]), np.concatenate([program.row_upper, program.upper])
+    lower, upper = (
+        np.concatenate([program.row_lower, program.lower]),
+        np.concatenate([program.row_upper, program.upper]),
+    )
     high, low, columns = binding(program, v)
     multipliers, on = np.zeros(values.size), np.zeros(0)
     if columns.size and np.isfinite(columns).all() and np.isfinite(gradient).all():
@@ -94,7 +107,11 @@ def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
     left = gradient + (columns @ on if on.size else 0.0)
     on_rows, on_bounds = np.split(multipliers, [values.size - v.size])
     return Stationarity(
-        float(np.abs(left).max()), float(outside.max()), float(np.abs(multipliers * slack).max()), on_rows, on_bounds
+        float(np.abs(left).max()),
+        float(outside.max()),
+        float(np.abs(multipliers * slack).max()),
+        on_rows,
+        on_bounds,
     )
 
 
@@ -114,7 +131,8 @@ class SqpResult:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A point and what holds there; an objective or row that cannot be evaluated is far too large."""
+    """A point and what holds there; an objective or row that cannot be evaluated is far too
+    large."""
 
     v: np.ndarray
     objective: float
@@ -139,8 +157,9 @@ def minimised(
 ) -> SqpResult:
     """Minimise from v within a box of the given radius round it.
 
-    Every step is the minimum of a quadratic model, within the box and the rows' linear models. It is shortened until the
-    objective and the violations, each at its price, fall together (Han, 1977; Powell, 1978).
+    Every step is the minimum of a quadratic model, within the box and the rows' linear models. It
+    is shortened until the objective and the violations, each at its price, fall together (Han,
+    1977; Powell, 1978).
 
     Parameters
     ----------
@@ -156,8 +175,17 @@ def minimised(
     v = np.clip(v, program.lower, program.upper)
     lower, upper = np.maximum(program.lower, v - radius), np.minimum(program.upper, v + radius)
     here, fresh = _Point.at(program, v), curvature is None
-    b, price, feasible = np.eye(v.size) if curvature is None else curvature, np.zeros(here.rows.size), max(accuracy, _FEASIBLE)
-    gradient, slopes, count, evaluations = program.gradient(here.v), program.row_slopes(here.v), 0, 1
+    b, price, feasible = (
+        np.eye(v.size) if curvature is None else curvature,
+        np.zeros(here.rows.size),
+        max(accuracy, _FEASIBLE),
+    )
+    gradient, slopes, count, evaluations = (
+        program.gradient(here.v),
+        program.row_slopes(here.v),
+        0,
+        1,
+    )
     with interruptible():
         while count < iterations and not interrupted():
             count += 1
@@ -167,7 +195,10 @@ def minimised(
             if step is not None:
                 price = np.maximum(np.abs(step.on_rows), 0.5 * (price + np.abs(step.on_rows)))
                 promised = gradient @ step.d - step.share * price @ here.outside
-                if abs(gradient @ step.d) + price @ here.outside < accuracy and here.outside.sum() < feasible:
+                if (
+                    abs(gradient @ step.d) + price @ here.outside < accuracy
+                    and here.outside.sum() < feasible
+                ):
                     break
                 there, tried = _improved(program, here, step.d, price, promised)
                 evaluations += tried
@@ -179,18 +210,26 @@ def minimised(
             before, here = here, there
             new_gradient, new_slopes = program.gradient(here.v), program.row_slopes(here.v)
             change = new_gradient - gradient + step.on_rows @ (new_slopes - slopes)
-            gradient, slopes, b, fresh = new_gradient, new_slopes, _updated(b, here.v - before.v, change), False
+            gradient, slopes, b, fresh = (
+                new_gradient,
+                new_slopes,
+                _updated(b, here.v - before.v, change),
+                False,
+            )
             if abs(here.objective - before.objective) < accuracy and here.outside.sum() < feasible:
                 break
     at = here.v
-    inner = (program.lower < lower - _EDGE) & (at < lower + _EDGE) | (program.upper > upper + _EDGE) & (at > upper - _EDGE)
+    inner = (program.lower < lower - _EDGE) & (at < lower + _EDGE) | (
+        program.upper > upper + _EDGE
+    ) & (at > upper - _EDGE)
     return SqpResult(at, here.objective, count, evaluations, bool(inner.any()), b)
 
 
 def _improved(
     program: NonlinearProgram, here: _Point, d: np.ndarray, price: np.ndarray, promised: float
 ) -> tuple[_Point | None, int]:
-    """The first point along a step that keeps a tenth of what the model promises, if there is one; points tried."""
+    """The first point along a step that keeps a tenth of what the model promises, if there is one;
+    points tried."""
     merit, size = here.objective + price @ here.outside, 1.0
     for tried in range(1, _TRIED + 1):
         there = _Point.at(program, here.v + size * d)
@@ -202,7 +241,8 @@ def _improved(
 
 
 def _updated(b: np.ndarray, s: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Curvature after a step s that changed the Lagrangian's gradient by y: BFGS, damped so that it stays positive."""
+    """Curvature after a step s that changed the Lagrangian's gradient by y: BFGS, damped so that it
+    stays positive."""
     bs = b @ s
     sbs, sy = s @ bs, s @ y
     if not np.isfinite(sy) or sbs <= 0:

@@ -1,4 +1,5 @@
-"""Pictures of an animation: the body on the plane with the friction on its links, and the path in shape space beside it."""
+"""Pictures of an animation: the body on the plane with the friction on its links, and the path in
+shape space beside it."""
 
 from __future__ import annotations
 
@@ -18,12 +19,21 @@ from colloc.results.solution import Solution
 
 
 def pictures(
-    solution: Solution, count: int, periods: int, *, arrows: bool = True, width: int = 900, from_rest: bool = False
+    solution: Solution,
+    count: int,
+    periods: int,
+    *,
+    arrows: bool = True,
+    width: int = 900,
+    from_rest: bool = False,
 ) -> Iterator[np.ndarray]:
-    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes, of an even width [pixels];
-    with arrows friction is drawn. A body with inertia can be shown from rest (`colloc.Solution.from_rest`)."""
+    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes,
+    of an even width [pixels]; with arrows friction is drawn. A body with inertia can be shown from
+    rest (`colloc.Solution.from_rest`)."""
     if from_rest:
-        shown = frames_of(solution, solution.from_rest(np.linspace(0.0, periods, periods * count + 1)))
+        shown = frames_of(
+            solution, solution.from_rest(np.linspace(0.0, periods, periods * count + 1))
+        )
     else:
         shown = frames(solution, count + 1, periods=periods)
     with styled():
@@ -58,19 +68,28 @@ class _Scene:
         axes.tick_params(length=0, labelbottom=False, labelleft=False)
         axes.spines[:].set_visible(False)
         verdict = "" if solution.status == "solved" else f"  ({solution.status})"
-        title = f"{solution.problem.name}   {solution.problem.objective.name} {solution.measured.value:.4f}{verdict}"
+        title = (
+            f"{solution.problem.name}   {solution.problem.objective.name} "
+            f"{solution.measured.value:.4f}{verdict}"
+        )
         figure.text(0.015, 0.93, title, fontsize=11, weight="bold")
         self.phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
-        self.trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in (SKY, ORANGE, VERMILION)]
+        self.trails = [
+            axes.plot([], [], color=colour, lw=1)[0] for colour in (SKY, ORANGE, VERMILION)
+        ]
         # a pixel is `scale` body lengths, and 0.72 points
         thickness = 0.72 * solution.problem.body.drawn_width / scale or 4
-        (self.body,) = axes.plot([], [], "-", color=INK, lw=thickness, solid_capstyle="round", solid_joinstyle="round")
+        (self.body,) = axes.plot(
+            [], [], "-", color=INK, lw=thickness, solid_capstyle="round", solid_joinstyle="round"
+        )
         (self.joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
         (self.head,) = axes.plot([], [], "o", color=INK, ms=9)
         (self.centre,) = axes.plot([], [], "o", color=VERMILION, ms=5)
         self.feet = FootMarks(axes, foot_kinds(solution.problem.body), 8.0)
         if key := self.feet.key():
-            axes.legend(key.values(), key.keys(), loc="lower right", ncols=len(key), borderaxespad=0)
+            axes.legend(
+                key.values(), key.keys(), loc="lower right", ncols=len(key), borderaxespad=0
+            )
         self.quiver: Any = None
         if arrows:
             base = shown.arrow_base[:, :, 0]
@@ -101,13 +120,17 @@ class _Scene:
         self.joints.set_data(*ends[:, self.hinges])
         self.head.set_data(*ends[:, -1:])
         self.centre.set_data(*before.of(shown.centre[:, [k]]))
-        for line, path in zip(self.trails, (shown.ends[:, 0], shown.ends[:, -1], shown.centre), strict=True):
+        for line, path in zip(
+            self.trails, (shown.ends[:, 0], shown.ends[:, -1], shown.centre), strict=True
+        ):
             whole = [earlier.of(path) for earlier in shown.before[:period]]
             line.set_data(*np.concatenate([*whole, before.of(path[:, : k + 1])], axis=1))
         self.feet.place(before.of(shown.feet[..., k]), shown.holding[:, k])
         if self.quiver is not None:
             self.quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
-            self.quiver.set_UVC(*(shown.arrow_scale * turned(shown.arrow[:, :, k], before.rotation)))
+            self.quiver.set_UVC(
+                *(shown.arrow_scale * turned(shown.arrow[:, :, k], before.rotation))
+            )
         if self.dot is not None:
             self.dot.set_data(shown.angles[:1, k], shown.angles[1:2, k])
         self.phase.set_text(f"t = {period + shown.t[k]:.2f} of {len(shown.before) * shown.t[-1]:g}")

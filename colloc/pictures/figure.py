@@ -16,7 +16,17 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.foot_marks import FootMarks
 from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
-from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SEQUENTIAL, SERIES, VERMILION, snapshot_colours
+from colloc.pictures.style import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    PHASE,
+    SEQUENTIAL,
+    SERIES,
+    VERMILION,
+    snapshot_colours,
+)
 from colloc.results.solution import Solution
 
 _GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08
@@ -26,7 +36,8 @@ _FLAT, _SEEN = 0.12, 0.3
 _SMALL = 1.6
 """Extent [rad] below which a path in shape space is shown from closer than the whole plane."""
 _MOST_PERIODS, _NAMED = 3, 5
-"""Drawn in the lab, at most; and lines that a legend names where there are too many for all of them."""
+"""Drawn in the lab, at most; and lines that a legend names where there are too many for all of
+them."""
 _CELLS = 180
 _ROUND = 9
 """Vertices of the round end of a link."""
@@ -34,7 +45,8 @@ _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
-    """The body at equal steps of a period, side by side and apart; below, the phase and how far its centre has come."""
+    """The body at equal steps of a period, side by side and apart; below, the phase and how far its
+    centre has come."""
     t = np.linspace(0.0, 1.0, count)
     motion = solution.sample(t)
     x, y = lab_outline(solution.problem.body, motion.angles, motion.theta, motion.tail)
@@ -51,8 +63,16 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
         draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body)
         marks = FootMarks(axes, foot_kinds(solution.problem.body), 4.5)
         marks.place(feet[..., k] * [[[1]], [[higher]]] + [[[shift[k]]], [[0]]], held[:, k])
-        axes.plot(motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6)
-        below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
+        axes.plot(
+            motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6
+        )
+        below: Any = {
+            "xycoords": "data",
+            "textcoords": "offset points",
+            "ha": "center",
+            "va": "top",
+            "fontsize": 7,
+        }
         axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, -3), color=GREY, **below)
         axes.annotate(
             f"{round(float(motion.centre[0, k]), 2) + 0.0:.2f}".replace("-", "−"),
@@ -64,12 +84,18 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     axes.set(xlim=(0, float(room.sum())), ylim=(low, float(y.max()) + _MARGIN), aspect="equal")
     axes.set_axis_off()
     if higher > 1:
-        above: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "color": GREY, "fontsize": 7}
+        above: Any = {
+            "xycoords": "axes fraction",
+            "textcoords": "offset points",
+            "color": GREY,
+            "fontsize": 7,
+        }
         axes.annotate(f"heights drawn {higher} times as large", (0, 1), (4, 4), **above)
 
 
 def strips(ends: np.ndarray, width: float) -> np.ndarray:
-    """Round-ended strips of a width about the parts of an outline ``(2, n_point)``: polygons ``(n_part, n_vertex, 2)``."""
+    """Round-ended strips of a width about the parts of an outline ``(2, n_point)``: polygons
+    ``(n_part, n_vertex, 2)``."""
     along = np.arctan2(*np.diff(ends)[::-1])[:, None]
     half_turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ROUND)
     rims = [
@@ -80,7 +106,8 @@ def strips(ends: np.ndarray, width: float) -> np.ndarray:
 
 
 def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body) -> None:
-    """One body from its outline, ``(2, n_point)``: links of their width, if they have one, joints hollow, the head a disc."""
+    """One body from its outline, ``(2, n_point)``: links of their width, if they have one, joints
+    hollow, the head a disc."""
     if body.drawn_width:
         links = list(strips(ends, body.drawn_width))
         axes.add_collection(PolyCollection(links, facecolors=[colour], edgecolors="white", lw=0.2))
@@ -91,9 +118,11 @@ def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body
 
 
 def draw_lab(axes: Axes, solution: Solution) -> None:
-    """Paths of the body's ends and its centre of mass in the lab, and the body at both ends of them, apart.
+    """Paths of the body's ends and its centre of mass in the lab, and the body at both ends of
+    them, apart.
 
-    As many periods as it takes for the body to leave the place where it began, and one body if that takes too many.
+    As many periods as it takes for the body to leave the place where it began, and one body if that
+    takes too many.
     """
     start = solution.sample(0.0)
     begin = lab_outline(solution.problem.body, start.angles, start.theta, start.tail)[:, :, 0]
@@ -104,8 +133,15 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     periods = max(1, int(np.ceil(needed))) if apart else 1
     fine = solution.sample(np.linspace(0.0, periods, 600 * periods + 1))
     ends = lab_outline(solution.problem.body, fine.angles, fine.theta, fine.tail)
-    feet, held = lab_feet(solution.problem.body, fine.angles, fine.theta, fine.tail), solution.holding(fine)
-    for path, colour, name in ((ends[:, 0], BLUE, "tail"), (ends[:, -1], ORANGE, "head"), (fine.centre, VERMILION, "centre")):
+    feet, held = (
+        lab_feet(solution.problem.body, fine.angles, fine.theta, fine.tail),
+        solution.holding(fine),
+    )
+    for path, colour, name in (
+        (ends[:, 0], BLUE, "tail"),
+        (ends[:, -1], ORANGE, "head"),
+        (fine.centre, VERMILION, "centre"),
+    ):
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
         draw_body(axes, ends[:, :, k], shade, solution.problem.body)
@@ -118,11 +154,14 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     draw_key(axes, more=marks.key())
 
 
-def forbidden(body: Body, joint_limit: Limit, first: int = 0, second: int = 1) -> tuple[np.ndarray, np.ndarray]:
+def forbidden(
+    body: Body, joint_limit: Limit, first: int = 0, second: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of two shape coordinates that are forbidden whatever the others are.
 
-    Of a body with no others: by its limits, and where parts cross. Of one with more: by limits on these two alone, as those of
-    a chain's joints are; what a smooth body may do in one of several modes depends on all.
+    Of a body with no others: by its limits, and where parts cross. Of one with more: by limits on
+    these two alone, as those of a chain's joints are; what a smooth body may do in one of several
+    modes depends on all.
 
     Returns
     -------
@@ -144,7 +183,9 @@ def forbidden(body: Body, joint_limit: Limit, first: int = 0, second: int = 1) -
     return grid, np.maximum(excess, 0.0).reshape(a.shape)
 
 
-def draw_allowed(axes: Axes, body: Body, joint_limit: Limit, first: int = 0, second: int = 1) -> None:
+def draw_allowed(
+    axes: Axes, body: Body, joint_limit: Limit, first: int = 0, second: int = 1
+) -> None:
     """Grey over the pairs of two shape coordinates that are `forbidden`."""
     grid, excess = forbidden(body, joint_limit, first, second)
     if excess.max() > 1e-9:
@@ -158,8 +199,11 @@ def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> No
     draw_key(axes, body.coordinate)
 
 
-def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
-    """The gait in the plane of two of all joint angles, light to dark, its start a disc, over the shapes that are allowed."""
+def draw_shape_path(
+    axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1
+) -> None:
+    """The gait in the plane of two of all joint angles, light to dark, its start a disc, over the
+    shapes that are allowed."""
     draw_allowed(axes, problem.body, problem.joint_limit, first, second)
     q = angles[[first, second]]
     colours = colormaps[PHASE](np.linspace(0.1, 0.8, 200))  # to be seen on white and on black
@@ -171,7 +215,8 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
     arrow = {"arrowstyle": "-|>", "color": VERMILION, "lw": 1.4}
     axes.annotate("", (q[0, at + 2], q[1, at + 2]), (q[0, at], q[1, at]), arrowprops=arrow)
     middle, half = np.zeros(2), 1.02 * np.pi
-    extent = float(np.ptp(angles, axis=1).max())  # of all coordinates: every plane of a gait has one scale
+    # of all coordinates: every plane of a gait has one scale
+    extent = float(np.ptp(angles, axis=1).max())
     if extent < _SMALL:
         middle, half = 0.5 * (q.min(axis=1) + q.max(axis=1)), 0.6 * max(extent, 0.05)
         axes.xaxis.set_major_locator(MaxNLocator(5))
@@ -187,7 +232,8 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
 
 
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
-    """Speeds of links, or of other parts, over a period, on a logarithmic scale that shows stick, and delta."""
+    """Speeds of links, or of other parts, over a period, on a logarithmic scale that shows stick,
+    and delta."""
     problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
     part, speed = problem.body.speeds(motion.angles, motion.rates, motion.z)
     speed = np.maximum(speed, 0.1 * delta)
@@ -210,11 +256,20 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
 
 def draw_mesh_ticks(axes: Axes, edges: np.ndarray) -> None:
     """Strokes on the time axis where mesh intervals meet."""
-    axes.plot(edges, np.zeros_like(edges), "|", color=GREY, ms=7, transform=axes.get_xaxis_transform(), clip_on=False)
+    axes.plot(
+        edges,
+        np.zeros_like(edges),
+        "|",
+        color=GREY,
+        ms=7,
+        transform=axes.get_xaxis_transform(),
+        clip_on=False,
+    )
 
 
 def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
-    """A logarithmic axis with powers of ten as plain text, which costs a tenth of what typeset ones do."""
+    """A logarithmic axis with powers of ten as plain text, which costs a tenth of what typeset ones
+    do."""
     axes.set(**{f"{which}scale": "log", f"{which}lim": limits})
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_locator(LogLocator(numticks=6))
@@ -223,8 +278,8 @@ def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
 
 
 def draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
-    """A line for every joint, or part, that is named by its number; where there are more than colours that differ, from dark to
-    light, and a few are named."""
+    """A line for every joint, or part, that is named by its number; where there are more than
+    colours that differ, from dark to light, and a few are named."""
     count = len(rows)
     many = count > len(SERIES)
     colours = colormaps[SEQUENTIAL](np.linspace(0.0, 0.9, count)) if many else SERIES
@@ -240,6 +295,7 @@ def draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) ->
     if of:
         labels[0] = f"{of} {labels[0]}"
     axes.legend(
-        handles, labels, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(labels), fontsize=7, handlelength=1,
+        handles, labels, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(labels), fontsize=7,
+        handlelength=1,
         columnspacing=0.8, handletextpad=0.8 if more else 0.3, borderpad=0, borderaxespad=0.3,
     )  # fmt: skip

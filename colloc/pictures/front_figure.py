@@ -13,7 +13,8 @@ _PHASES = np.linspace(0.0, 1.0, 1001)
 
 
 def front_figure(front: ParetoFront) -> Figure:
-    """Left the front, right the paths of its gaits in the plane of the first two joints, in the same colours."""
+    """Left the front, right the paths of its gaits in the plane of the first two joints, in the
+    same colours."""
     planar = front.problem.body.n_joint > 1
     with styled():
         figure = Figure(figsize=(7.2 if planar else 3.8, 3.4))
@@ -33,7 +34,15 @@ def draw_front(axes: Axes, front: ParetoFront) -> Axes:
     axes.plot(whole[:, 1], whole[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
     for k in after:
         label = "nothing found between" if k == after[0] else None
-        axes.plot(values[k - 1 : k + 1, 1], values[k - 1 : k + 1, 0], ":", color=VERMILION, lw=0.8, zorder=1, label=label)
+        axes.plot(
+            values[k - 1 : k + 1, 1],
+            values[k - 1 : k + 1, 0],
+            ":",
+            color=VERMILION,
+            lw=0.8,
+            zorder=1,
+            label=label,
+        )
     axes.scatter(values[:, 1], values[:, 0], c=snapshot_colours(len(front.points)), s=28, zorder=2)
     axes.set(xlabel=second.label, ylabel=first.label)
     axes.set_title(front.problem.name)

@@ -1,4 +1,5 @@
-"""What an animation needs: the body in the lab frame, frame by frame, with the friction along its links."""
+"""What an animation needs: the body in the lab frame, frame by frame, with the friction along its
+links."""
 
 from __future__ import annotations
 
@@ -32,12 +33,14 @@ class Frames:
     t: np.ndarray  # (n_time,)
     angles: np.ndarray  # (n_joint, n_time)
     ends: np.ndarray
-    """Lab positions of the body's outline (the ends of links), tail first, ``(2, n_point, n_time)``."""
+    """Lab positions of the body's outline (the ends of links), tail first, ``(2, n_point,
+    n_time)``."""
     centre: np.ndarray
     """Of mass, ``(2, n_time)``."""
     arrow_base: np.ndarray
     arrow: np.ndarray
-    """Where friction is shown, and the force per length there, in lab axes, ``(2, n_arrow, n_time)`` each."""
+    """Where friction is shown, and the force per length there, in lab axes, ``(2, n_arrow,
+    n_time)`` each."""
     holding: np.ndarray
     """Of feet: those that hold, ``(n_foot, n_time)``; no rows for a body without."""
     feet: np.ndarray
@@ -59,7 +62,8 @@ class Frames:
 
 
 def foot_kinds(body: Body) -> tuple[str, ...]:
-    """What the feet of a body are, in the order of `lab_feet` (`colloc.mechanics.feet.Foot.kind`)."""
+    """What the feet of a body are, in the order of `lab_feet`
+    (`colloc.mechanics.feet.Foot.kind`)."""
     chain = body.chain if isinstance(body, Coupled) else body
     if isinstance(chain, Chain):
         return tuple(foot.kind for foot in chain.standing_on)
@@ -68,7 +72,12 @@ def foot_kinds(body: Body) -> tuple[str, ...]:
 
 def foot_words(kinds: Sequence[str]) -> str:
     """What the marks of such feet mean, in words; empty for a body that lies on the floor."""
-    return " ".join([*(_WORDS[kind] for kind in dict.fromkeys(kinds)), *(["Filled: it holds."] if kinds else [])])
+    return " ".join(
+        [
+            *(_WORDS[kind] for kind in dict.fromkeys(kinds)),
+            *(["Filled: it holds."] if kinds else []),
+        ]
+    )
 
 
 def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
@@ -77,24 +86,30 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
 
 
 def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
-    """Lab positions of both ends of the feet of a body, wheels as they are drawn, ``(2, 2, n_foot, n_time)``; none where it
-    has none."""
+    """Lab positions of both ends of the feet of a body, wheels as they are drawn, ``(2, 2, n_foot,
+    n_time)``; none where it has none."""
     return tail[:, None, None] + turned(body.footprints(angles, _WHEEL), theta)
 
 
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
-    """Sample a solution's motion at `count` instants, both ends of the period included, and the friction that acts on it at
-    about so many arrows along the body; `periods` are shown in a row."""
+    """Sample a solution's motion at `count` instants, both ends of the period included, and the
+    friction that acts on it at about so many arrows along the body; `periods` are shown in a
+    row."""
     return frames_of(solution, solution.sample(np.linspace(0.0, 1.0, count)), arrows, periods)
 
 
-def frames_of(solution: Solution, motion: SampledMotion, arrows: int = ARROWS, periods: int = 1) -> Frames:
+def frames_of(
+    solution: Solution, motion: SampledMotion, arrows: int = ARROWS, periods: int = 1
+) -> Frames:
     """The same of any motion of a solution's gait, which is repeated so many times."""
     problem = solution.problem
     body, delta = problem.body, solution.delta_per_period
     ends = lab_outline(body, motion.angles, motion.theta, motion.tail)
     places, forces = body.rubbing(problem.law, motion.angles, motion.rates, delta, motion.z, arrows)
-    period = RigidMotion(float(motion.theta[-1] - motion.theta[0]), complex(*(motion.centre[:, -1] - motion.centre[:, 0])))
+    period = RigidMotion(
+        float(motion.theta[-1] - motion.theta[0]),
+        complex(*(motion.centre[:, -1] - motion.centre[:, 0])),
+    )
     return Frames(
         motion.t,
         motion.angles,

@@ -21,7 +21,8 @@ _MOST_PICTURES = 5000
 
 
 def write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
-    """Write pictures as a GIF that repeats for ever; all share the palette of the first one with some of the others'."""
+    """Write pictures as a GIF that repeats for ever; all share the palette of the first one with
+    some of the others'."""
     from PIL import Image
 
     images = [Image.fromarray(picture) for picture in pictures]
@@ -30,23 +31,44 @@ def write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
     flat = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     duration = max(20, 10 * round(100 / fps))  # the format counts hundredths of a second
     with replaced_file(path) as temporary:
-        flat[0].save(temporary, format="GIF", save_all=True, append_images=flat[1:], duration=duration, loop=0)
+        flat[0].save(
+            temporary,
+            format="GIF",
+            save_all=True,
+            append_images=flat[1:],
+            duration=duration,
+            loop=0,
+        )
 
 
 def _ffmpeg() -> str:
     program = shutil.which("ffmpeg")
     if program is None:
-        raise ProblemError("MP4 needs the program ffmpeg, which is not installed; install it, or write a GIF: --format gif.")
+        raise ProblemError(
+            "MP4 needs the program ffmpeg, which is not installed; install it, or write a GIF: "
+            "--format gif."
+        )
     return program
 
 
 def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
-    """Write pictures as H.264 video through ffmpeg. `ProblemError` if ffmpeg is not installed, or fails."""
+    """Write pictures as H.264 video through ffmpeg. `ProblemError` if ffmpeg is not installed, or
+    fails."""
     ffmpeg = _ffmpeg()
     first = next(pictures)
     size = f"{first.shape[1]}x{first.shape[0]}"
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", f"{fps:g}", "-i", "-"]
-    coded = ["-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"]
+    coded = [
+        "-an",
+        "-c:v",
+        "libx264",
+        "-pix_fmt",
+        "yuv420p",
+        "-movflags",
+        "+faststart",
+        "-f",
+        "mp4",
+    ]
     with replaced_file(path) as temporary:
         command = [ffmpeg, "-y", "-loglevel", "error", *raw, *coded, temporary]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
@@ -61,7 +83,9 @@ def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
                 pass  # ffmpeg ended early; its own words follow
             complaint = process.stderr.read().decode(errors="replace").strip()
         if process.returncode:
-            raise ProblemError(f"ffmpeg failed: {complaint.splitlines()[-1] if complaint else process.returncode}.")
+            raise ProblemError(
+                f"ffmpeg failed: {complaint.splitlines()[-1] if complaint else process.returncode}."
+            )
 
 
 def write_movie(
@@ -94,18 +118,23 @@ def write_movie(
     arrows : bool
         Draw friction.
     from_rest : bool
-        Show the first periods of a body with inertia, which is at rest before, instead of those that are all alike.
+        Show the first periods of a body with inertia, which is at rest before, instead of those
+        that are all alike.
     quiet : bool
         Say nothing while it is drawn, also on a terminal.
 
     Raises
     ------
     ProblemError
-        If a number or the ending of the path is unusable, the solution holds no gait, or MP4 is asked for without ffmpeg.
+        If a number or the ending of the path is unusable, the solution holds no gait, or MP4 is
+        asked for without ffmpeg.
     """
     count = round(seconds * fps) if np.isfinite(seconds * fps) else 0
     if periods < 1 or count < 2 or periods * count > _MOST_PICTURES:
-        raise ProblemError(f"{periods} periods of {count:g} pictures cannot be drawn; change periods, seconds or fps.")
+        raise ProblemError(
+            f"{periods} periods of {count:g} pictures cannot be drawn; change periods, seconds "
+            f"or fps."
+        )
     if not 200 <= width <= 4000:
         raise ProblemError(f"width must lie between 200 and 4000, not {width}.")
     if path.suffix not in (".gif", ".mp4"):
@@ -113,7 +142,9 @@ def write_movie(
     solution.gait  # noqa: B018  raises where there is none
     if path.suffix == ".mp4":
         _ffmpeg()  # before anything is drawn
-    drawn = pictures(solution, count, periods, arrows=arrows, width=2 * (width // 2), from_rest=from_rest)
+    drawn = pictures(
+        solution, count, periods, arrows=arrows, width=2 * (width // 2), from_rest=from_rest
+    )
     with StatusLine(enabled=not quiet) as line:
         counted = _counted(drawn, periods * count, line)
         (write_mp4 if path.suffix == ".mp4" else write_gif)(path, counted, fps)

@@ -61,10 +61,14 @@ def draw_convergence(axes: Axes, solution: Solution) -> None:
     good = [step for step in solution.history if step.optimal]
     bad = [step for step in solution.history if not step.optimal]
     deltas = np.array([step.delta for step in solution.history])
-    axes.plot([step.delta for step in good], [step.value for step in good], "o-", color=BLUE, ms=4, lw=1.2)
+    axes.plot(
+        [step.delta for step in good], [step.value for step in good], "o-", color=BLUE, ms=4, lw=1.2
+    )
     if good:
         axes.set_ylim(*axes.get_ylim())
-    axes.plot([step.delta for step in bad], [step.value for step in bad], "x", color=VERMILION, ms=5)
+    axes.plot(
+        [step.delta for step in bad], [step.value for step in bad], "x", color=VERMILION, ms=5
+    )
     axes.set(xlabel="δ  [length/period]", ylabel=solution.problem.objective.label)
     axes.ticklabel_format(axis="y", useOffset=False)
     set_log(axes, "x", (deltas.min() / 2, deltas.max() * 2))
@@ -73,12 +77,19 @@ def draw_convergence(axes: Axes, solution: Solution) -> None:
 def mesh_errors(solution: Solution) -> np.ndarray:
     """Estimated error of the objective from every mesh interval, ``(n,)``, magnitudes."""
     control = control_problem(solution.answer.problem)
-    return np.abs(mesh_error(control, solution.mesh, solution.gait, solution.delta_per_period).value)
+    return np.abs(
+        mesh_error(control, solution.mesh, solution.gait, solution.delta_per_period).value
+    )
 
 
 def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:
-    """Estimated error of the objective from every mesh interval, `mesh_errors`, and what is allowed in all."""
-    edges, shown, tolerance = solution.mesh.edges, np.maximum(errors, 1e-12), solution.problem.mesh_tolerance
+    """Estimated error of the objective from every mesh interval, `mesh_errors`, and what is allowed
+    in all."""
+    edges, shown, tolerance = (
+        solution.mesh.edges,
+        np.maximum(errors, 1e-12),
+        solution.problem.mesh_tolerance,
+    )
     axes.stairs(shown, edges, color=ORANGE, lw=1.2, baseline=None)
     draw_mesh_ticks(axes, edges)
     high = float(shown.max())
@@ -96,21 +107,27 @@ def panels(solution: Solution) -> dict[str, Panel]:
     found = {
         "filmstrip": Panel(PAGE, 1.9, lambda axes: draw_filmstrip(axes, solution, count=6)),
         "lab": Panel(PAGE, 3.0, lambda axes: draw_lab(axes, solution)),
-        "angles": Panel(COLUMN, 2.2, lambda axes: draw_angles(axes, t, angles, solution.problem.body)),
+        "angles": Panel(
+            COLUMN, 2.2, lambda axes: draw_angles(axes, t, angles, solution.problem.body)
+        ),
         "speeds": Panel(COLUMN, 2.4, lambda axes: draw_speeds(axes, solution, t)),
         "power": Panel(COLUMN, 2.4, lambda axes: draw_power(axes, solution, t)),
         "convergence": Panel(COLUMN, 2.2, lambda axes: draw_convergence(axes, solution)),
         "mesh": Panel(COLUMN, 2.2, lambda axes: draw_mesh(axes, solution, mesh_errors(solution))),
     }
     for j in range(len(angles) - 1 if solution.problem.gait.free else 0):
-        drawn = partial(draw_shape_path, problem=solution.problem, angles=angles, first=j, second=j + 1)
+        drawn = partial(
+            draw_shape_path, problem=solution.problem, angles=angles, first=j, second=j + 1
+        )
         found[f"shape-{j + 1}-{j + 2}"] = Panel(COLUMN, 3.2, drawn)
     return found
 
 
 def draw_panel(axes: Axes, solution: Solution, panel: str = "gait") -> Axes:
     """Draw the panel of that name, and return the axes. `ProblemError` if there is none."""
-    found = {"gait": Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))} | panels(solution)
+    found = {"gait": Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))} | panels(
+        solution
+    )
     return chosen(found, panel).draw_on(axes)
 
 
@@ -123,5 +140,7 @@ def chosen(found: dict[str, Panel], name: str) -> Panel:
 
 def save_panels(solution: Solution, stem: Path) -> list[Path]:
     """Write ``STEM-PANEL.pdf`` and ``.png`` for every panel; returns the PDFs."""
-    named = ((stem.with_name(f"{stem.name}-{name}"), panel) for name, panel in panels(solution).items())
+    named = (
+        (stem.with_name(f"{stem.name}-{name}"), panel) for name, panel in panels(solution).items()
+    )
     return [save(panel.figure(), path, dpi=_RESOLUTION)[-1] for path, panel in named]

@@ -19,7 +19,9 @@ def robot_figure(robot: Robot) -> Figure:
     """Torque, speed and power over a period, one below the other."""
     with styled():
         figure = Picture(figsize=(6.4, 6.4))
-        for axes, panel in zip(figure.subplots(len(_SHOWN), sharex=True), robot_panels(robot).values(), strict=True):
+        for axes, panel in zip(
+            figure.subplots(len(_SHOWN), sharex=True), robot_panels(robot).values(), strict=True
+        ):
             panel.draw(axes)
             axes.label_outer()
     return figure

@@ -26,7 +26,11 @@ def solution_card(solution: Solution) -> str:
     failed = sum(not check.passed for check in checks)
     tally = f"{len(checks)} checks, {'all hold' if failed == 0 else f'{failed} failed'}"
     listed = _table(
-        (f"{'✓' if check.passed else '✗'} {check.name}", f"{check.value:.1e} (≤ {check.threshold:.0e})") for check in checks
+        (
+            f"{'✓' if check.passed else '✗'} {check.name}",
+            f"{check.value:.1e} (≤ {check.threshold:.0e})",
+        )
+        for check in checks
     )
     parts = [
         f"<div><b>{escape(solution.problem.name)}</b> {escape(solution.status)}</div>",
@@ -35,15 +39,22 @@ def solution_card(solution: Solution) -> str:
         f"<div>{foot_words(foot_kinds(solution.problem.body))}</div>",
         _table(_facts(solution)),
         f"<div>δ = {solution.answer.delta:.0e}; {escape(solution.standing[0])}</div>",
-        f"<details{' open' if failed else ''}><summary>{tally}</summary>{listed}</details>" if checks else "",
+        f"<details{' open' if failed else ''}><summary>{tally}</summary>{listed}</details>"
+        if checks
+        else "",
     ]
     return f"<div>{''.join(parts)}</div>"
 
 
 def film(solution: Solution) -> str:
-    """Two periods from above as an SVG that moves by itself, in the colour of the text around it; feet that hold are filled."""
+    """Two periods from above as an SVG that moves by itself, in the colour of the text around it;
+    feet that hold are filled."""
     shown = frames(solution, _FRAMES + 1, arrows=1, periods=_PERIODS)
-    chosen = np.linspace(0, shown.ends.shape[1] - 1, min(_POINTS, shown.ends.shape[1])).round().astype(int)
+    chosen = (
+        np.linspace(0, shown.ends.shape[1] - 1, min(_POINTS, shown.ends.shape[1]))
+        .round()
+        .astype(int)
+    )
     low, high = shown.window
     scale = min(_WIDTH / (high - low)[0], _TALLEST / (high - low)[1])
     size = np.ceil(scale * (high - low)).astype(int)
@@ -60,21 +71,33 @@ def film(solution: Solution) -> str:
     body, centre = pixels(shown.ends[:, chosen]), pixels(shown.centre[:, None])
     line = 'fill="none" stroke="currentColor" stroke-linecap="round" stroke-linejoin="round"'
     drawn = [
-        f'<polyline points="{_points(body[..., 0])}" {line} stroke-width="{width:.1f}" opacity="0.15"/>',
+        f'<polyline points="{_points(body[..., 0])}" {line} stroke-width="{width:.1f}" '
+        f'opacity="0.15"/>',
         f'<polyline points="{_points(centre[:, 0])}" {line} stroke-width="1" opacity="0.4"/>',
         _line(body, clock, f'{line} stroke-width="{width:.1f}"'),
         _disc(body[:, -1], clock, f'r="{0.8 * width + 2:.1f}" fill="currentColor"'),
     ]
-    for number, (kind, holds) in enumerate(zip(foot_kinds(solution.problem.body), shown.holding[:, :-1], strict=True)):
+    for number, (kind, holds) in enumerate(
+        zip(foot_kinds(solution.problem.body), shown.holding[:, :-1], strict=True)
+    ):
         foot, colour = pixels(shown.feet[:, :, number]), "#009e73" if kind == WHEEL else "#d55e00"
         slides = ";".join("0" if held else "1" for held in np.tile(holds, _PERIODS))
-        hollow = f'<animate attributeName="stroke-opacity" calcMode="discrete" values="{slides}" {clock}/>'
-        drawn.append(_line(foot, clock, f'stroke="{colour}" stroke-width="8" stroke-linecap="square"'))
+        hollow = (
+            f'<animate attributeName="stroke-opacity" calcMode="discrete" values="{slides}" '
+            f"{clock}/>"
+        )
+        drawn.append(
+            _line(foot, clock, f'stroke="{colour}" stroke-width="8" stroke-linecap="square"')
+        )
         cap = "square" if kind == FOOT else "butt"
-        drawn.append(_line(foot, clock, f'stroke="white" stroke-width="4.4" stroke-linecap="{cap}"', hollow))
+        drawn.append(
+            _line(foot, clock, f'stroke="white" stroke-width="4.4" stroke-linecap="{cap}"', hollow)
+        )
     return (
-        f'<svg width="{size[0]}" height="{size[1]}" viewBox="0 0 {size[0]} {size[1]}" role="img" style="max-width:100%" '
-        f'aria-label="{escape(solution.problem.name)} as it moves, two periods">{"".join(drawn)}</svg>'
+        f'<svg width="{size[0]}" height="{size[1]}" viewBox="0 0 {size[0]} {size[1]}" role="img" '
+        f'style="max-width:100%" '
+        f'aria-label="{escape(solution.problem.name)} as it moves, two '
+        f'periods">{"".join(drawn)}</svg>'
     )
 
 
@@ -84,14 +107,18 @@ def _points(places: np.ndarray) -> str:
 
 def _line(places: np.ndarray, clock: str, look: str, inside: str = "") -> str:
     """A line that runs through places, ``(2, n_point, n_time)``."""
-    moves = f'<animate attributeName="points" values="{";".join(map(_points, np.moveaxis(places, -1, 0)))}" {clock}/>'
+    moves = (
+        f'<animate attributeName="points" '
+        f'values="{";".join(map(_points, np.moveaxis(places, -1, 0)))}" {clock}/>'
+    )
     return f'<polyline points="{_points(places[..., 0])}" {look}>{moves}{inside}</polyline>'
 
 
 def _disc(places: np.ndarray, clock: str, look: str) -> str:
     """A circle whose centre runs through places, ``(2, n_time)``."""
     moves = "".join(
-        f'<animate attributeName="{name}" values="{";".join(f"{value:.1f}" for value in row)}" {clock}/>'
+        f'<animate attributeName="{name}" values="{";".join(f"{value:.1f}" for value in row)}" '
+        f"{clock}/>"
         for name, row in zip(("cx", "cy"), places, strict=True)
     )
     return f'<circle cx="{places[0, 0]:.1f}" cy="{places[1, 0]:.1f}" {look}>{moves}</circle>'
@@ -105,7 +132,10 @@ def _facts(solution: Solution) -> list[tuple[str, str]]:
     own = [] if best == EFFICIENCY else [(EFFICIENCY.label, f"{certificate.efficiency:.5f}")]
     return [
         (best.label, f"{certificate.value:.5f} ± {certificate.value_error:.0e}"),
-        ("for δ → 0", f"{certificate.value_at_zero_delta:.5f} ± {certificate.value_error_at_zero_delta:.0e}"),
+        (
+            "for δ → 0",
+            f"{certificate.value_at_zero_delta:.5f} ± {certificate.value_error_at_zero_delta:.0e}",
+        ),
         *own,
         ("distance d", f"{certificate.distance:.5f}"),
         ("work W", f"{certificate.work:.5f}"),
@@ -114,5 +144,8 @@ def _facts(solution: Solution) -> list[tuple[str, str]]:
 
 
 def _table(rows: Iterable[tuple[str, str]]) -> str:
-    lines = (f'<tr><td style="text-align:left">{escape(key)}</td><td>{escape(value)}</td></tr>' for key, value in rows)
+    lines = (
+        f'<tr><td style="text-align:left">{escape(key)}</td><td>{escape(value)}</td></tr>'
+        for key, value in rows
+    )
     return f"<table><tbody>{''.join(lines)}</tbody></table>"

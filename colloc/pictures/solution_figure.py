@@ -1,4 +1,5 @@
-"""The figure of a solution: filmstrip and paths in the lab, then what tells most about its kind of gait."""
+"""The figure of a solution: filmstrip and paths in the lab, then what tells most about its kind of
+gait."""
 
 from __future__ import annotations
 
@@ -8,7 +9,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_power, draw_shape_path, draw_speeds
+from colloc.pictures.figure import (
+    draw_angles,
+    draw_filmstrip,
+    draw_lab,
+    draw_power,
+    draw_shape_path,
+    draw_speeds,
+)
 from colloc.pictures.style import INK, VERMILION, Picture, styled
 from colloc.results.solution import SOLVED, Solution
 
@@ -25,9 +33,15 @@ def solution_figure(solution: Solution) -> Figure:
         colour = INK if solution.status == SOLVED else VERMILION
         figure.text(0.015, 0.985, _headline(solution), fontsize=11, va="top", color=colour)
         draw_filmstrip(figure.add_axes((0.015, 0.76, 0.97, 0.135)), solution)
-        figure.text(0.015, 0.905, "one period, frame by frame: phase, and below it how far the centre has come (disc: head)")
+        figure.text(
+            0.015,
+            0.905,
+            "one period, frame by frame: phase, and below it how far the centre has come "
+            "(disc: head)",
+        )
         grid = figure.add_gridspec(
-            2, 2, left=0.075, right=0.985, bottom=0.06, top=0.685, wspace=0.2, hspace=0.33, width_ratios=(2, 1),
+            2, 2, left=0.075, right=0.985, bottom=0.06, top=0.685, wspace=0.2, hspace=0.33,
+            width_ratios=(2, 1),
             height_ratios=(1.35, 1),
         )  # fmt: skip
         for k, (title, draw) in enumerate(panels.items()):
@@ -51,8 +65,12 @@ def _headline(solution: Solution) -> str:
 def _panels(solution: Solution) -> _Panels:
     t, work = _PHASES, solution.measured.work
     found: _Panels = {"in the lab (black: at the end)": lambda axes: draw_lab(axes, solution)}
-    found["shape space (disc: t = 0)" if _is_planar(solution) else "shape"] = lambda axes: draw_gait(axes, solution)
-    found["speeds along the body; what is near δ sticks"] = lambda axes: draw_speeds(axes, solution, t)
+    found["shape space (disc: t = 0)" if _is_planar(solution) else "shape"] = lambda axes: (
+        draw_gait(axes, solution)
+    )
+    found["speeds along the body; what is near δ sticks"] = lambda axes: draw_speeds(
+        axes, solution, t
+    )
     found[f"power; W = {work:.4f} (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
     return found
 
@@ -62,8 +80,8 @@ def _is_planar(solution: Solution) -> bool:
 
 
 def draw_gait(axes: Axes, solution: Solution) -> Axes:
-    """The gait of a solution: its path in the plane of two shape coordinates, or where that is not all of it their course in
-    time; returns the axes."""
+    """The gait of a solution: its path in the plane of two shape coordinates, or where that is not
+    all of it their course in time; returns the axes."""
     angles, problem = solution.gait.angles(_PHASES), solution.problem
     if _is_planar(solution):
         draw_shape_path(axes, problem, angles)

@@ -16,8 +16,8 @@ _PERIODS, _PHASES = 6, 60
 
 
 def steering_figure(family: Steering) -> Figure:
-    """Left the efficiency against the turn, right six periods of every gait, the centre of mass and a dot a period; gaits that
-    turn on the spot are squares."""
+    """Left the efficiency against the turn, right six periods of every gait, the centre of mass and
+    a dot a period; gaits that turn on the spot are squares."""
     with styled():
         figure = Figure(figsize=(7.2, 3.4))
         for axes, panel in zip(figure.subplots(1, 2), _panels(family).values(), strict=True):
@@ -26,13 +26,16 @@ def steering_figure(family: Steering) -> Figure:
 
 
 def draw_steering(axes: Axes, family: Steering, panel: str = "cost") -> Axes:
-    """Draw the panel of that name, "cost" or "tracks", and return the axes. `ProblemError` if there is none."""
+    """Draw the panel of that name, "cost" or "tracks", and return the axes. `ProblemError` if there
+    is none."""
     return chosen(_panels(family), panel).draw_on(axes)
 
 
 def _panels(family: Steering) -> dict[str, Panel]:
     drawn = {"cost": _draw_cost, "tracks": _draw_tracks}
-    return {name: Panel(COLUMN, COLUMN, partial(draw, family=family)) for name, draw in drawn.items()}
+    return {
+        name: Panel(COLUMN, COLUMN, partial(draw, family=family)) for name, draw in drawn.items()
+    }
 
 
 def _draw_cost(axes: Axes, family: Steering) -> None:
@@ -41,9 +44,23 @@ def _draw_cost(axes: Axes, family: Steering) -> None:
     axes.scatter(turns, family.efficiency, c=snapshot_colours(len(turns)), s=28, zorder=2)
     failed = ~np.array([point.success for point in family.points])
     if failed.any():
-        axes.plot(turns[failed], family.efficiency[failed], "x", color=VERMILION, ms=9, label="not certified")
+        axes.plot(
+            turns[failed],
+            family.efficiency[failed],
+            "x",
+            color=VERMILION,
+            ms=9,
+            label="not certified",
+        )
     if (spot := family.on_the_spot) is not None:
-        axes.plot(np.degrees(spot.turns), spot.efficiency, "s", color=VERMILION, ms=4, label="on the spot, with least work")
+        axes.plot(
+            np.degrees(spot.turns),
+            spot.efficiency,
+            "s",
+            color=VERMILION,
+            ms=4,
+            label="on the spot, with least work",
+        )
     axes.set(xlabel="turn of a period  [degrees, + left]", ylabel="efficiency, chord / W")
     axes.set_ylim(0, 1.1 * family.efficiency.max())
     axes.set_title(family.problem.name)
@@ -55,10 +72,14 @@ def _draw_tracks(axes: Axes, family: Steering) -> None:
     colours = snapshot_colours(len(family.points))
     tracks = [*zip(family.points, colours, "o" * len(colours), strict=True)]
     if (spot := family.on_the_spot) is not None:
-        tracks += zip(spot.points, [VERMILION] * len(spot.points), "s" * len(spot.points), strict=True)
+        tracks += zip(
+            spot.points, [VERMILION] * len(spot.points), "s" * len(spot.points), strict=True
+        )
     t = np.linspace(0.0, _PERIODS, _PERIODS * _PHASES + 1)
     for point, colour, mark in tracks:
         track = point.motion.sample(t).centre  # all arcs set out along +x
         axes.plot(*track, color=colour, lw=1.0)
         axes.plot(*track[:, ::_PHASES], mark, color=colour, ms=3)
-    axes.set(xlabel=f"x  [body lengths],  {_PERIODS} periods", ylabel="y  [body lengths]", aspect="equal")
+    axes.set(
+        xlabel=f"x  [body lengths],  {_PERIODS} periods", ylabel="y  [body lengths]", aspect="equal"
+    )

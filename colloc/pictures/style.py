@@ -1,6 +1,8 @@
-"""What all figures share: one style, colours that colour-blind readers tell apart, saving, bodies with arrows.
+"""What all figures share: one style, colours that colour-blind readers tell apart, saving, bodies
+with arrows.
 
-Figures are made without pyplot, so that drawing one neither opens a window nor changes anybody's backend.
+Figures are made without pyplot, so that drawing one neither opens a window nor changes anybody's
+backend.
 """
 
 from __future__ import annotations
@@ -50,7 +52,9 @@ _STYLE: Any = {
 @contextmanager
 def styled(font_size: float = 9) -> Iterator[None]:
     """The common style, for figures made inside, whatever a user's own is."""
-    with style.context(["default", {**_STYLE, "font.size": font_size, "axes.labelsize": font_size}]):
+    with style.context(
+        ["default", {**_STYLE, "font.size": font_size, "axes.labelsize": font_size}]
+    ):
         yield
 
 
@@ -64,13 +68,17 @@ class Picture(Figure):
         return content.getvalue()
 
 
-def subplots(rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
+def subplots(
+    rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], **options: Any
+) -> tuple[Figure, Any]:
     """A figure of `figsize` inches and its axes."""
     figure = Figure(figsize=figsize)
     return figure, figure.subplots(rows, columns, **options)
 
 
-def save(figure: Figure, stem: Path, kinds: tuple[str, ...] = ("png", "pdf"), dpi: float = _DPI) -> list[Path]:
+def save(
+    figure: Figure, stem: Path, kinds: tuple[str, ...] = ("png", "pdf"), dpi: float = _DPI
+) -> list[Path]:
     """Write ``STEM.KIND`` for every kind, and return the paths.
 
     Raises
@@ -81,7 +89,12 @@ def save(figure: Figure, stem: Path, kinds: tuple[str, ...] = ("png", "pdf"), dp
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     for path, kind in zip(paths, kinds, strict=True):
         with replaced_file(path) as temporary, styled():
-            figure.savefig(temporary, format=kind, dpi=dpi, metadata={"CreationDate": None} if kind == "pdf" else None)
+            figure.savefig(
+                temporary,
+                format=kind,
+                dpi=dpi,
+                metadata={"CreationDate": None} if kind == "pdf" else None,
+            )
         figure.set_layout_engine("none")  # what the first saving laid out holds for the others
     return paths
 

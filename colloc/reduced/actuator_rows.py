@@ -1,8 +1,9 @@
 """Rows that keep the actuators of a collocated gait within their limits.
 
-They are laid on the points of the mesh, where the full program has the forces. What happens between the points is watched:
-by how much the largest value in a mesh interval exceeds that at its points, by so much less is allowed there. Measured again
-whenever the checks are moved, this leaves nothing over once the gait rests.
+They are laid on the points of the mesh, where the full program has the forces. What happens between
+the points is watched: by how much the largest value in a mesh interval exceeds that at its points,
+by so much less is allowed there. Measured again whenever the checks are moved, this leaves nothing
+over once the gait rests.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ _INSIDE = np.linspace(1e-9, 1 - 1e-9, SAMPLES + 1)
 _NEAR = 0.3
 """A value that is nearer to its bound than this, over the limit, is among the rows."""
 _ZOOMS, _CLOSE = 1, 0.02
-"""What is nearer to its limit than the second between the samples is sampled again around the highest, and zoomed into."""
+"""What is nearer to its limit than the second between the samples is sampled again around the
+highest, and zoomed into."""
 _SHIFT, _STEP = 1e-2, 1e-5
 """Shift of a peak, as a share of its interval, and step of parameters for differences."""
 _EXACT = 3e-5
@@ -51,7 +53,8 @@ class ActuatorRows:
         self.lower, self.upper = np.tile(limits.least[:, None], shape[1]), np.ones(shape)
 
     def place(self, v: np.ndarray, delta: float, gait: AnyGait, phases: Mesh) -> float:
-        """Choose the rows near the gait v, whose mesh in its phases is given; by how much it exceeds any limit, relative."""
+        """Choose the rows near the gait v, whose mesh in its phases is given; by how much it
+        exceeds any limit, relative."""
         mesh = self._motion.mesh
         here = self._limits.sizes(self._all(v, delta))
         largest = self._largest(v, delta, gait, phases)
@@ -59,7 +62,8 @@ class ActuatorRows:
         lowered = np.zeros_like(here)
         for points in mesh.points.T:  # neighbours may share a point
             lowered[:, points] = np.maximum(lowered[:, points], between)
-        self.upper = np.maximum(1.0 - lowered, 0.0)  # a gait may do several times what is allowed, between points alone
+        # a gait may do several times what is allowed, between points alone
+        self.upper = np.maximum(1.0 - lowered, 0.0)
         self.lower = np.where(np.isfinite(self.lower), -self.upper, self.lower)
         self.placed = np.stack(np.nonzero(here > self.upper - _NEAR))
         excess = float(largest.max()) - 1.0
@@ -72,25 +76,41 @@ class ActuatorRows:
         largest = found.max(axis=2)
         share, interval = np.nonzero(largest > 1.0 - _CLOSE)
         if share.size:
-            each, near = np.arange(share.size), np.clip(found[share, interval].argmax(axis=1), 1, SAMPLES - 1)
+            each, near = (
+                np.arange(share.size),
+                np.clip(found[share, interval].argmax(axis=1), 1, SAMPLES - 1),
+            )
             left, right = t[interval, near - 1], t[interval, near + 1]
 
             def own(t: np.ndarray) -> np.ndarray:
-                return self._limits.sizes(self._signed_at(v, delta, gait, t.ravel())).reshape(-1, *t.shape)[share, each]
+                return self._limits.sizes(self._signed_at(v, delta, gait, t.ravel())).reshape(
+                    -1, *t.shape
+                )[share, each]
 
-            largest[share, interval] = np.maximum(largest[share, interval], peaks(own, left, right - left, _ZOOMS)[1])
+            largest[share, interval] = np.maximum(
+                largest[share, interval], peaks(own, left, right - left, _ZOOMS)[1]
+            )
         return largest
 
     def _signed_at(self, v: np.ndarray, delta: float, gait: AnyGait, t: np.ndarray) -> np.ndarray:
         """Shares of the gait of parameters v at phases, ``(n_share, n_time)``."""
-        shapes, motion = Shapes(gait.angles(t), gait.rates(t), delta * gait.delta_unit), self._motion
+        shapes, motion = (
+            Shapes(gait.angles(t), gait.rates(t), delta * gait.delta_unit),
+            self._motion,
+        )
         return np.asarray(self._limits.at(motion.kind.instants(shapes, motion.theta(v, delta, t))))
 
     def of_moving_peaks(
-        self, v: np.ndarray, delta: float, member: Callable[[np.ndarray], AnyGait], phases: Mesh, on_rows: np.ndarray
+        self,
+        v: np.ndarray,
+        delta: float,
+        member: Callable[[np.ndarray], AnyGait],
+        phases: Mesh,
+        on_rows: np.ndarray,
     ) -> np.ndarray:
-        """What is added to the second derivatives ``(n, n)`` of multipliers times rows, as the largest values between the
-        points move with the gait (`colloc.reduced.second_order`); `member` gives gaits, `phases` is the mesh of that of v."""
+        """What is added to the second derivatives ``(n, n)`` of multipliers times rows, as the
+        largest values between the points move with the gait (`colloc.reduced.second_order`);
+        `member` gives gaits, `phases` is the mesh of that of v."""
         held = np.flatnonzero(on_rows)
         if held.size == 0:
             return np.zeros((v.size, v.size))
@@ -107,7 +127,9 @@ class ActuatorRows:
         peak, _ = peaks(lambda t: np.abs(shares(v, t)), left + edge, width - 2 * edge)
         t = peak[:, None] + _SHIFT * width[:, None] * np.array([-1.0, 0.0, 1.0])
         steps = _STEP * np.eye(v.size)
-        slopes = np.array([shares(v + step, t) - shares(v - step, t) for step in steps]) / (2 * _STEP)
+        slopes = np.array([shares(v + step, t) - shares(v - step, t) for step in steps]) / (
+            2 * _STEP
+        )
         return curvature_of_moving(on_rows, shares(v, t).T, slopes.transpose(2, 1, 0))
 
     def _all(self, v: np.ndarray, delta: float) -> np.ndarray:
@@ -134,7 +156,11 @@ class ActuatorRows:
 
     def laid_on(self, program: GaitProgram) -> GaitProgram:
         """The full program on the same mesh with the same bounds."""
-        lower, upper, rows = program.constraint_lower.copy(), program.constraint_upper.copy(), program.groups[ACTUATORS]
+        lower, upper, rows = (
+            program.constraint_lower.copy(),
+            program.constraint_upper.copy(),
+            program.groups[ACTUATORS],
+        )
         lower[rows], upper[rows] = self.lower.T.ravel(), self.upper.T.ravel()
         return program.with_rows(lower, upper)
 

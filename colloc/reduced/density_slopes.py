@@ -1,7 +1,8 @@
-"""Derivatives of densities and of what is limited along (angles, rates, orientation), where forces follow from the balance.
+"""Derivatives of densities and of what is limited along (angles, rates, orientation), where forces
+follow from the balance.
 
-The tail velocity z solves balance(z, y) = 0 with y = (angles, rates) and, of a body that is pulled, the components of the
-outside force, so that dz/dy = -R_z^-1 R_y.
+The tail velocity z solves balance(z, y) = 0 with y = (angles, rates) and, of a body that is pulled,
+the components of the outside force, so that dz/dy = -R_z^-1 R_y.
 """
 
 from __future__ import annotations
@@ -29,15 +30,26 @@ def _function(body: Body, friction: Law, of: Quantity | PathLimits, *, pulled: b
         balance = body.sliding(friction, angles, rates, z, delta).force
         if pulled:
             balance += load_wrench(body, body.posture(angles), load)  # type: ignore[attr-defined, arg-type]
-        slope -= ca.jacobian(balance, y).T @ ca.solve(ca.jacobian(balance, z).T, ca.jacobian(out, z).T)
+        slope -= ca.jacobian(balance, y).T @ ca.solve(
+            ca.jacobian(balance, z).T, ca.jacobian(out, z).T
+        )
     return ca.Function("slopes", [y, z, delta], [ca.vec(ca.densify(slope))], {"cse": True})
 
 
 def density_slopes(of: Quantity | PathLimits, now: Instants) -> np.ndarray:
-    """Derivatives ``(n_row, 2 n_joint + 1, n_time)`` of a density, or of the shares of limits, at balanced tail velocities."""
+    """Derivatives ``(n_row, 2 n_joint + 1, n_time)`` of a density, or of the shares of limits, at
+    balanced tail velocities."""
     pulled, n, n_time = now.load is not None, 2 * len(now.angles), now.angles.shape[1]
     y = np.concatenate([now.angles, now.rates, now.load if pulled else np.empty((0, n_time))])
-    slope = _function(now.body, now.friction, of, pulled=pulled)(y, now.z, now.delta).full().reshape(-1, len(y), n_time)
+    slope = (
+        _function(now.body, now.friction, of, pulled=pulled)(y, now.z, now.delta)
+        .full()
+        .reshape(-1, len(y), n_time)
+    )
     # an outside force turns against the body
-    on_theta = slope[:, n] * now.load[1] - slope[:, n + 1] * now.load[0] if pulled else np.zeros((len(slope), n_time))
+    on_theta = (
+        slope[:, n] * now.load[1] - slope[:, n + 1] * now.load[0]
+        if pulled
+        else np.zeros((len(slope), n_time))
+    )
     return np.concatenate([slope[:, :n], on_theta[:, None]], axis=1)

@@ -1,4 +1,5 @@
-"""Gaits that are linear in their parameters as a search sees them: shapes on a mesh, and rows that keep them admissible."""
+"""Gaits that are linear in their parameters as a search sees them: shapes on a mesh, and rows that
+keep them admissible."""
 
 from __future__ import annotations
 
@@ -9,7 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.collocation.worst_instants import check_values, followed, held_shares, moving, near_peaks
+from colloc.collocation.worst_instants import (
+    check_values,
+    followed,
+    held_shares,
+    moving,
+    near_peaks,
+)
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import widest
@@ -23,23 +30,34 @@ from colloc.reduced.pointed import pointed
 
 
 class LinearSpace:
-    """Members of a linear class by their parameters v, in which angles and rates are linear, on a mesh (by default the
-    first one), with pairs of links `far` apart that are kept from crossing; what it answers is
-    told by `colloc.reduced.program.SearchSpace`."""
+    """Members of a linear class by their parameters v, in which angles and rates are linear, on a
+    mesh (by default the first one), with pairs of links `far` apart that are kept from crossing;
+    what it answers is told by `colloc.reduced.program.SearchSpace`."""
 
-    def __init__(self, control: ControlProblem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
+    def __init__(
+        self,
+        control: ControlProblem,
+        edges: np.ndarray | None = None,
+        scheme: str = "",
+        far: Pairs = (),
+    ) -> None:
         self.control, self.given = control, Given(None, edges, scheme, far)
         self.mesh, self._admissible = control.mesh(edges, scheme), control.admissible
         gait, body, limit, speeds, _ = control.admissible
         self.checks, n_joint = shape_checks(body, far, speeds), body.n_joint
-        angles, rates = gait.angle_matrix(self.mesh.times, n_joint), gait.rate_matrix(self.mesh.times, n_joint)
+        angles, rates = (
+            gait.angle_matrix(self.mesh.times, n_joint),
+            gait.rate_matrix(self.mesh.times, n_joint),
+        )
         self._matrix = np.concatenate([angles, rates], axis=1)
         self.n = self._matrix.shape[2]
         self._pace = np.ones(self.mesh.n_point)
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
         self.lower, self.upper = gait.bounds(body, widest(limit))
         self.own = np.arange(self.n)
-        self._peaks = remembered(lambda v: near_peaks(self.member(v), self.mesh, self.checks, limit))
+        self._peaks = remembered(
+            lambda v: near_peaks(self.member(v), self.mesh, self.checks, limit)
+        )
 
     def member(self, v: np.ndarray) -> AnyGait:
         return self._admissible.member(v)
@@ -64,25 +82,43 @@ class LinearSpace:
         return shapes[:n_joint], shapes[n_joint:], self._pace
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        return np.asarray(on_shape.reshape(len(on_shape), -1) @ self._matrix.reshape(-1, self._matrix.shape[2]))
+        return np.asarray(
+            on_shape.reshape(len(on_shape), -1) @ self._matrix.reshape(-1, self._matrix.shape[2])
+        )
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
-        """Shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed."""
-        gait, n_joint, limit = self.member(v), self._admissible.n_joint, self._admissible.joint_limit
+        """Shape checks at their worst instants in the mesh cells in which they might bind, then the
+        mean square shape speed."""
+        gait, n_joint, limit = (
+            self.member(v),
+            self._admissible.n_joint,
+            self._admissible.joint_limit,
+        )
         placed, kinds, low, high, excess = list[_Placed](), dict[str, np.ndarray](), [], [], -np.inf
         for check, (cells, times) in zip(self.checks, self._peaks(v), strict=True):
             kinds[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
-            values, matrix = check_values(check, gait, times), check.matrix(self._admissible.gait, times, n_joint)
+            values, matrix = (
+                check_values(check, gait, times),
+                check.matrix(self._admissible.gait, times, n_joint),
+            )
             may_move = moving(values, check, limit, times, self.mesh, cells)
-            placed.append(_Placed(check, held_shares(check, gait, times), matrix, times, cells, may_move))
-            excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.nearer_bounds(values, limit)
+            placed.append(
+                _Placed(check, held_shares(check, gait, times), matrix, times, cells, may_move)
+            )
+            excess, (lower, upper) = (
+                max(excess, float(check.excess(values, limit).max())),
+                check.nearer_bounds(values, limit),
+            )
             low.append(lower)
             high.append(upper)
         kinds["shape speed"] = np.zeros(1, dtype=int)
-        lower, upper = np.concatenate([*low, [self._admissible.smallest_shape_speed**2]]), np.concatenate([*high, [np.inf]])
+        lower, upper = (
+            np.concatenate([*low, [self._admissible.smallest_shape_speed**2]]),
+            np.concatenate([*high, [np.inf]]),
+        )
         at_worst = remembered(partial(self._at_worst, placed))
 
         def moving_on() -> Constraints:
@@ -108,7 +144,9 @@ class LinearSpace:
                 where, matrix = (self.mesh.edges[cells], self.mesh.h[cells]), matrix.copy()
                 at = each.check, each.shares[which], gait, each.times[which]
                 worst = followed(*at, cells=where, limit=self._admissible.joint_limit)
-                matrix[which] = each.check.matrix(self._admissible.gait, worst, self._admissible.n_joint)
+                matrix[which] = each.check.matrix(
+                    self._admissible.gait, worst, self._admissible.n_joint
+                )
             found.append(each._replace(matrix=matrix))
         return found
 
@@ -118,10 +156,16 @@ class LinearSpace:
 
 
 class SerpenoidSpace(LinearSpace):
-    """Members of the class `colloc.gaits.serpenoid.Serpenoid` by their own parameters v; the chain rule to what a space of
-    series knows of their coefficients."""
+    """Members of the class `colloc.gaits.serpenoid.Serpenoid` by their own parameters v; the chain
+    rule to what a space of series knows of their coefficients."""
 
-    def __init__(self, control: ControlProblem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
+    def __init__(
+        self,
+        control: ControlProblem,
+        edges: np.ndarray | None = None,
+        scheme: str = "",
+        far: Pairs = (),
+    ) -> None:
         super().__init__(control, edges, scheme, far)
         self._n_own = n_own = control.admissible.gait.n_own
         told = len(kind_of_motion(control.dynamics).told)  # begins of states, which come last
@@ -134,9 +178,14 @@ class SerpenoidSpace(LinearSpace):
 
     def _slopes(self, v: np.ndarray) -> np.ndarray:
         """Of the full parameters, ``(n_full, n)``."""
-        n_own, coefficients = self._n_own, self._admissible.gait.coefficient_slopes(v[: self._n_own], self._admissible.n_joint)
+        n_own, coefficients = (
+            self._n_own,
+            self._admissible.gait.coefficient_slopes(v[: self._n_own], self._admissible.n_joint),
+        )
         slopes = np.eye(self.n + len(coefficients), self.n)
-        slopes[n_own:, n_own:] = np.eye(self.n + len(coefficients) - n_own, self.n - n_own, -len(coefficients))
+        slopes[n_own:, n_own:] = np.eye(
+            self.n + len(coefficients) - n_own, self.n - n_own, -len(coefficients)
+        )
         slopes[n_own : n_own + len(coefficients), :n_own] = coefficients
         return slopes
 
@@ -151,8 +200,9 @@ class SerpenoidSpace(LinearSpace):
 
 
 class _Placed(NamedTuple):
-    """A check at instants, one in each of some mesh cells: the shares that its cuts hold, what the shapes there are of the
-    parameters, ``(n, n_joint, n_parameter)``, and which instants move with the gait."""
+    """A check at instants, one in each of some mesh cells: the shares that its cuts hold, what the
+    shapes there are of the parameters, ``(n, n_joint, n_parameter)``, and which instants move with
+    the gait."""
 
     check: ShapeCheck
     shares: np.ndarray
@@ -167,4 +217,8 @@ class _Placed(NamedTuple):
     def slope(self, v: np.ndarray) -> np.ndarray:
         if self.check.row is not None:
             return self.check.row @ self.matrix
-        return np.einsum("jt,tjp->tp", self.check.slope((self.matrix @ v).T, self.shares[None]).full(), self.matrix)
+        return np.einsum(
+            "jt,tjp->tp",
+            self.check.slope((self.matrix @ v).T, self.shares[None]).full(),
+            self.matrix,
+        )

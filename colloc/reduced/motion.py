@@ -1,9 +1,12 @@
-r"""What a period of a collocated gait comes to as functions of the gait alone, with exact gradients.
+r"""What a period of a collocated gait comes to as functions of the gait alone, with exact
+gradients.
 
-On a mesh every equation of the collocation fixes one unknown: the balance the tail velocity, its rotation rate the
-orientation, both the displacement D (`colloc.motion.collocated`) and the work ``W = sum_ki h_k b_i P_ki``, P being the power.
-What is left is a program of the gait's parameters v alone: of distance, work and rotation, which follow as the kind of motion
-says (`colloc.motion.kinds`), and of integrals (`colloc.mechanics.densities`). Gradients take one sweep back through the states.
+On a mesh every equation of the collocation fixes one unknown: the balance the tail velocity, its
+rotation rate the orientation, both the displacement D (`colloc.motion.collocated`) and the work ``W
+= sum_ki h_k b_i P_ki``, P being the power. What is left is a program of the gait's parameters v
+alone: of distance, work and rotation, which follow as the kind of motion says
+(`colloc.motion.kinds`), and of integrals (`colloc.mechanics.densities`). Gradients take one sweep
+back through the states.
 """
 
 from __future__ import annotations
@@ -16,7 +19,16 @@ import numpy as np
 
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
-from colloc.motion.kinds import OMEGA, OUTPUTS, Along, Kind, Passed, Share, first_theta, through_motion
+from colloc.motion.kinds import (
+    OMEGA,
+    OUTPUTS,
+    Along,
+    Kind,
+    Passed,
+    Share,
+    first_theta,
+    through_motion,
+)
 from colloc.motion.kinds import Shapes as Moving
 from colloc.numerics.mesh import Mesh
 
@@ -25,11 +37,12 @@ class Shapes(Protocol):
     """A class of gaits on the points of a mesh."""
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are multiplied."""
+        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are
+        multiplied."""
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        """Derivatives ``(k, n)`` of k numbers, from those with respect to ``(angles, rates)``, ``(k, n_point, 2 n_joint)``,
-        and to the pace, ``(k, n_point)``."""
+        """Derivatives ``(k, n)`` of k numbers, from those with respect to ``(angles, rates)``,
+        ``(k, n_point, 2 n_joint)``, and to the pace, ``(k, n_point)``."""
 
 
 @dataclass(eq=False)
@@ -54,12 +67,19 @@ class _State:
 
 
 class ReducedMotion:
-    """What a period of gaits comes to, as functions of their parameters; the mesh is that of the part of the period that is
-    solved, and `integrals` are asked for, too."""
+    """What a period of gaits comes to, as functions of their parameters; the mesh is that of the
+    part of the period that is solved, and `integrals` are asked for, too."""
 
-    def __init__(self, kind: Kind, mesh: Mesh, shapes: Shapes, integrals: Sequence[Quantity] = ()) -> None:
+    def __init__(
+        self, kind: Kind, mesh: Mesh, shapes: Shapes, integrals: Sequence[Quantity] = ()
+    ) -> None:
         self.body, self.friction, self.shapes, self.mesh = kind.body, kind.friction, shapes, mesh
-        self.kind, self._integrals, self._weight, self._point_weight = kind, integrals, stage_weights(mesh), point_weights(mesh)
+        self.kind, self._integrals, self._weight, self._point_weight = (
+            kind,
+            integrals,
+            stage_weights(mesh),
+            point_weights(mesh),
+        )
         self._last: _State | None = None
         self._near: tuple[_State, np.ndarray, np.ndarray] | None = None
         self.solves = 0
@@ -71,7 +91,12 @@ class ReducedMotion:
             return last
         angles, rates, pace = self.shapes.at(v)
         begin = v[v.size - len(self.kind.told) :]
-        along = self.kind.along(self.mesh, Moving(angles, rates, delta, pace=pace), begin, self._start(angles, rates, begin))
+        along = self.kind.along(
+            self.mesh,
+            Moving(angles, rates, delta, pace=pace),
+            begin,
+            self._start(angles, rates, begin),
+        )
         self.solves += 1
         now, mesh = along.now, self.mesh
         out = np.vstack([now.z[OMEGA] - self._even(pace), now.centre, now.power])
@@ -90,9 +115,11 @@ class ReducedMotion:
         """Rotation rate of the axes that turn evenly, over the pace [rad]."""
         return self.kind.turn / float(self._point_weight @ pace) if self.kind.turn else 0.0
 
-    def _start(self, angles: np.ndarray, rates: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """States to start from, those of the last gait, and tail velocities: those of the last gait differentiated, moved along
-        their slopes."""
+    def _start(
+        self, angles: np.ndarray, rates: np.ndarray, begin: np.ndarray
+    ) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """States to start from, those of the last gait, and tail velocities: those of the last gait
+        differentiated, moved along their slopes."""
         if self._near is None or self.kind.states:
             last = self._last
             if last is None:
@@ -106,12 +133,16 @@ class ReducedMotion:
         return None, near.z + np.einsum("ijt,jt->it", slopes[:3], moved)
 
     def values(self, v: np.ndarray, delta: float) -> dict[str, float]:
-        """What a period comes to, as the kind of motion counts it, and the integrals; NaN where there is no motion."""
+        """What a period comes to, as the kind of motion counts it, and the integrals; NaN where
+        there is no motion."""
         s = self.at(v, delta)
         if not s.values:
             s.values = self.kind.counted(s.passed)
             if self._integrals:
-                now, weight = self.instants(v, delta), self.kind.periods * s.pace * self._point_weight
+                now, weight = (
+                    self.instants(v, delta),
+                    self.kind.periods * s.pace * self._point_weight,
+                )
                 s.values |= {each.name: float(each.at(now)[0] @ weight) for each in self._integrals}
         return s.values
 
@@ -135,28 +166,38 @@ class ReducedMotion:
         on_points = np.zeros((len(shares) + len(self._integrals), 2 * n_joint + 1, s.pace.size))
         on_pace = np.zeros((len(on_points), s.pace.size))
         if self._integrals:
-            from colloc.reduced.density_slopes import density_slopes  # loads CasADi, which a certificate can do without
+            # loads CasADi, which a certificate can do without
+            from colloc.reduced.density_slopes import (
+                density_slopes,
+            )
 
             now = self.instants(v, delta)
         for row, quantity in enumerate(self._integrals, len(shares)):
             on_points[row] = kind.periods * weight * s.pace * density_slopes(quantity, now)[0]
             on_pace[row] = kind.periods * weight * quantity.at(now)[0]
-        found = self._through(s, [*shares.values(), *(Share() for _ in self._integrals)], on_points, on_pace)
+        found = self._through(
+            s, [*shares.values(), *(Share() for _ in self._integrals)], on_points, on_pace
+        )
         return dict(zip((*shares, *(each.name for each in self._integrals)), found, strict=True))
 
     def through_points(self, v: np.ndarray, delta: float, on_points: np.ndarray) -> np.ndarray:
-        """Derivatives ``(m, n)`` of m numbers, from those with respect to (angles, rates, orientation) at the points, ``(m,
-        2 n_joint + 1, n_point)``."""
+        """Derivatives ``(m, n)`` of m numbers, from those with respect to (angles, rates,
+        orientation) at the points, ``(m, 2 n_joint + 1, n_point)``."""
         on_pace = np.zeros((len(on_points), on_points.shape[2]))
         if not on_points[:, -1].any():
             return self.shapes.pulled_back(v, on_points[:, :-1].transpose(0, 2, 1), on_pace)
         return self._through(self.at(v, delta), [Share()] * len(on_points), on_points, on_pace)
 
-    def _through(self, s: _State, shares: Sequence[Share], on_points: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        """The same of numbers that depend on the pace, too, and have shares in what the period comes to."""
+    def _through(
+        self, s: _State, shares: Sequence[Share], on_points: np.ndarray, on_pace: np.ndarray
+    ) -> np.ndarray:
+        """The same of numbers that depend on the pace, too, and have shares in what the period
+        comes to."""
         mesh, kind = self.mesh, self.kind
         slopes, on_states = self._slopes(s)
-        rows, on_begin, _ = through_motion(kind, mesh, s.pose, shares, on_states * s.pace, on_points[:, -1][:, mesh.points])
+        rows, on_begin, _ = through_motion(
+            kind, mesh, s.pose, shares, on_states * s.pace, on_points[:, -1][:, mesh.points]
+        )
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
@@ -164,7 +205,9 @@ class ReducedMotion:
         if kind.turn:  # the axes turn less on what a longer path makes a smaller part of the period
             weight, even = self._point_weight, self._even(s.pace)
             on_pace += np.outer(on_out[:, 0] @ s.pace, even / (weight @ s.pace) * weight)
-        on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS]) + on_points[:, :-1].transpose(0, 2, 1)
+        on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS]) + on_points[
+            :, :-1
+        ].transpose(0, 2, 1)
         found = self.shapes.pulled_back(s.v, on_shape, on_pace)
         if kind.told:
             found[:, -len(kind.told) :] += on_begin

@@ -1,8 +1,10 @@
-"""Paths as a search sees them: arcs or straight pieces on a mesh, and rows that keep them in their class, by few parameters.
+"""Paths as a search sees them: arcs or straight pieces on a mesh, and rows that keep them in their
+class, by few parameters.
 
-A free path is its mean shape speed, the tangents where arcs meet, and the shape at its start: all other shapes follow, arc by
-arc. Tangents of more than two joints are divided by their length, so that they may be any vectors, and the last one is that
-of the first where the path closes smoothly. A polygon is its vertices.
+A free path is its mean shape speed, the tangents where arcs meet, and the shape at its start: all
+other shapes follow, arc by arc. Tangents of more than two joints are divided by their length, so
+that they may be any vectors, and the last one is that of the first where the path closes smoothly.
+A polygon is its vertices.
 """
 
 from __future__ import annotations
@@ -32,20 +34,27 @@ _FOLLOWS = ("path", "unit tangent", "smooth closure")
 """Rows that hold whatever the parameters are; for bilateral paths the last one does not."""
 
 _EXACT, _NEAR, _FITTED, _SETTLED, _ROUNDS = 1e-7, 1e-6, 3e-8, 1e-5, 12
-"""Violation at which a gait is a member; accuracy of the squared distance of a new one, at first and
-as the last violations go; violation of a start, where the worst instant of a cell swings between two; rounds of moving the
-checks to the worst instants: three joints need up to 8."""
+"""Violation at which a gait is a member; accuracy of the squared distance of a new one, at first
+and as the last violations go; violation of a start, where the worst instant of a cell swings
+between two; rounds of moving the checks to the worst instants: three joints need up to 8."""
 
 _LEAST_CURVATURE, _SOFT = 1e-4, 0.1
-"""Of the distance to a gait, as a share of the largest; and of the first guess of the objective's."""
+"""Of the distance to a gait, as a share of the largest; and of the first guess of the
+objective's."""
 
 
 class PathSpace:
-    """Members of a class of paths near one of them, which fixes winding, start phase, and which interval lies on which side;
-    edges of the mesh are phases of that one. Attributes as `colloc.reduced.program.SearchSpace`."""
+    """Members of a class of paths near one of them, which fixes winding, start phase, and which
+    interval lies on which side; edges of the mesh are phases of that one. Attributes as
+    `colloc.reduced.program.SearchSpace`."""
 
     def __init__(
-        self, control: ControlProblem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+        self,
+        control: ControlProblem,
+        near: AnyGait,
+        edges: np.ndarray | None = None,
+        scheme: str = "",
+        far: Pairs = (),
     ) -> None:
         self.control, self.given = control, Given(near, edges, scheme, far)
         self._paths = paths = path_geometry(control, near, edges, scheme, far)
@@ -61,16 +70,26 @@ class PathSpace:
         if self._arcs:
             speed, self._tangents, shapes = parts
             self._speed, last = speed[0, 0], self._tangents[:, : -1 if self._closed else None]
-            self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0], self.own[shapes[-1, -1] + 1 :]])
+            self.own = np.concatenate(
+                [speed[0], last.ravel(order="F"), shapes[:, 0], self.own[shapes[-1, -1] + 1 :]]
+            )
             self.own = self.own[free[self.own]]
             chord, self._on_arcs, arc_h = paths.blocks["chord"]
-            self._chord, self._chord_slope = ColumnFunction(chord.value), ColumnFunction(chord.jacobian)
-            self._chord_entries, self._along = (chord.jac_row, chord.jac_col), (arc_h, np.zeros_like(arc_h))
+            self._chord, self._chord_slope = (
+                ColumnFunction(chord.value),
+                ColumnFunction(chord.jacobian),
+            )
+            self._chord_entries, self._along = (
+                (chord.jac_row, chord.jac_col),
+                (arc_h, np.zeros_like(arc_h)),
+            )
         self.n = self.own.size
         self.lower, self.upper = paths.lower[self.own], paths.upper[self.own]
         dropped = _FOLLOWS[: 2 if gait.symmetry == BILATERAL else 3] if self._arcs else ()
         moving = [*dropped, *(check.name for check in paths.checks)]
-        self._fixed_rows = {n: np.arange(r.stop - r.start) for n, r in self._rows.groups.items() if n not in moving}
+        self._fixed_rows = {
+            n: np.arange(r.stop - r.start) for n, r in self._rows.groups.items() if n not in moving
+        }
         self._place()
         self._followed, self._steep = remembered(self._follow), remembered(self._chord_jacobian)
 
@@ -87,7 +106,8 @@ class PathSpace:
         self._scatter = selector(self._gather.ravel(), self._fixed.size).T.tocsr()
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        """The parameters of `colloc.gaits.free_path`: shapes where arcs meet follow from the start."""
+        """The parameters of `colloc.gaits.free_path`: shapes where arcs meet follow from the
+        start."""
         return self._followed(v).copy()
 
     def _raw(self, v: np.ndarray) -> np.ndarray:
@@ -109,7 +129,8 @@ class PathSpace:
         return p
 
     def from_full(self, v: np.ndarray, on_full: np.ndarray) -> np.ndarray:
-        """Derivatives ``(k, n)`` along v of k numbers, from those along the full parameters, ``(k, m)``: one sweep back."""
+        """Derivatives ``(k, n)`` along v of k numbers, from those along the full parameters, ``(k,
+        m)``: one sweep back."""
         if not self._arcs:
             return on_full[:, self.own]
         on, shapes, tangents = on_full.copy(), self.shapes, self._tangents
@@ -149,17 +170,21 @@ class PathSpace:
         return self.control.admissible.member(full, self._paths.knots)
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
-        """Parameters ``(n,)`` of the member nearest to a gait, in the sum of squared distances where arcs or sides meet.
-        `NotConvergedError` if no path of the class is found near the gait."""
+        """Parameters ``(n,)`` of the member nearest to a gait, in the sum of squared distances
+        where arcs or sides meet. `NotConvergedError` if no path of the class is found near the
+        gait."""
         laid = self._pointed(gait)
         v, target, accuracy = laid[self.own], laid, _NEAR
         for _ in range(_ROUNDS):
             asked = self.constraints(v)
             values = asked.values(v)
             outside = max((asked.lower - values).max(), (values - asked.upper).max(), asked.excess)
-            if outside < _EXACT and (accuracy == _FITTED or np.abs(self.full_parameters(v) - laid).max() < _EXACT):
+            if outside < _EXACT and (
+                accuracy == _FITTED or np.abs(self.full_parameters(v) - laid).max() < _EXACT
+            ):
                 return v
-            # the first round goes near the gait, later ones the shortest way into the class, which moves with its checks
+            # the first round goes near the gait, later ones the shortest way into the class, which
+            # moves with its checks
             nearest = _Nearest(self, asked, target)
             v = minimised(nearest, v, np.inf, accuracy, curvature=nearest.curvature(v)).v
             target, accuracy = self.full_parameters(v), _FITTED
@@ -167,14 +192,18 @@ class PathSpace:
             return v
         kind = self.control.admissible.gait
         bound = f"; allow more curvature than {kind.curvature:g}" if self._arcs else ""
-        raise NotConvergedError(f"found no {kind.describe()} near the guess; try another guess{bound}.")
+        raise NotConvergedError(
+            f"found no {kind.describe()} near the guess; try another guess{bound}."
+        )
 
     def laid(self, gait: AnyGait) -> np.ndarray:
-        """Parameters of a path through a gait, which need not be a member: it may bend more than it should."""
+        """Parameters of a path through a gait, which need not be a member: it may bend more than it
+        should."""
         return self._pointed(gait)[self.own]
 
     def _pointed(self, gait: AnyGait) -> np.ndarray:
-        """Full parameters of a path through a gait, which need not keep every constraint, and where it points."""
+        """Full parameters of a path through a gait, which need not keep every constraint, and where
+        it points."""
         laid = self._through(gait)
         if np.isnan(laid[-1]):
             laid[-1] = pointed(self.control, self.mesh, self, laid[self.own])[-1]
@@ -189,26 +218,37 @@ class PathSpace:
         return kind.parameters(path_through(self.control, gait, self.mesh.edges)[0])
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
+        """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase
+        ``(n_point,)``."""
         out = self._value(self.full_parameters(v)[self._gather], self._given).copy()
         n_joint = len(self.shapes)
         return out[:n_joint], out[n_joint:-1], out[-1]
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        on_local = self._pulled(self.full_parameters(v)[self._gather], self._given, on_shape, on_pace)
+        on_local = self._pulled(
+            self.full_parameters(v)[self._gather], self._given, on_shape, on_pace
+        )
         return self.from_full(v, (self._scatter @ on_local.reshape(len(on_local), -1).T).T)
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
-        """The rows of the class, and checks where they might bind. They stay where they are placed: no path was seen to swing,
-        and rows that follow cost as much as all else."""
+        """The rows of the class, and checks where they might bind. They stay where they are placed:
+        no path was seen to swing, and rows that follow cost as much as all else."""
         paths, rows, limit = self._paths, self._rows, self.control.admissible.joint_limit
         gait, excess, kinds = self._member(self.full_parameters(v)), -np.inf, dict(self._fixed_rows)
-        mesh, given = paths.phase_mesh(gait), {name: parameters.copy() for name, (*_, parameters) in paths.blocks.items()}
-        for check, (cells, times) in zip(paths.checks, near_peaks(gait, mesh, paths.checks, limit), strict=True):
+        mesh, given = (
+            paths.phase_mesh(gait),
+            {name: parameters.copy() for name, (*_, parameters) in paths.blocks.items()},
+        )
+        for check, (cells, times) in zip(
+            paths.checks, near_peaks(gait, mesh, paths.checks, limit), strict=True
+        ):
             kinds[check.name] = cells
             if not cells.size:
                 continue
-            times, instants = times + later * mesh.h[cells], 0.5 * (mesh.edges[1:] + mesh.edges[:-1])
+            times, instants = (
+                times + later * mesh.h[cells],
+                0.5 * (mesh.edges[1:] + mesh.edges[:-1]),
+            )
             instants[cells], values = times, check_values(check, gait, times)
             given[check.name][:-1] = paths.placed(check, instants, mesh)
             given[check.name][-1, cells] = held_shares(check, gait, times)
@@ -225,10 +265,11 @@ class PathSpace:
         )
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
-        """The mean squared distance that a step of the parameters moves the shapes, and a little for every parameter.
+        """The mean squared distance that a step of the parameters moves the shapes, and a little
+        for every parameter.
 
-        A tangent early on a path moves all that comes after it, so parameters are far from equal: with it SQP settles free
-        paths of 130 parameters in 50 iterations instead of 250 to 300.
+        A tangent early on a path moves all that comes after it, so parameters are far from equal:
+        with it SQP settles free paths of 130 parameters in 50 iterations instead of 250 to 300.
         """
         if not self._arcs:
             return None
@@ -242,7 +283,12 @@ class _Nearest:
 
     def __init__(self, space: PathSpace, asked: Constraints, target: np.ndarray) -> None:
         self.space, self._target = space, target
-        self.lower, self.upper, self.row_lower, self.row_upper = space.lower, space.upper, asked.lower, asked.upper
+        self.lower, self.upper, self.row_lower, self.row_upper = (
+            space.lower,
+            space.upper,
+            asked.lower,
+            asked.upper,
+        )
         self.rows, self.row_slopes = asked.values, asked.slopes
         self._shapes = space.shapes.ravel(order="F")
 
@@ -260,7 +306,8 @@ class _Nearest:
         return (self.space.full_parameters(v) - self._target)[self._shapes]
 
     def curvature(self, v: np.ndarray) -> np.ndarray:
-        """Of the objective near the target (Gauss and Newton); lengths of tangents, which nothing depends on, keep a little."""
+        """Of the objective near the target (Gauss and Newton); lengths of tangents, which nothing
+        depends on, keep a little."""
         frame = self.space.frame(v)
         metric = frame.T @ frame
         return metric + _LEAST_CURVATURE * metric.diagonal().max() * np.eye(v.size)

@@ -1,4 +1,5 @@
-"""The program of a search: the gait's parameters alone; net rotation, values to be reached and admissibility are rows."""
+"""The program of a search: the gait's parameters alone; net rotation, values to be reached and
+admissibility are rows."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ class SearchSpace(Shapes, Protocol):
         """Parameters of the member nearest to a gait."""
 
     def laid(self, gait: AnyGait) -> np.ndarray:
-        """Parameters near a gait that need not keep every row: where a search may begin that keeps them as it goes."""
+        """Parameters near a gait that need not keep every row: where a search may begin that keeps
+        them as it goes."""
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """The parameters as the full program has them (see `colloc.collocation.layout`)."""
@@ -45,18 +47,19 @@ class SearchSpace(Shapes, Protocol):
         """The mesh in phases of a member."""
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
-        """What keeps gaits in the class, with every check at the worst instants of the gait v, or later by a share of its mesh
-        cell."""
+        """What keeps gaits in the class, with every check at the worst instants of the gait v, or
+        later by a share of its mesh cell."""
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
-        """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near an optimum; None for 1."""
+        """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near
+        an optimum; None for 1."""
 
 
 class ReducedProgram:
     """Maximise an objective over a class of gaits on a mesh, at one delta.
 
-    Rows: net rotation where it is prescribed and no symmetry closes it, on a slope the way across a direction that is asked
-    for, what must be reached at least, what actuators can do, the space's.
+    Rows: net rotation where it is prescribed and no symmetry closes it, on a slope the way across a
+    direction that is asked for, what must be reached at least, what actuators can do, the space's.
 
     Attributes
     ----------
@@ -74,19 +77,29 @@ class ReducedProgram:
     def __init__(self, space: SearchSpace, delta: float) -> None:
         self.space, self.delta = space, delta
         aims, limits = space.control.aims, space.control.actuators
-        self.motion = ReducedMotion(kind_of_motion(space.control.dynamics), space.mesh, space, aims.integrals)
-        held = {"rotation": aims.rotation} if space.control.admissible.gait.closing_symmetry == NONE else {}
+        self.motion = ReducedMotion(
+            kind_of_motion(space.control.dynamics), space.mesh, space, aims.integrals
+        )
+        held = (
+            {"rotation": aims.rotation}
+            if space.control.admissible.gait.closing_symmetry == NONE
+            else {}
+        )
         held |= {"across": 0.0} if aims.no_way_across else {}
         self._held = [name for name, value in held.items() if value is not None]
         equal, least = [held[name] for name in self._held], [value for _, value in aims.at_least]
         self._objective, self._reached = aims.objective, [aim for aim, _ in aims.at_least]
-        self._own_lower, self._own_upper = np.array([*equal, *least]), np.array([*equal, *np.full(len(least), np.inf)])
+        self._own_lower, self._own_upper = (
+            np.array([*equal, *least]),
+            np.array([*equal, *np.full(len(least), np.inf)]),
+        )
         self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
         self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None
 
     def place_rows(self, v: np.ndarray) -> float:
-        """Place all rows that depend on where the gait v is, the space's and the actuators'; how far it exceeds any bound."""
+        """Place all rows that depend on where the gait v is, the space's and the actuators'; how
+        far it exceeds any bound."""
         excess = self.move_checks(v)
         if self.actuators is None:
             return excess
@@ -112,22 +125,28 @@ class ReducedProgram:
         """What each row is: its kind, and which of the full program's rows of that kind."""
         own = [("period", k) for k in range(self._own_lower.size)]
         if self.actuators is not None:
-            own += [(f"actuators, share {share}", int(point)) for share, point in self.actuators.placed.T]
-        return own + [(kind, int(cell)) for kind, cells in self.constraints.kinds.items() for cell in cells]
+            own += [
+                (f"actuators, share {share}", int(point))
+                for share, point in self.actuators.placed.T
+            ]
+        return own + [
+            (kind, int(cell)) for kind, cells in self.constraints.kinds.items() for cell in cells
+        ]
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
-        """Place the space's constraints for v, or later by a share of a mesh cell; how far it exceeds any bound there. Rows of
-        actuators stay where they are."""
+        """Place the space's constraints for v, or later by a share of a mesh cell; how far it
+        exceeds any bound there. Rows of actuators stay where they are."""
         self.constraints = self.space.constraints(v, later)
         return self.constraints.excess
 
     def follow_worst(self) -> None:
-        """Until they are placed again, checks move with the worst instants of whatever gait they are asked for."""
+        """Until they are placed again, checks move with the worst instants of whatever gait they
+        are asked for."""
         self.constraints = self.constraints.following()
 
     def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray:
-        """What limits on actuators add to the second derivatives ``(n, n)`` of multipliers times rows, as their largest values
-        between the points move."""
+        """What limits on actuators add to the second derivatives ``(n, n)`` of multipliers times
+        rows, as their largest values between the points move."""
         if self.actuators is None:
             return np.zeros((v.size, v.size))
         first = self._own_lower.size
@@ -144,10 +163,16 @@ class ReducedProgram:
         return self.space.control.stated(-objective)
 
     def period(self, v: np.ndarray) -> dict[str, float]:
-        """What a period comes to, by the names of `colloc.gaits.objective.QUANTITIES`, in the units of the problem."""
+        """What a period comes to, by the names of `colloc.gaits.objective.QUANTITIES`, in the units
+        of the problem."""
         found = self.motion.values(v, self.delta)
-        degrees = {"work": 1.0} | {each.name: each.friction_degree or 0.0 for each in self.space.control.aims.integrals}
-        return {name: value * self.space.control.unit ** degrees.get(name, 0.0) for name, value in found.items()}
+        degrees = {"work": 1.0} | {
+            each.name: each.friction_degree or 0.0 for each in self.space.control.aims.integrals
+        }
+        return {
+            name: value * self.space.control.unit ** degrees.get(name, 0.0)
+            for name, value in found.items()
+        }
 
     def gradient(self, v: np.ndarray) -> np.ndarray:
         """Of the objective, ``(n,)``."""
@@ -167,10 +192,23 @@ class ReducedProgram:
         values = self.motion.values(v, self.delta) if self._own_lower.size else {}
         own = [values[name] for name in self._held]
         done = np.empty(0) if self.actuators is None else self.actuators.values(v, self.delta)
-        return np.concatenate([own, [aim(values) for aim in self._reached], done, self.constraints.values(v)])
+        return np.concatenate(
+            [own, [aim(values) for aim in self._reached], done, self.constraints.values(v)]
+        )
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
         own = [self._slopes(v)[name] for name in self._held]
-        done = np.empty((0, v.size)) if self.actuators is None else self.actuators.slopes(v, self.delta)
-        return np.vstack([*own, *(self._slope(aim, v) for aim in self._reached), *done, self.constraints.slopes(v)])
+        done = (
+            np.empty((0, v.size))
+            if self.actuators is None
+            else self.actuators.slopes(v, self.delta)
+        )
+        return np.vstack(
+            [
+                *own,
+                *(self._slope(aim, v) for aim in self._reached),
+                *done,
+                self.constraints.slopes(v),
+            ]
+        )

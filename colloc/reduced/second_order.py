@@ -1,16 +1,19 @@
-r"""Whether a gait that satisfies the first-order conditions is an optimum: the curvature of its Lagrangian.
+r"""Whether a gait that satisfies the first-order conditions is an optimum: the curvature of its
+Lagrangian.
 
-On the free directions Z, along which no equation and no bound that carries a multiplier changes to first order, the Hessian
+On the free directions Z, along which no equation and no bound that carries a multiplier changes to
+first order, the Hessian
 
     Z' (grad L(v + h Z) - grad L(v - h Z)) / 2h,      L = -d/W + multipliers . rows,
 
-has to be positive. A row is a shape check at the worst instant of a stretch of the gait, and that instant moves with the gait:
-rows held at their instants lack the curvature that this adds (`colloc.numerics.peaks`).
+has to be positive. A row is a shape check at the worst instant of a stretch of the gait, and that
+instant moves with the gait: rows held at their instants lack the curvature that this adds
+(`colloc.numerics.peaks`).
 
-The Hessian is formed from exact gradients by differences. Stick and slip make second derivatives jump as they move over a mesh
-point; that shows in the part that is not symmetric, and in a change with the step h. Beside such a jump a direction may look
-like a way down that ends after 1e-8 rad. So a negative curvature counts where it is still there at a step a thousand times as
-long.
+The Hessian is formed from exact gradients by differences. Stick and slip make second derivatives
+jump as they move over a mesh point; that shows in the part that is not symmetric, and in a change
+with the step h. Beside such a jump a direction may look like a way down that ends after 1e-8 rad.
+So a negative curvature counts where it is still there at a step a thousand times as long.
 """
 
 from __future__ import annotations
@@ -25,13 +28,15 @@ from colloc.numerics.peaks import curvature_of_moving
 from colloc.numerics.sqp import NonlinearProgram, stationarity
 
 _STEP, _LONG_STEP = 1e-6, 1e-3
-"""Of the differences, over the length of the parameters' vector; and of those that confirm a negative curvature."""
+"""Of the differences, over the length of the parameters' vector; and of those that confirm a
+negative curvature."""
 _SHIFT = 1e-3
 """Of checks, as a share of a mesh cell, by which their derivatives in time are found."""
 _HELD = 1e-7
 """Multiplier from which a bound counts as held."""
 _ONE_ROW = 1e-2
-"""Rows whose unit slopes differ by less are one: a shape check may be placed on both sides of one worst instant."""
+"""Rows whose unit slopes differ by less are one: a shape check may be placed on both sides of one
+worst instant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +44,17 @@ class Curvature:
     """Second-order conditions of a reduced program at a point."""
 
     smallest: float
-    """Smallest eigenvalue of the Hessian of the Lagrangian on the free directions, a negative one as far as it is confirmed;
-    infinite if there are none."""
+    """Smallest eigenvalue of the Hessian of the Lagrangian on the free directions, a negative one
+    as far as it is confirmed; infinite if there are none."""
     error: float
-    """Of it: what half the step changes along its direction, and the part of the Hessian that is not symmetric."""
+    """Of it: what half the step changes along its direction, and the part of the Hessian that is
+    not symmetric."""
     n_free: int
     direction: np.ndarray
     """Unit vector of parameters along which the curvature is smallest, ``(n,)``."""
     kkt_error: float
-    """What the multipliers leave over of the gradient: the rest means something only where this is small."""
+    """What the multipliers leave over of the gradient: the rest means something only where this is
+    small."""
 
 
 class CheckedProgram(NonlinearProgram, Protocol):
@@ -58,10 +65,12 @@ class CheckedProgram(NonlinearProgram, Protocol):
         """What each row is: of which kind, and of which stretch of the gait."""
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> object:
-        """Place every check at the worst instants of v, or so much later as a share of its stretch; rows may appear and go."""
+        """Place every check at the worst instants of v, or so much later as a share of its stretch;
+        rows may appear and go."""
 
     def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray:
-        """The same curvature ``(n, n)`` of rows that no such move reaches, from the multipliers of all rows at v."""
+        """The same curvature ``(n, n)`` of rows that no such move reaches, from the multipliers of
+        all rows at v."""
 
 
 class Lagrangian:
@@ -77,7 +86,11 @@ class Lagrangian:
         program.move_checks(v)
         self._program, self._v, self.conditions = program, v, stationarity(program, v)
         rows, slopes, on_rows = program.rows(v), program.row_slopes(v), self.conditions.on_rows
-        self._held = [(name, on_rows[k], rows[k], slopes[k]) for k, name in enumerate(program.row_names) if on_rows[k]]
+        self._held = [
+            (name, on_rows[k], rows[k], slopes[k])
+            for k, name in enumerate(program.row_names)
+            if on_rows[k]
+        ]
 
     def slope(self, at: np.ndarray) -> np.ndarray:
         """Gradient ``(n,)`` with the checks at the instants that are the worst ones of v."""
@@ -108,7 +121,8 @@ class Lagrangian:
 
 
 def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
-    """Smallest curvature of the Lagrangian at v, a point that satisfies the first-order conditions; ``2 n_free + 2`` gradients.
+    """Smallest curvature of the Lagrangian at v, a point that satisfies the first-order conditions;
+    ``2 n_free + 2`` gradients.
 
     Examples
     --------
@@ -117,7 +131,8 @@ def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
     >>> from colloc import Harmonic, Problem, ellipse
     >>> from colloc.reduced.program import ReducedProgram
     >>> from colloc.search.spaces import space_near
-    >>> space, v = space_near(Problem("saddle", gait=Harmonic(1, "bilateral")), ellipse(0.0, 0.307347, 0.767811))
+    >>> space, v = space_near(Problem("saddle", gait=Harmonic(1, "bilateral")), ellipse(0.0,
+    ...     0.307347, 0.767811))
     >>> round(curvature(ReducedProgram(space, 1e-4), v).smallest, 1)
     -0.8
     """
@@ -135,7 +150,9 @@ def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
     moving = lagrangian.of_moving_instants()
 
     def product(z: np.ndarray, step: float) -> np.ndarray:
-        return (lagrangian.slope(v + step * z) - lagrangian.slope(v - step * z)) / (2 * step) + moving @ z
+        return (lagrangian.slope(v + step * z) - lagrangian.slope(v - step * z)) / (
+            2 * step
+        ) + moving @ z
 
     step = _STEP * (float(np.linalg.norm(v)) or 1.0)
     hessian = free.T @ np.stack([product(z, step) for z in free.T], axis=1)
@@ -143,7 +160,10 @@ def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
     confirmed, far, here = values.copy(), step * _LONG_STEP / _STEP, lagrangian.value(v)
     for k in np.flatnonzero(values < 0):
         along = far * free @ vectors[:, k]
-        confirmed[k] = max(values[k], (lagrangian.value(v + along) - 2 * here + lagrangian.value(v - along)) / far**2)
+        confirmed[k] = max(
+            values[k],
+            (lagrangian.value(v + along) - 2 * here + lagrangian.value(v - along)) / far**2,
+        )
     first = int(np.argmin(confirmed))
     least = free @ vectors[:, first]
     # what a wrong coupling of two directions does to the smaller eigenvalue
@@ -151,4 +171,6 @@ def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
     apart = np.maximum(np.abs(values - values[first]), 1e-300)
     mixed = np.minimum(np.abs(coupling), coupling**2 / apart)
     error = abs(float(least @ product(least, 0.5 * step)) - values[first]) + mixed.sum()
-    return Curvature(float(confirmed[first]), float(error), values.size, least, conditions.kkt_error)
+    return Curvature(
+        float(confirmed[first]), float(error), values.size, least, conditions.kkt_error
+    )

@@ -1,4 +1,5 @@
-"""The answer of a search: a gait with every variable of its full program; how the search came there, and what else it met."""
+"""The answer of a search: a gait with every variable of its full program; how the search came
+there, and what else it met."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ class Step:
     Attributes
     ----------
     delta : float
-        Regularisation speed, in the units of the problem's class of gaits: per period, or at unit shape speed.
+        Regularisation speed, in the units of the problem's class of gaits: per period, or at unit
+        shape speed.
     intervals : int
     value, distance, work : float
         The problem's objective, distance and work of a period, as collocation sees them.
@@ -38,7 +40,8 @@ class Step:
     iterations : int
     seconds : float
     program : str
-        What was solved: "reduced" by SQP in the gait's parameters, or the problem's formulation by IPOPT.
+        What was solved: "reduced" by SQP in the gait's parameters, or the problem's formulation by
+        IPOPT.
     """
 
     delta: float
@@ -56,13 +59,14 @@ class Step:
 
 @dataclass(frozen=True)
 class SecondOrder:
-    """Curvature of the Lagrangian at an answer, in the space of its class (`colloc.reduced.second_order`).
+    """Curvature of the Lagrangian at an answer, in the space of its class
+    (`colloc.reduced.second_order`).
 
     Attributes
     ----------
     smallest, error : float
-        Smallest curvature along a free direction, over the value of the objective [1/rad^2], and its error; infinite if no
-        direction is free, NaN if it was not measured.
+        Smallest curvature along a free direction, over the value of the objective [1/rad^2], and
+        its error; infinite if no direction is free, NaN if it was not measured.
     n_free : int
         Free directions.
     why_not : str
@@ -93,10 +97,11 @@ class Answer:
         The mesh, in phases of the gait.
     scheme : str
     knots : (n_arc + 1,), optional
-        Phases where the arcs of a free path meet; they are among the edges. By default they are the edges.
+        Phases where the arcs of a free path meet; they are among the edges. By default they are the
+        edges.
     x, lam_x : (n,)
-        Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces are in units of
-        `colloc.gaits.control_problem`.
+        Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces
+        are in units of `colloc.gaits.control_problem`.
     lam_g : (m,)
         Multipliers of the constraints.
     value, distance, work : float
@@ -110,8 +115,8 @@ class Answer:
     iterations : int
     seconds : float
     program : str
-        Where the conditions were measured: "reduced", or the problem's formulation as IPOPT confirms it; "prescribed" where
-        nothing is free.
+        Where the conditions were measured: "reduced", or the problem's formulation as IPOPT
+        confirms it; "prescribed" where nothing is free.
     second_order : SecondOrder
     message : str
         What does not hold, or holds in a way that should be told; empty otherwise.
@@ -146,7 +151,10 @@ class Answer:
     def __repr__(self) -> str:
         verdict = "" if self.optimal else f", {self.status}"
         size = f"{self.x.size} variables"
-        return f"<Answer at delta = {self.delta:.1e}: {self.value:.6g}, {self.program}, {size}{verdict}>"
+        return (
+            f"<Answer at delta = {self.delta:.1e}: {self.value:.6g}, {self.program}, "
+            f"{size}{verdict}>"
+        )
 
     @property
     def efficiency(self) -> float:
@@ -160,7 +168,10 @@ class Answer:
             self.delta,
             self.edges.size - 1,
             *(self.value, self.distance, self.work, self.kkt_error),
-            **{name: getattr(self, name) for name in ("optimal", "status", "iterations", "seconds", "program")},
+            **{
+                name: getattr(self, name)
+                for name in ("optimal", "status", "iterations", "seconds", "program")
+            },
         )
 
     @property
@@ -180,7 +191,9 @@ class Answer:
     @cached_property
     def motion(self) -> CollocatedMotion:
         """What the variables say of the motion."""
-        return CollocatedMotion(self.problem, self.mesh, self.layout, self.x, self.gait, self.delta_per_period)
+        return CollocatedMotion(
+            self.problem, self.mesh, self.layout, self.x, self.gait, self.delta_per_period
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +203,8 @@ class Alternative:
     Attributes
     ----------
     value : float
-        Of the objective, as collocation sees it on a coarse mesh, which may be a little more than a fine one would.
+        Of the objective, as collocation sees it on a coarse mesh, which may be a little more than a
+        fine one would.
     delta : float
         To which it was followed.
     starts : int
@@ -208,4 +222,7 @@ class Alternative:
 
     def __str__(self) -> str:
         size = ", as small as its bound allows" if self.on_speed_floor else ""
-        return f"{self.value:.4f} at delta {self.delta:.0e} ({self.starts} start{'s' * (self.starts > 1)}{size})"
+        return (
+            f"{self.value:.4f} at delta {self.delta:.0e} ({self.starts} "
+            f"start{'s' * (self.starts > 1)}{size})"
+        )

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 _INSTANTS = 2001
-"""Of the trapezoidal rule, whose integrand is a period's smooth motion: the radius is good to 1e-7."""
+"""Of the trapezoidal rule, whose integrand is a period's smooth motion: the radius is good to
+1e-7."""
 PHASES = np.linspace(0.0, 1.0, _INSTANTS)
 
 
@@ -60,5 +61,11 @@ def arc(angle: float, centre: np.ndarray) -> Arc:
     path = centre[0] + 1j * centre[1]
     t = np.linspace(0.0, 1.0, path.size)
     turn, displacement = np.exp(1j * angle) - 1, path[-1] - path[0]
-    # integrated by parts, which needs no velocities; what is integrated is periodic, so that the rule is as good as any
-    return Arc(angle, float(abs(np.trapezoid(np.exp(-1j * angle * t) * (turn * (path - path[0]) + displacement), t))))
+    # integrated by parts, which needs no velocities; what is integrated is periodic, so that the
+    # rule is as good as any
+    return Arc(
+        angle,
+        float(
+            abs(np.trapezoid(np.exp(-1j * angle * t) * (turn * (path - path[0]) + displacement), t))
+        ),
+    )

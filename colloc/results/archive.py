@@ -1,15 +1,17 @@
-"""Archives of searches over many starts: a row on the disk for each start as it ends, and one HDF5 file of all for users.
+"""Archives of searches over many starts: a row on the disk for each start as it ends, and one HDF5
+file of all for users.
 
-An archive is about one problem. Its starts are told apart by sampler, seed and number, so searches with other seeds join it,
-also at the same time. The rows (NAME.sqlite beside NAME.h5) are what a search goes on from: they hold every gait as it is. The
-HDF5 file is made of them when a search ends, with named dimensions; a free path or polygon is there by its Fourier series::
+An archive is about one problem. Its starts are told apart by sampler, seed and number, so searches
+with other seeds join it, also at the same time. The rows (NAME.sqlite beside NAME.h5) are what a
+search goes on from: they hold every gait as it is. The HDF5 file is made of them when a search
+ends, with named dimensions; a free path or polygon is there by its Fourier series::
 
     start, sampler, seed, status, message                        (start)
     value, value_error, efficiency, efficiency_error, distance, work, delta, iterations, seconds, cpu_seconds    (start)
     guess_mean, gait_mean (start, joint)         guess_cos, guess_sin, gait_cos, gait_sin (start, joint, harmonic)
     basin_{row,count,frequency,value,efficiency,on_speed_floor} (basin)     distinct optima, best first; row: the best start
     problem, versions: JSON texts; attributes problem_hash, command (the last one that added to it)
-"""
+"""  # noqa: E501
 
 from __future__ import annotations
 
@@ -57,11 +59,19 @@ class Archive:
 
     def of_search(self, sampler: str, seed: int) -> dict[int, Outcome]:
         """Outcomes of one sampler and seed, by start number."""
-        return {name.number: self.outcomes[name] for name in sorted(self.outcomes) if name[:2] == (sampler, seed)}
+        return {
+            name.number: self.outcomes[name]
+            for name in sorted(self.outcomes)
+            if name[:2] == (sampler, seed)
+        }
 
     def add(self, outcomes: Mapping[StartName, Outcome]) -> None:
         """Put starts that ended on the disk; StoreError if that is not possible."""
-        put_rows(row_path(self.path), ROWS, {" ".join(map(str, n)): [n, outcome_fields(o)] for n, o in outcomes.items()})
+        put_rows(
+            row_path(self.path),
+            ROWS,
+            {" ".join(map(str, n)): [n, outcome_fields(o)] for n, o in outcomes.items()},
+        )
         self.outcomes.update(outcomes)
 
 
@@ -80,30 +90,40 @@ def _outcomes_at(problem: Problem, path: Path) -> dict[StartName, Outcome] | Non
     stated = rows.pop(_PROBLEM, None)
     if stated is None:
         if rows:
-            raise StoreError(f"{row_path(path)} is damaged: it does not say what problem it is about; move it away.")
+            raise StoreError(
+                f"{row_path(path)} is damaged: it does not say what problem it is about; move "
+                f"it away."
+            )
         return None
     if problem.hash != Problem.from_dict(stated).hash:
-        raise StoreError(f"{row_path(path)} holds starts of another problem; choose another --output, or move it away.")
+        raise StoreError(
+            f"{row_path(path)} holds starts of another problem; choose another --output, or move "
+            f"it away."
+        )
     outcomes = {}
     for key, value in rows.items():
         try:
             (sampler, seed, number), entry = value
             outcomes[StartName(str(sampler), int(seed), int(number))] = outcome_from(entry)
         except (KeyError, TypeError, ValueError, OverflowError, CollocError):
-            raise StoreError(f"{row_path(path)} is damaged: {key} is no start; move it away.") from None
+            raise StoreError(
+                f"{row_path(path)} is damaged: {key} is no start; move it away."
+            ) from None
     return outcomes
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
-    """The archive of a problem with all starts that are on the disk, begun if there is none; the path is that of its HDF5 file.
-    `StoreError` if what is there is damaged, of an older colloc or about another problem, or the folder cannot be written."""
+    """The archive of a problem with all starts that are on the disk, begun if there is none; the
+    path is that of its HDF5 file. `StoreError` if what is there is damaged, of an older colloc or
+    about another problem, or the folder cannot be written."""
     path = Path(path)
     with locked(_lock(path), wait=True):
         found = _outcomes_at(problem, path)
         if found is None:
             if path.exists():
                 raise StoreError(
-                    f"{path} is there, but not {row_path(path).name}, which a search goes on from (older ones had none); "
+                    f"{path} is there, but not {row_path(path).name}, which a search goes on from "
+                    f"(older ones had none); "
                     "choose another --output, or move it away."
                 )
             put_rows(row_path(path), ROWS, {_PROBLEM: problem.to_dict()})
@@ -111,22 +131,26 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
 
 
 def archive_at(path: str | os.PathLike[str]) -> Archive:
-    """The archive with this HDF5 file, whatever its problem is, to be read: nothing is written, and other runs may go on adding
-    to it. `StoreError` if there is none, or it is damaged."""
+    """The archive with this HDF5 file, whatever its problem is, to be read: nothing is written, and
+    other runs may go on adding to it. `StoreError` if there is none, or it is damaged."""
     rows = row_path(path)
     stated = read_rows(rows, ROWS).get(_PROBLEM) if rows.exists() else None
     if stated is None:
         what = f"there is no archive of starts at {path}"
         if os.path.isfile(path):
-            what = f"{path} is no archive of starts, or {rows.name}, which holds its rows, is not beside it"
+            what = (
+                f"{path} is no archive of starts, or {rows.name}, which holds its rows, is not "
+                f"beside it"
+            )
         raise StoreError(f"{what}; colloc multistart makes one.")
     problem, path = Problem.from_dict(stated), Path(path).with_suffix(".h5")
     return Archive(problem, path, _outcomes_at(problem, path) or {})
 
 
 def save_archive(archive: Archive, command: str = "") -> Path:
-    """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then holds as well. `StoreError`
-    if the folder cannot be written; the file that was there before is left."""
+    """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then
+    holds as well. `StoreError` if the folder cannot be written; the file that was there before is
+    left."""
     with locked(_lock(archive.path), wait=True):
         found = _outcomes_at(archive.problem, archive.path)
         archive.outcomes |= found or {}
@@ -146,7 +170,13 @@ def _write(file: h5py.File, archive: Archive, command: str) -> None:
     outcomes = [archive.outcomes[name] for name in names]
 
     def put_column(name: str, values: list, units: str, dims: str = "start") -> None:
-        put(file, name, np.array(values, dtype=object if units == "text" else None), units=units, dims=dims)
+        put(
+            file,
+            name,
+            np.array(values, dtype=object if units == "text" else None),
+            units=units,
+            dims=dims,
+        )
 
     put_column("start", [name.number for name in names], "1")
     put_column("seed", [name.seed for name in names], "1")
@@ -159,9 +189,19 @@ def _write(file: h5py.File, archive: Archive, command: str) -> None:
             gaits = [gait.resized(max(g.n_harmonic for g in gaits)) for gait in gaits]
             put_column(f"{name}_mean", [gait.mean for gait in gaits], "rad", "start, joint")
             for part in ("cos", "sin"):
-                put_column(f"{name}_{part}", [getattr(gait, part) for gait in gaits], "rad", "start, joint, harmonic")
+                put_column(
+                    f"{name}_{part}",
+                    [getattr(gait, part) for gait in gaits],
+                    "rad",
+                    "start, joint, harmonic",
+                )
     found = basins(archive.problem, outcomes)
-    put_column("basin_row", [next(row for row, o in enumerate(outcomes) if o is b.best) for b in found], "1", "basin")
+    put_column(
+        "basin_row",
+        [next(row for row, o in enumerate(outcomes) if o is b.best) for b in found],
+        "1",
+        "basin",
+    )
     put_column("basin_count", [len(b.starts) for b in found], "1", "basin")
     put_column("basin_frequency", [b.frequency for b in found], "share of starts", "basin")
     put_column("basin_efficiency", [b.best.efficiency for b in found], "1/weight", "basin")

@@ -1,4 +1,5 @@
-"""What a certificate is: checks (what was measured, how much is allowed, what it means) and the numbers of the replay."""
+"""What a certificate is: checks (what was measured, how much is allowed, what it means) and the
+numbers of the replay."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from colloc.gaits.period import Period
 
 @dataclass(frozen=True)
 class Check:
-    """One line of a certificate: what was measured, the largest value allowed, and what it means."""
+    """One line of a certificate: what was measured, the largest value allowed, and what it
+    means."""
 
     name: str
     value: float
@@ -27,16 +29,18 @@ class Check:
     def line(self) -> str:
         """For a terminal."""
         return (
-            f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= {self.threshold:.0e})  {self.meaning}"
+            f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= "
+            f"{self.threshold:.0e})  {self.meaning}"
         )
 
 
 @dataclass(frozen=True)
 class Certificate(Period):
-    """The verdict of an independent replay, with the quantities of the period at the solution's delta.
+    """The verdict of an independent replay, with the quantities of the period at the solution's
+    delta.
 
-    Errors are those of distance and work; they hold for every balanced motion, and for every point of the body that could be
-    followed, so that `others` is empty.
+    Errors are those of distance and work; they hold for every balanced motion, and for every point
+    of the body that could be followed, so that `others` is empty.
 
     Attributes
     ----------
@@ -44,18 +48,20 @@ class Certificate(Period):
     instants : int
         Instants of the replay in one period; 0 if there was none (see `UNCERTIFIED`).
     efficiency_error : float
-        Error of that efficiency: what refining the replay changes, and what following another point of the body would
-        (net rotation times the body's reach over the distance), and what the body's other balanced motions would, if any.
+        Error of that efficiency: what refining the replay changes, and what following another point
+        of the body would (net rotation times the body's reach over the distance), and what the
+        body's other balanced motions would, if any.
     efficiency_at_zero_delta, error_at_zero_delta : float
-        Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed, and its error
-        (`colloc.results.measured.extrapolated_limit`).
+        Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed, and its
+        error (`colloc.results.measured.extrapolated_limit`).
     value, value_error, value_at_zero_delta, value_error_at_zero_delta : float
         The same of the problem's objective.
     dry : (float, float), optional
-        Between what the efficiency lies under dry friction, with no delta (`colloc.verification.dry_friction`), if that was
-        asked for.
+        Between what the efficiency lies under dry friction, with no delta
+        (`colloc.verification.dry_friction`), if that was asked for.
     of_samples : tuple of float, optional
-        What the errors of value, efficiency, distance and work hold for what the samples of a gait are off by.
+        What the errors of value, efficiency, distance and work hold for what the samples of a gait
+        are off by.
     """
 
     checks: tuple[Check, ...]
@@ -75,7 +81,9 @@ class Certificate(Period):
             return "<Certificate: nothing was replayed>"
         failed = ", ".join(check.name for check in self.failures)
         verdict = f"fails on {failed}" if failed else f"all {len(self.checks)} checks hold"
-        return f"<Certificate: {verdict}; d/W = {self.efficiency:.6g} +- {self.efficiency_error:.0e}>"
+        return (
+            f"<Certificate: {verdict}; d/W = {self.efficiency:.6g} +- {self.efficiency_error:.0e}>"
+        )
 
     def __str__(self) -> str:
         return "\n".join(check.line() for check in self.checks)
@@ -93,16 +101,26 @@ class Certificate(Period):
     def numbers(self) -> dict[str, float]:
         """Quantities of the period, their errors, and the rest that was measured, by names."""
         errors = {f"{name}_error": error for name, error in self.errors.items()}
-        return {**self.values, **errors, "efficiency": self.efficiency, **{name: getattr(self, name) for name in NUMBERS}}
+        return {
+            **self.values,
+            **errors,
+            "efficiency": self.efficiency,
+            **{name: getattr(self, name) for name in NUMBERS},
+        }
 
     def with_samples(self, errors: tuple[float, ...] | None) -> Certificate:
-        """The same for a gait through samples, which put (value, efficiency, distance, work) off by `errors`."""
+        """The same for a gait through samples, which put (value, efficiency, distance, work) off by
+        `errors`."""
         if errors is None or not self.replayed:
             return self
         value, efficiency, distance, work = errors
         return replace(
             self,
-            errors={**self.errors, "distance": self.errors["distance"] + distance, "work": self.errors["work"] + work},
+            errors={
+                **self.errors,
+                "distance": self.errors["distance"] + distance,
+                "work": self.errors["work"] + work,
+            },
             value_error=self.value_error + value,
             value_error_at_zero_delta=self.value_error_at_zero_delta + value,
             efficiency_error=self.efficiency_error + efficiency,
@@ -115,11 +133,16 @@ class Certificate(Period):
         """The same with the errors of the replay alone, whatever samples a gait goes through."""
         if self.of_samples is None:
             return self
-        return replace(self.with_samples(tuple(-error for error in self.of_samples)), of_samples=None)
+        return replace(
+            self.with_samples(tuple(-error for error in self.of_samples)), of_samples=None
+        )
 
     def facts(self) -> dict[str, Any]:
         """All of it as plain numbers (JSON)."""
-        listed = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in self.checks}
+        listed = {
+            c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed}
+            for c in self.checks
+        }
         dry = {} if self.dry is None else {"dry_efficiency": list(self.dry)}
         samples = {} if self.of_samples is None else {"errors_of_samples": list(self.of_samples)}
         return self.numbers | dry | samples | {"passed": self.passed, "checks": listed}
@@ -135,7 +158,11 @@ UNCERTIFIED = Certificate(
     values=dict.fromkeys(QUANTITIES, np.nan),
     errors=dict.fromkeys(("distance", "work"), np.nan),
     others={},
-    checks=(Check("replay", np.inf, 0.0, "not made, since the solve did not converge: nothing was checked"),),
+    checks=(
+        Check(
+            "replay", np.inf, 0.0, "not made, since the solve did not converge: nothing was checked"
+        ),
+    ),
     **(dict.fromkeys(NUMBERS, np.nan) | {"instants": 0}),  # type: ignore[arg-type]
 )
 """Of a solve that did not converge: it fails, and says that nothing was checked."""

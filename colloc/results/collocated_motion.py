@@ -1,4 +1,5 @@
-"""The motion of a collocated gait at any instant, by the scheme's own interpolant: the error between nodes is visible."""
+"""The motion of a collocated gait at any instant, by the scheme's own interpolant: the error
+between nodes is visible."""
 
 from __future__ import annotations
 
@@ -36,7 +37,10 @@ class CollocatedMotion:
     """Regularisation speed per period."""
 
     def __repr__(self) -> str:
-        return f"<CollocatedMotion of {self.problem.name}: sample(t), or Solution.to_xarray with units>"
+        return (
+            f"<CollocatedMotion of {self.problem.name}: sample(t), or Solution.to_xarray with "
+            f"units>"
+        )
 
     def sliding(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> Sliding:
         """The body with given tail velocities."""
@@ -55,8 +59,8 @@ class CollocatedMotion:
 
     @cached_property
     def at_points(self) -> Sliding:
-        """The body at the collocation points; its force is what is left over: with the weight's pull if it is on a slope, and
-        less what its momenta grow by if it has inertia."""
+        """The body at the collocation points; its force is what is left over: with the weight's
+        pull if it is on a slope, and less what its momenta grow by if it has inertia."""
         now, body = self.sliding(*self._points), self.problem.body
         force = np.array(now.force)
         if (load := self.problem.regime.pull(self._theta[None])) is not None:
@@ -67,16 +71,21 @@ class CollocatedMotion:
 
     @property
     def _growth(self) -> np.ndarray:
-        """Force, and torque about the tail, that change the momenta as the scheme's polynomials say, ``(3, n_point)``."""
+        """Force, and torque about the tail, that change the momenta as the scheme's polynomials
+        say, ``(3, n_point)``."""
         mesh, unit = self.mesh, self.gait.speed_unit
         momenta = unit * self.x[self.layout.momenta]
         grown = momenta[:, mesh.sites] - momenta[:, mesh.edge_sites[:-1], None]
         growth = np.empty((3, mesh.n_point))
-        growth[:, mesh.points] = np.einsum("ij,ckj->cki", np.linalg.inv(mesh.scheme.A), grown) / mesh.h[:, None]
+        growth[:, mesh.points] = (
+            np.einsum("ij,ckj->cki", np.linalg.inv(mesh.scheme.A), grown) / mesh.h[:, None]
+        )
         at_points = np.empty_like(growth)
         at_points[:, mesh.points] = momenta[:, mesh.sites]
         chain, (angles, _, z) = checked_mass(self.problem.body), self._points
-        return self.problem.regime.at(self.gait).froude * about_tail(chain, angles, growth - turning(z, at_points))
+        return self.problem.regime.at(self.gait).froude * about_tail(
+            chain, angles, growth - turning(z, at_points)
+        )
 
     @property
     def _theta(self) -> np.ndarray:
@@ -87,17 +96,20 @@ class CollocatedMotion:
 
     @property
     def rotation(self) -> float:
-        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none."""
+        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves
+        none."""
         problem, theta = self.problem, self.x[self.layout.theta[0]]
         turns = problem.gait.motion_symmetry == NONE
         return float(theta[-1] - theta[0]) + (problem.rotation or 0.0) if turns else 0.0
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
-        """The motion at phases t, any real numbers; periods follow each other, turned by the net rotation of those before.
+        """The motion at phases t, any real numbers; periods follow each other, turned by the net
+        rotation of those before.
 
-        Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's. The lab frame has the centre
-        of mass at the origin at t = 0, and the first period's way along +x; on a slope +x is straight uphill, and the arc of a
-        gait that is asked to turn sets out along +x.
+        Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's.
+        The lab frame has the centre of mass at the origin at t = 0, and the first period's way
+        along +x; on a slope +x is straight uphill, and the arc of a gait that is asked to turn sets
+        out along +x.
         """
         t = finite_array("t", np.atleast_1d(t), 1)
         period, phase = np.divmod(t, 1.0)
@@ -107,7 +119,9 @@ class CollocatedMotion:
         angles, rates = self.gait(phase)
         if symmetry == BILATERAL:
             # seen from the head the body repeats itself with reversed rates
-            head, heading = body.seen_from_head(self.gait.angles(solved), self.gait.rates(solved), z)
+            head, heading = body.seen_from_head(
+                self.gait.angles(solved), self.gait.rates(solved), z
+            )
             z = np.where(second, head, z)
             theta = np.where(second, theta + heading, theta)
             centre = np.where(second, 2 * end[:, None] - centre, centre)
@@ -120,14 +134,24 @@ class CollocatedMotion:
             end = np.array([2 * end[0], 0.0])
         before = RigidMotion(self.rotation, complex(*end)).repeated(period)
         theta, centre = theta + before.rotation, before.of(centre)
-        return SampledMotion(t, angles, rates, z, theta, centre, centre - turned(body.centre(angles), theta))
+        return SampledMotion(
+            t, angles, rates, z, theta, centre, centre - turned(body.centre(angles), theta)
+        )
 
     def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """z, theta and centre of mass at phases t of the solved part, and the centre's displacement at its end."""
+        """z, theta and centre of mass at phases t of the solved part, and the centre's displacement
+        at its end."""
         mesh, z_points = self.mesh, self._points[2]
         k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
         tau = (t - mesh.edges[k]) / mesh.h[k]
-        pose = CollocatedPose.on_mesh(mesh, z_points[2], self.at_points.centre, self.x[self.layout.theta[0, 0]])
+        pose = CollocatedPose.on_mesh(
+            mesh, z_points[2], self.at_points.centre, self.x[self.layout.theta[0, 0]]
+        )
         theta, place = pose.at(k, tau)
         z = np.einsum("ts,cts->ct", mesh.scheme.lagrange(tau), z_points[:, mesh.points[k]])
-        return z, theta, np.array([place.real, place.imag]), np.array([pose.place[-1].real, pose.place[-1].imag])
+        return (
+            z,
+            theta,
+            np.array([place.real, place.imag]),
+            np.array([pose.place[-1].real, pose.place[-1].imag]),
+        )

@@ -1,18 +1,21 @@
-"""When two gaits are the same (start phase, symmetries of body and friction), and the distinct optima among many starts.
+"""When two gaits are the same (start phase, symmetries of body and friction), and the distinct
+optima among many starts.
 
-With X(s, t) the position of the body, the following map motions in balance to motions in balance with the same distance
-and work. All are statements about joint angles q_j, counted from the tail, n of them:
+With X(s, t) the position of the body, the following map motions in balance to motions in balance
+with the same distance and work. All are statements about joint angles q_j, counted from the tail, n
+of them:
 
 - *phase*   q_j(t + a), for every body and friction.
 - *mirror*  -q_j(t), for every body and friction.
 - *reversal*  q_j(-t), if mu_b = mu_f: velocities and forces change sign.
 - *swap*    -q_(n+1-j)(t), the body named from its other end, if it reads the same from there and mu_b = mu_f.
 - *reversed swap*  -q_(n+1-j)(-t), if the body reads the same from both ends, for *every* friction: X(1 - s, -t) has the
-  opposite tangent and the opposite velocity, so every link slides forwards where it did and all forces change sign.
+  opposite tangent and the opposite velocity, so every link slides forwards where it did and all
+  forces change sign.
 
-The last one is why a gait of bilateral symmetry closes its rotation whatever mu_b / mu_f is: it is its own image, and
-the image turns the other way.
-"""
+The last one is why a gait of bilateral symmetry closes its rotation whatever mu_b / mu_f is: it is
+its own image, and the image turns the other way.
+"""  # noqa: E501
 
 from __future__ import annotations
 
@@ -46,7 +49,8 @@ def swapped(gait: Fourier, body: Body) -> Fourier:
 
 
 def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
-    """The gait and all gaits that differ from it by a symmetry of body and friction, but for the start phase."""
+    """The gait and all gaits that differ from it by a symmetry of body and friction, but for the
+    start phase."""
     result = []
     for mirror, reversal, swap in product((False, True), repeat=3):
         if swap and not body.symmetric:
@@ -60,7 +64,8 @@ def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
 
 
 def phase_distance(a: Fourier, b: Fourier) -> float:
-    """Root-mean-square distance [rad] of two closed paths of joint angles, at the best relative start phase."""
+    """Root-mean-square distance [rad] of two closed paths of joint angles, at the best relative
+    start phase."""
     n = max(a.n_harmonic, b.n_harmonic)
     a, b = a.resized(n), b.resized(n)
     k = np.arange(1, n + 1)
@@ -80,13 +85,15 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
 
 
 def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
-    """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body and friction."""
+    """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body
+    and friction."""
     return min(phase_distance(a, image) for image in images(b, body, friction))
 
 
 SAME_VALUE, SAME_GAIT = 1e-3, 0.05
-"""Two gaits are one if their values differ by less than this relative amount and their paths by less than this root-mean-square
-distance [rad], modulo symmetries. The objective is flat at its maximum, so the path is the laxer."""
+"""Two gaits are one if their values differ by less than this relative amount and their paths by
+less than this root-mean-square distance [rad], modulo symmetries. The objective is flat at its
+maximum, so the path is the laxer."""
 
 
 def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, friction: Law) -> bool:
@@ -101,7 +108,8 @@ SERIES_HARMONICS = 16
 
 
 def series_class(problem: Problem) -> Harmonic:
-    """The class of the Fourier series that stand for gaits of a problem: its own, if that is one of harmonics."""
+    """The class of the Fourier series that stand for gaits of a problem: its own, if that is one of
+    harmonics."""
     return problem.gait.series(SERIES_HARMONICS)
 
 
@@ -134,8 +142,8 @@ class Basin:
 def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     """The distinct certified optima, best first.
 
-    Outcomes join the first, better, optimum they agree with in value and in gait modulo start phase and the
-    symmetries of body and friction (see `images`).
+    Outcomes join the first, better, optimum they agree with in value and in gait modulo start phase
+    and the symmetries of body and friction (see `images`).
     """
     solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value)
     found: list[tuple[list[Outcome], Fourier]] = []
@@ -147,4 +155,6 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
                 break
         else:
             found.append(([outcome], path))
-    return [Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m, _ in found]
+    return [
+        Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m, _ in found
+    ]

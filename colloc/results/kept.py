@@ -1,4 +1,5 @@
-"""Results take their place without loss: what another problem, or a better answer, left there before is kept beside it."""
+"""Results take their place without loss: what another problem, or a better answer, left there
+before is kept beside it."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from colloc.system.replaced_file import alone_in
 from colloc.system.result_names import FAILED, INTERRUPTED, SHRUNK, beside, former
 
 _HOW = ("guess", "intervals", "scheme", "formulation", "mesh_tolerance", "delta_start")
-"""Fields of a problem that say how it is solved: results that differ in these alone answer the same question."""
+"""Fields of a problem that say how it is solved: results that differ in these alone answer the same
+question."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +42,13 @@ class Saved:
 
 
 def save_result(solution: Solution, path: Path) -> list[Saved]:
-    """Save a solution at `path` (NAME.h5), or beside it if it failed (NAME.failed.h5) or was interrupted (NAME.interrupted.h5);
-    and the better gait that shrank, if there is one, as NAME.shrunk.h5.
+    """Save a solution at `path` (NAME.h5), or beside it if it failed (NAME.failed.h5) or was
+    interrupted (NAME.interrupted.h5); and the better gait that shrank, if there is one, as
+    NAME.shrunk.h5.
 
-    A result that is there already is replaced only by an answer to the same question that is as good, and only if nobody added
-    anything to it. Else it is kept, with its figures, under the first free name of NAME.former-1.h5, NAME.former-2.h5, ...
-    Ctrl-C waits until all is saved.
+    A result that is there already is replaced only by an answer to the same question that is as
+    good, and only if nobody added anything to it. Else it is kept, with its figures, under the
+    first free name of NAME.former-1.h5, NAME.former-2.h5, ... Ctrl-C waits until all is saved.
 
     Returns
     -------
@@ -94,31 +97,46 @@ def _question(solution: Solution) -> dict:
 
 
 def _worth(there: Solution | None, new: Solution, path: Path) -> str:
-    """What there is at a path that the new solution must not replace, in words; "" if there is no such thing."""
+    """What there is at a path that the new solution must not replace, in words; "" if there is no
+    such thing."""
     if there is None:
         return "what was there and cannot be read" if path.exists() else ""
     if _question(there) != _question(new):
         return f"the former result, of another problem called {there.problem.name},"
     if there.success and not (new.success and _is_as_good(new, there)):
-        return f"the former result, which is better ({there.certificate.value:.6g}, best of {there.starts} starts),"
-    return "the former result, which holds more than colloc wrote," if store.holds_more(path, there) else ""
+        return (
+            f"the former result, which is better ({there.certificate.value:.6g}, best of "
+            f"{there.starts} starts),"
+        )
+    return (
+        "the former result, which holds more than colloc wrote,"
+        if store.holds_more(path, there)
+        else ""
+    )
 
 
 def _is_as_good(a: Solution, b: Solution) -> bool:
     """Whether the certified value of `a` is no less than that of `b`, as far as both are known."""
-    return a.certificate.value + a.certificate.value_error >= b.certificate.value - b.certificate.value_error
+    return (
+        a.certificate.value + a.certificate.value_error
+        >= b.certificate.value - b.certificate.value_error
+    )
 
 
 def _may_go(there: Solution | None, place: Path) -> bool:
     """Whether a result may be kept at a place: a free one, or one whose result it could replace."""
-    return not place.exists() or (there is not None and not _worth(_solution_at(place), there, place))
+    return not place.exists() or (
+        there is not None and not _worth(_solution_at(place), there, place)
+    )
 
 
 @contextmanager
 def _moved(path: Path, place: Path) -> Iterator[None]:
-    """Keep a result under another name, with its figures and its gait that shrank; back again if the block fails.
+    """Keep a result under another name, with its figures and its gait that shrank; back again if
+    the block fails.
 
-    The block replaces the result itself: under its own name there is always the former one or the new one.
+    The block replaces the result itself: under its own name there is always the former one or the
+    new one.
     """
     pairs = [(path.with_suffix(kind), place.with_suffix(kind)) for kind in (".png", ".pdf")]
     pairs.append((beside(path, SHRUNK), beside(place, SHRUNK)))

@@ -1,4 +1,5 @@
-"""What a gait uses of the limits of its problem, and limits that no gait of the body could come near."""
+"""What a gait uses of the limits of its problem, and limits that no gait of the body could come
+near."""
 
 from __future__ import annotations
 
@@ -27,19 +28,36 @@ UNITS = {
 
 
 def shares(solution: Solution) -> dict[str, float]:
-    """The largest share of every limit that the gait uses in a period, by name; empty where no more than usual is limited."""
+    """The largest share of every limit that the gait uses in a period, by name; empty where no more
+    than usual is limited."""
     problem, body = solution.problem, solution.problem.body
     limits = problem.path_limits
-    if not (problem.gait.free and (problem.joint_limit != body.usual.limit or limits.each or problem.largest_speeds)):
+    if not (
+        problem.gait.free
+        and (problem.joint_limit != body.usual.limit or limits.each or problem.largest_speeds)
+    ):
         return {}
     motion = solution.sample(_INSTANTS)
     stretched, limit = under_one_limit(motion.angles, problem.joint_limit)
-    found = {body.usual.limit_name.replace("limits", "angles"): float(body.largest_angles(stretched).max()) / limit}
+    found = {
+        body.usual.limit_name.replace("limits", "angles"): float(
+            body.largest_angles(stretched).max()
+        )
+        / limit
+    }
     if problem.largest_speeds:
-        found["joint speed"] = float((np.abs(motion.rates).max(axis=1) / problem.largest_speeds).max())
+        found["joint speed"] = float(
+            (np.abs(motion.rates).max(axis=1) / problem.largest_speeds).max()
+        )
     if limits.each:
-        z, load = (motion.z, problem.regime.pull(motion.theta[None])) if limits.needs_forces else (None, None)
-        now = Instants(body, problem.law, motion.angles, motion.rates, solution.delta_per_period, z, load=load)
+        z, load = (
+            (motion.z, problem.regime.pull(motion.theta[None]))
+            if limits.needs_forces
+            else (None, None)
+        )
+        now = Instants(
+            body, problem.law, motion.angles, motion.rates, solution.delta_per_period, z, load=load
+        )
         used = iter(limits.sizes(limits.at(now)).max(axis=1))
         found |= {each.name: max(float(next(used)) for _ in each.names) for each in limits.each}
     return found
@@ -50,15 +68,28 @@ def lines(solution: Solution) -> list[str]:
     used = shares(solution)
     if not used:
         return []
-    stated = {name: getattr(solution.problem, field) for name, (field, _) in UNITS.items() if name in used}
-    of = {name: f" of {limit:g} {UNITS[name][1]}" for name, limit in stated.items() if not isinstance(limit, tuple)}
-    told = (f"{name} {100 * share:.{0 if share >= 0.01 else 2}f} %{of.get(name, '')}" for name, share in used.items())
-    return [", ".join(told), *_beyond_any_gait(solution.problem), *_short_swings(solution.problem, used)]
+    stated = {
+        name: getattr(solution.problem, field) for name, (field, _) in UNITS.items() if name in used
+    }
+    of = {
+        name: f" of {limit:g} {UNITS[name][1]}"
+        for name, limit in stated.items()
+        if not isinstance(limit, tuple)
+    }
+    told = (
+        f"{name} {100 * share:.{0 if share >= 0.01 else 2}f} %{of.get(name, '')}"
+        for name, share in used.items()
+    )
+    return [
+        ", ".join(told),
+        *_beyond_any_gait(solution.problem),
+        *_short_swings(solution.problem, used),
+    ]
 
 
 def _beyond_any_gait(problem: Problem) -> Iterator[str]:
-    """Limits that cannot matter: torques by statics, speeds by Bernstein's inequality for the derivative of a Fourier series,
-    and powers by both."""
+    """Limits that cannot matter: torques by statics, speeds by Bernstein's inequality for the
+    derivative of a Fourier series, and powers by both."""
     n, gait = problem.body.n_joint, problem.gait
     torque, speed = np.full(n, np.inf), np.full(n, np.inf)
     if isinstance(problem.body, Chain) and rate_independent(problem.law):
@@ -74,18 +105,23 @@ def _beyond_any_gait(problem: Problem) -> Iterator[str]:
         if stated and (np.array(stated) > _SURELY * bound).any():
             joint = int(np.argmax(stated / bound))
             of = f" of joint {joint + 1}" * isinstance(limit, tuple)
-            yield f"{field} {stated[joint]:g}{of} cannot matter: no gait needs more than {bound[joint]:.3g} {unit}, its unit"
+            yield (
+                f"{field} {stated[joint]:g}{of} cannot matter: no gait needs more than "
+                f"{bound[joint]:.3g} {unit}, its unit"
+            )
 
 
 def _short_swings(problem: Problem, used: dict[str, float]) -> Iterator[str]:
-    """Speeds that decide how far joints swing: to and fro within a period, by half of what they could cover."""
+    """Speeds that decide how far joints swing: to and fro within a period, by half of what they
+    could cover."""
     if used.get("joint speed", 0.0) > _BINDS:
         most, whole = np.array(problem.largest_speeds) / 2, 2 * _half_ranges(problem)
         joint = int(np.argmin(most / whole))
         if most[joint] < whole[joint]:
             least, largest = np.degrees([most[joint], whole[joint]])
             yield (
-                f"speed_limit {2 * most[joint]:g} rad per period, its unit, lets a joint swing by {least:.3g} of {largest:.3g} "
+                f"speed_limit {2 * most[joint]:g} rad per period, its unit, lets a joint swing by "
+                f"{least:.3g} of {largest:.3g} "
                 "degrees at most"
             )
 

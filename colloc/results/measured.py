@@ -1,4 +1,5 @@
-"""What replays say of a gait: its objective, efficiency, distance and work with errors, and for delta -> 0."""
+"""What replays say of a gait: its objective, efficiency, distance and work with errors, and for
+delta -> 0."""
 
 from __future__ import annotations
 
@@ -20,8 +21,8 @@ PARTS_OF_DELTA = (1.0, 0.1, 0.01)
 _DECADE = PARTS_OF_DELTA[1]
 _SLOWEST = 0.9
 _FEWER = 4
-"""Times fewer instants that replays at smaller deltas begin with: nothing but the limit is asked of them, and what that leaves
-open is in its error."""
+"""Times fewer instants that replays at smaller deltas begin with: nothing but the limit is asked of
+them, and what that leaves open is in its error."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,11 @@ class Estimate(NamedTuple):
 def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limit:
     """Limit for delta -> 0 of one gait's value, from its values at delta, delta/10 and delta/100.
 
-    Regularisation acts like c delta at leading order, so a ninth of the last change remains; sticking links act like
-    delta log delta, and gaits of the size of delta like delta squared, with any signs. So the error is that ninth again; or
-    more where the two changes fall off more slowly; and no less than what is left of a linear part of the first change that
-    other parts hide in the second.
+    Regularisation acts like c delta at leading order, so a ninth of the last change remains;
+    sticking links act like delta log delta, and gaits of the size of delta like delta squared, with
+    any signs. So the error is that ninth again; or more where the two changes fall off more slowly;
+    and no less than what is left of a linear part of the first change that other parts hide in the
+    second.
 
     Parameters
     ----------
@@ -61,7 +63,8 @@ def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limi
 
 
 class Measured(NamedTuple):
-    """What replays of a gait at delta, a tenth and a hundredth of it say, with errors that hold for every balanced motion."""
+    """What replays of a gait at delta, a tenth and a hundredth of it say, with errors that hold for
+    every balanced motion."""
 
     fine: Replay
     errors: dict[str, float]
@@ -85,10 +88,12 @@ def measured(
     limits: Iterable[PathLimit] | PathLimits = (),
     run: Callable[..., Replay] = replay,
 ) -> Measured:
-    """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.
+    """An objective, efficiency, distance and work of a path at delta, and the first two for delta
+    -> 0, with their errors.
 
-    Arguments are those of `colloc.verification.replay.replay`, and the net rotation that is asked for: the distance of a body
-    that turns by more depends on the point that is followed. `run` is what replays (`colloc.verification.replayer`).
+    Arguments are those of `colloc.verification.replay.replay`, and the net rotation that is asked
+    for: the distance of a body that turns by more depends on the point that is followed. `run` is
+    what replays (`colloc.verification.replayer`).
     """
     replays: list[Replay] = []
     smoothed = friction.regularised or any(each.smoothed for each in objective.integrals)
@@ -96,13 +101,28 @@ def measured(
         near = replays[-1] if replays else None
         begin = max(2 * (instants // (2 * _FEWER)), 4) if replays else instants
         at = (body, friction, path, part * delta)
-        asked: dict[str, Any] = {"objective": objective, "quantities": quantities, "limits": limits, "turn": rotation or 0.0}
-        replays.append(run(*at, **asked, instants=begin, tolerance=tolerance, breaks=breaks, near=near))
+        asked: dict[str, Any] = {
+            "objective": objective,
+            "quantities": quantities,
+            "limits": limits,
+            "turn": rotation or 0.0,
+        }
+        replays.append(
+            run(*at, **asked, instants=begin, tolerance=tolerance, breaks=breaks, near=near)
+        )
     known = []
     for aim in (objective, EFFICIENCY):
         values = [aim(each.values) for each in replays]
-        errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
-        known.append(Estimate(errors[0], extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])))
+        errors = [
+            abs(value) * _error(each, aim, rotation)
+            for value, each in zip(values, replays, strict=True)
+        ]
+        known.append(
+            Estimate(
+                errors[0],
+                extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0]),
+            )
+        )
     fine = replays[0]
     stated = {name: fine.errors[name] + fine.others.get(name, 0.0) for name in ("distance", "work")}
     stated["distance"] += astray(fine, rotation)
@@ -110,7 +130,8 @@ def measured(
 
 
 def astray(replayed: Replay, rotation: float | None) -> float:
-    """How far the distance depends on the point of the body that is followed: by the rotation beyond what is asked for."""
+    """How far the distance depends on the point of the body that is followed: by the rotation
+    beyond what is asked for."""
     return 0.0 if rotation is None else abs(replayed.rotation - rotation) * replayed.lever
 
 

@@ -1,4 +1,5 @@
-"""The motion of a body over some instants, and the same as labelled columns: for result files, xarray and pandas."""
+"""The motion of a body over some instants, and the same as labelled columns: for result files,
+xarray and pandas."""
 
 from __future__ import annotations
 
@@ -45,7 +46,9 @@ class SampledMotion:
     tail: np.ndarray
 
     def __repr__(self) -> str:
-        return f"<SampledMotion at {self.t.size} instants, t = {self.t.min():g} to {self.t.max():g}>"
+        return (
+            f"<SampledMotion at {self.t.size} instants, t = {self.t.min():g} to {self.t.max():g}>"
+        )
 
 
 def turned(vectors: np.ndarray, theta: np.ndarray | float) -> np.ndarray:
@@ -63,7 +66,8 @@ class RigidMotion:
     rotation : float or (n,)
         Angle, counter-clockwise [rad].
     shift : complex or (n,)
-        x + iy of where the origin goes [body lengths]: of a gait the way of its centre of mass, a chord if it turns.
+        x + iy of where the origin goes [body lengths]: of a gait the way of its centre of mass, a
+        chord if it turns.
 
     Examples
     --------
@@ -76,11 +80,15 @@ class RigidMotion:
     shift: complex | np.ndarray
 
     def repeated(self, times: np.ndarray | int) -> RigidMotion:
-        """The motion so many times in a row, whole numbers ``(n,)`` or one; negative ones go back."""
+        """The motion so many times in a row, whole numbers ``(n,)`` or one; negative ones go
+        back."""
         angle = math.remainder(self.rotation, 2 * np.pi)
-        # sum of e^(i k angle) for k = 0 to n - 1: e^(i (n - 1) angle / 2) sin(n angle / 2) / sin(angle / 2)
+        # sum of e^(i k angle) for k = 0 to n - 1: e^(i (n - 1) angle / 2) sin(n angle / 2) /
+        # sin(angle / 2)
         chords = times * np.sinc(0.5 * times * angle / np.pi) / np.sinc(0.5 * angle / np.pi)
-        return RigidMotion(times * self.rotation, chords * np.exp(0.5j * (times - 1) * angle) * self.shift)
+        return RigidMotion(
+            times * self.rotation, chords * np.exp(0.5j * (times - 1) * angle) * self.shift
+        )
 
     def of(self, points: np.ndarray) -> np.ndarray:
         """Where points ``(2, ..., n)`` of the lab go."""
@@ -97,13 +105,16 @@ class Column(NamedTuple):
 
 
 def motion_columns(motion: SampledMotion, power: np.ndarray, body: Body) -> dict[str, Column]:
-    """Name to column, with the power against friction ``(n_time,)``; shape coordinates are named as their body names them."""
+    """Name to column, with the power against friction ``(n_time,)``; shape coordinates are named as
+    their body names them."""
     shape = body.coordinate, "t"
     return {
         "t": Column(motion.t, "period", ("t",)),
         f"{body.quantity.replace(' ', '_')}s": Column(motion.angles, "rad", shape),
         f"{body.coordinate}_rates": Column(motion.rates, "rad/period", shape),
-        "tail_velocity": Column(motion.z, "length/period, length/period, rad/period", ("velocity", "t")),
+        "tail_velocity": Column(
+            motion.z, "length/period, length/period, rad/period", ("velocity", "t")
+        ),
         "theta": Column(motion.theta, "rad", ("t",)),
         "centre": Column(motion.centre, "length", ("axis", "t")),
         "tail": Column(motion.tail, "length", ("axis", "t")),
@@ -134,5 +145,7 @@ def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
 def _labels(columns: dict[str, Column]) -> dict[str, list]:
     """Labels along the dimensions other than time: names, or numbers from 1."""
     named: dict[str, list] = {"velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
-    sizes = {column.dims[0]: len(column.values) for column in columns.values() if len(column.dims) > 1}
+    sizes = {
+        column.dims[0]: len(column.values) for column in columns.values() if len(column.dims) > 1
+    }
     return {dim: named.get(dim, [*range(1, size + 1)]) for dim, size in sizes.items()}

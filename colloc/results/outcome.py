@@ -1,4 +1,5 @@
-"""What became of one start of a search over many; as a plain dictionary (JSON) every number to the bit, every gait as it is."""
+"""What became of one start of a search over many; as a plain dictionary (JSON) every number to the
+bit, every gait as it is."""
 
 from __future__ import annotations
 
@@ -29,7 +30,16 @@ UNITS = {
 """Of the numbers of an outcome, for files."""
 RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 """What may end otherwise when it is tried again."""
-STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, PASSED_OVER, TIME_LIMIT, ERROR, CRASHED)
+STATUSES = (
+    SOLVED,
+    TRIVIAL,
+    CERTIFICATE_FAILED,
+    NOT_CONVERGED,
+    PASSED_OVER,
+    TIME_LIMIT,
+    ERROR,
+    CRASHED,
+)
 _LONGEST_MESSAGE = 1000
 
 
@@ -82,25 +92,39 @@ class Outcome:
                 object.__setattr__(self, name, usual)
 
     def __repr__(self) -> str:
-        return f"<Outcome of start {self.start}: {self.status}, d/W = {self.efficiency:.6g}, {self.cpu_seconds:.1f} s>"
+        return (
+            f"<Outcome of start {self.start}: {self.status}, d/W = {self.efficiency:.6g}, "
+            f"{self.cpu_seconds:.1f} s>"
+        )
 
 
 _GAITS, _TEXTS, _COUNTS = ("guess", "gait"), ("status", "message"), ("start", "iterations")
-_NUMBERS = tuple(f.name for f in dataclasses.fields(Outcome) if f.name not in (*_GAITS, *_TEXTS, *_COUNTS))
+_NUMBERS = tuple(
+    f.name for f in dataclasses.fields(Outcome) if f.name not in (*_GAITS, *_TEXTS, *_COUNTS)
+)
 
 
 def outcome_fields(outcome: Outcome) -> dict[str, Any]:
     """The fields of an outcome as numbers (also NaN), strings and lists."""
     plain = {name: getattr(outcome, name) for name in (*_COUNTS, *_TEXTS, *_NUMBERS)}
-    return plain | {"message": outcome.message[:_LONGEST_MESSAGE]} | {g: gait_fields(getattr(outcome, g)) for g in _GAITS}
+    return (
+        plain
+        | {"message": outcome.message[:_LONGEST_MESSAGE]}
+        | {g: gait_fields(getattr(outcome, g)) for g in _GAITS}
+    )
 
 
 def outcome_from(entry: dict[str, Any]) -> Outcome:
-    """The outcome that `outcome_fields` described. KeyError, TypeError, ValueError, OverflowError or ProblemError if it did
-    not."""
+    """The outcome that `outcome_fields` described. KeyError, TypeError, ValueError, OverflowError
+    or ProblemError if it did not."""
     if entry["status"] not in STATUSES:
         raise ValueError(f"no status: {entry['status']}")
-    kinds: list[tuple[Callable, tuple[str, ...]]] = [(int, _COUNTS), (str, _TEXTS), (float, _NUMBERS), (gait_from, _GAITS)]
+    kinds: list[tuple[Callable, tuple[str, ...]]] = [
+        (int, _COUNTS),
+        (str, _TEXTS),
+        (float, _NUMBERS),
+        (gait_from, _GAITS),
+    ]
     return Outcome(**{name: kind(entry[name]) for kind, names in kinds for name in names})
 
 

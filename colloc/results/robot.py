@@ -1,9 +1,10 @@
 """A gait on a robot of so many metres and kilograms: the one module that knows units.
 
-Everything else counts lengths in body lengths L, forces in weights m g and time in periods T. So a torque is one in m g L,
-work too, a power in m g L / T, and a speed in L / T; the cost of transport W / (m g d) has no unit. The numbers are those at
-the robot's pace, with inertia: what that does depends on the *Froude number* Fr = L / (g T^2) alone. Where the body has no
-masses, or the motion with inertia is not found, they are those of slow motion, which is said.
+Everything else counts lengths in body lengths L, forces in weights m g and time in periods T. So a
+torque is one in m g L, work too, a power in m g L / T, and a speed in L / T; the cost of transport
+W / (m g d) has no unit. The numbers are those at the robot's pace, with inertia: what that does
+depends on the *Froude number* Fr = L / (g T^2) alone. Where the body has no masses, or the motion
+with inertia is not found, they are those of slow motion, which is said.
 """
 
 from __future__ import annotations
@@ -20,7 +21,14 @@ import numpy as np
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import GRAVITY, checked_inertia, inertial_moments, momenta, momentum_rates, tail_velocity
+from colloc.mechanics.inertia import (
+    GRAVITY,
+    checked_inertia,
+    inertial_moments,
+    momenta,
+    momentum_rates,
+    tail_velocity,
+)
 from colloc.mechanics.law import rate_independent
 from colloc.mechanics.links import LinkVelocity
 from colloc.results.arc import arc
@@ -39,7 +47,8 @@ SLOW_ENOUGH = 0.01
 _MOMENT = 1e-5
 """Of a period, over which velocities of links are differentiated."""
 _PACE = 0.01
-"""Relative difference of the Froude numbers of a robot and of the gait, up to which it is played at the pace that it is for."""
+"""Relative difference of the Froude numbers of a robot and of the gait, up to which it is played at
+the pace that it is for."""
 _ACCURACY = 1e-6
 """Of the momenta in the motion with inertia."""
 _LITTLE = 1e-3
@@ -54,11 +63,16 @@ _PHASES = np.arange(_INSTANTS) / _INSTANTS
 
 
 def joint_torques(
-    solution: Solution, t: np.ndarray, motion: SampledMotion | None = None, froude: float | None = None
+    solution: Solution,
+    t: np.ndarray,
+    motion: SampledMotion | None = None,
+    froude: float | None = None,
 ) -> np.ndarray:
-    """Torques of the joints' motors [weight x body length] at phases t ``(n_time,)``, ``(n_joint, n_time)``.
+    """Torques of the joints' motors [weight x body length] at phases t ``(n_time,)``, ``(n_joint,
+    n_time)``.
 
-    Those of the result, unless another `motion` at these phases is given, with the Froude number that it belongs to.
+    Those of the result, unless another `motion` at these phases is given, with the Froude number
+    that it belongs to.
 
     Raises
     ------
@@ -67,20 +81,29 @@ def joint_torques(
     """
     problem = solution.problem
     if not problem.body.force_names:
-        raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
+        raise ProblemError(
+            f"{problem.name} is a smooth body: it has no joints whose torques could be told."
+        )
     motion = motion or solution.sample(t)
     froude = solution.froude if froude is None else froude
     (angles, rates), z, load = solution.gait(t), motion.z, problem.regime.pull(motion.theta[None])
     if not froude:
         return slow_torques(solution, angles, rates, load, z)
-    return _of_friction(solution, angles, rates, load, z) + _of_inertia(solution, t, z, load, froude)
+    return _of_friction(solution, angles, rates, load, z) + _of_inertia(
+        solution, t, z, load, froude
+    )
 
 
 def slow_torques(
-    solution: Solution, angles: np.ndarray, rates: np.ndarray, load: np.ndarray | None, start: np.ndarray | None = None
+    solution: Solution,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    load: np.ndarray | None,
+    start: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Torques of the motors in balance [weight x body length] at any angles and rates of joints, ``(n_joint, n_time)``, with a
-    pull on the centre of mass ``(2, n_time)`` if there is one; tail velocities are sought near `start`."""
+    """Torques of the motors in balance [weight x body length] at any angles and rates of joints,
+    ``(n_joint, n_time)``, with a pull on the centre of mass ``(2, n_time)`` if there is one; tail
+    velocities are sought near `start`."""
     body: Any = solution.problem.body
     balanced = body.solve if load is None else partial(solve_balance, body, load=load)
     z = balanced(solution.problem.law, angles, rates, solution.delta_per_period, start=start).z
@@ -88,33 +111,50 @@ def slow_torques(
 
 
 def _of_friction(
-    solution: Solution, angles: np.ndarray, rates: np.ndarray, load: np.ndarray | None, z: np.ndarray
+    solution: Solution,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    load: np.ndarray | None,
+    z: np.ndarray,
 ) -> np.ndarray:
     """Torques of the motors against friction and pull, with tail velocities z."""
     body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
-    return np.asarray(joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta, load))
+    return np.asarray(
+        joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta, load)
+    )
 
 
-def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None, froude: float) -> np.ndarray:
+def _of_inertia(
+    solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None, froude: float
+) -> np.ndarray:
     """Torques of the motors that change how the links move, at phases with tail velocities z."""
     problem = solution.problem
     body, joints = checked_inertia(problem.body, solution.gait)
     angles, rates = joints(t)
     link = body.velocity(body.posture(angles), rates, z)
     states = momenta(body, body.posture(angles), link)
-    grows = momentum_rates(body, problem.law, angles, rates, states, delta=solution.delta_per_period, froude=froude).rates
+    grows = momentum_rates(
+        body, problem.law, angles, rates, states, delta=solution.delta_per_period, froude=froude
+    ).rates
     if load is not None:
         grows[:2] += load / froude
 
     def later(by: float) -> LinkVelocity:
         then, pace = joints(t + by)
-        return body.velocity(body.posture(then), pace, tail_velocity(body, then, pace, states + by * grows))
+        return body.velocity(
+            body.posture(then), pace, tail_velocity(body, then, pace, states + by * grows)
+        )
 
     growth = LinkVelocity(
-        *((after - before) / (2 * _MOMENT) for before, after in zip(later(-_MOMENT), later(_MOMENT), strict=True))
+        *(
+            (after - before) / (2 * _MOMENT)
+            for before, after in zip(later(-_MOMENT), later(_MOMENT), strict=True)
+        )
     )
     moments = froude * inertial_moments(body, angles, link, growth)
-    return np.array(problem.body.gears).T @ moments if isinstance(problem.body, Coupled) else moments
+    return (
+        np.array(problem.body.gears).T @ moments if isinstance(problem.body, Coupled) else moments
+    )
 
 
 class _Played:
@@ -138,12 +178,22 @@ class _Played:
 
         problem, self._gait = solution.problem, solution.gait
         self._body = problem.body
-        how: Any = {"froude": froude, "breaks": solution.gait.corner_phases, "regime": problem.regime}
-        played = gait_with_inertia(problem.body, problem.law, solution.gait, solution.delta_per_period, **how)
+        how: Any = {
+            "froude": froude,
+            "breaks": solution.gait.corner_phases,
+            "regime": problem.regime,
+        }
+        played = gait_with_inertia(
+            problem.body, problem.law, solution.gait, solution.delta_per_period, **how
+        )
         closed = played.closed_from(None)
         self._course = played.periodic_run(closed.momenta, _ACCURACY, closed.slopes).course
         passed = played.passed(self._course.states)
-        self.work, self.rotation, self.distance = passed["work"], passed["rotation"], passed["distance"]
+        self.work, self.rotation, self.distance = (
+            passed["work"],
+            passed["rotation"],
+            passed["distance"],
+        )
         self._ahead = 0.0
         if not problem.regime.slides:
             way = arc(self.rotation, self._course.at(np.linspace(0.0, 1.0, _INSTANTS + 1))[4:6])
@@ -182,13 +232,14 @@ class Robot:
     gravity : float
         [m/s^2]
     max_speed, max_torque : float or (n_joint,), optional
-        Of the motors [rad/s], [N m]: then the shortest period is told, and whether the torques at this one suffice.
+        Of the motors [rad/s], [N m]: then the shortest period is told, and whether the torques at
+        this one suffice.
 
     Raises
     ------
     ProblemError
-        If a number is not positive, the body has no joints, the gait is for another pace, or `max_speed` or `max_torque` is
-        given where torques depend on the pace.
+        If a number is not positive, the body has no joints, the gait is for another pace, or
+        `max_speed` or `max_torque` is given where torques depend on the pace.
 
     Examples
     --------
@@ -212,20 +263,28 @@ class Robot:
         check_finite(positive=True, **numbers)
         for name, value in numbers.items():
             if not 1 / _LARGEST <= value <= _LARGEST:
-                raise ProblemError(f"{name} must lie between {1 / _LARGEST:g} and {_LARGEST:g} in SI units, not {value:g}.")
+                raise ProblemError(
+                    f"{name} must lie between {1 / _LARGEST:g} and {_LARGEST:g} in SI units, not "
+                    f"{value:g}."
+                )
         problem, n = self.solution.problem, self.solution.gait.n_joint
         if (own := self.solution.froude) and abs(self.froude / own - 1.0) > _PACE:
             needed = math.sqrt(self.length / (self.pressing * own))
             raise ProblemError(
-                f"{problem.name} is the best gait for the Froude number {own:.4g}: a robot of {self.length:g} m has "
-                f"to take {needed:.4g} s a period, not {self.period:g}: solve again with froude={self.froude:.4g}."
+                f"{problem.name} is the best gait for the Froude number {own:.4g}: a robot of "
+                f"{self.length:g} m has "
+                f"to take {needed:.4g} s a period, not {self.period:g}: solve again with "
+                f"froude={self.froude:.4g}."
             )
         for name, unit in (("max_speed", "speed"), ("max_torque", "torque")):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, one_each(getattr(self, name), n, f"joint {unit} limit"))
+                object.__setattr__(
+                    self, name, one_each(getattr(self, name), n, f"joint {unit} limit")
+                )
                 if problem.froude or not rate_independent(problem.law):
                     raise ProblemError(
-                        f"{name} asks for another pace, and torques depend on it, as {problem.paced_by}: leave it out, or "
+                        f"{name} asks for another pace, and torques depend on it, as "
+                        f"{problem.paced_by}: leave it out, or "
                         "solve again for that pace."
                     )
 
@@ -252,7 +311,8 @@ class Robot:
         return None
 
     def torques(self, t: np.ndarray) -> np.ndarray:
-        """Of the joints [N m] at ascending phases t in [0, 1] ``(n_time,)``, ``(n_joint, n_time)``."""
+        """Of the joints [N m] at ascending phases t in [0, 1] ``(n_time,)``, ``(n_joint,
+        n_time)``."""
         played = () if self._played is None else (self._played.sample(t), self.froude)
         return self.torque_unit * joint_torques(self.solution, t, *played)
 
@@ -276,19 +336,26 @@ class Robot:
 
     def to_xarray(self) -> xarray.Dataset:
         """The motion over a period as an xarray Dataset whose units are SI ones."""
-        return motion_dataset(self.columns, {name: value for name, value in self.facts.items() if value is not None})
+        return motion_dataset(
+            self.columns, {name: value for name, value in self.facts.items() if value is not None}
+        )
 
     def plot(self, ax: Any = None, panel: str = "torque") -> Any:
-        """Torque, speed and power of every joint over a period, as a matplotlib Figure; with `ax`, a matplotlib Axes, one of
-        them there, "torque", "speed" or "power", and the Axes is returned."""
-        return bound("plot_robot")(self) if ax is None else bound("plot_robot_panel")(ax, self, panel)
+        """Torque, speed and power of every joint over a period, as a matplotlib Figure; with `ax`,
+        a matplotlib Axes, one of them there, "torque", "speed" or "power", and the Axes is
+        returned."""
+        return (
+            bound("plot_robot")(self) if ax is None else bound("plot_robot_panel")(ax, self, panel)
+        )
 
     @cached_property
     def facts(self) -> dict[str, Any]:
         """All numbers by names that end in their units (JSON)."""
         problem, motion = self.solution.problem, self._played or self.solution.measured
         distance = motion.distance
-        torques, speeds, powers = (self.columns[f"joint_{name}"].values for name in ("torques", "speeds", "powers"))
+        torques, speeds, powers = (
+            self.columns[f"joint_{name}"].values for name in ("torques", "speeds", "powers")
+        )
         work, total = self.torque_unit * motion.work, powers.sum(axis=0)
         facts = {
             "name": problem.name,
@@ -299,7 +366,9 @@ class Robot:
             "gravity_m_per_s2": float(self.gravity),
             "speed_m_per_s": distance * self.length / self.period,
             "body_lengths_per_period": distance,
-            "travels": direction_of_travel(*(self.columns[name].values for name in ("centre", "tail"))),
+            "travels": direction_of_travel(
+                *(self.columns[name].values for name in ("centre", "tail"))
+            ),
             "work_per_period_J": work,
             "motor_work_per_period_J": self.period * float(_mean(np.maximum(powers, 0.0)).sum()),
             "mean_power_W": work / self.period,
@@ -325,11 +394,15 @@ class Robot:
         if problem.regime.slides:
             return found
         if self._played is not None:
-            found["inertia_takes"] = 1.0 - self._played.distance / self._played.work / solution.efficiency
+            found["inertia_takes"] = (
+                1.0 - self._played.distance / self._played.work / solution.efficiency
+            )
             found["rotation_by_inertia_rad"] = self._played.rotation - solution.rotation
         with suppress(ProblemError, NotConvergedError):
             if rate_independent(problem.law):
-                found["slow_enough_period_s"] = math.sqrt(self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH)))
+                found["slow_enough_period_s"] = math.sqrt(
+                    self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH))
+                )
         return found
 
     def _motors(self, peak: np.ndarray) -> dict[str, Any]:
@@ -356,7 +429,8 @@ class Robot:
         """The sheet for people."""
         f = self.facts
         found = [
-            f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period ({f['status']})",
+            f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period "
+            f"({f['status']})",
             f"  speed              {f['speed_m_per_s']:.4g} m/s {f['travels']}; "
             f"{f['body_lengths_per_period']:.4g} body lengths a period",
             f"  work               {f['work_per_period_J']:.4g} J a period; "
@@ -368,9 +442,17 @@ class Robot:
             "             peak     r.m.s.   peak     r.m.s.   peak",
         ]
         coordinate = self.solution.problem.body.coordinate
-        names = ("peak_torque_N_m", "rms_torque_N_m", "peak_speed_rad_per_s", "rms_speed_rad_per_s", "peak_joint_power_W")
+        names = (
+            "peak_torque_N_m",
+            "rms_torque_N_m",
+            "peak_speed_rad_per_s",
+            "rms_speed_rad_per_s",
+            "peak_joint_power_W",
+        )
         for j, row in enumerate(zip(*(f[name] for name in names), strict=True), 1):
-            found.append(f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip())
+            found.append(
+                f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip()
+            )
         return [*found, "", *(f"  {sentence}" for sentence in self.sentences())]
 
     def sentences(self) -> list[str]:
@@ -378,50 +460,73 @@ class Robot:
         f, problem = self.facts, self.solution.problem
         said = []
         if "shortest_period_s" in f:
-            paced, fast = f.get("shortest_period_paced_by_speed_s"), f.get("speed_at_shortest_period_m_per_s")
+            paced, fast = (
+                f.get("shortest_period_paced_by_speed_s"),
+                f.get("speed_at_shortest_period_m_per_s"),
+            )
             does = "" if fast is None else f" ({fast:.4g} m/s)"
             more = "" if paced is None else f", {paced:.3g} s as colloc export --max-speed paces it"
             said.append(
-                f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the gait's own pace{does}{more}."
+                f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the "
+                f"gait's own pace{does}{more}."
             )
             if f["shortest_period_s"] > self.period * (1 + 1e-9):
-                said.append(f"That is more than {self.period:g} s, at which the numbers above are: the joints cannot follow.")
+                said.append(
+                    f"That is more than {self.period:g} s, at which the numbers above are: the "
+                    f"joints cannot follow."
+                )
         if "torque_used" in f:
             worst = int(np.argmax(f["torque_used"]))
             peak, has = f["peak_torque_N_m"][worst], f["max_torque_N_m"][worst]
             slowly = max(f.get("torque_used_slowly", f["torque_used"]))
             if f["torque_used"][worst] <= 1:
-                said.append(f"The torques suffice at this pace: joint {worst + 1} uses {100 * peak / has:.3g} % of its own.")
+                said.append(
+                    f"The torques suffice at this pace: joint {worst + 1} uses "
+                    f"{100 * peak / has:.3g} % of its own."
+                )
             elif slowly <= 1:
                 said.append(
-                    f"Joint {worst + 1} needs {peak:.3g} N m at this pace and has {has:.3g}; played slowly no joint needs more "
+                    f"Joint {worst + 1} needs {peak:.3g} N m at this pace and has {has:.3g}; "
+                    f"played slowly no joint needs more "
                     "than it has: take a longer period."
                 )
             else:
                 limit = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
                 said.append(
-                    f"Joint {worst + 1} needs {peak:.3g} N m and has {has:.3g}. Played slowly motors are too weak as well, so "
+                    f"Joint {worst + 1} needs {peak:.3g} N m and has {has:.3g}. Played slowly "
+                    f"motors are too weak as well, so "
                     f"a longer period does not help: solve with torque_limit=({limit})."
                 )
         if not rate_independent(problem.law):
             said.append(
-                f"Torques depend on the pace under {problem.law.label}: its coefficients are taken to be those in units "
+                f"Torques depend on the pace under {problem.law.label}: its coefficients are taken "
+                f"to be those in units "
                 "of this period."
             )
         if problem.froude:
             said.append("Torques and power include inertia")
             if (slowly := f.get("played_slowly")) is not None:
-                value = f"{problem.objective.short} {slowly:.4g} instead of {self.solution.measured.value:.4g}"
+                value = (
+                    f"{problem.objective.short} {slowly:.4g} instead of "
+                    f"{self.solution.measured.value:.4g}"
+                )
                 said[-1] += f"; played slowly the gait would have {value}"
             return [*said[:-1], f"{said[-1]}."]
         pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
         lost, slow = f.get("inertia_takes"), f.get("slow_enough_period_s")
         more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
         if self._played is None:
-            return [*said, f"All this is slow motion. What inertia does {pace} could not be computed{more}."]
+            return [
+                *said,
+                f"All this is slow motion. What inertia does {pace} could not be computed{more}.",
+            ]
         said.append(f"All this includes inertia {pace}")
         if lost is not None:
-            share = f"{100 * abs(lost):.2g} %" if abs(lost) > _LITTLE else f"less than {100 * _LITTLE:g} %"
+            share = (
+                f"{100 * abs(lost):.2g} %"
+                if abs(lost) > _LITTLE
+                else f"less than {100 * _LITTLE:g} %"
+            )
             does = f"Inertia {'takes' if lost >= 0 else 'adds'} {share} of the efficiency {pace}"
             said[-1] = f"All this includes inertia. {does}{more}"
             if abs(turns := math.degrees(f["rotation_by_inertia_rad"])) > _TURNS:

@@ -1,4 +1,5 @@
-"""The result of a solve: its answer with certificate, and the motion at any instant by the scheme's own interpolant."""
+"""The result of a solve: its answer with certificate, and the motion at any instant by the scheme's
+own interpolant."""
 
 from __future__ import annotations
 
@@ -22,7 +23,15 @@ from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, St
 from colloc.results.arc import PHASES, Arc, arc
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
-from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame, turned
+from colloc.results.motion import (
+    SAMPLES,
+    Column,
+    SampledMotion,
+    motion_columns,
+    motion_dataset,
+    motion_frame,
+    turned,
+)
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
@@ -34,9 +43,15 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED, INTERRUPTED = "solved", "not converged", "certificate failed", "interrupted"
+SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED, INTERRUPTED = (
+    "solved",
+    "not converged",
+    "certificate failed",
+    "interrupted",
+)
 _HOLDS, _INSTANTS = 3.0, np.arange(2000) / 2000
-"""Speed of a foot, in delta, up to which it holds: below friction is less than 95 % of what it can be; phases to count at."""
+"""Speed of a foot, in delta, up to which it holds: below friction is less than 95 % of what it can
+be; phases to count at."""
 _MOST_OTHERS = 4
 """Of the gaits that a search met besides, so many are told."""
 
@@ -96,7 +111,10 @@ class Solution:
         replayed = "" if self.certificate.replayed else " (not replayed)"
         error = f" +- {self.certificate.value_error:.0e}" if self.certificate.replayed else ""
         number = f"{self.problem.objective.short} = {self.value:.6g}{error}{replayed}"
-        return f"<Solution {self.problem.name}, {self.status}, {number} at delta = {self.answer.delta:.1e}>"
+        return (
+            f"<Solution {self.problem.name}, {self.status}, {number} at delta = "
+            f"{self.answer.delta:.1e}>"
+        )
 
     @property
     def status(self) -> str:
@@ -121,7 +139,8 @@ class Solution:
 
     @property
     def measured(self) -> Certificate | Answer:
-        """What says the objective, efficiency, distance and work best: the replay if there was one, else the answer."""
+        """What says the objective, efficiency, distance and work best: the replay if there was one,
+        else the answer."""
         return self.certificate if self.certificate.replayed else self.answer
 
     @property
@@ -141,24 +160,28 @@ class Solution:
 
     @property
     def work(self) -> float:
-        """Work against friction over a period, by replay (by collocation, if there was no replay)."""
+        """Work against friction over a period, by replay (by collocation, if there was no
+        replay)."""
         return self.measured.work
 
     @property
     def rotation(self) -> float:
-        """Net rotation over a period [rad], counter-clockwise: of the replay if there was one, else as collocated."""
+        """Net rotation over a period [rad], counter-clockwise: of the replay if there was one, else
+        as collocated."""
         return self.certificate.rotation if self.certificate.replayed else self.motion.rotation
 
     @property
     def arc(self) -> Arc:
-        """Angle, radius and chord of a period, whatever phase it is begun at; straight on if no turn is asked for."""
+        """Angle, radius and chord of a period, whatever phase it is begun at; straight on if no
+        turn is asked for."""
         if self.problem.rotation is not None:
             return Arc(self.problem.rotation, self.distance)
         return arc(self.rotation, self.motion.sample(PHASES).centre)
 
     @property
     def turning_radius(self) -> float:
-        """Of the circle about which the gait crawls [body lengths]; infinite where it is asked to crawl straight on."""
+        """Of the circle about which the gait crawls [body lengths]; infinite where it is asked to
+        crawl straight on."""
         return self.arc.radius
 
     @property
@@ -172,18 +195,31 @@ class Solution:
 
     @property
     def played_slowly(self) -> float:
-        """The objective of the same gait played so slowly that inertia does not matter; `NotConvergedError` if a slope does not
-        hold it then."""
+        """The objective of the same gait played so slowly that inertia does not matter;
+        `NotConvergedError` if a slope does not hold it then."""
         p, at = self.problem, self.answer.delta_per_period
-        asked: Any = {"quantities": p.objective.integrals, "turn": p.rotation or 0.0, "breaks": self.gait.corner_phases}
+        asked: Any = {
+            "quantities": p.objective.integrals,
+            "turn": p.rotation or 0.0,
+            "breaks": self.gait.corner_phases,
+        }
         period = {"period": self.froude**-0.5} if self.froude else {}
-        return float(p.objective({**replayer(p.regime.slowly)(p.body, p.law, self.gait, at, **asked).values, **period}))
+        return float(
+            p.objective(
+                {
+                    **replayer(p.regime.slowly)(p.body, p.law, self.gait, at, **asked).values,
+                    **period,
+                }
+            )
+        )
 
     def slow_enough(self, loss: float = 0.01) -> float:
-        """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than the part `loss`.
+        """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than
+        the part `loss`.
 
-        A body of length L [m] that takes T [s] a period, on a floor whose friction is f times the stated one, is slow enough if
-        T is at least sqrt(L / (9.81 f Fr)). See `colloc.slow_enough`, which says what is raised.
+        A body of length L [m] that takes T [s] a period, on a floor whose friction is f times the
+        stated one, is slow enough if T is at least sqrt(L / (9.81 f Fr)). See `colloc.slow_enough`,
+        which says what is raised.
         """
         if self.problem.regime.slides:
             raise ProblemError("on a slope it is not known how slow is slow enough.")
@@ -191,13 +227,14 @@ class Solution:
         return slow_enough(*at, loss, breaks=self.gait.corner_phases)
 
     def dry(self) -> DryFriction:
-        """Distance, work and efficiency at delta = 0, between bounds: the same gait under friction that is not smoothed.
+        """Distance, work and efficiency at delta = 0, between bounds: the same gait under friction
+        that is not smoothed.
 
         Raises
         ------
         ProblemError
-            Unless a chain crawls slowly on the level, under a law whose dry balance minimises the dissipation: isotropic
-            friction or `Elliptic`.
+            Unless a chain crawls slowly on the level, under a law whose dry balance minimises the
+            dissipation: isotropic friction or `Elliptic`.
 
         Examples
         --------
@@ -211,10 +248,13 @@ class Solution:
         p = self.problem
         if not p.regime.slow_on_level:
             raise ProblemError("bounds for dry friction are there for slow gaits on the level.")
-        return dry_friction(p.body, p.law, self.gait, breaks=self.gait.corner_phases, turn=p.rotation or 0.0)
+        return dry_friction(
+            p.body, p.law, self.gait, breaks=self.gait.corner_phases, turn=p.rotation or 0.0
+        )
 
     def certify_dry(self) -> None:
-        """Put the efficiency under dry friction into the certificate, which is saved with it; raises what `dry` does."""
+        """Put the efficiency under dry friction into the certificate, which is saved with it;
+        raises what `dry` does."""
         least, most = self.dry().efficiency
         self.certificate = replace(self.certificate, dry=(least, most))
 
@@ -230,7 +270,9 @@ class Solution:
         others = [other for other in self.others if other is not this]
         lines = [f"local optimum, best of {self.starts} starts, {this.starts} of which met it"]
         if others:
-            lines.append("also met, on a coarse mesh: " + "; ".join(map(str, others[:_MOST_OTHERS])))
+            lines.append(
+                "also met, on a coarse mesh: " + "; ".join(map(str, others[:_MOST_OTHERS]))
+            )
         return lines
 
     @property
@@ -250,7 +292,8 @@ class Solution:
 
     @property
     def delta_per_period(self) -> float:
-        """Regularisation speed of the answer in body lengths per period, whatever the class measures it in."""
+        """Regularisation speed of the answer in body lengths per period, whatever the class
+        measures it in."""
         return self.answer.delta_per_period
 
     @property
@@ -259,11 +302,13 @@ class Solution:
         return self.answer.motion
 
     def at_points(self) -> tuple[np.ndarray, Sliding]:
-        """Phases of the collocation points and the body there, from the variables of the answer (per period)."""
+        """Phases of the collocation points and the body there, from the variables of the answer
+        (per period)."""
         return self.mesh.times, self.motion.at_points
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
-        """The motion at phases t, any real numbers, period after period: `CollocatedMotion.sample`."""
+        """The motion at phases t, any real numbers, period after period:
+        `CollocatedMotion.sample`."""
         return self.motion.sample(t)
 
     @property
@@ -272,33 +317,54 @@ class Solution:
         return self.problem.regime.at(self.gait).froude
 
     def from_rest(self, t: np.ndarray) -> SampledMotion:
-        """The motion at ascending phases t, 0 and more, of a body with inertia that is at rest before its joints begin.
+        """The motion at ascending phases t, 0 and more, of a body with inertia that is at rest
+        before its joints begin.
 
         Raises
         ------
         ProblemError
             If the problem states no pace: without inertia the first period is like all others.
         """
-        from colloc.verification.inertial_motion import motion_from_rest  # loads what integrates, which few need
+        # loads what integrates, which few need
+        from colloc.verification.inertial_motion import (
+            motion_from_rest,
+        )
 
         p, chain = self.problem, self.problem.body
         if not p.froude:
-            raise ProblemError(f"{p.name} has no inertia, and is under way at once: from rest is for problems with a froude.")
+            raise ProblemError(
+                f"{p.name} has no inertia, and is under way at once: from rest is for problems "
+                f"with a froude."
+            )
         played = p.law, self.gait, self.delta_per_period, self.froude
-        begun: Any = {"grade": p.grade, "theta": getattr(self.gait, "theta", None) or 0.0, "breaks": self.gait.corner_phases}
+        begun: Any = {
+            "grade": p.grade,
+            "theta": getattr(self.gait, "theta", None) or 0.0,
+            "breaks": self.gait.corner_phases,
+        }
         ran = motion_from_rest(chain, *played, periods=max(1, int(np.ceil(t[-1]))), **begun)
         states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
         (angles, rates), theta, centre = self.gait(t % 1.0), states[3], states[4:6]
         z = tail_velocity(checked_mass(chain), angles, rates, states[:3])
-        return SampledMotion(t, angles, rates, z, theta, centre, centre - turned(np.array(chain.centre(angles)), theta))
+        return SampledMotion(
+            t,
+            angles,
+            rates,
+            z,
+            theta,
+            centre,
+            centre - turned(np.array(chain.centre(angles)), theta),
+        )
 
     def holding(self, motion: SampledMotion) -> np.ndarray:
-        """Which feet of the body hold at instants of its motion, slower than 3 delta, ``(n_foot, n_time)``; no rows for a body
-        that has none."""
+        """Which feet of the body hold at instants of its motion, slower than 3 delta, ``(n_foot,
+        n_time)``; no rows for a body that has none."""
         body = self.problem.body
         if not body.footprints(motion.angles).size:
             return np.zeros((0, motion.t.size), dtype=bool)
-        return body.speeds(motion.angles, motion.rates, motion.z)[1] < _HOLDS * self.delta_per_period
+        return (
+            body.speeds(motion.angles, motion.rates, motion.z)[1] < _HOLDS * self.delta_per_period
+        )
 
     @property
     def share_held(self) -> np.ndarray:
@@ -308,7 +374,8 @@ class Solution:
 
     @property
     def travels(self) -> str:
-        """Which way the body points as it travels, on average: "head first", "tail first" or "sideways"."""
+        """Which way the body points as it travels, on average: "head first", "tail first" or
+        "sideways"."""
         motion = self.sample(_INSTANTS)
         return direction_of_travel(motion.centre, motion.tail)
 
@@ -317,18 +384,20 @@ class Solution:
         return self.motion.sliding(motion.angles, motion.rates, motion.z).power[0]
 
     def plot(self, ax: Any = None, panel: str = "gait") -> Any:
-        """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it.
+        """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it,
+        ``.savefig("mine.png")`` writes it.
 
-        With `ax`, a matplotlib Axes, one panel is drawn there, and the Axes returned: the gait (its path in the plane of two
-        shape coordinates, of one or more than two their course in time), or another one of ``colloc report --figures``:
-        "filmstrip", "lab", "angles", "speeds", "power", "convergence", "mesh", "shape-1-2". `ProblemError` if there is none of
-        that name.
+        With `ax`, a matplotlib Axes, one panel is drawn there, and the Axes returned: the gait (its
+        path in the plane of two shape coordinates, of one or more than two their course in time),
+        or another one of ``colloc report --figures``: "filmstrip", "lab", "angles", "speeds",
+        "power", "convergence", "mesh", "shape-1-2". `ProblemError` if there is none of that name.
         """
         return bound("plot")(self) if ax is None else bound("plot_panel")(ax, self, panel)
 
     @checked_arguments
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write the motion as GIF or MP4, by the ending of `path`; options as for `colloc.pictures.movie.write_movie`."""
+        """Write the motion as GIF or MP4, by the ending of `path`; options as for
+        `colloc.pictures.movie.write_movie`."""
         return bound("animate")(self, Path(path), **options)
 
     @checked_arguments
@@ -338,13 +407,15 @@ class Solution:
 
     @checked_arguments
     def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-        """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`, ``solution.export("mine.csv",
-        period=4)``, or the robot as a model for simulators (``.xml``, ``.urdf``); returns what the file says. Options as for
+        """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`,
+        ``solution.export("mine.csv", period=4)``, or the robot as a model for simulators (``.xml``,
+        ``.urdf``); returns what the file says. Options as for
         `colloc.pictures.export.write_export`."""
         return bound("export")(self, Path(path), **options)
 
     def robot(self, length: float, mass: float, period: float, **options: Any) -> Any:
-        """A `colloc.results.robot.Robot`: speed, power and torques of the gait on a robot of so many metres and kilograms.
+        """A `colloc.results.robot.Robot`: speed, power and torques of the gait on a robot of so
+        many metres and kilograms.
 
         Options as there: `gravity`, `max_speed`, `max_torque`.
 
@@ -359,9 +430,11 @@ class Solution:
         return bound("robot")(self, length, mass, period, **options)
 
     def sensitivity(self, resolve: bool = False) -> Any:
-        """A `colloc.search.sensitivity.Sensitivity`: by how much the best value changes with every number of the problem.
+        """A `colloc.search.sensitivity.Sensitivity`: by how much the best value changes with every
+        number of the problem.
 
-        With `resolve` also what the best gait gets where each is a tenth smaller and larger, and what this one gets there.
+        With `resolve` also what the best gait gets where each is a tenth smaller and larger, and
+        what this one gets there.
 
         Examples
         --------
@@ -373,22 +446,30 @@ class Solution:
         return bound("sensitivity")(self, resolve)
 
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
-        """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""
-        about = {"name": self.problem.name, "status": self.status, "efficiency": self.measured.efficiency}
+        """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a
+        result file's group motion."""
+        about = {
+            "name": self.problem.name,
+            "status": self.status,
+            "efficiency": self.measured.efficiency,
+        }
         about |= {"rotation": self.rotation, "turning_radius": self.turning_radius}
         if self.problem.objective != EFFICIENCY:
             about |= {"objective": self.problem.objective.name, "value": self.measured.value}
         return motion_dataset(self.columns(t), about)
 
     def to_dataframe(self, t: np.ndarray | None = None) -> pandas.DataFrame:
-        """The motion at phases `t` (one period by default) as a pandas DataFrame: ``joint_angles_1``, ``centre_x``, ...
+        """The motion at phases `t` (one period by default) as a pandas DataFrame:
+        ``joint_angles_1``, ``centre_x``, ...
 
-        Of a body with modes for joints these are ``modes_1``, ``mode_rates_1``, and so in `to_xarray`.
+        Of a body with modes for joints these are ``modes_1``, ``mode_rates_1``, and so in
+        `to_xarray`.
         """
         return motion_frame(self.columns(t))
 
     def columns(self, t: np.ndarray | None = None) -> dict[str, Column]:
-        """The motion at phases `t` (one period by default): name to values with their units and dimensions."""
+        """The motion at phases `t` (one period by default): name to values with their units and
+        dimensions."""
         motion = self.sample(np.linspace(0.0, 1.0, SAMPLES) if t is None else t)
         return motion_columns(motion, self.power(motion), self.problem.body)
 
@@ -398,8 +479,8 @@ class Solution:
 
 
 def direction_of_travel(centre: np.ndarray, tail: np.ndarray) -> str:
-    """Which way a body points as it travels, on average: "head first", "tail first" or "sideways"; from places of its centre of
-    mass and of its tail over a period, ``(2, n_time)``."""
+    """Which way a body points as it travels, on average: "head first", "tail first" or "sideways";
+    from places of its centre of mass and of its tail over a period, ``(2, n_time)``."""
     (x, y), (ahead, aside) = (centre - tail).mean(axis=1), centre[:, -1] - centre[:, 0]
     along, across = x * ahead + y * aside, abs(x * aside - y * ahead)
     return "sideways" if abs(along) <= across else "head first" if along > 0 else "tail first"

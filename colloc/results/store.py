@@ -1,16 +1,19 @@
-"""Solutions as HDF5 files: self-describing, readable with plain h5py, replaced atomically, and nothing but data.
+"""Solutions as HDF5 files: self-describing, readable with plain h5py, replaced atomically, and
+nothing but data.
 
 Layout of a file (every dataset carries ``units`` and ``dims``)::
 
     /problem            JSON text of all fields          /source     text of the problem file
     /gait/{mean,cos,sin}                                 /versions   JSON text
-         or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
+         or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute
+         symmetry
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result; of a smooth body
         modes and mode_rates
-    /answer/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, value, distance, work, kkt_error, panels, ...
-    /history/{delta,intervals,value,distance,work,...}: how the search came there, a row a step
-    /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, distance, distance_error, work, ...
-"""
+    /answer/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, value, distance, work,
+    kkt_error, panels, ... /history/{delta,intervals,value,distance,work,...}: how the search came
+    there, a row a step /certificate/{name,value,threshold,passed,meaning}, attributes value,
+    value_error, distance, distance_error, work, ...
+"""  # noqa: E501
 
 from __future__ import annotations
 
@@ -33,7 +36,17 @@ from colloc.results.answer import Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError, StoreError
-from colloc.system.store_file import BETWEEN_DIMS, array, attribute, child, mark, new_file, open_file, put, put_attribute
+from colloc.system.store_file import (
+    BETWEEN_DIMS,
+    array,
+    attribute,
+    child,
+    mark,
+    new_file,
+    open_file,
+    put,
+    put_attribute,
+)
 
 FORMAT, FORMAT_VERSION = "colloc solution", 5
 _LAYOUT = "see colloc.collocation.layout"
@@ -110,7 +123,8 @@ def load(path: str | os.PathLike[str]) -> Solution:
 
 
 def holds_more(path: str | os.PathLike[str], solution: Solution) -> bool:
-    """Whether the file of a solution holds attributes or datasets that `save` does not write for it, such as remarks."""
+    """Whether the file of a solution holds attributes or datasets that `save` does not write for
+    it, such as remarks."""
     with h5py.File(path, "r", locking=False) as file, h5py.File(io.BytesIO(), "w") as written:
         _write(written, solution)
         return not _names(file) <= _names(written)
@@ -119,7 +133,9 @@ def holds_more(path: str | os.PathLike[str], solution: Solution) -> bool:
 def _names(file: h5py.File) -> set[str]:
     """Of all datasets, groups and attributes."""
     names = {f"/@{name}" for name in file.attrs}
-    file.visititems(lambda place, item: names.update([place, *(f"{place}@{name}" for name in item.attrs)]))
+    file.visititems(
+        lambda place, item: names.update([place, *(f"{place}@{name}" for name in item.attrs)])
+    )
     return names
 
 
@@ -133,7 +149,9 @@ def _write(file: h5py.File, solution: Solution) -> None:
     put(file, "source", solution.source)
     put(file, "versions", json.dumps(solution.versions))
     put_attribute(file, "starts", solution.starts)
-    others = [{**dataclasses.asdict(other), "gait": fields(other.gait)} for other in solution.others]
+    others = [
+        {**dataclasses.asdict(other), "gait": fields(other.gait)} for other in solution.others
+    ]
     put(file, "others", json.dumps(others))
     put_attribute(file, "interrupted", int(solution.interrupted))
     _write_answer(file, solution.answer)
@@ -165,7 +183,9 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     group = child(file, "answer")
     arrays = {name: array(group, name) for name in _ANSWER_ARRAYS}
     knots = array(group, "knots") if "knots" in group else None
-    plain = {f.name: attribute(group, f.name) for f in dataclasses.fields(Answer) if f.name not in _APART}
+    plain = {
+        f.name: attribute(group, f.name) for f in dataclasses.fields(Answer) if f.name not in _APART
+    }
     panels = int(attribute(group, "panels"))
     if panels:
         problem = problem.with_(body=problem.body.on_panels(panels))
@@ -173,18 +193,34 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         problem = problem.with_(delta=plain["delta"])
     if "guess" in group:  # the least speed was raised for a gait that would shrink
         guess = gait_from(json.loads(array(group, "guess")))
-        problem = problem.with_(smallest_shape_speed=attribute(group, "smallest_shape_speed"), guess=guess)
-    second = SecondOrder(**{f.name: attribute(group, f"second_order_{f.name}") for f in dataclasses.fields(SecondOrder)})
+        problem = problem.with_(
+            smallest_shape_speed=attribute(group, "smallest_shape_speed"), guess=guess
+        )
+    second = SecondOrder(
+        **{
+            f.name: attribute(group, f"second_order_{f.name}")
+            for f in dataclasses.fields(SecondOrder)
+        }
+    )
     steps = child(file, "history")
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
-    history = tuple(Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
+    history = tuple(
+        Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)
+    )
     # by the variables, not by what the group gait says for other readers
-    layout = layout_of(control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]), knots)
+    layout = layout_of(
+        control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]), knots
+    )
     if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
         raise StoreError("its variables do not fit its mesh.")
-    parameters, meet = arrays["x"][layout.parameters[:, 0]], arrays["edges"] if knots is None else knots
+    parameters, meet = (
+        arrays["x"][layout.parameters[:, 0]],
+        arrays["edges"] if knots is None else knots,
+    )
     gait = problem.gait.member(parameters, problem.body.n_joint, meet)
-    return Answer(problem, gait, knots=knots, **arrays, **plain, second_order=second, history=history)
+    return Answer(
+        problem, gait, knots=knots, **arrays, **plain, second_order=second, history=history
+    )
 
 
 def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
@@ -221,17 +257,22 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
 def _read_certificate(group: h5py.Group) -> Certificate:
     """The certificate that `_write_certificate` wrote."""
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
-    checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
+    checks = tuple(
+        Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True)
+    )
     besides = {*NUMBERS, _DRY, _OF_SAMPLES, *(f"{name}_error" for name in ("distance", "work"))}
     integrals = [name for name in group.attrs if name not in besides]  # those that were asked for
-    values = {name: float(attribute(group, name)) for name in ("distance", "work", "rotation", *integrals)}
+    values = {
+        name: float(attribute(group, name)) for name in ("distance", "work", "rotation", *integrals)
+    }
     errors = {name: float(attribute(group, f"{name}_error")) for name in ("distance", "work")}
     dry = tuple(attribute(group, _DRY)) if _DRY in group.attrs else None
     samples = None
     if _OF_SAMPLES in group.attrs:
         value, efficiency, distance, work = map(float, attribute(group, _OF_SAMPLES))
         samples = value, efficiency, distance, work
-    others = {name: type(getattr(UNCERTIFIED, name))(attribute(group, name)) for name in NUMBERS}  # numbers, not arrays of them
+    # numbers, not arrays of them
+    others = {name: type(getattr(UNCERTIFIED, name))(attribute(group, name)) for name in NUMBERS}
     return Certificate(values, errors, {}, checks, **others, dry=dry, of_samples=samples)
 
 
@@ -250,7 +291,12 @@ def _read(file: h5py.File) -> Solution:
         str(attribute(file, "message")),
         json.loads(array(file, "versions")),
     )
-    others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(array(file, "others"))]
-    solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
+    others = [
+        {**other, "gait": gait_from(other["gait"])} for other in json.loads(array(file, "others"))
+    ]
+    solution.starts, solution.others = (
+        int(attribute(file, "starts")),
+        tuple(Alternative(**other) for other in others),
+    )
     solution.interrupted = bool(attribute(file, "interrupted"))
     return solution

@@ -1,4 +1,5 @@
-"""The certificate: every solve is judged by an independent replay and by its own first-order conditions."""
+"""The certificate: every solve is judged by an independent replay and by its own first-order
+conditions."""
 
 from __future__ import annotations
 
@@ -19,26 +20,29 @@ from colloc.verification.played import Path, Replay
 from colloc.verification.replayer import replayer
 
 EXACT, VIOLATION, CLOSURE, WORK = 1e-6, 1e-8, 1e-9, 1e-7
-"""Largest values that pass of what holds but for rounding and the ends of iterations. EXACT: gradient of the Lagrangian,
-balance of forces, penetration of links [body lengths]."""
+"""Largest values that pass of what holds but for rounding and the ends of iterations. EXACT:
+gradient of the Lagrangian, balance of forces, penetration of links [body lengths]."""
 GAP = 1e-4
-"""As much as collocation may be wrong by, relative. The distance of a body that turns depends on the point of it that is
-followed, to first order; so its rotation is limited by what that changes there."""
+"""As much as collocation may be wrong by, relative. The distance of a body that turns depends on
+the point of it that is followed, to first order; so its rotation is limited by what that changes
+there."""
 ANGLE, SEVERAL = 1e-3, 1e-3
-"""An angle that counts [rad]: on a slope off the direction that was asked for, or turned in a period by a gait that goes
-nowhere. Part of the period at which the motion on a slope may be left open."""
+"""An angle that counts [rad]: on a slope off the direction that was asked for, or turned in a
+period by a gait that goes nowhere. Part of the period at which the motion on a slope may be left
+open."""
 SADDLE = 1e-2
-"""Curvature of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains 5e-5,
-what the mesh may be wrong by."""
+"""Curvature of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a
+radian along it gains 5e-5, what the mesh may be wrong by."""
 NOWHERE = 1e-4
-"""Efficiency times the smallest friction coefficient (at most 1), or on a slope the value of the objective in units of the
-friction, up to which a gait goes nowhere."""
+"""Efficiency times the smallest friction coefficient (at most 1), or on a slope the value of the
+objective in units of the friction, up to which a gait goes nowhere."""
 _FINE_PHASES = 20000
 _BALANCED = "net force and torque at all replayed instants", "what a period changes of the momenta"
 
 
 class Certified(NamedTuple):
-    """An answer with its certificate, which is `UNCERTIFIED` where no replay was possible or of use."""
+    """An answer with its certificate, which is `UNCERTIFIED` where no replay was possible or of
+    use."""
 
     answer: Answer
     certificate: Certificate = UNCERTIFIED
@@ -57,7 +61,8 @@ class Certified(NamedTuple):
 
 
 def is_trivial(answer: Answer) -> bool:
-    """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
+    """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one:
+    no optimum."""
     problem = answer.problem
     if problem.regime.slides:
         return control_problem(problem).in_units(answer.value) < NOWHERE
@@ -72,7 +77,8 @@ def goes_nowhere(answer: Answer) -> bool:
 
 
 def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
-    """Replay an answer's gait on a much finer grid and measure everything a claim of success rests on.
+    """Replay an answer's gait on a much finer grid and measure everything a claim of success rests
+    on.
 
     Parameters
     ----------
@@ -108,7 +114,9 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     if answer.program == EVALUATED:
         return gait_certificate(*at, claimed=answer.value, after=tuple(_mesh(answer)))
     before = (*_first_order(answer), _second_order(answer))
-    return gait_certificate(*at, claimed=answer.value, before=before, after=(*_class(answer), *_mesh(answer)))
+    return gait_certificate(
+        *at, claimed=answer.value, before=before, after=(*_class(answer), *_mesh(answer))
+    )
 
 
 def gait_certificate(
@@ -143,10 +151,22 @@ def gait_certificate(
         What else has to hold.
     """
 
-    settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
+    settings = {
+        "tolerance": tolerance,
+        "instants": instants,
+        "breaks": breaks,
+        "rotation": problem.rotation,
+    }
     run = replayer(problem.regime)
     settings |= {"quantities": problem.integrals, "limits": problem.path_limits, "run": run}
-    known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
+    known = measured(
+        problem.body,
+        problem.law,
+        path,
+        delta,
+        **settings,  # type: ignore[arg-type]
+        objective=problem.objective,
+    )
     fine, at_zero, allowed = known.fine, known.value.limit.value, problem.body.usual.delta_influence
     checks = (
         *before,
@@ -156,7 +176,12 @@ def gait_certificate(
         *_direction(problem, fine),
         _one_motion(problem, fine),
         *after,
-        Check("delta influence", at_zero / fine.value - 1, allowed, "same gait at delta -> 0, relative change"),
+        Check(
+            "delta influence",
+            at_zero / fine.value - 1,
+            allowed,
+            "same gait at delta -> 0, relative change",
+        ),
     )
     return Certificate(
         values=fine.values,
@@ -177,14 +202,30 @@ def gait_certificate(
 def _first_order(answer: Answer) -> list[Check]:
     residual = np.abs(answer.motion.at_points.force).max() / answer.problem.law.largest
     return [
-        Check("KKT error", max(answer.kkt_error, answer.complementarity), EXACT, "gradient of the Lagrangian, complementarity"),
-        Check("constraint violation", answer.violation, VIOLATION, "largest violated equation or bound"),
-        Check("balance at nodes", float(residual), EXACT, "net force and torque by the closed-form law"),
+        Check(
+            "KKT error",
+            max(answer.kkt_error, answer.complementarity),
+            EXACT,
+            "gradient of the Lagrangian, complementarity",
+        ),
+        Check(
+            "constraint violation",
+            answer.violation,
+            VIOLATION,
+            "largest violated equation or bound",
+        ),
+        Check(
+            "balance at nodes",
+            float(residual),
+            EXACT,
+            "net force and torque by the closed-form law",
+        ),
     ]
 
 
 def _second_order(answer: Answer) -> Check:
-    """Whether the gait is a local optimum and no other critical point, in the space of its class."""
+    """Whether the gait is a local optimum and no other critical point, in the space of its
+    class."""
     found = answer.second_order
     if found.why_not:
         return Check("second order", 0.0, SADDLE, found.why_not)
@@ -192,16 +233,28 @@ def _second_order(answer: Answer) -> Check:
     if found.n_free == 0:
         verdict = "a vertex: what binds leaves no direction free"
     elif found.smallest > found.error:
-        verdict = f"an optimum: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
+        verdict = (
+            f"an optimum: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
+        )
     elif value > SADDLE:
-        verdict = f"a saddle: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
+        verdict = (
+            f"a saddle: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
+        )
     else:
-        verdict = f"flat: smallest curvature {found.smallest:.1e} +- {found.error:.0e} in {found.n_free} free directions"
+        verdict = (
+            f"flat: smallest curvature {found.smallest:.1e} +- {found.error:.0e} in "
+            f"{found.n_free} free directions"
+        )
     return Check("second order", value, SADDLE, f"{verdict} [1/rad^2]")
 
 
 def _motion(
-    problem: Problem, path: Path, fine: Replay, breaks: np.ndarray, tolerance: float, claimed: float | None
+    problem: Problem,
+    path: Path,
+    fine: Replay,
+    breaks: np.ndarray,
+    tolerance: float,
+    claimed: float | None,
 ) -> list[Check]:
     body, ends = problem.body, path(np.array([0.0, 1.0]))[0]
     angles, rates = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))
@@ -210,17 +263,28 @@ def _motion(
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
     checks = [
         Check("balance in replay", fine.residual, EXACT, _BALANCED[bool(problem.froude)]),
-        Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, f"{body.quantity}s after one period [rad]"),
+        Check(
+            "closure",
+            float(np.abs(ends[:, 1] - ends[:, 0]).max()),
+            CLOSURE,
+            f"{body.quantity}s after one period [rad]",
+        ),
         *_rotation(problem, fine),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, EXACT, "penetration of links between nodes [body lengths]"),
         *_speeds(problem, rates),
     ]
     if (lean := float(body.imbalance(angles).max())) > BALANCED:
-        beside = "way from the centre of mass to where its weights press [body lengths]; reported, not judged"
+        beside = (
+            "way from the centre of mass to where its weights press [body lengths]; "
+            "reported, "
+            "not judged"
+        )
         checks.append(Check("statics", lean, 1.0, beside))  # the body is no longer than that
     if fine.multipliers:
-        meaning = "largest Floquet multiplier: what a period leaves of a small change of the momenta"
+        meaning = (
+            "largest Floquet multiplier: what a period leaves of a small change of the momenta"
+        )
         checks.append(Check("stability", float(np.abs(fine.multipliers).max()), 1.0, meaning))
     if claimed is not None:
         gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
@@ -228,8 +292,18 @@ def _motion(
     spent = problem.regime.spent
     return [
         *checks,
-        Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
-        Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, f"work of the joints over {spent}, less 1"),
+        Check(
+            "replay error",
+            fine.error,
+            tolerance,
+            "relative: its quadrature and balance; allowed as asked for",
+        ),
+        Check(
+            "work = dissipation",
+            fine.actuator_work / fine.work - 1,
+            WORK,
+            f"work of the joints over {spent}, less 1",
+        ),
     ]
 
 
@@ -238,8 +312,18 @@ def _speeds(problem: Problem, rates: np.ndarray) -> list[Check]:
     if not problem.largest_speeds:
         return []
     share = np.abs(rates).max(axis=1) / np.array(problem.largest_speeds)
-    excess, fastest = max(float(share.max()) - 1.0, 0.0), f"{problem.body.coordinate} {int(share.argmax()) + 1}"
-    return [Check("joint speed", excess, GAP, f"excess over a limit, relative; nearest to its own: {fastest}")]
+    excess, fastest = (
+        max(float(share.max()) - 1.0, 0.0),
+        f"{problem.body.coordinate} {int(share.argmax()) + 1}",
+    )
+    return [
+        Check(
+            "joint speed",
+            excess,
+            GAP,
+            f"excess over a limit, relative; nearest to its own: {fastest}",
+        )
+    ]
 
 
 def _rotation(problem: Problem, fine: Replay) -> list[Check]:
@@ -256,7 +340,9 @@ def _reached(problem: Problem, fine: Replay) -> list[Check]:
     checks = []
     for aim, least in problem.at_least:
         lacks = max(least - aim(fine.values), 0.0) / (abs(least) or 1.0)
-        checks.append(Check(f"least {aim.name}", lacks, GAP, f"relative, below {least:g}, in replay"))
+        checks.append(
+            Check(f"least {aim.name}", lacks, GAP, f"relative, below {least:g}, in replay")
+        )
     return checks
 
 
@@ -266,14 +352,28 @@ def _actuators(problem: Problem, fine: Replay) -> list[Check]:
     if not names:
         return []
     most, excess = names[np.argmax(fine.shares)], max(float(fine.shares.max()) - 1.0, 0.0)
-    return [Check("actuators", excess, GAP, f"excess over a limit, relative, in replay; nearest to its own: {most}")]
+    return [
+        Check(
+            "actuators",
+            excess,
+            GAP,
+            f"excess over a limit, relative, in replay; nearest to its own: {most}",
+        )
+    ]
 
 
 def _direction(problem: Problem, fine: Replay) -> list[Check]:
     """Where the way leads, if that is asked for."""
     if not problem.regime.keeps_ahead:
         return []
-    return [Check("direction", fine.across / fine.distance, ANGLE, "of the way, off the one that was asked for [rad]")]
+    return [
+        Check(
+            "direction",
+            fine.across / fine.distance,
+            ANGLE,
+            "of the way, off the one that was asked for [rad]",
+        )
+    ]
 
 
 def _beyond(value: float, unknown: float) -> float:
@@ -282,10 +382,14 @@ def _beyond(value: float, unknown: float) -> float:
 
 
 def _one_motion(problem: Problem, fine: Replay) -> Check:
-    """How far the objective depends on which of several balanced motions the body takes: where the law leaves it open, no mesh
-    decides it, and as much is allowed as the law's other limit, delta, may change."""
+    """How far the objective depends on which of several balanced motions the body takes: where the
+    law leaves it open, no mesh decides it, and as much is allowed as the law's other limit, delta,
+    may change."""
     if not problem.regime.others_measured:
-        meaning = "part of the period at which several motions are balanced; what they would change is not measured"
+        meaning = (
+            "part of the period at which several motions are balanced; what they would "
+            "change is not measured"
+        )
         return Check("one motion", fine.several, SEVERAL, meaning)
     if problem.regime.others:
         meaning = f"relative; between the motions {problem.regime.others}"
@@ -306,12 +410,20 @@ def _class(answer: Answer) -> list[Check]:
 
 
 def _mesh(answer: Answer) -> list[Check]:
-    """The error estimate from the scheme's own defect; it has to pass only if the problem requests an accuracy."""
+    """The error estimate from the scheme's own defect; it has to pass only if the problem requests
+    an accuracy."""
     problem = answer.problem
     tolerance = problem.mesh_tolerance
     if tolerance == 0:
         return []
-    error = mesh_error(control_problem(problem), answer.mesh, answer.gait, answer.delta_per_period, tolerance)
+    error = mesh_error(
+        control_problem(problem), answer.mesh, answer.gait, answer.delta_per_period, tolerance
+    )
     return [
-        Check("mesh error", error.estimate, tolerance, f"of the {problem.objective.name}, relative, from defects between nodes")
+        Check(
+            "mesh error",
+            error.estimate,
+            tolerance,
+            f"of the {problem.objective.name}, relative, from defects between nodes",
+        )
     ]

@@ -1,8 +1,8 @@
 """Which of several certified gaits is the answer, and what is said of it.
 
-A gait may shrink as far as the problem lets it: with dry friction small cycles may go farthest for their work. Nobody can
-build those, so the best gait of finite size, one that a person sees move, is the answer, unless the problem asks otherwise; a
-better one that shrank stands beside it.
+A gait may shrink as far as the problem lets it: with dry friction small cycles may go farthest for
+their work. Nobody can build those, so the best gait of finite size, one that a person sees move, is
+the answer, unless the problem asks otherwise; a better one that shrank stands beside it.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ def choose(problem: Problem, found: Sequence[Certified]) -> Solution:
     Returns
     -------
     Solution
-        Its answer is the best gait of finite size whose certificate holds (of any size, if the problem asks for that, or there
-        is no other); `shrunk` is a better one that nobody sees move.
+        Its answer is the best gait of finite size whose certificate holds (of any size, if the
+        problem asks for that, or there is no other); `shrunk` is a better one that nobody sees
+        move.
     """
     held = [each for each in found if each.holds]
     finite = [each for each in held if each.is_finite or problem.shrinking]
@@ -51,12 +52,19 @@ def choose(problem: Problem, found: Sequence[Certified]) -> Solution:
     lost = [each for each in found if not each.holds and each.answer.value > best.answer.value]
     if best.holds and lost:
         told = solution_of(problem, lost[0])
-        solution.message = f"{solution.message} A gait of {told.answer.value:.4f} is not certified: {told.message}".strip()
-    smaller = [each for each in held if not each.is_finite and each.answer.value > best.answer.value]
+        solution.message = (
+            f"{solution.message} A gait of {told.answer.value:.4f} is not certified: {told.message}"
+        ).strip()
+    smaller = [
+        each for each in held if not each.is_finite and each.answer.value > best.answer.value
+    ]
     if finite and smaller and not problem.shrinking:
         solution.shrunk = solution_of(problem, max(smaller, key=lambda each: each.answer.value))
         value = solution.shrunk.certificate.value
-        text = f"Smaller gaits do better still: {value:.6f} where one shrank until nobody sees it move, kept beside this one."
+        text = (
+            f"Smaller gaits do better still: {value:.6f} where one shrank until nobody sees it "
+            f"move, kept beside this one."
+        )
         solution.message = f"{solution.message} {text}".strip()
     return solution
 
@@ -64,18 +72,22 @@ def choose(problem: Problem, found: Sequence[Certified]) -> Solution:
 def solution_of(problem: Problem, found: Certified) -> Solution:
     """A solution of one answer, and what is said of it."""
     answer, certificate, failure = found
-    return Solution(problem, answer, certificate, message=_message(problem, answer, certificate, failure))
+    return Solution(
+        problem, answer, certificate, message=_message(problem, answer, certificate, failure)
+    )
 
 
 def _message(problem: Problem, answer: Answer, certificate: Certificate, failure: str) -> str:
     if problem.gait.free and is_trivial(answer):
         if not problem.regime.slides:
             return (
-                "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point). Try another "
+                "the search ended in a trivial gait that goes nowhere (every retraced gait is a "
+                "critical point). Try another "
                 "guess, or an imposed symmetry."
             )
         return (
-            f"no gait was found that climbs a grade of {problem.grade:g}, or goes the way asked for. Try a gentler slope, more "
+            f"no gait was found that climbs a grade of {problem.grade:g}, or goes the way asked "
+            f"for. Try a gentler slope, more "
             "starts, or more harmonics."
         )
     if failure:
@@ -84,7 +96,10 @@ def _message(problem: Problem, answer: Answer, certificate: Certificate, failure
         return answer.message  # why the search ended says more than what does not hold for that
     lowered = ""
     if answer.delta < problem.delta * (1 - 1e-9):
-        lowered = f"The gait is so slow or small that delta had to be lowered from {problem.delta:.1g} to {answer.delta:.1g}."
+        lowered = (
+            f"The gait is so slow or small that delta had to be lowered from "
+            f"{problem.delta:.1g} to {answer.delta:.1g}."
+        )
     text = answer.message
     failed = certificate.failures
     if failed:
@@ -94,14 +109,18 @@ def _message(problem: Problem, answer: Answer, certificate: Certificate, failure
     elif problem.gait.free and on_speed_floor(problem, answer.gait):
         better = "more efficient" if problem.objective == EFFICIENCY else "better"
         text = (
-            f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: the gait shrinks as far "
-            f"as it may, smaller ones are {better} still. For a gait that a robot can make raise the bound; to see how far "
+            f"the optimum lies on the bound smallest_shape_speed = "
+            f"{problem.smallest_shape_speed:g}: the gait shrinks as far "
+            f"as it may, smaller ones are {better} still. For a gait that a robot can make raise "
+            f"the bound; to see how far "
             "smaller ones go, lower it (and delta with it)."
         )
     elif problem.gait.free and on_speed_floor(answer.problem, answer.gait):
         text = (
-            "Gaits that become smaller become better here, so the search kept them large: it met no better gait with a shape "
-            f"speed of {answer.problem.smallest_shape_speed:.2g} or more. For another size state smallest_shape_speed, or the "
+            "Gaits that become smaller become better here, so the search kept them large: it met "
+            "no better gait with a shape "
+            f"speed of {answer.problem.smallest_shape_speed:.2g} or more. For another size state "
+            f"smallest_shape_speed, or the "
             'distance, at_least={"distance": 0.1}.'
         )
     return f"{text} {lowered}".strip()

@@ -1,11 +1,13 @@
 """A gait as a solution of its problem's full nonlinear program, confirmed by IPOPT.
 
-The full program has joint angles, rates, tail velocities and link forces as variables and the balance of forces as
-constraints. It is solved on the final mesh, from the gait that the search found, with the multipliers of the reduced program
-and, for the equations, those that come closest to stationarity. Both have the same solutions, so a few steps confirm it.
+The full program has joint angles, rates, tail velocities and link forces as variables and the
+balance of forces as constraints. It is solved on the final mesh, from the gait that the search
+found, with the multipliers of the reduced program and, for the equations, those that come closest
+to stationarity. Both have the same solutions, so a few steps confirm it.
 
-Where IPOPT strays from a gait at which the first-order conditions hold, the gait is kept: at a kink of the collocated objective
-its second derivatives mislead. What holds then, and where, is the answer's verdict.
+Where IPOPT strays from a gait at which the first-order conditions hold, the gait is kept: at a kink
+of the collocated objective its second derivatives mislead. What holds then, and where, is the
+answer's verdict.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ from colloc.search.spaces import heading, space_near, transcribed, with_far
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
 _MOST_PARAMETERS = 150
-"""Curvature is measured for so many parameters at most: it takes two gradients for each, 8 s for a free path of 256."""
+"""Curvature is measured for so many parameters at most: it takes two gradients for each, 8 s for a
+free path of 256."""
 
 
 class Verdict(Enum):
@@ -74,7 +77,8 @@ def confirm(optimum: Optimum) -> Answer:
     Returns
     -------
     Answer
-        Optimal if any of the first four verdicts holds; `message` says which, unless IPOPT confirms it.
+        Optimal if any of the first four verdicts holds; `message` says which, unless IPOPT confirms
+        it.
     """
     begin = time.perf_counter()
 
@@ -82,7 +86,11 @@ def confirm(optimum: Optimum) -> Answer:
         found = with_kink(optimum)
         reduced = found.program()
         outcome = _outcome(found, reduced, stationarity(reduced, found.v))
-        program, result, confirmed = outcome.program, outcome.result, outcome.verdict is Verdict.CONFIRMED
+        program, result, confirmed = (
+            outcome.program,
+            outcome.result,
+            outcome.verdict is Verdict.CONFIRMED,
+        )
         answer = answer_of(program, result, optimum.delta)
         answer = replace(
             answer,
@@ -100,12 +108,19 @@ def confirm(optimum: Optimum) -> Answer:
 def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity) -> _Outcome:
     space, delta = optimum.space, optimum.delta
     mesh = space.phase_mesh(optimum.gait)
-    program = transcribed(optimum.problem, optimum.gait, mesh.edges, mesh.scheme.name, space.given.far)
+    program = transcribed(
+        optimum.problem, optimum.gait, mesh.edges, mesh.scheme.name, space.given.far
+    )
     x = feasible_point(program, space.full_parameters(optimum.v), delta)
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, CONFIRMING)
     before = solver.measured(x, delta, *_multipliers(reduced, conditions, program))
-    here = replace(before, status=STATIONARY, kkt_error=optimum.kkt_error, complementarity=optimum.complementarity)
+    here = replace(
+        before,
+        status=STATIONARY,
+        kkt_error=optimum.kkt_error,
+        complementarity=optimum.complementarity,
+    )
     failed = replace(before, status=NOT_STATIONARY, iterations=optimum.iterations)
     if optimum.violation > RADIUS:  # no gait within reach is admissible
         return _Outcome(Verdict.FAILED, program, failed)
@@ -113,7 +128,8 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
         return _Outcome(Verdict.ON_KINK, program, here)
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
-    # beyond its checks it may be by what SQP allows; at last, where the worst instant swings, by what a certificate lets pass
+    # beyond its checks it may be by what SQP allows; at last, where the worst instant swings, by
+    # what a certificate lets pass
     for allowed in (*SKETCH.rounds * (VIOLATION,), EXACT):
         if not result.optimal:
             break
@@ -121,14 +137,21 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
             return _Outcome(Verdict.CONFIRMED, program, result)
         # the gait has moved so far that other instants are the worst
         solver.transcription = program = _limited(reduced, program)
-        result = solver.solve_within(result.x, delta, (result.lam_x, result.lam_g), RADIUS).accumulated(result)
-    ended = f"IPOPT, begun there, ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
+        result = solver.solve_within(
+            result.x, delta, (result.lam_x, result.lam_g), RADIUS
+        ).accumulated(result)
+    ended = (
+        f"IPOPT, begun there, ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
+    )
     if result.optimal:
         ended = f"IPOPT, begun there, moved the gait beyond its limits {SKETCH.rounds} times"
     if before.optimal:
-        return _Outcome(Verdict.STATIONARY_ON_FULL, program, replace(before, status=STATIONARY), ended)
+        return _Outcome(
+            Verdict.STATIONARY_ON_FULL, program, replace(before, status=STATIONARY), ended
+        )
     if optimum.optimal and before.violation < VIOLATION:
-        # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits than the conditions need
+        # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits
+        # than the conditions need
         return _Outcome(Verdict.STATIONARY_ON_REDUCED, program, here, ended, before.kkt_error)
     return _Outcome(Verdict.FAILED, program, failed, ended)
 
@@ -139,9 +162,15 @@ def _sentence(optimum: Optimum, outcome: _Outcome) -> str:
     if outcome.verdict is Verdict.CONFIRMED:
         return ""
     if outcome.verdict is Verdict.ON_KINK:
-        return f"The optimum is a kink of the objective: gradients on its sides cancel (to {kkt_error:.1e})."
+        return (
+            f"The optimum is a kink of the objective: gradients on its sides cancel (to "
+            f"{kkt_error:.1e})."
+        )
     if outcome.verdict is Verdict.STATIONARY_ON_FULL:
-        return f"First-order conditions hold (KKT error {kkt_error:.1e} on the {kind} program); {outcome.ended}."
+        return (
+            f"First-order conditions hold (KKT error {kkt_error:.1e} on the {kind} program); "
+            f"{outcome.ended}."
+        )
     if outcome.verdict is Verdict.STATIONARY_ON_REDUCED:
         where = f"KKT error {kkt_error:.1e}; {outcome.on_full:.1e} on the {kind} program"
         return f"First-order conditions hold in the reduced space ({where}); {outcome.ended}."
@@ -179,10 +208,21 @@ def answer_of(program: GaitProgram, result: NlpResult, delta: float) -> Answer:
 
 
 def unconfirmed(optimum: Optimum) -> Answer:
-    """The gait as the search found it, every other variable following from its balance: where there is no time for more."""
+    """The gait as the search found it, every other variable following from its balance: where there
+    is no time for more."""
     space, control = optimum.space, optimum.space.control
-    mesh, layout = space.phase_mesh(optimum.gait), layout_of(control, space.mesh, optimum.gait.knots)
-    x = balanced_variables(control.dynamics, layout, mesh, optimum.gait, space.full_parameters(optimum.v), optimum.delta)
+    mesh, layout = (
+        space.phase_mesh(optimum.gait),
+        layout_of(control, space.mesh, optimum.gait.knots),
+    )
+    x = balanced_variables(
+        control.dynamics,
+        layout,
+        mesh,
+        optimum.gait,
+        space.full_parameters(optimum.v),
+        optimum.delta,
+    )
     distance, work = distance_and_work(control, layout, x)
     return Answer(
         optimum.problem,
@@ -218,7 +258,10 @@ def second_order(answer: Answer) -> SecondOrder:
     program.place_rows(v)
     found, size = curvature(program, v), abs(answer.value / program.stated(-1.0))
     if not found.kkt_error < ROUGH.kkt_error * size:  # elsewhere a curvature means nothing
-        return replace(NOT_MEASURED, why_not="not measured, where the gradient of the reduced program does not vanish")
+        return replace(
+            NOT_MEASURED,
+            why_not="not measured, where the gradient of the reduced program does not vanish",
+        )
     return SecondOrder(found.smallest / size, found.error / size, found.n_free)
 
 
@@ -227,11 +270,15 @@ def _limited(reduced: ReducedProgram, program: GaitProgram) -> GaitProgram:
     return program if reduced.actuators is None else reduced.actuators.laid_on(program)
 
 
-def _multipliers(reduced: ReducedProgram, conditions: Stationarity, program: GaitProgram) -> tuple[np.ndarray, np.ndarray]:
+def _multipliers(
+    reduced: ReducedProgram, conditions: Stationarity, program: GaitProgram
+) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
     space, reached = reduced.space, len(reduced.space.control.aims.at_least)
-    of_period, on_rows = np.split(conditions.on_rows, [conditions.on_rows.size - reduced.constraints.lower.size])
+    of_period, on_rows = np.split(
+        conditions.on_rows, [conditions.on_rows.size - reduced.constraints.lower.size]
+    )
     if reduced.actuators is not None:
         limited = reduced.actuators
         of_period, on_actuators = np.split(of_period, [of_period.size - limited.placed.shape[1]])

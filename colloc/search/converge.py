@@ -1,11 +1,13 @@
-"""A gait optimised at one delta on one mesh, in the reduced space, by quasi-Newton SQP: what every stage of a search repeats.
+"""A gait optimised at one delta on one mesh, in the reduced space, by quasi-Newton SQP: what every
+stage of a search repeats.
 
-The gait is optimised within a box round the last one, with the shape checks at their worst instants; they are moved, and the
-gait optimised again, until checks, box and gait rest.
+The gait is optimised within a box round the last one, with the shape checks at their worst
+instants; they are moved, and the gait optimised again, until checks, box and gait rest.
 
-Links more than two apart are kept from crossing only where they turn out to cross. A chain of n links has (n - 2)(n - 3)/2
-such pairs and few of them ever come near each other. So a problem is solved without them, the gait is checked against every
-pair, the pairs that cross are constrained from then on, and the problem is solved again (a cutting-plane method).
+Links more than two apart are kept from crossing only where they turn out to cross. A chain of n
+links has (n - 2)(n - 3)/2 such pairs and few of them ever come near each other. So a problem is
+solved without them, the gait is checked against every pair, the pairs that cross are constrained
+from then on, and the problem is solved again (a cutting-plane method).
 """
 
 from __future__ import annotations
@@ -32,17 +34,20 @@ from colloc.search.spaces import with_far
 from colloc.system.errors import NotConvergedError
 
 BOX = 1.0
-"""How far a parameter may go in one round [rad]: as far as an optimum moves, not so far that a step ends in another world. A
-gait that ends on the edge of its box goes on from there."""
+"""How far a parameter may go in one round [rad]: as far as an optimum moves, not so far that a step
+ends in another world. A gait that ends on the edge of its box goes on from there."""
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
 _SLOW = 0.1
-"""A round that changes the violation by less than this part of it, or ends nearer than this part of its way to where the one
-before began, is the last: the rows contradict each other, or the gait goes to and fro between two worst instants of a cell."""
+"""A round that changes the violation by less than this part of it, or ends nearer than this part of
+its way to where the one before began, is the last: the rows contradict each other, or the gait goes
+to and fro between two worst instants of a cell."""
 _WIDEST = 1e-5
-"""Radius [rad] of the ball in which gradients are sampled at a suspected kink, at most: where the slopes are so small that the
-objective is missed by less than an equation may be violated. It is as exact as a gait has to be elsewhere."""
+"""Radius [rad] of the ball in which gradients are sampled at a suspected kink, at most: where the
+slopes are so small that the objective is missed by less than an equation may be violated. It is as
+exact as a gait has to be elsewhere."""
 PHASES = 1000
-"""Phases of the solved part of the period at which all pairs of links are checked; the certificate checks 20000 a period."""
+"""Phases of the solved part of the period at which all pairs of links are checked; the certificate
+checks 20000 a period."""
 _FRACTIONS = np.linspace(0.05, 0.95, 19)
 
 
@@ -60,7 +65,8 @@ class Placed(NonlinearProgram, Protocol):
 
 
 class Rested(NamedTuple):
-    """Where a program came to rest: parameters, objective, first-order conditions, counts, and what is known of curvature."""
+    """Where a program came to rest: parameters, objective, first-order conditions, counts, and what
+    is known of curvature."""
 
     v: np.ndarray
     objective: float
@@ -76,8 +82,8 @@ def at_rest(
     effort: Effort,
     curvature: np.ndarray | None = None,
 ) -> Rested:
-    """Optimise from v ``(n,)`` until rows, box and gait rest, as exactly as an equation has to hold, or for as many rounds as
-    the effort allows."""
+    """Optimise from v ``(n,)`` until rows, box and gait rest, as exactly as an equation has to
+    hold, or for as many rounds as the effort allows."""
     iterations = evaluations = 0
     program.place_rows(v)
     violation, ends = np.inf, [v]
@@ -90,19 +96,32 @@ def at_rest(
         if fresh and effort.accuracy < SKETCH.accuracy:
             curvature = program.space.metric(v)
         result = minimised(program, v, BOX, effort.accuracy, curvature=curvature)
-        v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
+        v, iterations, evaluations = (
+            result.v,
+            iterations + result.iterations,
+            evaluations + result.evaluations,
+        )
         admissible = program.place_rows(v) <= VIOLATION
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < effort.kkt_error
         # what was learned across kinks may end the search too early: then it begins anew
         curvature = result.curvature if stationary else None
-        if admissible and not result.on_edge and (stationary or (fresh and np.abs(v - before).max() < VIOLATION)):
+        if (
+            admissible
+            and not result.on_edge
+            and (stationary or (fresh and np.abs(v - before).max() < VIOLATION))
+        ):
             break
         violation = conditions.violation
-        if violation > ROUGH.kkt_error and abs(violation - worse) < _SLOW * worse and not result.on_edge:
+        if (
+            violation > ROUGH.kkt_error
+            and abs(violation - worse) < _SLOW * worse
+            and not result.on_edge
+        ):
             break  # the rows contradict each other near here
         ends.append(v)
-        # the first round, with instants held, may have left an optimum that the second comes back to
+        # the first round, with instants held, may have left an optimum that the second comes back
+        # to
         if len(ends) > 3 and np.abs(v - ends[-3]).max() < _SLOW * np.abs(v - before).max():
             break  # between two worst instants of one cell, where only finer cells help
     return Rested(v, result.objective, conditions, iterations, evaluations, curvature)
@@ -136,7 +155,13 @@ def optimum_at(
         space.given,
         v,
         gait,
-        *(program.delta, objective, conditions.kkt_error, conditions.violation, conditions.complementarity),
+        *(
+            program.delta,
+            objective,
+            conditions.kkt_error,
+            conditions.violation,
+            conditions.complementarity,
+        ),
         effort=effort,
         iterations=iterations,
         seconds=seconds,
@@ -212,18 +237,29 @@ def _rested(
     return at_rest(program, v, effort, curvature), program
 
 
-def conditions_on_kink(program: NonlinearProgram, v: np.ndarray, effort: Effort) -> Stationarity | None:
-    """First-order conditions that hold by the gradients around v, where they do not hold by that at v: it lies on a kink."""
+def conditions_on_kink(
+    program: NonlinearProgram, v: np.ndarray, effort: Effort
+) -> Stationarity | None:
+    """First-order conditions that hold by the gradients around v, where they do not hold by that at
+    v: it lies on a kink."""
     conditions = stationarity(program, v)
     radius = min(max(EXACT, VIOLATION / conditions.kkt_error), _WIDEST)
     around = stationarity_around(program, v, conditions, radius, enough=effort.kkt_error)
-    holds = max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < EXACT
+    holds = (
+        max(around.kkt_error, around.complementarity) < effort.kkt_error
+        and around.violation < EXACT
+    )
     return around if holds else None
 
 
 def with_kink(optimum: Optimum) -> Optimum:
-    """The same; where the conditions do not hold at the gait but around it, it rests on a kink, and they are those."""
-    around = None if optimum.optimal else conditions_on_kink(optimum.program(), optimum.v, optimum.effort)
+    """The same; where the conditions do not hold at the gait but around it, it rests on a kink, and
+    they are those."""
+    around = (
+        None
+        if optimum.optimal
+        else conditions_on_kink(optimum.program(), optimum.v, optimum.effort)
+    )
     if around is None:
         return optimum
     step = replace(optimum.step, kkt_error=around.kkt_error, optimal=True, status=STATIONARY)
@@ -251,8 +287,9 @@ class Members(Protocol):
 def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     """Pairs of links more than two apart that cross, or pass through each other, in a gait.
 
-    Judged by plain intersection: the smooth `mechanics.contact.clearance` keeps a small distance, and constraining pairs that
-    only touch makes problems harder for nothing (a folded chain of equal links has such contacts).
+    Judged by plain intersection: the smooth `mechanics.contact.clearance` keeps a small distance,
+    and constraining pairs that only touch makes problems harder for nothing (a folded chain of
+    equal links has such contacts).
     """
     admissible = space.control.admissible
     body, t = admissible.body, np.linspace(0.0, admissible.gait.fraction, PHASES)
@@ -261,7 +298,8 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
 
 
 def last_free(space: Members, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:
-    """Gait parameters on the way from those of a free gait to those of one with crossing links, as far as links stay apart."""
+    """Gait parameters on the way from those of a free gait to those of one with crossing links, as
+    far as links stay apart."""
     last = free
     for fraction in _FRACTIONS:
         between = free + fraction * (crossing - free)

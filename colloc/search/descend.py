@@ -1,9 +1,12 @@
-"""Friction gets drier: a gait is followed from the delta at which it was found down to the problem's, and off any saddle.
+"""Friction gets drier: a gait is followed from the delta at which it was found down to the
+problem's, and off any saddle.
 
-A gait may satisfy the first-order conditions only because its symmetry keeps the search from falling: a start with more
-symmetry than its class never leaves it, as the gradient has it too. Such a gait may be the best of the symmetric ones and still
-no optimum. The curvature (`colloc.reduced.second_order`) shows the way down. Where rows bind they bend away from that straight
-line, so it is the Lagrangian that has to fall along it; what counts is where the search then ends.
+A gait may satisfy the first-order conditions only because its symmetry keeps the search from
+falling: a start with more symmetry than its class never leaves it, as the gradient has it too. Such
+a gait may be the best of the symmetric ones and still no optimum. The curvature
+(`colloc.reduced.second_order`) shows the way down. Where rows bind they bend away from that
+straight line, so it is the Lagrangian that has to fall along it; what counts is where the search
+then ends.
 """
 
 from __future__ import annotations
@@ -21,7 +24,8 @@ from colloc.search.run import this_run
 FACTOR = 0.2
 """Of one delta to the one before."""
 _STEP = 0.1
-"""Along the direction of smallest curvature, over the length of the parameters' vector; its square where that leads up."""
+"""Along the direction of smallest curvature, over the length of the parameters' vector; its square
+where that leads up."""
 _LOST = 0.5
 """A gait that loses this part of its value at the next delta owes it to delta."""
 
@@ -65,12 +69,15 @@ def descend(optimum: Optimum, effort: Effort = ROUGH) -> Optimum:
     for done, delta in enumerate(below):
         run.told("descend", done, len(below), optimum)
         history = optimum.history
-        optimum = converged(optimum.space, optimum.v, delta, effort, optimum.curvature).after(*history)
+        optimum = converged(optimum.space, optimum.v, delta, effort, optimum.curvature).after(
+            *history
+        )
     return optimum
 
 
 def below_saddle(optimum: Optimum) -> Optimum | None:
-    """A better gait that the search comes to from beside a gait of negative curvature; None if there is none."""
+    """A better gait that the search comes to from beside a gait of negative curvature; None if
+    there is none."""
     program = optimum.program()
     here = curvature(program, optimum.v)
     if here.smallest + here.error >= 0:
@@ -89,6 +96,7 @@ def below_saddle(optimum: Optimum) -> Optimum | None:
 
 
 def is_viscous(optimum: Optimum) -> bool:
-    """Whether the gait owes its value to delta: at the next one half is lost. Slow parts of a retraced gait do that."""
+    """Whether the gait owes its value to delta: at the next one half is lost. Slow parts of a
+    retraced gait do that."""
     dry = ReducedProgram(optimum.space, FACTOR * optimum.delta).objective(optimum.v)
     return not dry <= optimum.objective + (1 - _LOST) * abs(optimum.objective)

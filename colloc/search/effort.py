@@ -28,7 +28,8 @@ class Effort:
 
     @property
     def rounds(self) -> int:
-        """Times that the shape checks are moved to the worst instants, and the gait optimised again, at most: two a digit."""
+        """Times that the shape checks are moved to the worst instants, and the gait optimised
+        again, at most: two a digit."""
         return 2 * round(-np.log10(self.kkt_error))
 
 

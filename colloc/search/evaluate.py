@@ -1,4 +1,5 @@
-"""A gait that is given, not sought: replayed, certified as far as that applies, and a solution like any other."""
+"""A gait that is given, not sought: replayed, certified as far as that applies, and a solution like
+any other."""
 
 from __future__ import annotations
 
@@ -32,33 +33,42 @@ _DRAWN = 4
 
 
 def evaluate(
-    problem: Problem, gait: Given, *, period: float | None = None, harmonics: int | None = None, degrees: bool = False
+    problem: Problem,
+    gait: Given,
+    *,
+    period: float | None = None,
+    harmonics: int | None = None,
+    degrees: bool = False,
 ) -> Solution:
-    """What a gait of one's own achieves: joint angles measured or invented, on the body and the ground of a problem.
+    """What a gait of one's own achieves: joint angles measured or invented, on the body and the
+    ground of a problem.
 
-    The angles are closed and smoothed (`colloc.gaits.fitted_gait.fitted_gait`), replayed and certified; that the gait is an
-    optimum is not asked. It may turn the body, if it does.
+    The angles are closed and smoothed (`colloc.gaits.fitted_gait.fitted_gait`), replayed and
+    certified; that the gait is an optimum is not asked. It may turn the body, if it does.
 
     Parameters
     ----------
     problem : Problem
         Whose body, friction, limits and objective are meant; its class of gaits is left out.
     gait : any gait, array, path of a CSV file, or callable
-        Joint angles: a series, ``(n_joint, n_time)`` at equal steps of a period, an xarray DataArray with a dimension "joint"
-        and one of times, a file with a column of times, or a function of phases ``(n_time,)``.
+        Joint angles: a series, ``(n_joint, n_time)`` at equal steps of a period, an xarray
+        DataArray with a dimension "joint" and one of times, a file with a column of times, or a
+        function of phases ``(n_time,)``.
     period, harmonics, degrees
         See `colloc.gaits.fitted_gait.fitted_gait`.
 
     Returns
     -------
     Solution
-        Of a class of as many harmonics as the gait has; its message tells what was read and how far the angles were smoothed.
-        Its errors hold what the samples are off by, with two standard deviations (`Certificate.of_samples`).
+        Of a class of as many harmonics as the gait has; its message tells what was read and how far
+        the angles were smoothed. Its errors hold what the samples are off by, with two standard
+        deviations (`Certificate.of_samples`).
 
     Raises
     ------
     ProblemError
-        If the gait cannot be read, has other joints than the body, or the problem is one on a slope or of a prescribed motion.
+        If the gait cannot be read, has other joints than the body, or the problem is one on a slope
+        or of a prescribed motion.
 
     Examples
     --------
@@ -69,24 +79,31 @@ def evaluate(
     """
     begin = time.monotonic()
     if problem.regime.slides:
-        raise ProblemError("on a slope a gait goes where its body points: follow it with colloc.slope_motion.")
+        raise ProblemError(
+            "on a slope a gait goes where its body points: follow it with colloc.slope_motion."
+        )
     if problem.body.schedule:
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")
-    fitted = fitted_gait(gait, problem.body.n_joint, period=period, harmonics=harmonics, degrees=degrees)
+    fitted = fitted_gait(
+        gait, problem.body.n_joint, period=period, harmonics=harmonics, degrees=degrees
+    )
     if fitted.centre:
         _check_centre(problem, fitted, gait)
-    problem.regime.at(fitted.gait)  # refuses one that does not say a pace which the problem leaves open
+    # refuses one that does not say a pace which the problem leaves open
+    problem.regime.at(fitted.gait)
     solution = _evaluated(problem, fitted)
     solution.seconds = time.monotonic() - begin
     return solution
 
 
 def _check_centre(problem: Problem, fitted: FittedGait, given: Given) -> None:
-    """A `ProblemError` if all joints are bent about one right angle and links cross: so look servos without negative angles."""
+    """A `ProblemError` if all joints are bent about one right angle and links cross: so look servos
+    without negative angles."""
     phases = np.arange(_PHASES) / _PHASES
     if float(problem.body.crossing_depth(fitted.gait.angles(phases)).max()) > EXACT:
         raise ProblemError(
-            f"{given}: all joints move about {fitted.centre}°, where links cross: if servos stand so when the body is "
+            f"{given}: all joints move about {fitted.centre}°, where links cross: if servos stand "
+            f"so when the body is "
             "straight, subtract it from every column of angles."
         )
 
@@ -95,7 +112,8 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
     gait_class, length = Harmonic(fitted.gait.n_harmonic), 2 * math.pi * fitted.gait.shape_speed
     if fitted.gait.shape_speed < problem.smallest_shape_speed:
         raise ProblemError(
-            f"the gait hardly moves: its shape speed {fitted.gait.shape_speed:.3g} is below smallest_shape_speed "
+            f"the gait hardly moves: its shape speed {fitted.gait.shape_speed:.3g} is below "
+            f"smallest_shape_speed "
             f"{problem.smallest_shape_speed:g}, where friction is viscous."
         )
     # of unit-speed classes delta is that at unit shape speed
@@ -112,13 +130,17 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
         stated = stated.with_(rotation=turned)
         answer = evaluated_answer(stated, fitted.gait)
     if goes_nowhere(answer):
-        said = "It goes nowhere for its work, so there is no value to certify: is it one that retraces its path?"
+        said = (
+            "It goes nowhere for its work, so there is no value to certify: is it one that "
+            "retraces its path?"
+        )
         return Solution(stated, answer, message=f"{fitted.describe()}. {said}")
     certificate, said = UNCERTIFIED, ""
     try:
         certificate = certify(answer)
         failures = ", ".join(
-            f"{check.name} {check.value:.1e} (allowed {check.threshold:.0e})" for check in certificate.failures
+            f"{check.name} {check.value:.1e} (allowed {check.threshold:.0e})"
+            for check in certificate.failures
         )
         said = f" It fails: {failures}." if failures else ""
     except NotConvergedError as error:
@@ -126,23 +148,32 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
     if fitted.uncertainty is not None and certificate.replayed:
         errors, missed = _errors_of_samples(answer, fitted.gait, fitted.uncertainty)
         if errors[0] > certificate.value_error:
-            what = f"{problem.objective.short} uncertain by {errors[0]:.1e} (two standard deviations{missed})"
+            what = (
+                f"{problem.objective.short} uncertain by {errors[0]:.1e} (two standard "
+                f"deviations{missed})"
+            )
             said = f" Samples that far off leave {what}.{said}"
         certificate = certificate.with_samples(errors)
     return Solution(stated, answer, certificate, message=f"{fitted.describe()}.{said}")
 
 
-def _errors_of_samples(answer: Answer, gait: Fourier, samples: Uncertainty) -> tuple[tuple[float, ...], str]:
-    """By how much value, efficiency, distance and work may be wrong for what the samples of a gait are off by, two standard
-    deviations; and what of it is lack of fit, in words.
+def _errors_of_samples(
+    answer: Answer, gait: Fourier, samples: Uncertainty
+) -> tuple[tuple[float, ...], str]:
+    """By how much value, efficiency, distance and work may be wrong for what the samples of a gait
+    are off by, two standard deviations; and what of it is lack of fit, in words.
 
-    The covariance of the fit goes through the gradients of the collocated motion on the mesh of the answer. Near an optimum
-    they vanish, and what counts is of second order: typical changes of the series are tried, both ways. What smoothing leaves
-    out, if it is more than noise, is what a series of more harmonics changes.
+    The covariance of the fit goes through the gradients of the collocated motion on the mesh of the
+    answer. Near an optimum they vanish, and what counts is of second order: typical changes of the
+    series are tried, both ways. What smoothing leaves out, if it is more than noise, is what a
+    series of more harmonics changes.
     """
     control, richer = control_problem(answer.problem), samples.richer
-    highest = max(gait.n_harmonic, samples.directions.shape[2] // 2, richer.n_harmonic if richer else 0)
-    later = math.atan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * math.pi)  # where the gait of the answer begins
+    highest = max(
+        gait.n_harmonic, samples.directions.shape[2] // 2, richer.n_harmonic if richer else 0
+    )
+    # where the gait of the answer begins
+    later = math.atan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * math.pi)
     phases, wide = answer.mesh.times + later, Harmonic(highest)
     series = _Series(np.stack([wide.functions(phases), wide.functions(phases, 1)]))
     aims, delta = control.aims, answer.problem.delta * answer.gait.delta_unit
@@ -151,11 +182,18 @@ def _errors_of_samples(answer: Answer, gait: Fourier, samples: Uncertainty) -> t
 
     def values(v: np.ndarray) -> np.ndarray:
         period = motion.values(v, delta)
-        return scale * [aims.objective(period), EFFICIENCY(period), period["distance"], period["work"]]
+        return scale * [
+            aims.objective(period),
+            EFFICIENCY(period),
+            period["distance"],
+            period["work"],
+        ]
 
     v = coefficients(gait.resized(highest)).ravel()
     known, period, slopes = values(v), motion.values(v, delta), motion.gradients(v, delta)
-    by_aim = [aim.gradient(period, slopes) + np.zeros_like(v) for aim in (aims.objective, EFFICIENCY)]
+    by_aim = [
+        aim.gradient(period, slopes) + np.zeros_like(v) for aim in (aims.objective, EFFICIENCY)
+    ]
     gradients = scale[:, None] * [*by_aim, slopes["distance"], slopes["work"]]
     changes = np.zeros((len(samples.directions), gait.n_joint, 2 * highest + 1))
     changes[:, :, : samples.directions.shape[2]] = samples.directions
@@ -167,7 +205,9 @@ def _errors_of_samples(answer: Answer, gait: Fourier, samples: Uncertainty) -> t
     lack, missed = np.zeros(4), ""
     if richer is not None:
         lack = np.abs(values(coefficients(richer.resized(highest)).ravel()) - known)
-        missed = f", and lack of fit: {richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
+        missed = (
+            f", and lack of fit: {richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
+        )
     # the mesh was made for a smoother gait
     return tuple(np.nan_to_num(noise + _ROUGHLY * lack, nan=np.inf).tolist()), missed
 

@@ -1,10 +1,12 @@
-"""Where a search begins: many starts, cheaply told apart, the promising ones followed to the final delta.
+"""Where a search begins: many starts, cheaply told apart, the promising ones followed to the final
+delta.
 
-A start is first followed on a coarse mesh down to a delta at which friction is nearly dry. Where it meets a gait that an
-earlier start came through, at the same delta, it goes on as that one did, and is dropped. After every sixteen new starts
-come as many hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). Beside them are a few small
-loops (`colloc.search.small_starts`), slow and so followed at a smaller delta only. What is left is sorted by its value at that
-one; the first few of both are followed to the final delta.
+A start is first followed on a coarse mesh down to a delta at which friction is nearly dry. Where it
+meets a gait that an earlier start came through, at the same delta, it goes on as that one did, and
+is dropped. After every sixteen new starts come as many hops: the best gait so far, shaken (Wales
+and Doye, J. Phys. Chem. A 101, 1997). Beside them are a few small loops
+(`colloc.search.small_starts`), slow and so followed at a smaller delta only. What is left is sorted
+by its value at that one; the first few of both are followed to the final delta.
 """
 
 from __future__ import annotations
@@ -22,7 +24,13 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import ellipse
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import is_visible, laid_into, latin_hypercube_gait, on_speed_floor, over_links
+from colloc.gaits.starts import (
+    is_visible,
+    laid_into,
+    latin_hypercube_gait,
+    on_speed_floor,
+    over_links,
+)
 from colloc.mechanics.chain import Chain
 from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative
@@ -39,22 +47,27 @@ from colloc.search.spaces import space_about, space_near
 from colloc.system.errors import CollocError, NotConvergedError
 
 STARTS, ENOUGH, _MOST = 32, 8, 3
-"""Starts where no number is asked for, or fewer, a quarter of them at least, once one new start in so many that are enough, and
-half as many, met the best gait. The search goes on until enough in a row have led nowhere better, and ends at so many times the
-starts. With inertia, which makes many more gaits, as many times are asked for: of 16 problems of `benchmarks.zoo` with inertia
-(1, 8, 15, ..., 99 less 29, 82, 93) 32 starts come within 1 % of 128 on the coarse mesh in 11; with these rules 78 do in all."""
+"""Starts where no number is asked for, or fewer, a quarter of them at least, once one new start in
+so many that are enough, and half as many, met the best gait. The search goes on until enough in a
+row have led nowhere better, and ends at so many times the starts. With inertia, which makes many
+more gaits, as many times are asked for: of 16 problems of `benchmarks.zoo` with inertia (1, 8, 15,
+..., 99 less 29, 82, 93) 32 starts come within 1 % of 128 on the coarse mesh in 11; with these rules
+78 do in all."""
 FOLLOWED, PROMISING, CLOSE = 3, 0.8, 0.01
-"""How many different gaits those that are followed to the final delta may come to, and small loops; the share of the best value
-that they need at the coarse one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
+"""How many different gaits those that are followed to the final delta may come to, and small loops;
+the share of the best value that they need at the coarse one, and how far they may be from the best
+at the final one to be optimised on the whole mesh."""
 _HOP = 0.4
-"""How far hops from the best gait known go [rad], in turn half as far, as far and twice as far; half as many as usual starts
-take turns with as many hops. At 0.2 a hop mostly falls back, at 0.8 it lands where any start would; which of them leads on
-differs from problem to problem. What start k is depends on what came before alone: more starts go wherever fewer do."""
+"""How far hops from the best gait known go [rad], in turn half as far, as far and twice as far;
+half as many as usual starts take turns with as many hops. At 0.2 a hop mostly falls back, at 0.8 it
+lands where any start would; which of them leads on differs from problem to problem. What start k is
+depends on what came before alone: more starts go wherever fewer do."""
 _SIZE = 0.5
-"""Least root-mean-square shape speed searched where no optimum is of finite size: five joints that swing by 18 degrees."""
+"""Least root-mean-square shape speed searched where no optimum is of finite size: five joints that
+swing by 18 degrees."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
-"""The two best ellipses of three equal links under isotropic friction: without them one harmonic of other bodies is missed at
-times, as that of `problems/purcell.py`."""
+"""The two best ellipses of three equal links under isotropic friction: without them one harmonic of
+other bodies is missed at times, as that of `problems/purcell.py`."""
 
 
 @dataclass(eq=False)
@@ -93,7 +106,8 @@ class Exploration:
     others : tuple of Alternative
         All distinct gaits met, the best first.
     left : tuple of Optimum
-        Gaits at a larger delta that nobody followed further, the most promising first (see `followed_further`).
+        Gaits at a larger delta that nobody followed further, the most promising first (see
+        `followed_further`).
     """
 
     optima: tuple[Optimum, ...]
@@ -103,9 +117,11 @@ class Exploration:
 
 
 def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
-    """The optimum at the first delta that the search comes to from a gait; where that is a viscous one, at the next delta.
+    """The optimum at the first delta that the search comes to from a gait; where that is a viscous
+    one, at the next delta.
 
-    A gait that is nearly an optimum at the problem's delta is not led there from a larger one: it begins there.
+    A gait that is nearly an optimum at the problem's delta is not led there from a larger one: it
+    begins there.
     """
     near = _at_the_end(problem, gait)
     if near is not None:
@@ -120,7 +136,8 @@ def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
 
 
 def _at_the_end(problem: Problem, gait: AnyGait) -> Optimum | None:
-    """The optimum at the problem's delta that a gait is a sketch of, if it is one: nearer than that [rad]."""
+    """The optimum at the problem's delta that a gait is a sketch of, if it is one: nearer than that
+    [rad]."""
     space, v = space_near(problem, gait)
     here, near = as_it_is(space, v, problem.delta), SKETCH.kkt_error
     steep = here.kkt_error * near > CLOSE * abs(here.objective)
@@ -133,18 +150,21 @@ def _at_the_end(problem: Problem, gait: AnyGait) -> Optimum | None:
     return None
 
 
-def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], bool] = lambda: True) -> Exploration:
+def explore(
+    problem: Problem, starts: int | None = None, goes_on: Callable[[], bool] = lambda: True
+) -> Exploration:
     """The best gaits of a problem's class that many starts lead to.
 
-    Where they shrink until nobody sees them move, the search begins anew among gaits that are as large as the best optimum of
-    finite size, at least (`smallest_shape_speed`). What is better there than that one is among the gaits returned.
+    Where they shrink until nobody sees them move, the search begins anew among gaits that are as
+    large as the best optimum of finite size, at least (`smallest_shape_speed`). What is better
+    there than that one is among the gaits returned.
 
     Parameters
     ----------
     problem : Problem
     starts : int, optional
-        At least so many: they go on while they lead on, to three times as many at most. By default 32, with inertia 96, or
-        fewer once some of them have met the best gait.
+        At least so many: they go on while they lead on, to three times as many at most. By default
+        32, with inertia 96, or fewer once some of them have met the best gait.
     goes_on : callable
         Whether there is time for another start, and another gait to be followed.
 
@@ -176,7 +196,9 @@ def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], b
             return found  # nothing moves as much
     # the first one has a size of its own, which counts for something
     enough = (1 + CLOSE) * finite.objective if finite else 0.0
-    better = [optimum for optimum in large.optima if is_finite(optimum) and optimum.objective < enough]
+    better = [
+        optimum for optimum in large.optima if is_finite(optimum) and optimum.objective < enough
+    ]
     optima = sorted([*found.optima, *better], key=lambda optimum: optimum.objective)
     known = [(other.value, fourier_series(problem, other.gait)) for other in found.others]
     others = list(found.others)
@@ -189,14 +211,21 @@ def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], b
 
 
 def _as_large(problem: Problem, finite: Optimum | None) -> Problem:
-    """The problem among gaits as large as one of finite size; without one, as large as is usual, or the usual first gait is."""
+    """The problem among gaits as large as one of finite size; without one, as large as is usual, or
+    the usual first gait is."""
     if finite is None:
         usual = problem.with_(guess=None)
-        return usual.with_(smallest_shape_speed=max(min(_SIZE, usual.guess.shape_speed), problem.smallest_shape_speed))
+        return usual.with_(
+            smallest_shape_speed=max(
+                min(_SIZE, usual.guess.shape_speed), problem.smallest_shape_speed
+            )
+        )
     return problem.with_(smallest_shape_speed=finite.gait.shape_speed, guess=finite.gait)
 
 
-def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool], helpers: Helpers) -> Exploration:
+def _explored(
+    problem: Problem, starts: int | None, goes_on: Callable[[], bool], helpers: Helpers
+) -> Exploration:
     """What starts lead to, of whatever size."""
     known, tried = candidates(problem, starts, goes_on, helpers)
     if not known:
@@ -212,29 +241,43 @@ def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool],
     followed = [_alternative(problem, optimum, led.starts) for optimum, led in distinct]
     left = [c for c in known if not any(c is done for _, done in ends)]
     others = *followed, *(_alternative(problem, c.optimum, c.starts) for c in left)
-    return Exploration(tuple(optimum for optimum, _ in distinct), tried, others, tuple(c.optimum for c in left))
+    return Exploration(
+        tuple(optimum for optimum, _ in distinct), tried, others, tuple(c.optimum for c in left)
+    )
 
 
-def followed_further(problem: Problem, explored: Exploration, goes_on: Callable[[], bool]) -> tuple[Optimum, ...]:
-    """What the first of the gaits left over lead to at the final delta, best first, where none of those followed will do."""
+def followed_further(
+    problem: Problem, explored: Exploration, goes_on: Callable[[], bool]
+) -> tuple[Optimum, ...]:
+    """What the first of the gaits left over lead to at the final delta, best first, where none of
+    those followed will do."""
     ends: list[Optimum] = []
     left = explored.left[:ENOUGH]
     for done, optimum in enumerate(itertools.takewhile(lambda _: goes_on(), left)):
         this_run().told("follow", done, len(left))
         with suppress(CollocError):
             end = _followed(problem, optimum)
-            if _is_member(end) and not any(same_gait(problem, end, other) for other in (*explored.optima, *ends)):
+            if _is_member(end) and not any(
+                same_gait(problem, end, other) for other in (*explored.optima, *ends)
+            ):
                 ends.append(end)
     return tuple(sorted(ends, key=lambda end: end.objective))
 
 
 def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
-    """The guess, gaits known from three links, waves both ways, then seeded Latin hypercubes without end."""
+    """The guess, gaits known from three links, waves both ways, then seeded Latin hypercubes
+    without end."""
     body, limit = problem.body, problem.joint_limit
     known = [over_links(ellipse(*numbers), Chain(), body, limit) for numbers in _KNOWN]
     waves = [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
     own = problem.gait.seeds
-    first = [problem.guess, *(laid_into(own, gait, body, limit, problem.smallest_shape_speed) for gait in (*known, *waves))]
+    first = [
+        problem.guess,
+        *(
+            laid_into(own, gait, body, limit, problem.smallest_shape_speed)
+            for gait in (*known, *waves)
+        ),
+    ]
     # known gaits and seeds take turns: neither are always better
     seeds = map(partial(latin_hypercube_gait, problem, seed), itertools.count())
     return itertools.chain(itertools.chain.from_iterable(zip(first, seeds, strict=False)), seeds)
@@ -251,13 +294,20 @@ def same_gait(problem: Problem, a: Optimum, b: Optimum) -> bool:
 def candidates(
     problem: Problem, asked: int | None, goes_on: Callable[[], bool], helpers: Helpers
 ) -> tuple[list[Candidate], int]:
-    """What the starts lead to on a coarse mesh, best first, and how many were tried, at least one."""
+    """What the starts lead to on a coarse mesh, best first, and how many were tried, at least
+    one."""
     run, count = this_run(), asked or STARTS * (_MOST if problem.regime.froude else 1)
-    coarse = problem.with_(intervals=min(problem.intervals, problem.gait.coarse_intervals(problem.body.n_joint)))
-    usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)  # compared where friction is nearly dry
+    coarse = problem.with_(
+        intervals=min(problem.intervals, problem.gait.coarse_intervals(problem.body.n_joint))
+    )
+    # compared where friction is nearly dry
+    usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)
     deltas = [max(delta, problem.delta) for delta in (problem.delta_start, FACTOR * usual)]
     # where friction is as dry for a loop as slow as may be
-    dry = max(deltas[-1] * (1.0 if problem.gait.unit_speed else problem.smallest_shape_speed), problem.delta)
+    dry = max(
+        deltas[-1] * (1.0 if problem.gait.unit_speed else problem.smallest_shape_speed),
+        problem.delta,
+    )
     with suppress(CollocError):  # something to show from the first second on
         run.told("explore", 0, count, as_it_is(*space_about(coarse, problem.guess), deltas[0]))
     known: list[list[Candidate]] = [[] for _ in deltas]
@@ -273,9 +323,12 @@ def candidates(
         return (tried >= count or (sure and not asked)) and tried > better + ENOUGH
 
     def begun(start: int, number: int) -> tuple[AnyGait | None, bool]:
-        """Where a start begins, if anywhere: at the next new gait, of that number, or at a hop; and whether it is new."""
+        """Where a start begins, if anywhere: at the next new gait, of that number, or at a hop; and
+        whether it is new."""
         if not _is_new(start) and known[-1]:
-            return _shaken(problem, min((c.optimum for c in known[-1]), key=lambda f: f.objective).gait, start), False
+            return _shaken(
+                problem, min((c.optimum for c in known[-1]), key=lambda f: f.objective).gait, start
+            ), False
         while len(drawn) <= number:
             drawn.append(None)
             with suppress(CollocError):
@@ -298,7 +351,8 @@ def candidates(
         before, best = best, min((c.optimum.objective for c in known[-1]), default=0.0)
         if start > 0 and best < before - SAME_VALUE * abs(before):
             better = start
-        shown = [*known[-1], *loops] if problem.shrinking else known[-1]  # as a rule loops shrink further on their way down
+        # as a rule loops shrink further on their way down
+        shown = [*known[-1], *loops] if problem.shrinking else known[-1]
         run.told("explore", tried, max(tried, count), _best([c.optimum for c in shown]))
 
     for candidate in (ends := [*known[-1], *loops]):
@@ -308,7 +362,9 @@ def candidates(
 
 def objective_at(delta: float, optimum: Optimum) -> float:
     """Minus the value of a gait at another delta, as it is; inf where it has none."""
-    return float(np.nan_to_num(ReducedProgram(optimum.space, delta).objective(optimum.v), nan=np.inf))
+    return float(
+        np.nan_to_num(ReducedProgram(optimum.space, delta).objective(optimum.v), nan=np.inf)
+    )
 
 
 def _met_best(candidates: Sequence[Candidate]) -> int:
@@ -318,12 +374,18 @@ def _met_best(candidates: Sequence[Candidate]) -> int:
 
 
 def _best(optima: Sequence[Optimum]) -> Optimum | None:
-    """The best that may be the answer while others are known: of finite size, unless the problem asks for any."""
-    return min((f for f in optima if f.problem.shrinking or is_finite(f)), key=lambda f: f.objective, default=None)
+    """The best that may be the answer while others are known: of finite size, unless the problem
+    asks for any."""
+    return min(
+        (f for f in optima if f.problem.shrinking or is_finite(f)),
+        key=lambda f: f.objective,
+        default=None,
+    )
 
 
 def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
-    """What stands for a gait with every coefficient moved by chance: where the next hop from basin to basin lands."""
+    """What stands for a gait with every coefficient moved by chance: where the next hop from basin
+    to basin lands."""
     size = _HOP * 2.0 ** (number % 3 - 1)
     return problem.gait.seeds.moved(gait, size, 1, np.random.default_rng([1, number]))
 
@@ -334,7 +396,8 @@ def _is_new(start: int) -> bool:
 
 
 def sketched(coarse: Problem, gait: AnyGait, is_new: bool, deltas: list[float]) -> None:
-    """What a start comes through, for the run that keeps it; as far as no earlier one of this process has come through it."""
+    """What a start comes through, for the run that keeps it; as far as no earlier one of this
+    process has come through it."""
     _sketch(coarse, gait, is_new, deltas, _met_here(coarse.smallest_shape_speed, *deltas))
 
 
@@ -343,7 +406,13 @@ def _met_here(smallest: float, *deltas: float) -> list[list[Candidate]]:
     return [[] for _ in deltas]
 
 
-def _sketch(coarse: Problem, gait: AnyGait | None, is_new: bool, deltas: list[float], known: list[list[Candidate]]) -> None:
+def _sketch(
+    coarse: Problem,
+    gait: AnyGait | None,
+    is_new: bool,
+    deltas: list[float],
+    known: list[list[Candidate]],
+) -> None:
     """Follow a new start through all deltas, a hop through the last."""
     if is_new and gait is not None:
         _follow(coarse, _closed(coarse, gait, deltas[0]), deltas, known)
@@ -355,8 +424,16 @@ def _closed(coarse: Problem, gait: AnyGait, delta: float) -> AnyGait:
     return this_run().kept("begin", (coarse, gait, delta), lambda: closed_gait(coarse, gait, delta))
 
 
-def _follow(problem: Problem, gait: AnyGait, deltas: list[float], known: list[list[Candidate]], *, hop: bool = False) -> None:
-    """Follow a start through the deltas until it comes through a known gait; what it finds is added to the known ones."""
+def _follow(
+    problem: Problem,
+    gait: AnyGait,
+    deltas: list[float],
+    known: list[list[Candidate]],
+    *,
+    hop: bool = False,
+) -> None:
+    """Follow a start through the deltas until it comes through a known gait; what it finds is added
+    to the known ones."""
     space, v = space_about(problem, gait)
     before = None
     for delta, here in zip(deltas, known, strict=True):
@@ -419,7 +496,9 @@ def _followed_to_the_end(
 
     tell()
     queues = [c for c in known if not c.is_loop], [c for c in known if c.is_loop]
-    for number, candidate in enumerate(filter(promising, itertools.chain(*(queue[:FOLLOWED] for queue in queues)))):
+    for number, candidate in enumerate(
+        filter(promising, itertools.chain(*(queue[:FOLLOWED] for queue in queues)))
+    ):
         if helpers.has(number):
             helpers.ask(_followed, problem, candidate.optimum)
     for queue in queues:
@@ -432,7 +511,10 @@ def _followed_to_the_end(
             break
         follow(candidate)
     if not ends:
-        raise NotConvergedError("no gait could be followed to the final delta; start at a larger delta or give another guess.")
+        raise NotConvergedError(
+            "no gait could be followed to the final delta; start at a larger delta or give another "
+            "guess."
+        )
     best = min(optimum.objective for optimum, _ in ends)
     best_finite = min((optimum.objective for optimum, _ in ends if is_finite(optimum)), default=0.0)
     close = (1 - CLOSE) * best, (1 - CLOSE) * best_finite
@@ -453,4 +535,6 @@ def _followed(problem: Problem, optimum: Optimum) -> Optimum:
 
 
 def _alternative(problem: Problem, optimum: Optimum, starts: int) -> Alternative:
-    return Alternative(optimum.value, optimum.delta, starts, on_speed_floor(problem, optimum.gait), optimum.gait)
+    return Alternative(
+        optimum.value, optimum.delta, starts, on_speed_floor(problem, optimum.gait), optimum.gait
+    )

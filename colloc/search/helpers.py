@@ -1,8 +1,10 @@
-"""Other processes that compute ahead what a search is going to ask for: its answer is the same with any number of them.
+"""Other processes that compute ahead what a search is going to ask for: its answer is the same with
+any number of them.
 
-A search keeps what its stages find under the values that they found it from (`colloc.search.run`). A helper calls a function
-that the search will call later, with the same values, and what was kept on the way becomes known to the search. So the search
-itself stays one after the other. What a helper has not begun when its turn comes, or never ends, the search computes itself.
+A search keeps what its stages find under the values that they found it from (`colloc.search.run`).
+A helper calls a function that the search will call later, with the same values, and what was kept
+on the way becomes known to the search. So the search itself stays one after the other. What a
+helper has not begun when its turn comes, or never ends, the search computes itself.
 """
 
 from __future__ import annotations
@@ -40,7 +42,8 @@ serve(says)
 
 
 class Helpers:
-    """Processes that are begun when it is worth it, one for each other processor (`available_threads`).
+    """Processes that are begun when it is worth it, one for each other processor
+    (`available_threads`).
 
     Parameters
     ----------
@@ -65,8 +68,11 @@ class Helpers:
         except (pickle.PicklingError, AttributeError, TypeError):
             return  # a part of the problem is known in this process only
         for _ in range(count):
-            command = [sys.executable, "-P", "-c", _COMMAND]  # -P: no file of the folder is imported instead of another module
-            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+            # -P: no file of the folder is imported instead of another module
+            command = [sys.executable, "-P", "-c", _COMMAND]
+            process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            )
             self._processes.append(process)
             threading.Thread(target=self._lead, args=(process, given), daemon=True).start()
 
@@ -81,7 +87,8 @@ class Helpers:
         return len(self._waiting)
 
     def has(self, number: int) -> bool:
-        """Whether a piece of work of this number is for a helper: the search does its own share of them."""
+        """Whether a piece of work of this number is for a helper: the search does its own share of
+        them."""
         return number % (self.count + 1) > 0
 
     def ask(self, function: Callable[..., object], *given: Any) -> None:
@@ -91,7 +98,8 @@ class Helpers:
             self._next.put(task)
 
     def await_for(self, function: Callable[..., object], *given: Any) -> None:
-        """Wait for what was asked, if a helper has begun with it; what it found is known to the run then."""
+        """Wait for what was asked, if a helper has begun with it; what it found is known to the run
+        then."""
         if not self._processes:
             return
         task = self._task(function, given)
@@ -117,7 +125,8 @@ class Helpers:
         with suppress(OSError), process:
             process.stdin.write(given)
             process.stdin.flush()
-            answers = (line for line in process.stdout if line.endswith(b"}\n"))  # not what Python prints as it starts
+            # not what Python prints as it starts
+            answers = (line for line in process.stdout if line.endswith(b"}\n"))
             alive = next(answers, b"")
             while alive and (task := self._next.get()):
                 answer = self._waiting.pop(task, None)

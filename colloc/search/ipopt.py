@@ -1,4 +1,5 @@
-"""The one place that names IPOPT: solves a transcription's nonlinear program and measures what comes back."""
+"""The one place that names IPOPT: solves a transcription's nonlinear program and measures what
+comes back."""
 
 from __future__ import annotations
 
@@ -32,12 +33,12 @@ IPOPT_OPTIONS: dict[str, object] = {
     "max_iter": 60,
 }
 LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
-"""With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along
-negative curvature would otherwise carry them away for good. The price is up to 120 short steps a level. The velocity map
-needs no such leash and is slowed by it."""
+"""With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from
+which a step along negative curvature would otherwise carry them away for good. The price is up to
+120 short steps a level. The velocity map needs no such leash and is slowed by it."""
 CONFIRMING: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
-"""To confirm a gait. The barrier begins where it ends, as multipliers are known: one to four steps confirm most gaits, and
-more than these lead away."""
+"""To confirm a gait. The barrier begins where it ends, as multipliers are known: one to four steps
+confirm most gaits, and more than these lead away."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,22 +80,31 @@ class NlpResult:
 
 
 _REGIONS = 20
-"""Trust regions that may follow each other. Paths of three joints, whose basins end between deltas, go 2 rad and more."""
+"""Trust regions that may follow each other. Paths of three joints, whose basins end between deltas,
+go 2 rad and more."""
 _INSIDE = 0.999
-"""A point nearer to the edge of its trust region than this is on it: the barrier keeps off an active bound by its tolerance
-over the multiplier, which is small where efficiency is flat."""
+"""A point nearer to the edge of its trust region than this is on it: the barrier keeps off an
+active bound by its tolerance over the multiplier, which is small where efficiency is flat."""
 
 
 class Solver:
     """A transcription bound to IPOPT; built once, solved for many deltas and starts."""
 
-    def __init__(self, transcription: GaitProgram, options: dict[str, object] | None = None) -> None:
+    def __init__(
+        self, transcription: GaitProgram, options: dict[str, object] | None = None
+    ) -> None:
         self.transcription = transcription
         self.oracles: Oracles = oracles(transcription.assembly)
         own = LIFTED_OPTIONS if transcription.lifted else {}
         chosen = {**IPOPT_OPTIONS, **own, **(options or {})}
         settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
-        settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
+        settings |= {
+            "print_time": False,
+            "calc_lam_p": False,
+            "calc_lam_x": False,
+            "calc_f": False,
+            "calc_g": False,
+        }
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
         self._stop = StopRequest(self.oracles.nlp)  # held here: CasADi does not keep it alive
         self._settings = settings | {**self.oracles.options, "iteration_callback": self._stop}
@@ -105,7 +115,11 @@ class Solver:
         return ca.nlpsol("colloc", "ipopt", self.oracles.nlp, self._settings)
 
     def solve(
-        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None = None, radius: float = np.inf
+        self,
+        x: np.ndarray,
+        delta: float,
+        multipliers: tuple[np.ndarray, np.ndarray] | None = None,
+        radius: float = np.inf,
     ) -> NlpResult:
         """Maximise efficiency from x.
 
@@ -117,7 +131,8 @@ class Solver:
         multipliers : (lam_x, lam_g), optional
             By default those of the equations that come closest to stationarity at x.
         radius : float
-            Trust region: how far each gait parameter may move [rad]. A result on its edge is solved again from there.
+            Trust region: how far each gait parameter may move [rad]. A result on its edge is solved
+            again from there.
         """
         result = self.solve_within(x, delta, multipliers, radius)
         own = self.transcription.layout.parameters[:, 0]
@@ -129,16 +144,25 @@ class Solver:
         return replace(result, complementarity=np.inf, status="still moving")
 
     def solve_within(
-        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None, radius: float
+        self,
+        x: np.ndarray,
+        delta: float,
+        multipliers: tuple[np.ndarray, np.ndarray] | None,
+        radius: float,
     ) -> NlpResult:
         """The same within one trust region, on whose edge the result may lie."""
         t = self.transcription
         own = t.layout.parameters[:, 0]
         parameters = self._parameters(x, delta)
         lower, upper = t.lower.copy(), t.upper.copy()
-        lower[own], upper[own] = np.maximum(lower[own], x[own] - radius), np.minimum(upper[own], x[own] + radius)
+        lower[own], upper[own] = (
+            np.maximum(lower[own], x[own] - radius),
+            np.minimum(upper[own], x[own] + radius),
+        )
         limits = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
-        lam_x, lam_g = multipliers or self._completed(x, parameters, np.zeros_like(x), np.zeros(t.assembly.m))
+        lam_x, lam_g = multipliers or self._completed(
+            x, parameters, np.zeros_like(x), np.zeros(t.assembly.m)
+        )
         duals = {"lam_x0": lam_x, "lam_g0": lam_g}
         start = time.perf_counter()
         with interruptible():
@@ -149,7 +173,8 @@ class Solver:
         return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
 
     def _evaluated(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
-        """Objective, its gradient ``(n,)``, rows ``(m,)`` and their Jacobian ``(m, n)`` at variables, then parameters."""
+        """Objective, its gradient ``(n,)``, rows ``(m,)`` and their Jacobian ``(m, n)`` at
+        variables, then parameters."""
         x, parameters = np.split(at, [self.transcription.layout.n])
         f, gradient = self.oracles.options["grad_f"](x, parameters)
         g, jacobian = self.oracles.options["jac_g"](x, parameters)
@@ -157,11 +182,16 @@ class Solver:
 
     def _parameters(self, x: np.ndarray, delta: float) -> np.ndarray:
         t = self.transcription
-        return self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]]))
+        return self.oracles.parameter_vector(
+            delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]])
+        )
 
-    def measured(self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray) -> NlpResult:
-        """The first-order conditions at x ``(n,)``, solving nothing, from multipliers of the bounds and of the inequalities;
-        those of the equations are the ones that come closest to the conditions."""
+    def measured(
+        self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
+    ) -> NlpResult:
+        """The first-order conditions at x ``(n,)``, solving nothing, from multipliers of the bounds
+        and of the inequalities; those of the equations are the ones that come closest to the
+        conditions."""
         parameters = self._parameters(x, delta)
         multipliers = self._completed(x, parameters, lam_x, lam_g)
         bounds = self.transcription.lower, self.transcription.upper
@@ -171,7 +201,8 @@ class Solver:
     def _completed(
         self, x: np.ndarray, parameters: np.ndarray, lam_x: np.ndarray, lam_g: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's gradient, given all others."""
+        """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's
+        gradient, given all others."""
         t = self.transcription
         free, equality = t.lower < t.upper, np.flatnonzero(t.constraint_lower == t.constraint_upper)
         _, gradient, _, jacobian = self._values_and_slopes(np.concatenate([x, parameters]))
@@ -180,8 +211,11 @@ class Solver:
         lam_g[equality] = estimated_multipliers(jacobian[equality][:, free], gradient[free])
         return lam_x, lam_g
 
-    def equality_jacobian(self, x: np.ndarray, delta: float) -> tuple[sparse.csr_matrix, np.ndarray]:
-        """Jacobian of the equations in the free variables at x, and their row numbers among all constraints."""
+    def equality_jacobian(
+        self, x: np.ndarray, delta: float
+    ) -> tuple[sparse.csr_matrix, np.ndarray]:
+        """Jacobian of the equations in the free variables at x, and their row numbers among all
+        constraints."""
         t = self.transcription
         equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
         jacobian = self._values_and_slopes(np.concatenate([x, self._parameters(x, delta)]))[3]
@@ -225,7 +259,9 @@ class Solver:
         )
 
 
-def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
+def _complementarity(
+    multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> float:
     """Largest |multiplier| x distance to the bound it belongs to; equality rows do not count.
 
     Where that bound is infinite the multiplier itself ought to vanish and counts as it is.
@@ -238,12 +274,14 @@ def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarra
 
 
 class StopRequest(ca.Callback):
-    """What IPOPT asks between iterations, the ``iteration_callback`` of nlpsol: whether Ctrl-C came. Stopped so, it ends at
-    once and says nothing."""
+    """What IPOPT asks between iterations, the ``iteration_callback`` of nlpsol: whether Ctrl-C
+    came. Stopped so, it ends at once and says nothing."""
 
     def __init__(self, nlp: Mapping[str, ca.MX]) -> None:
         ca.Callback.__init__(self)
-        self._sparsity = {name: nlp[name.removeprefix("lam_")].sparsity() for name in ca.nlpsol_out()}
+        self._sparsity = {
+            name: nlp[name.removeprefix("lam_")].sparsity() for name in ca.nlpsol_out()
+        }
         self.construct("stop_request")
 
     def get_n_in(self) -> int:

@@ -1,7 +1,8 @@
-"""The literal route: IPOPT on the full program at every level of delta, from the guess and the balance solver alone.
+"""The literal route: IPOPT on the full program at every level of delta, from the guess and the
+balance solver alone.
 
-Nothing is eliminated and no second derivative is spared. It is what a reader of the equations would try first, and what the
-search in the reduced space is measured against.
+Nothing is eliminated and no second derivative is spared. It is what a reader of the equations would
+try first, and what the search in the reduced space is measured against.
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ def literal_answer(problem: Problem) -> Answer:
         this_run().told("refine", done, MESHES)
         gait = program.member(parameters)
         mesh = program.phase_mesh(gait)
-        plan = planned_mesh(program.control, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)
+        plan = planned_mesh(
+            program.control, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept
+        )
         if plan is None:
             break
         kept = np.concatenate([kept, plan.kept])
@@ -78,13 +81,25 @@ def _solved(program: GaitProgram, parameters: np.ndarray, delta: float) -> Answe
         answer = answer_of(program, result, delta)
         return answer if result.optimal else replace(answer, message=_why(solver, x, result, delta))
 
-    given = (program.control.problem, parameters, delta, program.mesh.edges, program.mesh.scheme.name)
+    given = (
+        program.control.problem,
+        parameters,
+        delta,
+        program.mesh.edges,
+        program.mesh.scheme.name,
+    )
     return this_run().kept("literal", given, compute)
 
 
 def _why(solver: Solver, x: np.ndarray, result: NlpResult, delta: float) -> str:
     """What failed, and whether the equations were to blame from the start."""
-    redundant, text = redundant_equations(solver, x, delta), explanation(solver.transcription, result, delta)
+    redundant, text = (
+        redundant_equations(solver, x, delta),
+        explanation(solver.transcription, result, delta),
+    )
     if redundant:
-        text += f" Before the first solve the equations were rank deficient, which no optimiser bears: {', '.join(redundant)}."
+        text += (
+            f" Before the first solve the equations were rank deficient, which no optimiser "
+            f"bears: {', '.join(redundant)}."
+        )
     return text

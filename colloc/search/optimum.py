@@ -1,4 +1,5 @@
-"""The value that the stages of a search hand on: a gait that is optimal in its class at one delta on one mesh, or nearly."""
+"""The value that the stages of a search hand on: a gait that is optimal in its class at one delta
+on one mesh, or nearly."""
 
 from __future__ import annotations
 
@@ -73,11 +74,15 @@ class Optimum:
 
     def __repr__(self) -> str:
         verdict = "" if self.optimal else ", not stationary"
-        return f"<Optimum {self.value:.6g} at delta = {self.delta:.1e}, {self.step.intervals} intervals{verdict}>"
+        return (
+            f"<Optimum {self.value:.6g} at delta = {self.delta:.1e}, {self.step.intervals} "
+            f"intervals{verdict}>"
+        )
 
     @cached_property
     def space(self) -> SearchSpace:
-        """The class of gaits on its mesh. Its rows are placed by whoever asks for them (`ReducedProgram.place_rows`)."""
+        """The class of gaits on its mesh. Its rows are placed by whoever asks for them
+        (`ReducedProgram.place_rows`)."""
         return space_of(self.problem, *self.given)
 
     def program(self) -> ReducedProgram:
@@ -94,7 +99,10 @@ class Optimum:
     @property
     def optimal(self) -> bool:
         """Whether the first-order conditions hold, as far as the effort asks for."""
-        return max(self.kkt_error, self.complementarity) < self.effort.kkt_error and self.violation < EXACT
+        return (
+            max(self.kkt_error, self.complementarity) < self.effort.kkt_error
+            and self.violation < EXACT
+        )
 
     def after(self, *before: Step) -> Optimum:
         """The same with steps that led to it."""

@@ -1,4 +1,5 @@
-"""Gaits that are collocated as they are, by no optimiser: prescribed motions, and gaits that are given."""
+"""Gaits that are collocated as they are, by no optimiser: prescribed motions, and gaits that are
+given."""
 
 from __future__ import annotations
 
@@ -26,17 +27,28 @@ from colloc.verification.refinement import planned_mesh
 
 
 def prescribed_answer(problem: Problem) -> Answer:
-    """What a prescribed motion achieves on a mesh that meets the problem's tolerance; its message says what is missing."""
+    """What a prescribed motion achieves on a mesh that meets the problem's tolerance; its message
+    says what is missing."""
     gait = problem.gait.member(np.empty(0), problem.body.n_joint)
     edges, kept = problem.gait.edges(problem.intervals), np.array(problem.gait.stages)
-    return _on_a_fine_mesh(problem, gait, edges, kept, lambda mesh: as_it_is(problem, mesh, gait, np.empty(0), PRESCRIBED))
+    return _on_a_fine_mesh(
+        problem,
+        gait,
+        edges,
+        kept,
+        lambda mesh: as_it_is(problem, mesh, gait, np.empty(0), PRESCRIBED),
+    )
 
 
 def evaluated_answer(problem: Problem, gait: Fourier) -> Answer:
-    """The same of a series whose class is that of the problem, all harmonics without symmetry; it starts at the phase that
-    fixes the start of the class. Of a gait that goes nowhere, which no mesh would resolve, on a first mesh."""
+    """The same of a series whose class is that of the problem, all harmonics without symmetry; it
+    starts at the phase that fixes the start of the class. Of a gait that goes nowhere, which no
+    mesh would resolve, on a first mesh."""
     parameters = problem.gait.parameters(gait)
-    member, edges = problem.gait.member(parameters, gait.n_joint), np.linspace(0.0, 1.0, problem.intervals + 1)
+    member, edges = (
+        problem.gait.member(parameters, gait.n_joint),
+        np.linspace(0.0, 1.0, problem.intervals + 1),
+    )
 
     def answer_on(mesh: Mesh) -> Answer:
         return as_it_is(problem, mesh, member, parameters, EVALUATED)
@@ -48,12 +60,19 @@ def evaluated_answer(problem: Problem, gait: Fourier) -> Answer:
 
 
 def _on_a_fine_mesh(
-    problem: Problem, gait: AnyGait, edges: np.ndarray, kept: np.ndarray, answer_on: Callable[[Mesh], Answer]
+    problem: Problem,
+    gait: AnyGait,
+    edges: np.ndarray,
+    kept: np.ndarray,
+    answer_on: Callable[[Mesh], Answer],
 ) -> Answer:
-    """The answer on a mesh that meets the problem's tolerance for a gait, and on which the phases `kept` are knots."""
+    """The answer on a mesh that meets the problem's tolerance for a gait, and on which the phases
+    `kept` are knots."""
     begin, mesh, message = time.perf_counter(), Mesh(scheme(problem.scheme), edges), ""
     for _ in range(MESHES if problem.mesh_tolerance > 0 else 0):
-        plan = planned_mesh(control_problem(problem), mesh, gait, problem.delta, problem.mesh_tolerance, kept=kept)
+        plan = planned_mesh(
+            control_problem(problem), mesh, gait, problem.delta, problem.mesh_tolerance, kept=kept
+        )
         if plan is None:
             break
         mesh = Mesh(scheme(plan.scheme), plan.edges)
@@ -76,13 +95,17 @@ class _Given(NamedTuple):
         raise NotImplementedError("nothing is sought")
 
 
-def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, word: str) -> Answer:
+def as_it_is(
+    problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, word: str
+) -> Answer:
     """A gait with everything else following from its balance."""
     control = control_problem(problem)
     layout, aim = layout_of(control, mesh), control.aims.objective
     x = balanced_variables(control.dynamics, layout, mesh, gait, parameters, problem.delta)
     distance, work = distance_and_work(control, layout, x)
-    motion = ReducedMotion(kind_of_motion(control.dynamics), mesh, _Given(gait, mesh), aim.integrals)
+    motion = ReducedMotion(
+        kind_of_motion(control.dynamics), mesh, _Given(gait, mesh), aim.integrals
+    )
     value = control.stated(float(aim(motion.values(parameters, problem.delta * gait.delta_unit))))
     return Answer(
         problem,

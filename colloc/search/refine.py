@@ -1,7 +1,9 @@
-"""The mesh is refined until the collocated objective is as accurate as the problem asks for; a smooth body's panels with it.
+"""The mesh is refined until the collocated objective is as accurate as the problem asks for; a
+smooth body's panels with it.
 
-Every mesh is planned as a whole for the gait at hand (`colloc.verification.refinement`), and the gait optimised on it, until it
-needs no other. On the way it need not be optimised to the last digit: the next mesh moves it by more.
+Every mesh is planned as a whole for the gait at hand (`colloc.verification.refinement`), and the
+gait optimised on it, until it needs no other. On the way it need not be optimised to the last
+digit: the next mesh moves it by more.
 """
 
 from __future__ import annotations
@@ -21,14 +23,14 @@ from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
 MESHES, _SAME_AIM = 8, 2
-"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, as many are planned for
-half of it, later ones for a quarter, and keep all their knots."""
+"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh,
+as many are planned for half of it, later ones for a quarter, and keep all their knots."""
 _GROWTH = 4
-"""A mesh has at most so many times the points of the last one, and a smooth body so many times its panels: the gait will move,
-and what was planned is wasted."""
+"""A mesh has at most so many times the points of the last one, and a smooth body so many times its
+panels: the gait will move, and what was planned is wasted."""
 _MOST_PANELS, _LEFT = 128, 6
-"""Panels of a smooth body at most; error that they may leave, over what the mesh may. Every doubling was seen to leave a sixth
-or less, with a point at rest that moves over the panels."""
+"""Panels of a smooth body at most; error that they may leave, over what the mesh may. Every
+doubling was seen to leave a sixth or less, with a point at rest that moves over the panels."""
 
 
 @dataclass(eq=False)
@@ -78,16 +80,20 @@ def refine(optimum: Optimum) -> Optimum:
         this_run().told("refine", meshes.count, MESHES, optimum)
         try:
             finer = _finer(optimum, meshes)
-        except NotConvergedError as error:  # the gait at hand is not lost for it: its certificate says what it is worth
-            finer = replace_keeping_space(optimum, lacks=f"refinement ended, as on a finer mesh: {error}")
+        except (
+            NotConvergedError
+        ) as error:  # the gait at hand is not lost for it: its certificate says what it is worth
+            finer = replace_keeping_space(
+                optimum, lacks=f"refinement ended, as on a finer mesh: {error}"
+            )
         if finer is None or finer.lacks:
             return finer or optimum
         optimum = finer
 
 
 def _finer(optimum: Optimum, meshes: _Meshes) -> Optimum | None:
-    """The gait optimised on the next mesh, or on more panels; after the last with what it lacks. None if its own will do, or
-    no other would."""
+    """The gait optimised on the next mesh, or on more panels; after the last with what it lacks.
+    None if its own will do, or no other would."""
     if meshes.count and optimum.violation > ROUGH.kkt_error:
         return None  # its rows contradict each other, which no mesh mends
     refines = optimum.problem.mesh_tolerance > 0
@@ -115,7 +121,8 @@ def _finer(optimum: Optimum, meshes: _Meshes) -> Optimum | None:
 
 
 def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:
-    """The class with a smooth body on as many panels as the gait needs, and its parameters; None if its own will do.
+    """The class with a smooth body on as many panels as the gait needs, and its parameters; None if
+    its own will do.
 
     They do where half as many change the objective by no more than six times what the mesh may.
     """
@@ -126,7 +133,9 @@ def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:
 
     def on(count: int) -> tuple[SearchSpace, np.ndarray, float]:
         body = problem.body.on_panels(count)
-        space = space_of(problem.with_(body=body), optimum.gait, mesh.edges, mesh.scheme.name, optimum.given.far)
+        space = space_of(
+            problem.with_(body=body), optimum.gait, mesh.edges, mesh.scheme.name, optimum.given.far
+        )
         v = space.parameters(optimum.gait)
         return space, v, ReducedProgram(space, optimum.delta).objective(v)
 

@@ -1,8 +1,10 @@
-"""A run of the search: what its stages found is kept as it appears, and found again, not computed again, by the next run.
+"""A run of the search: what its stages found is kept as it appears, and found again, not computed
+again, by the next run.
 
-A stage is a function of values. So what it finds can be kept under a digest of its name and these values, and a run that was
-interrupted, by Ctrl-C or a power cut, goes on by doing everything once more: whatever is known already takes no time, and the
-end is the same to the last bit. No stage knows of it but for the line that says what is worth keeping (`kept`).
+A stage is a function of values. So what it finds can be kept under a digest of its name and these
+values, and a run that was interrupted, by Ctrl-C or a power cut, goes on by doing everything once
+more: whatever is known already takes no time, and the end is the same to the last bit. No stage
+knows of it but for the line that says what is worth keeping (`kept`).
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ from colloc.system.row_file import put_rows, read_rows
 Value = TypeVar("Value")
 ROWS = "colloc run 2"
 EVERY = 2.0
-"""Seconds between writes: as much may have to be computed again after a crash. Short solves write nothing."""
+"""Seconds between writes: as much may have to be computed again after a crash. Short solves write
+nothing."""
 _PROBLEM = "problem"
 STAGES = ("explore", "follow", "descend", "refine", "confirm", "certify")
 
@@ -47,15 +50,16 @@ class Progress:
     stage : str
         "explore", "follow", "descend", "refine", "confirm" or "certify".
     done, count : int
-        Of starts, of gaits followed to the final delta, of levels of delta, or of meshes. Fewer may be enough: nobody knows
-        how long a stage will take.
+        Of starts, of gaits followed to the final delta, of levels of delta, or of meshes. Fewer may
+        be enough: nobody knows how long a stage will take.
     best : Optimum, optional
-        The best gait so far; one that shrank as far as the problem allows only if none of finite size is known.
+        The best gait so far; one that shrank as far as the problem allows only if none of finite
+        size is known.
     seconds : float
         Since the solve began.
     round : int
-        Counts from 1 how often the stages were begun: again for a second gait that may be the answer, at a smaller delta, or
-        off a saddle.
+        Counts from 1 how often the stages were begun: again for a second gait that may be the
+        answer, at a smaller delta, or off a saddle.
     """
 
     stage: str
@@ -71,7 +75,11 @@ class Progress:
             text = f"round {self.round}, {text}"
         if self.best is None:
             return text
-        return f"{text}; best {self.best.problem.objective.short} = {self.best.value:.4f} at delta = {self.best.delta:.0e}"
+        return (
+            f"{text}; best {self.best.problem.objective.short} = {self.best.value:.4f} at "
+            f"delta "
+            f"= {self.best.delta:.0e}"
+        )
 
 
 @dataclass(eq=False)
@@ -105,7 +113,9 @@ class Run:
         self._known: dict[str, Any] = {}
         self._pending: dict[str, Any] = {}
         self._problems: dict[str, Problem] = {}
-        self._refused = False  # by the disk; tried again at the end, since another try may have to wait
+        self._refused = (
+            False  # by the disk; tried again at the end, since another try may have to wait
+        )
         if self.problem is None:
             return
         self._stated = self.problem.to_dict()
@@ -119,20 +129,32 @@ class Run:
         try:
             rows = read_rows(self.path, ROWS)
         except StoreError as error:
-            raise StoreError(f"{error} It was left by an interrupted run; remove it to begin again (solve --fresh).") from None
+            raise StoreError(
+                f"{error} It was left by an interrupted run; remove it to begin again (solve "
+                f"--fresh)."
+            ) from None
         if rows.pop(_PROBLEM, self.problem.hash) != self.problem.hash:
-            raise StoreError(f"{self.path} was left by a run of another problem of that name; --fresh begins again.")
+            raise StoreError(
+                f"{self.path} was left by a run of another problem of that name; --fresh begins "
+                f"again."
+            )
         self._known = rows
 
     def _changes(self, problem: Problem) -> dict[str, Any]:
         stated = problem.to_dict()
-        return {name: stated.get(name) for name in {*stated, *self._stated} if stated.get(name) != self._stated.get(name)}
+        return {
+            name: stated.get(name)
+            for name in {*stated, *self._stated}
+            if stated.get(name) != self._stated.get(name)
+        }
 
     def _with_changes(self, changes: dict[str, Any]) -> Problem:
         key = json.dumps(changes, sort_keys=True)
         if key not in self._problems:
             stated = {**self._stated, **changes}
-            self._problems[key] = Problem.from_dict({name: value for name, value in stated.items() if value is not None})
+            self._problems[key] = Problem.from_dict(
+                {name: value for name, value in stated.items() if value is not None}
+            )
         return self._problems[key]
 
     def written(self, value: Any) -> Any:
@@ -154,7 +176,8 @@ class Run:
         self._pending.update(rows)
 
     def kept(self, stage: str, given: tuple, compute: Callable[[], Value]) -> Value:
-        """What a stage makes of given values: as an earlier run found it, else computed, and kept."""
+        """What a stage makes of given values: as an earlier run found it, else computed, and
+        kept."""
         keeps = self.remembers or self.path is not None
         if not keeps and not self._known:
             return compute()
@@ -173,8 +196,8 @@ class Run:
         return value
 
     def write(self) -> None:
-        """Put what was found since the last time into the file; a warning, once, where that is not possible. The file then
-        holds what it held; an empty one goes."""
+        """Put what was found since the last time into the file; a warning, once, where that is not
+        possible. The file then holds what it held; an empty one goes."""
         self._last = time.monotonic()
         if self.path is None or not self._pending:
             return
@@ -192,19 +215,28 @@ class Run:
                     self.path.unlink()
 
     def told(self, stage: str, done: int, count: int, best: Optimum | None = None) -> None:
-        """Say how far a stage has come, and which gait is the best so far: one of finite size is, beside one that shrank."""
+        """Say how far a stage has come, and which gait is the best so far: one of finite size is,
+        beside one that shrank."""
         if (self._stage, stage) == ("follow", "descend"):
             return  # each gait is followed by a descent of its own
-        if best is not None and (self.best is None or best.delta < self.best.delta or _counts(best) or not _counts(self.best)):
+        if best is not None and (
+            self.best is None
+            or best.delta < self.best.delta
+            or _counts(best)
+            or not _counts(self.best)
+        ):
             self.best = best
         self._round += STAGES.index(stage) < STAGES.index(self._stage)
         self._stage = stage
-        self.progress(Progress(stage, done, count, self.best, time.monotonic() - self._begin, self._round))
+        self.progress(
+            Progress(stage, done, count, self.best, time.monotonic() - self._begin, self._round)
+        )
 
     @contextmanager
     def under_way(self, seconds: float) -> Iterator[None]:
-        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C, and after so many seconds.
-        However it ends, all of it is written: the result may yet fail to be saved."""
+        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C,
+        and after so many seconds. However it ends, all of it is written: the result may yet fail to
+        be saved."""
         token = _CURRENT.set(self)
         try:
             with interruptible(polled=False), time_limit(seconds):

@@ -1,17 +1,20 @@
-r"""What a wrong floor, or a robot built otherwise, costs: by how much the best value changes with every number of a problem.
+r"""What a wrong floor, or a robot built otherwise, costs: by how much the best value changes with
+every number of a problem.
 
-At an optimum the derivative of the best value is that of the Lagrangian ``L = f + sum_i lambda_i (g_i - b_i)`` with gait and
-multipliers held fixed (envelope theorem): the gait need not be sought again. So it is what the collocated motion of the *same*
-gait says, balanced anew, and what the rows that hold it back say times their multipliers. L is differentiated in the number by
-central differences of relative step 1e-5, which its Newton solves to 1e-11 allow.
+At an optimum the derivative of the best value is that of the Lagrangian ``L = f + sum_i lambda_i
+(g_i - b_i)`` with gait and multipliers held fixed (envelope theorem): the gait need not be sought
+again. So it is what the collocated motion of the *same* gait says, balanced anew, and what the rows
+that hold it back say times their multipliers. L is differentiated in the number by central
+differences of relative step 1e-5, which its Newton solves to 1e-11 allow.
 
-The slope is off to first order in how far gait and multipliers are from the optimum without a mesh, some 1e-4 rad on the mesh
-of the answer, where the value is off to second order only. So the gait is optimised again on meshes much finer than that. How
-far slopes on different ones lie apart is the error: halves of the answer's intervals, and quarters whose knots lie elsewhere,
-for meshes with knots on the same kinks err alike.
+The slope is off to first order in how far gait and multipliers are from the optimum without a mesh,
+some 1e-4 rad on the mesh of the answer, where the value is off to second order only. So the gait is
+optimised again on meshes much finer than that. How far slopes on different ones lie apart is the
+error: halves of the answer's intervals, and quarters whose knots lie elsewhere, for meshes with
+knots on the same kinks err alike.
 
-Whoever wants more than first order has the gait sought again from where it is (`resolve`); what that gains over the gait as it
-stands is of second order.
+Whoever wants more than first order has the gait sought again from where it is (`resolve`); what
+that gains over the gait as it stands is of second order.
 """
 
 from __future__ import annotations
@@ -43,19 +46,23 @@ from colloc.verification.replayer import replayer
 CHANGE = 0.1
 """Of a number, that tables speak of: a tenth more and less."""
 _STEP = 1e-5
-"""Of differences, relative. With delta = 1e-4 the motion bends over relative changes of that order; measured on three problems,
-steps from 1e-4 to 1e-7 agree to 1e-7."""
+"""Of differences, relative. With delta = 1e-4 the motion bends over relative changes of that order;
+measured on three problems, steps from 1e-4 to 1e-7 agree to 1e-7."""
 _NOTHING = 1e-9
 """Relative slope that counts as none."""
 _FINEST = 8
 """Parts of each interval of the answer's mesh."""
 _STATIONARY = 1e-4
 """Largest gradient of the Lagrangian, over the value, at which there are multipliers."""
-_OF_ARCS = "of paths of so many arcs: other numbers of arcs may change slopes by some per cent, which the errors leave out"
-"""For curvature 2 and bilateral paths, with 90 to 240 arcs of the half that is solved, the slope along curvature is 0.057 to
-0.060, whichever way the number goes."""
+_OF_ARCS = (
+    "of paths of so many arcs: other numbers of arcs may change slopes by some per cent, "
+    "which the errors leave out"
+)
+"""For curvature 2 and bilateral paths, with 90 to 240 arcs of the half that is solved, the slope
+along curvature is 0.057 to 0.060, whichever way the number goes."""
 _EXCESS, _TURNS = 1e-5, 1e-4
-"""By how much a gait may exceed its limits [rad, or relative], and turn in a period [rad], and still be one of the problem."""
+"""By how much a gait may exceed its limits [rad, or relative], and turn in a period [rad], and
+still be one of the problem."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +74,8 @@ class Again:
     change : float
         Of the number.
     value, error : float
-        Of the best gait there, sought from the gait on file and certified; NaN if it is not certified.
+        Of the best gait there, sought from the gait on file and certified; NaN if it is not
+        certified.
     status : str
     kept, kept_error : float
         Of the gait on file, replayed there.
@@ -85,12 +93,16 @@ class Again:
 
     @property
     def behind(self) -> float:
-        """By how much the gait on file falls behind the best one there; it may be ahead where it breaks something."""
+        """By how much the gait on file falls behind the best one there; it may be ahead where it
+        breaks something."""
         return self.value - self.kept
 
     def facts(self) -> dict[str, Any]:
         """As plain numbers; None for what there is not."""
-        numbers = {name: getattr(self, name) for name in ("change", "value", "error", "kept", "kept_error", "behind")}
+        numbers = {
+            name: getattr(self, name)
+            for name in ("change", "value", "error", "kept", "kept_error", "behind")
+        }
         return {name: float(x) if np.isfinite(x) else None for name, x in numbers.items()} | {
             "status": self.status,
             "breaks": self.breaks,
@@ -107,11 +119,14 @@ class Effect:
     now : float
         The number.
     relative : bool
-        Whether changes are parts of the number (0.1: a tenth more), or parts of a link, for places of feet.
+        Whether changes are parts of the number (0.1: a tenth more), or parts of a link, for places
+        of feet.
     slope : float
-        Derivative of the best value along that change. Where the number can only become smaller, that to this side.
+        Derivative of the best value along that change. Where the number can only become smaller,
+        that to this side.
     error : float
-        What other meshes, and doubling the step of the differences, change of it. See `Sensitivity.note`.
+        What other meshes, and doubling the step of the differences, change of it. See
+        `Sensitivity.note`.
     sides : tuple of int
         Whether the number can be smaller (-1) and larger (1).
     again : tuple of Again
@@ -128,7 +143,10 @@ class Effect:
 
     def facts(self) -> dict[str, Any]:
         """As plain numbers."""
-        own = {name: getattr(self, name) for name in ("name", "now", "relative", "slope", "error", "sides")}
+        own = {
+            name: getattr(self, name)
+            for name in ("name", "now", "relative", "slope", "error", "sides")
+        }
         return own | {"again": [each.facts() for each in self.again]}
 
 
@@ -162,7 +180,9 @@ class Sensitivity:
     def __getitem__(self, name: str) -> Effect:
         found = next((effect for effect in self.effects if effect.name == name), None)
         if found is None:
-            raise KeyError(f"{name!r}: there is {', '.join(effect.name for effect in self.effects)}")
+            raise KeyError(
+                f"{name!r}: there is {', '.join(effect.name for effect in self.effects)}"
+            )
         return found
 
     def __str__(self) -> str:
@@ -170,16 +190,21 @@ class Sensitivity:
 
     def facts(self) -> dict[str, Any]:
         """All of it as plain numbers (JSON)."""
-        own = {name: getattr(self, name) for name in ("name", "objective", "value", "error", "note")}
+        own = {
+            name: getattr(self, name) for name in ("name", "objective", "value", "error", "note")
+        }
         return own | {"effects": [effect.facts() for effect in self.effects]}
 
     @property
     def seen(self) -> list[Effect]:
         """Those that change the value to first order."""
-        return [effect for effect in self.effects if not abs(effect.slope) <= _NOTHING * abs(self.value)]
+        return [
+            effect for effect in self.effects if not abs(effect.slope) <= _NOTHING * abs(self.value)
+        ]
 
     def beside(self, effect: Effect) -> list[str]:
-        """The best value where a number is a tenth smaller, and where it is a tenth larger; "-" where it cannot be."""
+        """The best value where a number is a tenth smaller, and where it is a tenth larger; "-"
+        where it cannot be."""
         values = {side: f"{self.value + side * CHANGE * effect.slope:.4f}" for side in effect.sides}
         return [values.get(side, "-") for side in (-1, 1)]
 
@@ -188,14 +213,17 @@ class Sensitivity:
         seen = self.seen
         width = max((len(effect.name) for effect in seen), default=0)
         lines = [
-            f"{self.name}: {self.objective} = {self.value:.6f} +- {self.error:.0e}; the best gait's elsewhere, to first order:",
+            f"{self.name}: {self.objective} = {self.value:.6f} +- {self.error:.0e}; the best "
+            f"gait's elsewhere, to first order:",
             f"  {'':<{width}}  {'now':>8s}  {'10 % less':>9s}  {'10 % more':>9s}  slope",
         ]
         for effect in seen:
             less, more = (f"{text:>9s}" for text in self.beside(effect))
             unit = "" if effect.relative else "  (a tenth of its link)"
             slope = f"{effect.slope:+.5f} +- {effect.error:.0e}"
-            lines.append(f"  {effect.name:<{width}}  {effect.now:8.4g}  {less}  {more}  {slope}{unit}")
+            lines.append(
+                f"  {effect.name:<{width}}  {effect.now:8.4g}  {less}  {more}  {slope}{unit}"
+            )
         if without := [effect.name for effect in self.effects if effect not in seen]:
             lines.append(f"  no effect to first order: {', '.join(without)}")
         if self.note:
@@ -205,7 +233,9 @@ class Sensitivity:
         return lines
 
     def _again(self, width: int) -> list[str]:
-        head = f"{'change':>7s}  {'first order':>11s}  {'best there':>10s}  {'on file':>8s}  behind by"
+        head = (
+            f"{'change':>7s}  {'first order':>11s}  {'best there':>10s}  {'on file':>8s}  behind by"
+        )
         lines = ["", f"  {'':<{width}}  {head}"]
         for effect in self.effects:
             for each in effect.again:
@@ -214,21 +244,26 @@ class Sensitivity:
                 behind = f"{each.behind:9.1e}"
                 if not np.isfinite(each.value):
                     best, behind = f"{'-':>10s}", f"  {each.status}"
-                row = f"{change:>7s}  {first:11.4f}  {best}  {each.kept:8.4f}  {behind}  {each.breaks}".rstrip()
+                row = (
+                    f"{change:>7s}  {first:11.4f}  {best}  {each.kept:8.4f}  {behind}  "
+                    f"{each.breaks}"
+                ).rstrip()
                 lines.append(f"  {effect.name:<{width}}  {row}")
         return lines
 
 
 def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANGE) -> Sensitivity:
-    """By how much the best value changes with every number of the problem (`colloc.gaits.parameters`).
+    """By how much the best value changes with every number of the problem
+    (`colloc.gaits.parameters`).
 
     Parameters
     ----------
     solution : Solution
         Solved.
     resolve : bool
-        Whether to seek the gait again, from where it is, with each number that matters a little smaller and larger, and to
-        replay the gait on file there. Takes about a second or two for each.
+        Whether to seek the gait again, from where it is, with each number that matters a little
+        smaller and larger, and to replay the gait on file there. Takes about a second or two for
+        each.
     change : float
         How much smaller and larger, then.
 
@@ -246,7 +281,8 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
     Forces are proportional to friction, so half as much of it costs half as much:
 
     >>> import colloc
-    >>> solution = colloc.solve(colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2), starts=1)
+    >>> solution = colloc.solve(colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"),
+    ...     delta=1e-2), starts=1)
     >>> found = solution.sensitivity()
     >>> slopes = [found[f"friction {way}"].slope for way in ("sideways", "forwards", "backwards")]
     >>> bool(abs(sum(slopes) / solution.value + 1) < 1e-4)
@@ -265,23 +301,36 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
         effect = Effect(parameter.name, parameter.value, parameter.relative, slope, error, sides)
         if resolve and abs(slope) > _NOTHING * abs(solution.value):
             beside = _beside(parameter, change)
-            again = tuple(_again(solution, problem, side * change) for side, problem in beside.items())
+            again = tuple(
+                _again(solution, problem, side * change) for side, problem in beside.items()
+            )
             effect = replace(effect, again=again)
         effects.append(effect)
     problem, at = solution.problem, (certificate.value, certificate.value_error)
-    return Sensitivity(problem.name, problem.objective.short, *at, tuple(effects), _OF_ARCS if problem.gait.of_arcs else "")
+    return Sensitivity(
+        problem.name,
+        problem.objective.short,
+        *at,
+        tuple(effects),
+        _OF_ARCS if problem.gait.of_arcs else "",
+    )
 
 
 def _check_is_optimum(solution: Solution) -> None:
     if solution.answer.program == EVALUATED or not solution.problem.gait.free:
-        raise ProblemError("the gait was given: only of an optimum is it known how the best value changes.")
+        raise ProblemError(
+            "the gait was given: only of an optimum is it known how the best value changes."
+        )
     if not solution.success:
-        raise ProblemError(f"only an optimum has a sensitivity, and this solve ended as: {solution.status}.")
+        raise ProblemError(
+            f"only an optimum has a sensitivity, and this solve ended as: {solution.status}."
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class _Lagrangian:
-    """The Lagrangian of the reduced program on one mesh at its optimum, as a function of the problem.
+    """The Lagrangian of the reduced program on one mesh at its optimum, as a function of the
+    problem.
 
     Attributes
     ----------
@@ -301,7 +350,8 @@ class _Lagrangian:
     on_bounds: np.ndarray
 
     def __call__(self, problem: Problem) -> float:
-        """Its value, in the units of the stated objective, with the rows at the worst instants of the gait."""
+        """Its value, in the units of the stated objective, with the rows at the worst instants of
+        the gait."""
         program = ReducedProgram(space_of(problem, *self.space.given), problem.delta)
         program.place_rows(self.v)
         at = {name: k for k, name in enumerate(program.row_names)}
@@ -309,12 +359,19 @@ class _Lagrangian:
             what = f"the bound {min(missing)[0]!r}, which holds the gait back, vanishes beside it"
             raise ProblemError(f"the gait has no sensitivity: {what}.")
         rows, which = program.rows(self.v), [at[name] for name in self.on_rows]
-        left = _beyond(rows[which], program.row_lower[which], program.row_upper[which], np.array([*self.on_rows.values()]))
+        left = _beyond(
+            rows[which],
+            program.row_lower[which],
+            program.row_upper[which],
+            np.array([*self.on_rows.values()]),
+        )
         left += _beyond(self.v, program.lower, program.upper, self.on_bounds)
         return program.stated(program.objective(self.v)) + program.stated(1.0) * left
 
 
-def _beyond(values: np.ndarray, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray) -> float:
+def _beyond(
+    values: np.ndarray, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray
+) -> float:
     """Multipliers times how far values are beyond the bounds that they belong to."""
     bounds = np.select([multipliers > 0, multipliers < 0], [high, low], values)
     return float(multipliers @ (values - bounds))
@@ -343,7 +400,9 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
 
     def on(parts: int, later: float = 0.0) -> _Lagrangian:
         inner = edges[:-1, None] + (np.arange(parts) + later) / parts * np.diff(edges)[:, None]
-        space = remeshed(own.space, answer.gait, np.unique([edges[0], *inner.flat, edges[-1]]), answer.scheme)
+        space = remeshed(
+            own.space, answer.gait, np.unique([edges[0], *inner.flat, edges[-1]]), answer.scheme
+        )
         found = converged(space, space.parameters(answer.gait), answer.delta, FINE)
         return _lagrangian(found.space, found.v, answer.delta)
 
@@ -362,7 +421,12 @@ def _beside(parameter: Parameter, step: float) -> dict[int, Problem]:
     return found
 
 
-def _slope(value: Callable[[Problem], float], parameter: Parameter, sides: tuple[int, ...], step: float = _STEP) -> float:
+def _slope(
+    value: Callable[[Problem], float],
+    parameter: Parameter,
+    sides: tuple[int, ...],
+    step: float = _STEP,
+) -> float:
     """Derivative along a change of a number; where it can change to one side only, to that side."""
     if len(sides) == 2:
         return (value(parameter.changed(step)) - value(parameter.changed(-step))) / (2 * step)
@@ -378,10 +442,22 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
     found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
     best = found.certificate if found.success else UNCERTIFIED
     at = problem.body, problem.law, gait, delta * gait.delta_unit
-    asked: Any = {"objective": problem.objective, "quantities": problem.integrals, "turn": problem.rotation or 0.0}
+    asked: Any = {
+        "objective": problem.objective,
+        "quantities": problem.integrals,
+        "turn": problem.rotation or 0.0,
+    }
     kept = replayer(problem.regime)(*at, breaks=gait.corner_phases, **asked)
     breaks = "; ".join(_broken(problem, kept, ReducedProgram(space, delta).place_rows(v)))
-    return Again(change, best.value, best.value_error, found.status, kept.value, kept.error * abs(kept.value), breaks)
+    return Again(
+        change,
+        best.value,
+        best.value_error,
+        found.status,
+        kept.value,
+        kept.error * abs(kept.value),
+        breaks,
+    )
 
 
 def _broken(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
@@ -389,7 +465,11 @@ def _broken(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
     if excess > _EXCESS:
         yield f"{excess:.2g} beyond its limits"
     turned = kept.rotation - (problem.rotation or 0.0)
-    if problem.rotation is not None and problem.gait.closing_symmetry == NONE and abs(turned) > _TURNS:
+    if (
+        problem.rotation is not None
+        and problem.gait.closing_symmetry == NONE
+        and abs(turned) > _TURNS
+    ):
         yield f"turns {np.degrees(turned):+.2g}° too far a period"
     for aim, least in problem.at_least:
         if aim(kept.values) < least * (1 - _EXCESS):

@@ -2,8 +2,9 @@
 
     explore -> descend -> refine -> confirm -> certify -> choose
 
-Each is a function of one value that returns the next one, in a module of its name, and can be called by itself. Only here is
-decided what comes after what, how often something is tried again, how long all of it may take, and what an interrupt leaves.
+Each is a function of one value that returns the next one, in a module of its name, and can be
+called by itself. Only here is decided what comes after what, how often something is tried again,
+how long all of it may take, and what an interrupt leaves.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ from colloc.system.interruption import heeded
 REDUCED, FULL = "reduced", "full"
 SEARCHES = (REDUCED, FULL)
 _TRIES = 3
-"""Gaits of a kind that are solved for at most, until a certificate holds; saddles left one after another; and deltas tried
-where nothing but the influence of delta fails."""
+"""Gaits of a kind that are solved for at most, until a certificate holds; saddles left one after
+another; and deltas tried where nothing but the influence of delta fails."""
 _EXPLORING = 0.6
 """The share of the time allowed that is spent on starts; the rest is for the answer."""
 
@@ -61,30 +62,36 @@ def solve(
     ----------
     problem : Problem
     starts : int, optional
-        The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops: at least so many. With 1 the guess
-        alone. By default 32, with inertia 96; fewer once four new ones, and one in eight, met the best.
+        The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops: at
+        least so many. With 1 the guess alone. By default 32, with inertia 96; fewer once four new
+        ones, and one in eight, met the best.
     seconds : float
-        Wall time allowed. Then the best gait so far is returned, with status "interrupted" unless its certificate holds.
+        Wall time allowed. Then the best gait so far is returned, with status "interrupted" unless
+        its certificate holds.
     search : {"reduced", "full"}
-        Where gaits are searched: in the space of their parameters, or by IPOPT on the full program, from the guess alone.
+        Where gaits are searched: in the space of their parameters, or by IPOPT on the full program,
+        from the guess alone.
     keep : path, optional
-        File in which everything found is kept until the end; a solve of the same problem goes on from what is there.
+        File in which everything found is kept until the end; a solve of the same problem goes on
+        from what is there.
     progress : callable, optional
         Called with every `colloc.search.run.Progress`.
     worth : callable, optional
-        Whether the best gait, at the final delta and before its mesh is refined, is worth an answer. By default it is.
+        Whether the best gait, at the final delta and before its mesh is refined, is worth an
+        answer. By default it is.
 
     Returns
     -------
     Solution
-        With status "solved", "not converged", "certificate failed" or, after Ctrl-C or when the time is over, "interrupted";
-        nothing is raised for the last three.
+        With status "solved", "not converged", "certificate failed" or, after Ctrl-C or when the
+        time is over, "interrupted"; nothing is raised for the last three.
 
     Examples
     --------
     >>> from colloc import Harmonic, Problem, ellipse
     >>> from colloc.search.solve import solve
-    >>> solve(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral")), starts=1).status
+    >>> solve(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral")),
+    ...     starts=1).status
     'solved'
     """
     if search not in SEARCHES:
@@ -97,12 +104,20 @@ def solve(
     except KeyboardInterrupt:
         heeded()
         over = time.monotonic() - begin >= seconds
-        solution = _interrupted(problem, run, f"the {seconds:g} s allowed are over" if over else "interrupted")
+        solution = _interrupted(
+            problem, run, f"the {seconds:g} s allowed are over" if over else "interrupted"
+        )
     solution.seconds = time.monotonic() - begin
     return solution
 
 
-def _solved(problem: Problem, starts: int | None, search: str, until: float, worth: Callable[[Optimum], bool]) -> Solution:
+def _solved(
+    problem: Problem,
+    starts: int | None,
+    search: str,
+    until: float,
+    worth: Callable[[Optimum], bool],
+) -> Solution:
     """The stages, in order. After the time `until` nothing else is explored."""
 
     def goes_on() -> bool:
@@ -135,19 +150,23 @@ def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool])
 
 
 def _certified_best(problem: Problem, optima: Sequence[Optimum]) -> list[Certified]:
-    """The best gaits, certified: of finite size first, then what shrank and is better; in one row where either will do."""
+    """The best gaits, certified: of finite size first, then what shrank and is better; in one row
+    where either will do."""
     if problem.shrinking:
         return _tried(optima, lambda found: found.holds)
     finite = [optimum for optimum in optima if is_finite(optimum)]
     shrunk = [optimum for optimum in optima if not is_finite(optimum)]
     found = _tried(finite, lambda found: found.holds and found.is_finite)
     best = max(map(promised, found), default=-np.inf)
-    return [*found, *_tried([optimum for optimum in shrunk if optimum.value > best], lambda found: found.holds)]
+    return [
+        *found,
+        *_tried([optimum for optimum in shrunk if optimum.value > best], lambda found: found.holds),
+    ]
 
 
 def _tried(optima: Sequence[Optimum], counts: Callable[[Certified], bool]) -> list[Certified]:
-    """Certified answers, best first: the next one where one does not count, or lost more on its refined mesh than the next one
-    is behind."""
+    """Certified answers, best first: the next one where one does not count, or lost more on its
+    refined mesh than the next one is behind."""
     tried: list[Certified] = []
     for optimum in optima[:_TRIES]:
         best = max((each.answer.value for each in tried if counts(each)), default=-np.inf)
@@ -161,8 +180,9 @@ def _tried(optima: Sequence[Optimum], counts: Callable[[Certified], bool]) -> li
 def finished(optimum: Optimum) -> Certified:
     """An optimum through the last stages: refined, confirmed, and certified.
 
-    Where it turns out to be a saddle, the search goes on below it; where friction is viscous at its speeds, at a smaller
-    delta: what is slow enough for a large gait is not for a small one, or where feet hold.
+    Where it turns out to be a saddle, the search goes on below it; where friction is viscous at its
+    speeds, at a smaller delta: what is slow enough for a large gait is not for a small one, or
+    where feet hold.
     """
     found = certified(confirmed(optimum))
     for _ in range(_TRIES - 1):
@@ -196,7 +216,9 @@ def certified(answer: Answer) -> Certified:
         return Certified(answer)
     run.told("certify", 0, 1)
     # exactly may take minutes, for what is no optimum
-    roughly: dict[str, Any] = {} if answer.optimal else {"tolerance": GAP, "instants": problem.body.usual.instants}
+    roughly: dict[str, Any] = (
+        {} if answer.optimal else {"tolerance": GAP, "instants": problem.body.usual.instants}
+    )
     try:
         return Certified(answer, run.kept("certify", (answer,), lambda: certify(answer, **roughly)))
     except NotConvergedError as error:
@@ -204,7 +226,8 @@ def certified(answer: Answer) -> Certified:
 
 
 def _is_viscous(found: Certified) -> bool:
-    """Whether nothing fails but the influence of delta: the gait is so slow, or small, that friction is viscous at it."""
+    """Whether nothing fails but the influence of delta: the gait is so slow, or small, that
+    friction is viscous at it."""
     return [check.name for check in found.certificate.failures] == ["delta influence"]
 
 

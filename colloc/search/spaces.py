@@ -1,6 +1,8 @@
-"""From a problem to its programs: the full one, and the space of gaits that a search sees; which of them a class wants.
+"""From a problem to its programs: the full one, and the space of gaits that a search sees; which of
+them a class wants.
 
-A class that derives from `LinearClass`, as `Harmonic` does, needs nothing here; any other has a line in `SEARCHED`.
+A class that derives from `LinearClass`, as `Harmonic` does, needs nothing here; any other has a
+line in `SEARCHED`.
 """
 
 from __future__ import annotations
@@ -33,8 +35,8 @@ class Searched(NamedTuple):
     """How a class of gaits is collocated, and how a search sees it."""
 
     program: Callable[[ControlProblem, AnyGait, np.ndarray | None, str, Pairs], GaitProgram]
-    """Of a control problem, a gait near, the edges of a mesh, a scheme, and pairs of links that must not cross: its nonlinear
-    program."""
+    """Of a control problem, a gait near, the edges of a mesh, a scheme, and pairs of links that
+    must not cross: its nonlinear program."""
     space: Callable[[ControlProblem, AnyGait, np.ndarray | None, str, Pairs], SearchSpace]
     """Of the same: its parameters."""
 
@@ -44,7 +46,10 @@ _LINEAR = Searched(
     lambda control, gait, edges, scheme, far: LinearSpace(control, edges, scheme, far),
 )
 _ALONG_PATHS = Searched(transcribe_path, PathSpace)
-_SERPENOID = Searched(_LINEAR.program, lambda control, gait, edges, scheme, far: SerpenoidSpace(control, edges, scheme, far))
+_SERPENOID = Searched(
+    _LINEAR.program,
+    lambda control, gait, edges, scheme, far: SerpenoidSpace(control, edges, scheme, far),
+)
 SEARCHED: dict[type, Searched] = {
     FreePath: _ALONG_PATHS,
     Polygon: _ALONG_PATHS,
@@ -59,17 +64,24 @@ def _searched(problem: Problem) -> Searched:
     found = next((how for kind, how in SEARCHED.items() if isinstance(problem.gait, kind)), None)
     if found is None:
         raise ProblemError(
-            f"no search is known for the class {type(problem.gait).__name__}: derive it from LinearClass if its angles are "
-            "linear in its parameters, or give its program and its space a line in SEARCHED of colloc.search.spaces "
+            f"no search is known for the class {type(problem.gait).__name__}: derive it from "
+            f"LinearClass if its angles are "
+            "linear in its parameters, or give its program and its space a line in SEARCHED of "
+            "colloc.search.spaces "
             "(docs/howto/own_gait_class.md)."
         )
     return found
 
 
 def transcribed(
-    problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+    problem: Problem,
+    gait: AnyGait | None = None,
+    edges: np.ndarray | None = None,
+    scheme: str = "",
+    far: Pairs = (),
 ) -> GaitProgram:
-    """The nonlinear program of a problem of any class near a gait, by default its guess, in units of friction.
+    """The nonlinear program of a problem of any class near a gait, by default its guess, in units
+    of friction.
 
     Self-contact is constrained between links two apart, and between the pairs `far`
     (see `colloc.search.converge.crossing_pairs`).
@@ -90,17 +102,21 @@ def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
 def space_near(
     problem: Problem, gait: AnyGait, edges: np.ndarray | None = None, scheme: str = ""
 ) -> tuple[SearchSpace, np.ndarray]:
-    """The class of a problem on its first mesh, or a given one, and the parameters of its member nearest to a gait.
-    `NotConvergedError` if no path of the class is found near the gait."""
+    """The class of a problem on its first mesh, or a given one, and the parameters of its member
+    nearest to a gait. `NotConvergedError` if no path of the class is found near the gait."""
     space = space_of(problem, gait, edges, scheme)
     return space, space.parameters(gait)
 
 
 def space_of(
-    problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+    problem: Problem,
+    near: AnyGait,
+    edges: np.ndarray | None = None,
+    scheme: str = "",
+    far: Pairs = (),
 ) -> SearchSpace:
-    """The class of a problem on its first mesh, or a given one, with the pairs `far` kept apart; `near` says which of several
-    kinds of members are meant."""
+    """The class of a problem on its first mesh, or a given one, with the pairs `far` kept apart;
+    `near` says which of several kinds of members are meant."""
     return _searched(problem).space(control_problem(problem), near, edges, scheme, far)
 
 
@@ -116,13 +132,16 @@ def remeshed(space: SearchSpace, gait: AnyGait, edges: np.ndarray, scheme: str) 
 
 
 def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
-    """The class of a problem on its first mesh, and parameters about a gait that need not keep every row: ten times as fast for
-    free paths."""
+    """The class of a problem on its first mesh, and parameters about a gait that need not keep
+    every row: ten times as fast for free paths."""
     space = space_of(problem, gait)
     return space, space.laid(gait)
 
 
 def nearest_parameters(program: GaitProgram, gait: AnyGait) -> np.ndarray:
-    """Parameters of the member of a program's class that is nearest to a gait, on the program's mesh."""
-    space, v = space_near(program.control.problem, gait, program.mesh.edges, program.mesh.scheme.name)
+    """Parameters of the member of a program's class that is nearest to a gait, on the program's
+    mesh."""
+    space, v = space_near(
+        program.control.problem, gait, program.mesh.edges, program.mesh.scheme.name
+    )
     return space.full_parameters(v)

@@ -1,9 +1,10 @@
-"""NumPy solver of the balance of smooth bodies, batched over instants, on panels that adapt to the solution.
+"""NumPy solver of the balance of smooth bodies, batched over instants, on panels that adapt to the
+solution.
 
-The velocity of the body at stick changes over lengths ~ delta / (rotation rate), and shapes may be sharp. So after every
-solve each panel's integrals are compared with those over its two halves; panels that differ by more than the tolerance
-are halved and the instant is solved again. The iteration itself is that of `colloc.mechanics.damped_newton`; its references are
-the panel edges.
+The velocity of the body at stick changes over lengths ~ delta / (rotation rate), and shapes may be
+sharp. So after every solve each panel's integrals are compared with those over its two halves;
+panels that differ by more than the tolerance are halved and the instant is solved again. The
+iteration itself is that of `colloc.mechanics.damped_newton`; its references are the panel edges.
 """
 
 from __future__ import annotations
@@ -33,12 +34,14 @@ class SmoothSolution:
     ----------
     t : phases
     z : (3, n_time)
-        Velocity of the tail in the axes of the frame in which Theta is measured, and the rotation rate of that frame.
+        Velocity of the tail in the axes of the frame in which Theta is measured, and the rotation
+        rate of that frame.
     power : rate of work against friction
     centre : (2, n_time)
         Velocity of the centre of mass, in the same axes.
     force : (3, n_time)
-        Net force and torque about the tail or, where the velocities were solved for, about the part at rest.
+        Net force and torque about the tail or, where the velocities were solved for, about the part
+        at rest.
     bending_power : power of what bends the body; equals `power` in balance
     power_inside : the part of it done on the arcs `regions`
     slowest : smallest speed of a whole panel: how fast the part at stick creeps
@@ -67,8 +70,10 @@ class SmoothSolution:
         bad = np.flatnonzero(self.residual > self.tolerance)
         if bad.size:
             raise NotConvergedError(
-                f"the smooth body did not balance at {bad.size} of {self.t.size} instants (first: phase "
-                f"{self.t[bad[0]]:.4f}, worst residual {self.residual[bad].max():.1e}); use a larger delta."
+                f"the smooth body did not balance at {bad.size} of {self.t.size} instants (first: "
+                f"phase "
+                f"{self.t[bad[0]]:.4f}, worst residual {self.residual[bad].max():.1e}); use a "
+                f"larger delta."
             )
         return self
 
@@ -76,7 +81,8 @@ class SmoothSolution:
 def _motion_fields(
     motion: Motion, t: np.ndarray, panels: PanelGrid, speed: np.ndarray | None = None
 ) -> tuple[PanelFields, np.ndarray]:
-    """Theta and its rate on the panels of some instants, rates in units of the returned `speed` ``(n_time,)``."""
+    """Theta and its rate on the panels of some instants, rates in units of the returned `speed`
+    ``(n_time,)``."""
     nodes = panels.nodes
     angle, rate = motion.angle(nodes, t), motion.rate(nodes, t)
     if not (np.isfinite(rate).all() and np.isfinite(angle).all()):
@@ -88,7 +94,8 @@ def _motion_fields(
 
 
 def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """The chosen panels ``(n_panel, n_time)`` cut in two; columns that need fewer edges end in panels of width zero."""
+    """The chosen panels ``(n_panel, n_time)`` cut in two; columns that need fewer edges end in
+    panels of width zero."""
     middle = np.where(chosen, 0.5 * (edges[1:] + edges[:-1]), 1.0)
     fine = np.sort(np.concatenate([edges, middle]), axis=0)
     keep = 1 + int(np.max(np.sum(fine < 1.0, axis=0)))
@@ -98,8 +105,8 @@ def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
 def _panel_integrals(
     body: Curve, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray, fn: np.ndarray, panels: PanelGrid
 ) -> np.ndarray:
-    """Force, torque about the reference and power of every panel, ``(4, n_panel, n_time)``, from its nodes' velocities and
-    forces per length."""
+    """Force, torque about the reference and power of every panel, ``(4, n_panel, n_time)``, from
+    its nodes' velocities and forces per length."""
     densities = (
         fs * body.cos - fn * body.sin,
         fs * body.sin + fn * body.cos,
@@ -136,9 +143,11 @@ def solve_smooth(
     panels, order : int
         Equal panels to start from (besides the motion's breaks), and Gauss nodes a panel.
     quadrature_tolerance : float
-        Largest difference in force, torque or power between a panel and its halves; 0 keeps the first panels.
+        Largest difference in force, torque or power between a panel and its halves; 0 keeps the
+        first panels.
     tolerance : float
-        Largest net force or torque over the largest coefficient at which an instant counts as converged.
+        Largest net force or torque over the largest coefficient at which an instant counts as
+        converged.
     max_iterations : int
         As in `colloc.mechanics.fixed_point.solve_balance`.
     regions : tuple of (float, float)
@@ -155,7 +164,17 @@ def solve_smooth(
     check_finite(positive=True, delta=delta)
     t = np.atleast_1d(np.asarray(t, dtype=float))
     n = t.size
-    out = {name: np.zeros(n) for name in ("power", "bending_power", "power_inside", "slowest", "residual", "quadrature_error")}
+    out = {
+        name: np.zeros(n)
+        for name in (
+            "power",
+            "bending_power",
+            "power_inside",
+            "slowest",
+            "residual",
+            "quadrature_error",
+        )
+    }
     out["centre"], out["force"] = np.zeros((2, n)), np.zeros((3, n))
     z_tail, n_panel, iterations = np.zeros((3, n)), np.zeros(n, dtype=int), np.zeros(n, dtype=int)
 
@@ -183,7 +202,9 @@ def solve_smooth(
             solve(state, make, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
             for reference, members in groups(state.anchor):
                 batch = make(members, reference)
-                state.anchor[members], state.velocity[:, members] = batch.slowest(state.velocity[:, members], d[:, members])
+                state.anchor[members], state.velocity[:, members] = batch.slowest(
+                    state.velocity[:, members], d[:, members]
+                )
             state = starting_state(state.anchor, state.velocity)
         else:
             state = starting_state(anchor, velocity / speed)
@@ -201,9 +222,14 @@ def solve_smooth(
             fs, fn = friction.density(vs, vn, d[:, members])
             whole = _panel_integrals(body, vs, vn, fs, fn, own)
             out["centre"][:, chosen] = mean_velocity(body, vs, vn) * speed[members]
-            out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * spent[members]
+            out["bending_power"][chosen] = (
+                bending_power(own, body, fs, fn, fields.rate[:, members]) * spent[members]
+            )
             middle = 0.5 * (edges[1:, members] + edges[:-1, members])
-            inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
+            inside = sum(
+                ((middle > a) & (middle < b) for a, b in regions),
+                np.zeros(middle.shape, dtype=bool),
+            )
             out["force"][:, chosen] = whole[:3].sum(axis=1) * (spent / speed)[members]
             out["power"][chosen] = whole[3].sum(axis=0) * spent[members]
             out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * spent[members]
@@ -211,10 +237,17 @@ def solve_smooth(
             tail = batch.edge_velocity(z)[:, 0]
             tail[2] -= fields.edge_rate[0, members]
             z_tail[:, chosen] = tail * speed[members]
-            error = _panel_error(motion, friction, t[chosen], batch, z, d[:, members], speed[members])
+            error = _panel_error(
+                motion, friction, t[chosen], batch, z, d[:, members], speed[members]
+            )
             out["quadrature_error"][chosen] = error.max(axis=0)
-            # two stretches at rest know each other's velocity to rounding only: no refinement beats that
-            floor = _ROUNDING * batch.largest_speed(z) / (d[0, members] + batch.panel_speed(z).min(axis=0))
+            # two stretches at rest know each other's velocity to rounding only: no refinement beats
+            # that
+            floor = (
+                _ROUNDING
+                * batch.largest_speed(z)
+                / (d[0, members] + batch.panel_speed(z).min(axis=0))
+            )
             split[:, members] = error > quadrature_tolerance + floor
         out["residual"][active] = state.residual
         n_panel[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
@@ -223,33 +256,53 @@ def solve_smooth(
         if quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
             break
         anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
-        active, velocity, edges = active[more], velocity[:, more], _split(edges[:, more], split[:, more])
+        active, velocity, edges = (
+            active[more],
+            velocity[:, more],
+            _split(edges[:, more], split[:, more]),
+        )
         anchor = np.argmax(edges == anchor_at, axis=0)
-    return SmoothSolution(t, z_tail, **out, panels=n_panel, iterations=iterations, tolerance=tolerance)
+    return SmoothSolution(
+        t, z_tail, **out, panels=n_panel, iterations=iterations, tolerance=tolerance
+    )
 
 
 def _panel_error(
-    motion: Motion, friction: Law, t: np.ndarray, batch: PanelBatch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
+    motion: Motion,
+    friction: Law,
+    t: np.ndarray,
+    batch: PanelBatch,
+    z: np.ndarray,
+    delta: np.ndarray,
+    speed: np.ndarray,
 ) -> np.ndarray:
     """How far each panel is from its two halves, ``(n_panel, n_time)``.
 
-    Every panel is taken as a body of its own that moves with its left end, so that an error is charged to the panel that
-    makes it. Compared are force, torque and power, and the velocity handed on to the right end in units of the speed of
-    the slowest panel, because that is what decides the friction there.
+    Every panel is taken as a body of its own that moves with its left end, so that an error is
+    charged to the panel that makes it. Compared are force, torque and power, and the velocity
+    handed on to the right end in units of the speed of the slowest panel, because that is what
+    decides the friction there.
     """
     edges = batch.fields.panels.edges[:, batch.members]
     left, right = edges[:-1].ravel(), edges[1:].ravel()
     n_panel = len(edges) - 1
-    many = (np.tile(a, n_panel) for a in (t, speed, delta[0], delta[0] + batch.panel_speed(z).min(axis=0)))
+    many = (
+        np.tile(a, n_panel)
+        for a in (t, speed, delta[0], delta[0] + batch.panel_speed(z).min(axis=0))
+    )
     t_many, speed_many, delta_many, slow_many = many
     start = batch.edge_velocity(z)[:, :-1].reshape(3, -1)
     results = []
     for cuts in ([left, right], [left, 0.5 * (left + right), right]):
-        fields, _ = _motion_fields(motion, t_many, PanelGrid(np.stack(cuts), batch.fields.panels.order), speed_many)
+        fields, _ = _motion_fields(
+            motion, t_many, PanelGrid(np.stack(cuts), batch.fields.panels.order), speed_many
+        )
         one = PanelBatch(fields, friction, np.arange(t_many.size), 0)
         velocity = node_velocity(Curve(*one.curve), start)
         force = friction.density(*velocity, delta_many)
-        integrals = _panel_integrals(Curve(*one.curve), *velocity, *force, fields.panels).sum(axis=1)
+        integrals = _panel_integrals(Curve(*one.curve), *velocity, *force, fields.panels).sum(
+            axis=1
+        )
         end = one.edge_velocity(start)[:2, -1] / slow_many
         results.append(np.concatenate([integrals / friction.largest, end]))
     return np.abs(results[1] - results[0]).max(axis=0).reshape(n_panel, t.size)

@@ -1,32 +1,37 @@
-r"""Concertina crawlers: a straight body with one or two travelling bumps of half-width epsilon (paper, section VI).
+r"""Concertina crawlers: a straight body with one or two travelling bumps of half-width epsilon
+(paper, section VI).
 
-Shape. On a bump of arc length ``w`` centred at ``c`` the tangent angle is, with ``x = 2 (s - c)/w`` in [-1, 1],
+Shape. On a bump of arc length ``w`` centred at ``c`` the tangent angle is, with ``x = 2 (s - c)/w``
+in [-1, 1],
 
     Theta = a odd(x) + b even(x),    odd = -k x (1 - x^2)^3,   k = 7^(7/2)/6^3 (so that max odd = 1),    even = (1 - x^2)^3
 
-and zero elsewhere: twice continuously differentiable, with the end tangents those of the straight body. The odd part
-shortens the body by ``w (1 - mean cos Theta)``, the even part shifts it sideways. A bump that travels without changing
-keeps its chord, so both straight parts can rest.
+and zero elsewhere: twice continuously differentiable, with the end tangents those of the straight
+body. The odd part shortens the body by ``w (1 - mean cos Theta)``, the even part shifts it
+sideways. A bump that travels without changing keeps its chord, so both straight parts can rest.
 
 One bump (figure 13A to D), in the region ``|s - 1/2| <= epsilon``, half a period:
 
-1. a grows from 0 to `amplitude`, bump at the rear end of the region: the front half rests, the rear is pulled along;
+1. a grows from 0 to `amplitude`, bump at the rear end of the region: the front half rests, the rear
+  is pulled along;
 2. the bump travels to the front end of the region: both straight parts rest;
 3. a falls to 0: the rear rests, the front is pushed on;
 
 then the mirror image, Theta(s, t + 1/2) = -Theta(s, t).
 
-Two bumps (figure 13E), in the regions around 1/4 and 3/4, antisymmetric about the middle, Theta(1 - s) = -Theta(s): the
-body lies across its path. ``(a, b) = A(phi) (sin phi, cos phi)`` with A(0) = `amplitude` and A(phi) such that the chord
-along the body stays constant. In a period
+Two bumps (figure 13E), in the regions around 1/4 and 3/4, antisymmetric about the middle, Theta(1 -
+s) = -Theta(s): the body lies across its path. ``(a, b) = A(phi) (sin phi, cos phi)`` with A(0) =
+`amplitude` and A(phi) such that the chord along the body stays constant. In a period
 
-1. phi goes from 0 to pi, bumps at the inner ends of their regions: the middle part slides on, the outer parts rest;
+1. phi goes from 0 to pi, bumps at the inner ends of their regions: the middle part slides on, the
+  outer parts rest;
 2. the bumps travel to the outer ends of their regions: all straight parts rest;
 3. phi returns to 0: the outer parts slide on, the middle rests;
 4. the bumps travel back.
 
-In the limit epsilon -> 0 the efficiency is 1/mu_f (one bump; 1/mu_b if it runs backwards), or 1/mu_t (two bumps).
-"""
+In the limit epsilon -> 0 the efficiency is 1/mu_f (one bump; 1/mu_b if it runs backwards), or
+1/mu_t (two bumps).
+"""  # noqa: E501
 
 from __future__ import annotations
 
@@ -78,8 +83,8 @@ class Concertina(PrescribedBody):
     amplitude : float
         Largest tangent angle of the bump [rad].
     share : float
-        Arc length of a bump over that of its region, 2 epsilon; the paper's is 1/2. The rest is the margin by which the
-        resting part is longer than the sliding one.
+        Arc length of a bump over that of its region, 2 epsilon; the paper's is 1/2. The rest is the
+        margin by which the resting part is longer than the sliding one.
     bumps : {1, 2}
     backwards : bool
         One bump: run from head to tail, towards the tail (for mu_b < mu_f).
@@ -103,7 +108,10 @@ class Concertina(PrescribedBody):
         check_finite(epsilon=self.epsilon, share=self.share, amplitude=self.amplitude)
         widest = 0.5 / self.bumps
         if not 0 < self.epsilon < widest:
-            raise ProblemError(f"epsilon must lie between 0 and {widest:g} for {self.bumps} bump(s), not {self.epsilon!r}.")
+            raise ProblemError(
+                f"epsilon must lie between 0 and {widest:g} for {self.bumps} bump(s), not "
+                f"{self.epsilon!r}."
+            )
         if not 0 < self.share < 1:
             raise ProblemError(f"share must lie between 0 and 1, not {self.share!r}.")
         if not 0 < self.amplitude < np.pi / 2:
@@ -125,7 +133,9 @@ class Concertina(PrescribedBody):
         """Distance per period if nothing slips that should rest."""
         x, weight = _CHORD_NODES, 0.5 * _CHORD_WEIGHTS
         if self.bumps == 1:
-            return float(2 * self.width * np.sum(weight * (1 - np.cos(self.amplitude * odd_profile(x)))))
+            return float(
+                2 * self.width * np.sum(weight * (1 - np.cos(self.amplitude * odd_profile(x))))
+            )
         return float(2 * self.width * np.sum(weight * np.sin(self.amplitude * even_profile(x))))
 
     def prescribed(self) -> Motion:
@@ -134,7 +144,8 @@ class Concertina(PrescribedBody):
     def describe(self) -> str:
         bumps = "one bump" if self.bumps == 1 else "two bumps"
         return (
-            f"smooth, {bumps} of width {self.width:g} and amplitude {self.amplitude:g} rad in regions of {2 * self.epsilon:g}"
+            f"smooth, {bumps} of width {self.width:g} and amplitude {self.amplitude:g} rad in "
+            f"regions of {2 * self.epsilon:g}"
         )
 
 
@@ -152,7 +163,9 @@ def _one_bump(crawler: Concertina) -> Motion:
         """Amplitude and centre of the bump, with their rates."""
         scale = np.where(t < 0.5, crawler.amplitude, -crawler.amplitude)
         t = np.where(t < 0.5, t, t - 0.5)
-        (up, up_rate), (on, on_rate), (down, down_rate) = (_ramp(t, k / 6, (k + 1) / 6) for k in range(3))
+        (up, up_rate), (on, on_rate), (down, down_rate) = (
+            _ramp(t, k / 6, (k + 1) / 6) for k in range(3)
+        )
         centre, centre_rate = 0.5 + travel * (on - 0.5), travel * on_rate
         return scale * (up - down), scale * (up_rate - down_rate), centre, centre_rate
 
@@ -168,7 +181,11 @@ def _one_bump(crawler: Concertina) -> Motion:
     def breaks(t: np.ndarray) -> np.ndarray:
         centre = state(t)[2]
         (low, high) = crawler.regions[0]
-        ends = [np.full_like(t, low), *_quarters(centre - w / 2, centre + w / 2), np.full_like(t, high)]
+        ends = [
+            np.full_like(t, low),
+            *_quarters(centre - w / 2, centre + w / 2),
+            np.full_like(t, high),
+        ]
         return np.stack(ends)
 
     return Motion(angle, rate, breaks, stages=(0.0, 1 / 6, 1 / 3, 0.5), antipodal=True)
@@ -179,7 +196,8 @@ def _quarters(a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
 
 
 def _constant_chord(amplitude: float, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A(phi) that keeps ``int cos(A (sin phi odd + cos phi even)) dx`` as at phi = 0, and dA/dphi."""
+    """A(phi) that keeps ``int cos(A (sin phi odd + cos phi even)) dx`` as at phi = 0, and
+    dA/dphi."""
     x, weight = _CHORD_NODES[:, None], _CHORD_WEIGHTS[:, None]
     odd, even = odd_profile(x), even_profile(x)
     goal = np.sum(weight * np.cos(amplitude * even))
@@ -199,7 +217,8 @@ def _two_bumps(crawler: Concertina) -> Motion:
 
     def state(t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Coefficients a, b and centre of the rear bump, with their rates."""
-        t, places = np.unique(t, return_inverse=True)  # a solver asks for the same phases panel by panel
+        # a solver asks for the same phases panel by panel
+        t, places = np.unique(t, return_inverse=True)
         legs = [_ramp(t % 1.0, k / 4, (k + 1) / 4) for k in range(4)]
         phi, phi_rate = np.pi * (legs[0][0] - legs[2][0]), np.pi * (legs[0][1] - legs[2][1])
         centre = 0.25 + travel * (0.5 - legs[1][0] + legs[3][0])
@@ -211,7 +230,8 @@ def _two_bumps(crawler: Concertina) -> Motion:
         return tuple(part[places] for part in (a, b, centre, a_rate, b_rate, centre_rate))
 
     def mirrored(s: np.ndarray, of_rear: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """The rear half's function of arc length, and minus that of the mirror image in the front half."""
+        """The rear half's function of arc length, and minus that of the mirror image in the front
+        half."""
         value = of_rear(np.minimum(s, 1 - s))
         return np.where(s > 0.5, -value, value)
 
@@ -237,7 +257,11 @@ def _two_bumps(crawler: Concertina) -> Motion:
     def breaks(t: np.ndarray) -> np.ndarray:
         centre = state(t)[2]
         low, high = crawler.regions[0]
-        ends = [np.full_like(t, low), *_quarters(centre - w / 2, centre + w / 2), np.full_like(t, high)]
+        ends = [
+            np.full_like(t, low),
+            *_quarters(centre - w / 2, centre + w / 2),
+            np.full_like(t, high),
+        ]
         return np.stack([*ends, *(1 - end for end in ends)])
 
     return Motion(angle, rate, breaks, stages=(0.0, 0.25, 0.5, 0.75, 1.0))

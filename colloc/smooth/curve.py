@@ -1,10 +1,11 @@
 """Smooth bodies: a curve given by its tangent angle, integrated on composite Gauss panels.
 
-The tangent angle ``Theta(s, t)`` and its rate are prescribed at the panels' nodes; positions are integrals of its cosine
-and sine with the panels' own integration matrices (paper, eqs. x0, y0), so the body is inextensible to rounding.
-The rigid velocity ``z = (u, v, omega)`` is that of a *reference*, one of the panels' edges: velocity of the point and
-rotation rate of the tangent there. Path integrals start at the reference and rates are taken relative to it, so a stretch
-that keeps its shape moves with relative precision, however slow it is.
+The tangent angle ``Theta(s, t)`` and its rate are prescribed at the panels' nodes; positions are
+integrals of its cosine and sine with the panels' own integration matrices (paper, eqs. x0, y0), so
+the body is inextensible to rounding. The rigid velocity ``z = (u, v, omega)`` is that of a
+*reference*, one of the panels' edges: velocity of the point and rotation rate of the tangent there.
+Path integrals start at the reference and rates are taken relative to it, so a stretch that keeps
+its shape moves with relative precision, however slow it is.
 """
 
 from __future__ import annotations
@@ -26,8 +27,11 @@ def _gauss(order: int) -> Scheme:
 
 
 @lru_cache(maxsize=1024)
-def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, sparse.csc_matrix, sparse.csc_matrix]:
-    """Nodes to whole panels, panels to their nodes, and the integrals from a panel's left end to its nodes."""
+def _panel_matrices(
+    n: int, order: int
+) -> tuple[sparse.csc_matrix, sparse.csc_matrix, sparse.csc_matrix]:
+    """Nodes to whole panels, panels to their nodes, and the integrals from a panel's left end to
+    its nodes."""
     each, unit = sparse.identity(n, format="csc"), _gauss(order)
     return (
         sparse.kron(each, unit.b, "csc"),
@@ -41,8 +45,8 @@ class PanelGrid:
     """Gauss panels on the arc length, one column per instant (or a single column for all)."""
 
     edges: np.ndarray
-    """``(n_panel + 1, n_time)``: ascending from 0 to 1; panels of width zero are allowed (they fill up columns that need
-    fewer)."""
+    """``(n_panel + 1, n_time)``: ascending from 0 to 1; panels of width zero are allowed (they fill
+    up columns that need fewer)."""
     order: int = 8
     """Gauss nodes a panel."""
 
@@ -62,7 +66,10 @@ class PanelGrid:
     @property
     def nodes(self) -> np.ndarray:
         """Arc length of the nodes, ``(n_panel * order, n_time)``."""
-        return np.repeat(self.edges[:-1], self.order, axis=0) + np.tile(self.gauss.c, self.n)[:, None] * self.widths
+        return (
+            np.repeat(self.edges[:-1], self.order, axis=0)
+            + np.tile(self.gauss.c, self.n)[:, None] * self.widths
+        )
 
     @property
     def weights(self) -> np.ndarray:
@@ -70,18 +77,24 @@ class PanelGrid:
         return np.tile(self.gauss.b, self.n)[:, None] * self.widths
 
     def integrate(self, integrand: Array, reference: int) -> Array:
-        """Integrals from edge `reference` to the nodes; the integrand ``(n_node, n_time)`` is times the panel widths."""
+        """Integrals from edge `reference` to the nodes; the integrand ``(n_node, n_time)`` is times
+        the panel widths."""
         xp = namespace(integrand)
         whole, spread, own = _panel_matrices(self.n, self.order)
         ahead = np.arange(self.n) >= reference
-        panel_by_panel = np.tril(np.ones((self.n, self.n)), -1) * ahead - np.triu(np.ones((self.n, self.n))) * ~ahead
+        panel_by_panel = (
+            np.tril(np.ones((self.n, self.n)), -1) * ahead
+            - np.triu(np.ones((self.n, self.n))) * ~ahead
+        )
         start = xp.matmul(panel_by_panel, xp.matmul(whole, integrand))
         return xp.matmul(spread, start) + xp.matmul(own, integrand)
 
     def edge_path(self, reference: int) -> np.ndarray:
         """``(n_panel + 1, n_node)``: the same integrals up to the edges."""
         edge, panel = np.arange(self.n + 1)[:, None], np.arange(self.n)[None, :]
-        sign = (panel >= reference).astype(float) * (panel < edge) - (panel < reference) * (panel >= edge)
+        sign = (panel >= reference).astype(float) * (panel < edge) - (panel < reference) * (
+            panel >= edge
+        )
         return np.kron(sign, self.gauss.b)
 
     def panel_sums(self, density: np.ndarray) -> np.ndarray:
@@ -92,8 +105,9 @@ class PanelGrid:
 class Curve(NamedTuple):
     """A body at given instants, seen from a reference; each ``(n_node, n_time)``.
 
-    Direction cosines of the tangent; how a rotation about the reference moves a node tangentially and normally; the
-    tangential and normal velocity of the nodes while the reference is held; quadrature weights.
+    Direction cosines of the tangent; how a rotation about the reference moves a node tangentially
+    and normally; the tangential and normal velocity of the nodes while the reference is held;
+    quadrature weights.
     """
 
     cos: Array
@@ -105,20 +119,26 @@ class Curve(NamedTuple):
     weight: Array
 
 
-def curve(panels: PanelGrid, angle: Array, rate: Array, reference: int, reference_rate: Array) -> Curve:
-    """The curve of tangent angles [rad] and rates [rad/time] at the nodes, ``(n_node, n_time)``, seen from the panel edge
-    number `reference`, where Theta has the rate ``(1, n_time)`` (paper, eqs. x0, y0 and dtz0)."""
+def curve(
+    panels: PanelGrid, angle: Array, rate: Array, reference: int, reference_rate: Array
+) -> Curve:
+    """The curve of tangent angles [rad] and rates [rad/time] at the nodes, ``(n_node, n_time)``,
+    seen from the panel edge number `reference`, where Theta has the rate ``(1, n_time)`` (paper,
+    eqs. x0, y0 and dtz0)."""
     xp = namespace(angle, rate)
     width = panels.widths
     c, s = xp.cos(angle), xp.sin(angle)
     x, y = panels.integrate(width * c, reference), panels.integrate(width * s, reference)
     turning = width * (rate - reference_rate)
     vx, vy = -panels.integrate(turning * s, reference), panels.integrate(turning * c, reference)
-    return Curve(c, s, x * s - y * c, x * c + y * s, vx * c + vy * s, vy * c - vx * s, panels.weights)
+    return Curve(
+        c, s, x * s - y * c, x * c + y * s, vx * c + vy * s, vy * c - vx * s, panels.weights
+    )
 
 
 def node_velocity(body: Curve, z: Array) -> tuple[Array, Array]:
-    """Tangential and normal velocity of the nodes when the reference moves with z ``(3, n_time)``."""
+    """Tangential and normal velocity of the nodes when the reference moves with z ``(3,
+    n_time)``."""
     u, v, omega = z[0:1, :], z[1:2, :], z[2:3, :]
     return (
         body.cos * u + body.sin * v + body.arm_s * omega + body.shape_s,
@@ -127,7 +147,8 @@ def node_velocity(body: Curve, z: Array) -> tuple[Array, Array]:
 
 
 def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
-    """Net force and torque about the reference of a force per length, ``(3, n_time)`` (paper, eq. ftb)."""
+    """Net force and torque about the reference of a force per length, ``(3, n_time)`` (paper, eq.
+    ftb)."""
     xp = namespace(body.cos, tangential)
     fs, fn = body.weight * tangential, body.weight * normal
     return xp.stack(
@@ -140,10 +161,17 @@ def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
 
 
 def pulled_back(body: Curve, blocks: tuple[tuple[np.ndarray, np.ndarray], ...]) -> np.ndarray:
-    """``integral of G^T K G``, ``(n_time, 3, 3)``, with G = d(vs, vn)/dz and K the given 2 x 2 of densities."""
+    """``integral of G^T K G``, ``(n_time, 3, 3)``, with G = d(vs, vn)/dz and K the given 2 x 2 of
+    densities."""
     row_s, row_n = (body.cos, body.sin, body.arm_s), (-body.sin, body.cos, body.arm_n)
-    right = [[body.weight * (block[0] * row_s[j] + block[1] * row_n[j]) for j in range(3)] for block in blocks]
-    columns = [[(row_s[i] * right[0][j] + row_n[i] * right[1][j]).sum(axis=0) for j in range(3)] for i in range(3)]
+    right = [
+        [body.weight * (block[0] * row_s[j] + block[1] * row_n[j]) for j in range(3)]
+        for block in blocks
+    ]
+    columns = [
+        [(row_s[i] * right[0][j] + row_n[i] * right[1][j]).sum(axis=0) for j in range(3)]
+        for i in range(3)
+    ]
     return np.array(columns).transpose(2, 0, 1)
 
 
@@ -158,11 +186,15 @@ def mean_velocity(body: Curve, vs: Array, vn: Array) -> Array:
     )
 
 
-def bending_power(panels: PanelGrid, body: Curve, tangential: np.ndarray, normal: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Power of what bends the body against a force per length, ``(n_time,)``; `rate` is that of Theta at the nodes.
+def bending_power(
+    panels: PanelGrid, body: Curve, tangential: np.ndarray, normal: np.ndarray, rate: np.ndarray
+) -> np.ndarray:
+    """Power of what bends the body against a force per length, ``(n_time,)``; `rate` is that of
+    Theta at the nodes.
 
-    The moment of all force ahead of s has the derivative ``-t x F(s)``, with F the force ahead; its work on the curvature is,
-    by parts, ``-int (n . F) dTheta/dt ds``. In balance that is the power dissipated.
+    The moment of all force ahead of s has the derivative ``-t x F(s)``, with F the force ahead; its
+    work on the curvature is, by parts, ``-int (n . F) dTheta/dt ds``. In balance that is the power
+    dissipated.
     """
     fx, fy = tangential * body.cos - normal * body.sin, tangential * body.sin + normal * body.cos
     ahead_x, ahead_y = (-panels.integrate(panels.widths * f, panels.n) for f in (fx, fy))

@@ -1,7 +1,9 @@
-"""The smooth body of a few modes as a `colloc.mechanics.bodies.Body`: ``Theta(s, t) = sum_m q_m(t) phi_m(s)``, s from 0 to 1.
+"""The smooth body of a few modes as a `colloc.mechanics.bodies.Body`: ``Theta(s, t) = sum_m q_m(t)
+phi_m(s)``, s from 0 to 1.
 
-Modes have zero mean, so that Theta is measured from the mean direction of the body and the orientation of that direction is
-the rigid rotation. The shape coordinates q take the place of joint angles [rad].
+Modes have zero mean, so that Theta is measured from the mean direction of the body and the
+orientation of that direction is the rigid rotation. The shape coordinates q take the place of joint
+angles [rad].
 """
 
 from __future__ import annotations
@@ -22,14 +24,15 @@ from colloc.system.errors import ProblemError
 LEGENDRE, FOURIER = "legendre", "fourier"
 
 _PLACES_A_MODE = 4
-"""Where on the body |Theta| is bounded, with all that lies nearer to each place than to others; they lie denser towards the
-ends, where polynomials change fast."""
+"""Where on the body |Theta| is bounded, with all that lies nearer to each place than to others;
+they lie denser towards the ends, where polynomials change fast."""
 
 
 @named_arguments
 @dataclass(frozen=True)
 class ModalBody(PanelBody):
-    """A smooth body of unit length with a few bending modes; its shape coordinates are their amplitudes [rad].
+    """A smooth body of unit length with a few bending modes; its shape coordinates are their
+    amplitudes [rad].
 
     Parameters
     ----------
@@ -39,13 +42,15 @@ class ModalBody(PanelBody):
         Legendre polynomials of degree 1, 2, ... on the body (the curvature is a polynomial), or
         sin(2 pi s), cos(2 pi s), sin(4 pi s), ...: an even number of them.
     panels, order : int
-        Gauss panels on the body and nodes on each, for the optimisation; certificates use panels that adapt.
+        Gauss panels on the body and nodes on each, for the optimisation; certificates use panels
+        that adapt.
 
     Examples
     --------
     >>> from colloc import Friction, Harmonic, ModalBody, Problem
     >>> body = ModalBody(modes=6)
-    >>> Problem("low-modes", body=body, friction=Friction(mu_t=100), gait=Harmonic(1, "antipodal")).formulation
+    >>> Problem("low-modes", body=body, friction=Friction(mu_t=100), gait=Harmonic(1,
+    ...     "antipodal")).formulation
     'implicit velocity'
     """
 
@@ -63,9 +68,13 @@ class ModalBody(PanelBody):
         for name, least, most in (("modes", 1, 20), ("panels", 1, 200), ("order", 2, 12)):
             value = getattr(self, name)
             if not is_whole(value, least, most):
-                raise ProblemError(f"{name} must be a whole number from {least} to {most}, not {value!r}.")
+                raise ProblemError(
+                    f"{name} must be a whole number from {least} to {most}, not {value!r}."
+                )
         if self.basis == FOURIER and self.modes % 2:
-            raise ProblemError(f"fourier modes come in pairs (sine and cosine); {self.modes} is odd.")
+            raise ProblemError(
+                f"fourier modes come in pairs (sine and cosine); {self.modes} is odd."
+            )
 
     @property
     def grid(self) -> PanelGrid:
@@ -111,10 +120,14 @@ class ModalBody(PanelBody):
     def angle_rate(self, s: np.ndarray, q: Array, rates: Array) -> Array:
         return self.angle(s, rates)
 
-    def angle_slopes(self, s: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def angle_slopes(
+        self, s: np.ndarray, q: np.ndarray, rates: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         modes = self.modes_at(s)
         none = np.zeros_like(modes)
-        return np.concatenate([modes, none], axis=1)[..., None], np.concatenate([none, modes], axis=1)[..., None]
+        return np.concatenate([modes, none], axis=1)[..., None], np.concatenate(
+            [none, modes], axis=1
+        )[..., None]
 
     @property
     def limited(self) -> np.ndarray:
@@ -142,9 +155,11 @@ class ModalBody(PanelBody):
         return np.abs(self.modes_at(np.linspace(0.0, 1.0, 401)) @ angles).max(axis=0)
 
     def laid(self, lengths: np.ndarray) -> np.ndarray:
-        """``(modes, n_joint)``: amplitudes of the smooth shape nearest (in the mean square) to a chain of given joint angles.
+        """``(modes, n_joint)``: amplitudes of the smooth shape nearest (in the mean square) to a
+        chain of given joint angles.
 
-        The chain's tangent angle is a staircase; only its mean direction, which is a rigid rotation, is left out.
+        The chain's tangent angle is a staircase; only its mean direction, which is a rigid
+        rotation, is left out.
         """
         lengths = np.asarray(lengths, dtype=float)
         ends = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
@@ -156,8 +171,8 @@ class ModalBody(PanelBody):
         return np.linalg.solve(_gram(self), moments)
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
-        """``sin(2 pi t - 2 pi waves (s - 1/2))`` as nearly as the modes can: factors ``(modes,)`` of the cosine and the sine of
-        the phase."""
+        """``sin(2 pi t - 2 pi waves (s - 1/2))`` as nearly as the modes can: factors ``(modes,)``
+        of the cosine and the sine of the phase."""
         grid = _FINE
         s, w = grid.nodes[:, 0], grid.weights[:, 0]
         project = np.linalg.solve(_gram(self), self.modes_at(s).T * w)

@@ -1,4 +1,5 @@
-"""A smooth body that is solved on fixed panels, as a `colloc.mechanics.bodies.Body`: what such bodies answer alike."""
+"""A smooth body that is solved on fixed panels, as a `colloc.mechanics.bodies.Body`: what such
+bodies answer alike."""
 
 from __future__ import annotations
 
@@ -19,12 +20,13 @@ class PanelBody(SmoothBody):
 
     symmetries = ("none", "antipodal")
     usual = Usual(
-        delta=1e-2, delta_start=0.3, limit=1.5, largest_limit=0.5 * np.pi, limit_name="tangent angle", excess=1e-3,
+        delta=1e-2, delta_start=0.3, limit=1.5, largest_limit=0.5 * np.pi,
+        limit_name="tangent angle", excess=1e-3,
         delta_influence=2e-2, instants=400,
     )  # fmt: skip
-    """A smooth body has a point at rest at nearly every instant. So its panels have to resolve delta over the rotation rate,
-    and the influence of delta is of first order and larger than for links. Below pi/2 the body advances along its mean
-    direction and cannot cross itself."""
+    """A smooth body has a point at rest at nearly every instant. So its panels have to resolve
+    delta over the rotation rate, and the influence of delta is of first order and larger than for
+    links. Below pi/2 the body advances along its mean direction and cannot cross itself."""
 
     def on_panels(self, panels: int) -> Self:
         return dataclasses.replace(self, panels=panels)  # type: ignore[type-var]
@@ -42,7 +44,9 @@ class PanelBody(SmoothBody):
         """Its rate."""
         raise NotImplementedError
 
-    def angle_slopes(self, s: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def angle_slopes(
+        self, s: np.ndarray, q: np.ndarray, rates: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of both."""
         raise NotImplementedError
 

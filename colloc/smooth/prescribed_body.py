@@ -1,7 +1,9 @@
-"""Smooth bodies whose motion is prescribed, as bodies of a problem: what they achieve is asked for, nothing is free.
+"""Smooth bodies whose motion is prescribed, as bodies of a problem: what they achieve is asked for,
+nothing is free.
 
-Their shape coordinates are the phase, as a point on a circle (`colloc.gaits.prescribed`). Everything is solved on panels that
-adapt, since prescribed shapes may be as sharp, and delta as small, as one likes.
+Their shape coordinates are the phase, as a point on a circle (`colloc.gaits.prescribed`).
+Everything is solved on panels that adapt, since prescribed shapes may be as sharp, and delta as
+small, as one likes.
 """
 
 from __future__ import annotations
@@ -27,10 +29,12 @@ class PrescribedBody(SmoothBody):
     n_joint = 2
     coordinate, quantity = "coordinate", "phase coordinate"
     usual = Usual(
-        delta=1e-4, delta_start=1e-4, limit=0.5 * np.pi, largest_limit=np.pi, limit_name="tangent angle", excess=1e-9,
+        delta=1e-4, delta_start=1e-4, limit=0.5 * np.pi, largest_limit=np.pi,
+        limit_name="tangent angle", excess=1e-9,
         delta_influence=2e-2, instants=96, instants_a_point=2,
     )  # fmt: skip
-    """Nobody optimised the motion, so a replay need not look at it ten times as closely as the mesh; it adapts anyway."""
+    """Nobody optimised the motion, so a replay need not look at it ten times as closely as the
+    mesh; it adapts anyway."""
     limited = np.empty((0, 2))
     bending = np.empty((0, 2))
 
@@ -57,24 +61,46 @@ class PrescribedBody(SmoothBody):
         found = self.prescribed().breaks
         return super().breaks(angles) if found is None else found(_phase(angles))
 
-    def sliding(self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Sliding:
+    def sliding(
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray
+    ) -> Sliding:
         slid = self.on_adaptive_panels(friction, angles, rates, float(np.max(delta)), slide=z)
         return Sliding(slid.force, slid.centre, slid.power[None])
 
     def solve(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *,
+        start: np.ndarray | None = None,
         tolerance: float = 1e-11,
     ) -> BalanceSolution:  # fmt: skip
         s = self.on_adaptive_panels(friction, angles, rates, delta, tolerance=tolerance)
-        return BalanceSolution(s.z, s.residual, s.iterations, s.residual <= tolerance, np.zeros(s.t.size, dtype=int), s.z)
+        return BalanceSolution(
+            s.z,
+            s.residual,
+            s.iterations,
+            s.residual <= tolerance,
+            np.zeros(s.t.size, dtype=int),
+            s.z,
+        )
 
     def motion(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+        self,
+        friction: Law,
+        angles: np.ndarray,
+        rates: np.ndarray,
+        delta: float,
+        solved: BalanceSolution,
     ) -> BalancedMotion:
         slid = self.on_adaptive_panels(friction, angles, rates, delta, slide=solved.z)
         return BalancedMotion(solved.z, slid.centre, slid.power, slid.bending_power)
 
-    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
+    def slopes(
+        self,
+        friction: Law,
+        angles: np.ndarray,
+        rates: np.ndarray,
+        delta: float,
+        solved: BalanceSolution,
+    ) -> np.ndarray:
         raise NotImplementedError("a prescribed motion has nothing to differentiate by.")
 
     def swapped(self, shape: np.ndarray) -> np.ndarray:
@@ -96,8 +122,8 @@ class Wave(PrescribedBody):
     Parameters
     ----------
     profile : {"sine", "tanh", "standing"}
-        See `colloc.smooth.motion`: ``sin(2 pi (waves s + t))``, ``tanh(steepness sin(2 pi (waves s - t)))`` and
-        ``sin(2 pi s) sin(2 pi t)``, times the amplitude.
+        See `colloc.smooth.motion`: ``sin(2 pi (waves s + t))``, ``tanh(steepness sin(2 pi (waves s
+        - t)))`` and ``sin(2 pi s) sin(2 pi t)``, times the amplitude.
     amplitude : float
         Largest tangent angle [rad].
     waves : float
@@ -120,7 +146,9 @@ class Wave(PrescribedBody):
 
     def __post_init__(self) -> None:
         if self.profile not in ("sine", "tanh", "standing"):
-            raise ProblemError(f"profile must be 'sine', 'tanh' or 'standing', not {self.profile!r}.")
+            raise ProblemError(
+                f"profile must be 'sine', 'tanh' or 'standing', not {self.profile!r}."
+            )
         check_positive(self, "amplitude", "waves", "steepness")
 
     def prescribed(self) -> Motion:

@@ -1,4 +1,5 @@
-"""What the commands solve, multistart and sweep do, for scripts and notebooks: functions of the same names."""
+"""What the commands solve, multistart and sweep do, for scripts and notebooks: functions of the
+same names."""
 
 from __future__ import annotations
 
@@ -52,14 +53,15 @@ def solve(
     problem : Problem or path-like
         A problem, or a problem file.
     starts : int, optional
-        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else 32.
+        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else
+        32.
     seconds : float
         Wall time allowed: then the best gait so far is returned.
     search : {"reduced", "full"}
         "full": IPOPT on the full program at every level of delta, from the guess alone.
     output : path-like, optional
-        Of an HDF5 file in which the solution is saved. What is found on the way is kept beside it: after Ctrl-C, or a power
-        cut, the same call goes on.
+        Of an HDF5 file in which the solution is saved. What is found on the way is kept beside it:
+        after Ctrl-C, or a power cut, the same call goes on.
     verbose : bool
         Print a line for every step.
     progress : callable, optional
@@ -68,8 +70,8 @@ def solve(
     Returns
     -------
     Solution
-        Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that does not converge, or that
-        Ctrl-C interrupts.
+        Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that
+        does not converge, or that Ctrl-C interrupts.
 
     Raises
     ------
@@ -107,7 +109,10 @@ def _stated(problem: Stated) -> ProblemFile:
     if isinstance(problem, Problem):
         return ProblemFile(problem, None, "")
     if not isinstance(problem, (str, os.PathLike)):
-        raise ProblemError(f"problem must be a Problem or the path of a problem file, not {type(problem).__name__}.")
+        raise ProblemError(
+            f"problem must be a Problem or the path of a problem file, not "
+            f"{type(problem).__name__}."
+        )
     return read_problem_file(problem)
 
 
@@ -149,7 +154,8 @@ class Starts:
         return basins(self.problem, self.outcomes)
 
     def solution(self, start: int | None = None) -> Solution:
-        """The whole solution of a start (the best one by default), solved again from the gait that is known.
+        """The whole solution of a start (the best one by default), solved again from the gait that
+        is known.
 
         Raises
         ------
@@ -158,18 +164,25 @@ class Starts:
         """
         if start is None:
             if not self.optima:
-                raise NotConvergedError(f"none of {len(self.outcomes)} starts of {self.problem.name} was certified.")
+                raise NotConvergedError(
+                    f"none of {len(self.outcomes)} starts of {self.problem.name} was certified."
+                )
             return reopened(self.problem, self.optima[0].best)
         return reopened(self.problem, next(o for o in self.outcomes if o.start == start))
 
     def __repr__(self) -> str:
         tally = ", ".join(f"{n} {status}" for status, n in counts(self.outcomes).items())
-        best = f"; best {self.problem.objective.short} = {self.optima[0].best.value:.6g}" if self.optima else ""
+        best = (
+            f"; best {self.problem.objective.short} = {self.optima[0].best.value:.6g}"
+            if self.optima
+            else ""
+        )
         return f"<Starts of {self.problem.name}: {tally}; {len(self.optima)} distinct optima{best}>"
 
 
 def reopened(problem: Problem, outcome: Outcome) -> Solution:
-    """The solution that a start led to: solved at the final delta from its gait, or again from its guess if it failed."""
+    """The solution that a start led to: solved at the final delta from its gait, or again from its
+    guess if it failed."""
     if outcome.status != SOLVED:
         return search_solve(problem.with_(guess=outcome.guess), 1)
     return search_solve(problem.with_(guess=outcome.gait, delta_start=problem.delta), 1)
@@ -196,8 +209,9 @@ def multistart(
     starts, seed, sampler, time_limit
         As for `colloc.studies.campaign.run_starts`; starts 0 to `starts` - 1.
     workers : int
-        Processes; with one everything runs in this process. They import the script that asks for more only if it defines a
-        part of the problem; it has to be safe to import then (``if __name__ == "__main__":``).
+        Processes; with one everything runs in this process. They import the script that asks for
+        more only if it defines a part of the problem; it has to be safe to import then (``if
+        __name__ == "__main__":``).
     archive : path-like, optional
         HDF5 file in which starts are kept; what it holds already is not solved again.
     verbose : bool
@@ -215,7 +229,9 @@ def multistart(
     """
     check_count(starts=starts, workers=workers)
     if not is_whole(seed, 0, LARGEST_SEED):
-        raise ProblemError(f"seed must be a whole number from 0 to {LARGEST_SEED}, not {shown(seed)}.")
+        raise ProblemError(
+            f"seed must be a whole number from 0 to {LARGEST_SEED}, not {shown(seed)}."
+        )
     if sampler not in SAMPLERS:
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {shown(sampler)}.")
     if not time_limit > 0:
@@ -289,6 +305,9 @@ def sweep(
         for news in run.run(workers=workers, executor=pool_for):
             if verbose:
                 best = news.state.best
-                print(f"{cell_text(study, news.cell)}: {best.outcome.value if best else np.nan:.6f}", flush=True)
+                print(
+                    f"{cell_text(study, news.cell)}: {best.outcome.value if best else np.nan:.6f}",
+                    flush=True,
+                )
             told(news)
         return study_table(run)

@@ -1,4 +1,5 @@
-"""Many starts of one problem over any `concurrent.futures` executor; one bad start never ends the run."""
+"""Many starts of one problem over any `concurrent.futures` executor; one bad start never ends the
+run."""
 
 from __future__ import annotations
 
@@ -22,13 +23,22 @@ from colloc.system.task_pool import Lost, Task, completed, process_pool
 
 
 def run_start(
-    problem: Problem, sampler: str, seed: int, start: int, time_limit: float, known: AnyGait | None = None
+    problem: Problem,
+    sampler: str,
+    seed: int,
+    start: int,
+    time_limit: float,
+    known: AnyGait | None = None,
 ) -> Outcome:
-    """Solve and certify one start. Whatever goes wrong becomes the outcome's status and message; nothing is raised.
+    """Solve and certify one start. Whatever goes wrong becomes the outcome's status and message;
+    nothing is raised.
 
-    A start that takes longer than the time limit [s] is given up. A `known` gait takes the place of the sample.
+    A start that takes longer than the time limit [s] is given up. A `known` gait takes the place of
+    the sample.
     """
-    return run_guess(problem, lambda: known or start_gait(problem, sampler, seed, start), start, time_limit)
+    return run_guess(
+        problem, lambda: known or start_gait(problem, sampler, seed, start), start, time_limit
+    )
 
 
 def run_guess(
@@ -40,10 +50,11 @@ def run_guess(
     literal: bool = False,
     worth: Callable[[Optimum], bool] = lambda end: True,
 ) -> Outcome:
-    """Solve and certify a problem from the gait that `start_from` makes, as start number `start`; raises nothing.
+    """Solve and certify a problem from the gait that `start_from` makes, as start number `start`;
+    raises nothing.
 
-    With `literal`, IPOPT searches on the full program (`colloc.search.literal`). Where the search ends at the final delta in
-    what is not `worth` it, that is passed over.
+    With `literal`, IPOPT searches on the full program (`colloc.search.literal`). Where the search
+    ends at the final delta in what is not `worth` it, that is passed over.
     """
     begin, cpu, passed = time.perf_counter(), time.process_time(), list[Optimum]()
 
@@ -63,14 +74,22 @@ def run_guess(
         if solution.interrupted:
             if time.perf_counter() - begin < time_limit:
                 raise KeyboardInterrupt
-            where = f"the last optimum was at delta = {solution.answer.delta:.1e}" if seen[-1].best else "no optimum yet"
-            outcome = replace(outcome, status=TIME_LIMIT, message=f"gave up after {time_limit:g} s; {where}.")
+            where = (
+                f"the last optimum was at delta = {solution.answer.delta:.1e}"
+                if seen[-1].best
+                else "no optimum yet"
+            )
+            outcome = replace(
+                outcome, status=TIME_LIMIT, message=f"gave up after {time_limit:g} s; {where}."
+            )
         else:
             outcome = _outcome(start, guess, solution)
             outcome = replace(outcome, status=PASSED_OVER, message="") if passed else outcome
     except Exception as error:
         outcome = replace(outcome, status=ERROR, message=f"{type(error).__name__}: {error}")
-    return replace(outcome, seconds=time.perf_counter() - begin, cpu_seconds=time.process_time() - cpu)
+    return replace(
+        outcome, seconds=time.perf_counter() - begin, cpu_seconds=time.process_time() - cpu
+    )
 
 
 def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
@@ -81,7 +100,11 @@ def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
     outcome = Outcome(start, status, solution.message, guess, solution.gait, iterations=iterations)
     if certificate.replayed:
         names = ("value", "efficiency", "distance", "work", "value_error", "efficiency_error")
-        return replace(outcome, delta=solution.answer.delta, **{name: getattr(certificate, name) for name in names})
+        return replace(
+            outcome,
+            delta=solution.answer.delta,
+            **{name: getattr(certificate, name) for name in names},
+        )
     if optimal:
         last = optimal[-1]
         found = {name: getattr(last, name) for name in ("delta", "value", "distance", "work")}
@@ -106,8 +129,8 @@ def run_starts(
     ----------
     problem : Problem
     starts : iterable of int
-        Start numbers, each taken when a worker is free for it. A start depends only on the problem, the sampler, the seed and
-        its number.
+        Start numbers, each taken when a worker is free for it. A start depends only on the problem,
+        the sampler, the seed and its number.
     sampler : {"latin-hypercube", "perturbed"}
     seed : int
     workers : int
@@ -115,11 +138,13 @@ def run_starts(
     time_limit : float
         Seconds a start may take.
     executor : callable
-        Makes an executor for a number of workers: processes by default; threads, or the one a Dask client gives
-        (``lambda n: client.get_executor()``), will do. When a worker dies (killed, out of memory) a new one is made, the
-        starts under way are tried again one by one, and one that kills its worker again is recorded as crashed.
+        Makes an executor for a number of workers: processes by default; threads, or the one a Dask
+        client gives (``lambda n: client.get_executor()``), will do. When a worker dies (killed, out
+        of memory) a new one is made, the starts under way are tried again one by one, and one that
+        kills its worker again is recorded as crashed.
     known : mapping of int to a gait, optional
-        Gaits from which starts of these numbers begin instead of a sample: results of an earlier run to go on from.
+        Gaits from which starts of these numbers begin instead of a sample: results of an earlier
+        run to go on from.
 
     Raises
     ------
@@ -127,15 +152,23 @@ def run_starts(
         If nothing is free: a prescribed motion is the same from every start.
     """
     if not problem.gait.free:
-        raise ProblemError("a prescribed motion is the same from every start; colloc solve measures it.")
+        raise ProblemError(
+            "a prescribed motion is the same from every start; colloc solve measures it."
+        )
     native_kernel()  # missed once for all workers, or there
     waiting = iter(starts)
 
     def ready() -> Task | None:
         start = next(waiting, None)
-        return None if start is None else Task(start, (problem, sampler, seed, start, time_limit, (known or {}).get(start)))
+        return (
+            None
+            if start is None
+            else Task(start, (problem, sampler, seed, start, time_limit, (known or {}).get(start)))
+        )
 
     for task, outcome in completed(run_start, ready, workers=workers, executor=executor):
         if isinstance(outcome, Lost):
-            outcome = Outcome(task.arguments[3], CRASHED, outcome.message, problem.guess, problem.guess)
+            outcome = Outcome(
+                task.arguments[3], CRASHED, outcome.message, problem.guess, problem.guess
+            )
         yield outcome

@@ -1,4 +1,5 @@
-"""One cell of a study: which starts are worth solving, and what became of them. This is what runs on a worker."""
+"""One cell of a study: which starts are worth solving, and what became of them. This is what runs
+on a worker."""
 
 from __future__ import annotations
 
@@ -24,10 +25,12 @@ from colloc.verification.replayer import replayer
 Index = tuple[int, ...]
 _INSTANTS = 200
 _LEVER = 0.5
-"""Of a net rotation, in body lengths: how far the distance depends on the point of the body that is followed."""
+"""Of a net rotation, in body lengths: how far the distance depends on the point of the body that is
+followed."""
 _SAME_START = 1e-3
 BETTER = 1e-3
-"""Relative gain in value that is worth a solve, and that a coarse replay can tell (see `value_as_it_is`)."""
+"""Relative gain in value that is worth a solve, and that a coarse replay can tell (see
+`value_as_it_is`)."""
 GUESS, WARM, COLD, RESCUE = "guess", "warm", "cold", "rescue"
 
 
@@ -38,7 +41,8 @@ def start_key(gait: AnyGait) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """One start of a cell: where it came from, and its outcome. `key` names the start, so that none is solved twice."""
+    """One start of a cell: where it came from, and its outcome. `key` names the start, so that none
+    is solved twice."""
 
     origin: str
     key: str
@@ -81,18 +85,23 @@ class Visit:
     cell: Index
     attempts: list[Attempt]
     scores: dict[str, float] = field(default_factory=dict)
-    """The value there of every gait that came from elsewhere, as it is, by its `start_key`; NaN if nobody knows."""
+    """The value there of every gait that came from elsewhere, as it is, by its `start_key`; NaN if
+    nobody knows."""
 
 
 def failed_visit(work: Work, status: str, message: str) -> Visit:
-    """The visit of which nothing came. If the cell's own starts may be to blame, gaits from elsewhere have another chance."""
+    """The visit of which nothing came. If the cell's own starts may be to blame, gaits from
+    elsewhere have another chance."""
     guess = work.problem.guess
     attempt = Attempt(GUESS, start_key(guess), Outcome(0, status, message, guess, guess))
-    return Visit(work.cell, [attempt], {} if work.first else {start_key(gait): np.nan for gait in work.gaits})
+    return Visit(
+        work.cell, [attempt], {} if work.first else {start_key(gait): np.nan for gait in work.gaits}
+    )
 
 
 def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
-    """The member of the problem's class next to a gait of any class; None if there is none that is admissible and moves."""
+    """The member of the problem's class next to a gait of any class; None if there is none that is
+    admissible and moves."""
     body, kind = problem.body, problem.gait
     if gait.n_joint != body.n_joint or not kind.free:
         return None
@@ -106,12 +115,15 @@ def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
     return projected
 
 
-def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, most_instants: int = _INSTANTS) -> float:
+def value_as_it_is(
+    problem: Problem, gait: AnyGait, instants: int = _INSTANTS, most_instants: int = _INSTANTS
+) -> float:
     """The objective of a gait without a search, from a coarse replay; 0 if that fails.
 
-    A net rotation makes the distance depend on the point that is followed. What it can be too large by is taken off, where
-    it is not asked for.
-    200 instants are within 3e-4 of 1,600 for the ellipse of efficiency 0.26 and delta from 1e-2 to 1e-4.
+    A net rotation makes the distance depend on the point that is followed. What it can be too large
+    by is taken off, where it is not asked for.
+    200 instants are within 3e-4 of 1,600 for the ellipse of efficiency 0.26 and delta from 1e-2 to
+    1e-4.
     """
     try:
         found = replayer(problem.regime)(
@@ -128,28 +140,42 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
     except CollocError:
         return 0.0
     turned = 0.0 if problem.rotation is None else abs(found.rotation - problem.rotation)
-    sure = problem.objective({**found.values, "distance": max(0.0, found.distance - _LEVER * turned)})
+    sure = problem.objective(
+        {**found.values, "distance": max(0.0, found.distance - _LEVER * turned)}
+    )
     return float(sure) if np.isfinite(sure) else 0.0
 
 
 def visit(work: Work, found: dict[Index, AnyGait]) -> Visit:
-    """Solve a cell from its starts; `found` holds the best gaits of earlier cells of the task, by cell.
+    """Solve a cell from its starts; `found` holds the best gaits of earlier cells of the task, by
+    cell.
 
-    A gait from elsewhere is a start while it does better, as it is, than all that was found; the best ones come first. What
-    leads to the gait that is certified by then, or to no better one, is passed over. If the best from elsewhere promises more
-    than the search from it keeps, it is tried once more from the problem's own delta_start.
+    A gait from elsewhere is a start while it does better, as it is, than all that was found; the
+    best ones come first. What leads to the gait that is certified by then, or to no better one, is
+    passed over. If the best from elsewhere promises more than the search from it keeps, it is tried
+    once more from the problem's own delta_start.
     """
     problem, attempts = work.problem, list[Attempt]()
     gaits = {start_key(g): g for g in (*work.gaits, *(found[c] for c in work.inside if c in found))}
-    members = {key: near for key, gait in gaits.items() if (near := member(problem, gait)) is not None}
-    scores = {key: value_as_it_is(problem, members[key]) if key in members else 0.0 for key in gaits}
+    members = {
+        key: near for key, gait in gaits.items() if (near := member(problem, gait)) is not None
+    }
+    scores = {
+        key: value_as_it_is(problem, members[key]) if key in members else 0.0 for key in gaits
+    }
 
     def solve(origin: str, gait: AnyGait, delta_start: float) -> None:
         key = start_key(gait) + ("r" if origin == RESCUE else "")
         if key in work.tried or key in {a.key for a in attempts}:
             return
         stated = problem.with_(delta_start=delta_start)
-        attempts.append(Attempt(origin, key, run_guess(stated, lambda: gait, len(attempts), work.time_limit, worth=worth)))
+        attempts.append(
+            Attempt(
+                origin,
+                key,
+                run_guess(stated, lambda: gait, len(attempts), work.time_limit, worth=worth),
+            )
+        )
 
     def enough() -> float:
         """What a gait has to do to be better than all that was found."""
@@ -161,7 +187,9 @@ def visit(work: Work, found: dict[Index, AnyGait]) -> Visit:
         if best is None:
             return end.value > enough() or not work.incumbent
         known, found = (fourier_series(problem, gait) for gait in (best.outcome.gait, end.gait))
-        return end.value > enough() and distance(known, found, problem.body, problem.law) > SAME_GAIT
+        return (
+            end.value > enough() and distance(known, found, problem.body, problem.law) > SAME_GAIT
+        )
 
     def promising(key: str) -> bool:
         return scores[key] > enough()
@@ -172,7 +200,9 @@ def visit(work: Work, found: dict[Index, AnyGait]) -> Visit:
     if work.first:
         solve(GUESS, problem.guess, problem.delta_start)
         for number in work.cold if problem.gait.free else ():
-            solve(COLD, start_gait(problem, LATIN_HYPERCUBE, work.seed, number), problem.delta_start)
+            solve(
+                COLD, start_gait(problem, LATIN_HYPERCUBE, work.seed, number), problem.delta_start
+            )
     for key in warm:
         if promising(key):
             solve(WARM, members[key], problem.delta)
@@ -184,7 +214,9 @@ def visit(work: Work, found: dict[Index, AnyGait]) -> Visit:
     return Visit(work.cell, attempts, scores)
 
 
-def _distinct_untried(work: Work, members: dict[str, AnyGait], scores: dict[str, float]) -> list[str]:
+def _distinct_untried(
+    work: Work, members: dict[str, AnyGait], scores: dict[str, float]
+) -> list[str]:
     """Keys of the gaits that make different starts not solved before, the best first."""
     paths = {key: fourier_series(work.problem, near) for key, near in members.items()}
     distinct: list[str] = []

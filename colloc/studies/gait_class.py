@@ -1,8 +1,10 @@
-"""What kind of gait an optimum is: its symmetry, and how its path runs around the plane of the two joint angles.
+"""What kind of gait an optimum is: its symmetry, and how its path runs around the plane of the two
+joint angles.
 
-A wave of curvature travels along the body where the joints bend one after the other. With the displacement along the
-body's axis that gives the classes of the paper's figure 1: *retrograde* where the wave runs against the motion, *direct*
-where it runs with it, *standing* where the joints bend together or in opposition.
+A wave of curvature travels along the body where the joints bend one after the other. With the
+displacement along the body's axis that gives the classes of the paper's figure 1: *retrograde*
+where the wave runs against the motion, *direct* where it runs with it, *standing* where the joints
+bend together or in opposition.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from colloc.results.distinct_optima import phase_distance, reversed_in_time, swa
 
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
 _SAME, _STANDING = 0.02, 0.05
-"""Relative distance of a gait to its image that counts as symmetric; |wave| below which it counts as standing."""
+"""Relative distance of a gait to its image that counts as symmetric; |wave| below which it counts
+as standing."""
 _INSTANTS, _FINE = 200, 2000
 _DELTA = 1e-3
 
@@ -36,12 +39,14 @@ class GaitClass:
     retraced: bool
     """It goes back the way it came."""
     winding: int
-    """Turns of the path (angle 1, angle 2) about its mean over a period, positive counter-clockwise."""
+    """Turns of the path (angle 1, angle 2) about its mean over a period, positive
+    counter-clockwise."""
     wave: float
-    """Direction in which bending travels (see `wave_direction`): 1 if every joint repeats the one behind it a quarter period
-    later, which is a wave towards the head."""
+    """Direction in which bending travels (see `wave_direction`): 1 if every joint repeats the one
+    behind it a quarter period later, which is a wave towards the head."""
     forward: float
-    """Displacement per period along the mean direction of the body, tail to head, over the distance: 1 is head first."""
+    """Displacement per period along the mean direction of the body, tail to head, over the
+    distance: 1 is head first."""
 
     @property
     def symmetry(self) -> str:
@@ -73,8 +78,8 @@ def winding(gait: Fourier) -> int:
 def wave_direction(gait: Fourier) -> float:
     """In [-1, 1]: how far bending travels from tail to head (positive) or from head to tail.
 
-    With complex amplitudes a_jk of joint j and harmonic k, ``2 sum_jk k Im(conj(a_jk) a_(j+1)k)`` over
-    ``sum_jk k (|a_jk|^2 + |a_(j+1)k|^2)``.
+    With complex amplitudes a_jk of joint j and harmonic k, ``2 sum_jk k Im(conj(a_jk) a_(j+1)k)``
+    over ``sum_jk k (|a_jk|^2 + |a_(j+1)k|^2)``.
     """
     a = gait.cos + 1j * gait.sin
     k = np.arange(1, gait.n_harmonic + 1)
@@ -84,9 +89,11 @@ def wave_direction(gait: Fourier) -> float:
 
 
 def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
-    """Mean velocity of the centre of mass along the body's mean direction, over its mean velocity; 1 is head first.
+    """Mean velocity of the centre of mass along the body's mean direction, over its mean velocity;
+    1 is head first.
 
-    From the velocities in the frame of the body's mean direction; friction at a delta of 1e-3 is enough for a sign.
+    From the velocities in the frame of the body's mean direction; friction at a delta of 1e-3 is
+    enough for a sign.
     """
     mesh = uniform_mesh(scheme("gauss-1"), _INSTANTS, 1.0)
     angles, rates = gait(mesh.times)
@@ -94,7 +101,10 @@ def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
     centre = body.sliding(friction, angles, rates, z, np.full((1, _INSTANTS), _DELTA)).centre
     pose = CollocatedPose.on_mesh(mesh, z[2], centre)
     head_x, head_y = (points[-1] for points in body.outline(angles))
-    moved, axis = pose.place[-1], np.mean(np.exp(1j * pose.stage_theta[:, 0]) * (head_x + 1j * head_y))
+    moved, axis = (
+        pose.place[-1],
+        np.mean(np.exp(1j * pose.stage_theta[:, 0]) * (head_x + 1j * head_y)),
+    )
     size = abs(moved) * abs(axis)
     return float((moved * np.conj(axis)).real / size) if size > 0 else 0.0
 
@@ -103,10 +113,19 @@ def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     """The kind of a gait of a body with at least two joints or modes."""
     amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
     close = _SAME * max(amplitude, 1e-12)
-    bilateral = body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait, body))) < close
+    bilateral = (
+        body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait, body))) < close
+    )
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
     antipodal = np.linalg.norm(even) < close
     retraced = phase_distance(gait, reversed_in_time(gait)) < close
     turns = 0 if retraced else winding(gait)
     ahead = headed_displacement(gait, body, friction)
-    return GaitClass(bool(bilateral), bool(antipodal), bool(retraced), turns, wave_direction(gait.mapped(body.bending)), ahead)
+    return GaitClass(
+        bool(bilateral),
+        bool(antipodal),
+        bool(retraced),
+        turns,
+        wave_direction(gait.mapped(body.bending)),
+        ahead,
+    )

@@ -1,7 +1,9 @@
-"""The best gaits that are known, as a table that a referee checks from the gaits alone, and that anyone can beat.
+"""The best gaits that are known, as a table that a referee checks from the gaits alone, and that
+anyone can beat.
 
-A row states a problem, a member of its class of gaits by the class's own parameters, and what the gait achieves. Nothing that a
-solver said is in it: `Known.certificate` replays the gait, and that is what counts.
+A row states a problem, a member of its class of gaits by the class's own parameters, and what the
+gait achieves. Nothing that a solver said is in it: `Known.certificate` replays the gait, and that
+is what counts.
 """
 
 from __future__ import annotations
@@ -27,13 +29,24 @@ from colloc.system.replaced_file import replaced_file
 from colloc.system.versions import version_of
 from colloc.verification.dry_friction import dry_friction
 
-_HOW = ("name", "guess", "delta_start", "intervals", "scheme", "formulation", "mesh_tolerance", "shrinking")
+_HOW = (
+    "name",
+    "guess",
+    "delta_start",
+    "intervals",
+    "scheme",
+    "formulation",
+    "mesh_tolerance",
+    "shrinking",
+)
 """Of a problem: how its answer is sought. The rest is the question."""
 _AGREEMENT = 3.0
-"""A replay may differ from a row by so many times the sum of their estimated errors, and by `_ROUNDING`."""
+"""A replay may differ from a row by so many times the sum of their estimated errors, and by
+`_ROUNDING`."""
 _ROUNDING = 1e-9
 _DRY_AGREEMENT = 1e-6
-"""Relative: bounds under dry friction are made on the same instants, and differ by rounding alone."""
+"""Relative: bounds under dry friction are made on the same instants, and differ by rounding
+alone."""
 _NUMBERS = "value", "value_error", "value_at_zero_delta", "value_error_at_zero_delta"
 
 
@@ -52,8 +65,8 @@ class Known:
     value_at_zero_delta, value_error_at_zero_delta : float
         The same for delta -> 0.
     dry : (float, float) or None
-        Between what the efficiency, whatever is maximised, lies under dry friction, with no delta, where the result stated it
-        (``colloc solve --dry``).
+        Between what the efficiency, whatever is maximised, lies under dry friction, with no delta,
+        where the result stated it (``colloc solve --dry``).
     command, version : str
         What found it, with which version of colloc.
 
@@ -83,13 +96,17 @@ class Known:
     @property
     def gait(self) -> AnyGait:
         problem = self.problem
-        return problem.gait.member(np.array(self.parameters), problem.body.n_joint, np.array(self.edges))
+        return problem.gait.member(
+            np.array(self.parameters), problem.body.n_joint, np.array(self.edges)
+        )
 
     @property
     def question(self) -> str:
         """What is asked, however it is answered: rows of equal questions are rivals."""
         stated = self.problem.to_dict()  # with numbers as they are written now
-        return json.dumps({name: value for name, value in stated.items() if name not in _HOW}, sort_keys=True)
+        return json.dumps(
+            {name: value for name, value in stated.items() if name not in _HOW}, sort_keys=True
+        )
 
     def certificate(self) -> Certificate:
         """The verdict of an independent replay of the gait as it stands here."""
@@ -103,21 +120,33 @@ class Known:
             return f"the gait fails on {', '.join(check.name for check in certificate.failures)}"
         allowed = _AGREEMENT * (self.value_error + certificate.value_error) + _ROUNDING
         if not abs(certificate.value - self.value) <= allowed:
-            return f"the table says {self.value:.8f}, the replay {certificate.value:.8f} +- {certificate.value_error:.0e}"
+            return (
+                f"the table says {self.value:.8f}, the replay {certificate.value:.8f} +- "
+                f"{certificate.value_error:.0e}"
+            )
         return ""
 
     def dry_complaint(self) -> str:
-        """What bounds made anew have against those in the row; empty if they hold, or if there are none."""
+        """What bounds made anew have against those in the row; empty if they hold, or if there are
+        none."""
         if self.dry is None:
             return ""
         problem, gait = self.problem, self.gait
-        now = dry_friction(problem.body, problem.law, gait, breaks=gait.corner_phases, turn=problem.rotation or 0.0).efficiency
+        now = dry_friction(
+            problem.body, problem.law, gait, breaks=gait.corner_phases, turn=problem.rotation or 0.0
+        ).efficiency
         if np.allclose(self.dry, now, rtol=_DRY_AGREEMENT, atol=0):
             return ""
-        return f"dry friction: the table says {self.dry[0]:.8f} to {self.dry[1]:.8f}, and it is {now[0]:.8f} to {now[1]:.8f}"
+        return (
+            f"dry friction: the table says {self.dry[0]:.8f} to {self.dry[1]:.8f}, and it is "
+            f"{now[0]:.8f} to {now[1]:.8f}"
+        )
 
     def __repr__(self) -> str:
-        return f"<Known {self.statement['name']}: {self.value:.8g} +- {self.value_error:.0e}, by {self.command}>"
+        return (
+            f"<Known {self.statement['name']}: {self.value:.8g} +- {self.value_error:.0e}, by "
+            f"{self.command}>"
+        )
 
 
 def known(table: str | os.PathLike[str] | None = None) -> tuple[Known, ...]:
@@ -170,7 +199,9 @@ def row_of(solution: Solution, command: str) -> Known:
     """
     problem, answer = solution.problem, solution.answer
     if not solution.success or not problem.gait.free:
-        raise ProblemError(f"{problem.name} is not the certified gait of a class: a row of the table has to be.")
+        raise ProblemError(
+            f"{problem.name} is not the certified gait of a class: a row of the table has to be."
+        )
     edges = answer.edges if answer.knots is None else answer.knots
     return Known(
         problem.with_(guess=None).to_dict(),
@@ -198,14 +229,16 @@ def with_row(rows: Sequence[Known], new: Known) -> tuple[Known, ...]:
         return (*rows, new)
     if not new.value - rival.value > new.value_error + rival.value_error + _ROUNDING:
         raise ProblemError(
-            f"{new.statement['name']} is not accepted: {rival.value:.8f} +- {rival.value_error:.0e} is known already "
+            f"{new.statement['name']} is not accepted: {rival.value:.8f} +- "
+            f"{rival.value_error:.0e} is known already "
             f"({rival.command}), and {new.value:.8f} +- {new.value_error:.0e} is not better."
         )
     return tuple(new if row is rival else row for row in rows)
 
 
 def save_known(rows: Iterable[Known], table: str | os.PathLike[str]) -> None:
-    """Write a table, a row a line; an existing one is replaced only once the new one is complete."""
+    """Write a table, a row a line; an existing one is replaced only once the new one is
+    complete."""
     lines = ",\n".join(json.dumps(asdict(row), sort_keys=True) for row in rows)
     with replaced_file(Path(table)) as temporary:
         Path(temporary).write_text(f"[\n{lines}\n]\n", encoding="utf-8")
@@ -213,13 +246,24 @@ def save_known(rows: Iterable[Known], table: str | os.PathLike[str]) -> None:
 
 def markdown(rows: Iterable[Known]) -> str:
     """The table as people read it."""
-    heads = "| problem | what is asked | best known | under dry friction | found by |\n|---|---|---|---|---|\n"
+    heads = (
+        "| problem | what is asked | best known | under dry friction | found by "
+        "|\n|---|---|---|---|---|\n"
+    )
 
     def line(row: Known) -> str:
         problem = row.problem
         told = f"{row.value:.6f} ± {row.value_error:.0e}"
-        limit = f"{row.value_at_zero_delta:.6f} ± {row.value_error_at_zero_delta:.0e}" if problem.law.regularised else ""
-        limit = limit if row.dry is None or problem.objective != EFFICIENCY else "between {:.6f} and {:.6f}".format(*row.dry)
+        limit = (
+            f"{row.value_at_zero_delta:.6f} ± {row.value_error_at_zero_delta:.0e}"
+            if problem.law.regularised
+            else ""
+        )
+        limit = (
+            limit
+            if row.dry is None or problem.objective != EFFICIENCY
+            else "between {:.6f} and {:.6f}".format(*row.dry)
+        )
         return f"| {problem.name} | {problem.asked} | {told} | {limit} | `{row.command}` |\n"
 
     return heads + "".join(map(line, rows))

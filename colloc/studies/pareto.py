@@ -1,12 +1,14 @@
 """What two objectives cost each other: certified gaits of which none is better in both.
 
-The ends of the front are the best gaits by one objective alone. Between them the first objective is maximised while the second
-is kept at a value (an epsilon constraint), which finds the front where it is not convex, too. Every point is begun at the gait
-of a neighbour, from both ends, and the better one counts: so the front may pass from one kind of gait to another.
+The ends of the front are the best gaits by one objective alone. Between them the first objective is
+maximised while the second is kept at a value (an epsilon constraint), which finds the front where
+it is not convex, too. Every point is begun at the gait of a neighbour, from both ends, and the
+better one counts: so the front may pass from one kind of gait to another.
 
-Evenly spaced in the second objective, points may lie far apart in the first. Wherever neighbours are too far apart, a gait
-halfway is sought in the objective in which they are, from both of them, and from as many starts as the ends where that leads to
-nothing new. What stays empty is named as a gap: there the front jumps, or the search failed.
+Evenly spaced in the second objective, points may lie far apart in the first. Wherever neighbours
+are too far apart, a gait halfway is sought in the objective in which they are, from both of them,
+and from as many starts as the ends where that leads to nothing new. What stays empty is named as a
+gap: there the front jumps, or the search failed.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ _MOST_POINTS = 1000
 _BETTER = 1e-6
 """Relative gain for which a point is replaced."""
 _CLOSE, _APART = 0.1, 2.0
-"""Neighbours are nearer than this part of the even spacing, in both objectives, or farther apart than that in either."""
+"""Neighbours are nearer than this part of the even spacing, in both objectives, or farther apart
+than that in either."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,8 @@ class Gap:
         The point before it.
     why : str
     certified : bool
-        Whether the gaits that were found there are; then they are no better than the points beside it.
+        Whether the gaits that were found there are; then they are no better than the points beside
+        it.
     """
 
     after: int
@@ -67,10 +71,12 @@ class ParetoFront:
         Whatever its own objective is.
     objectives : (Objective, Objective)
     points : tuple of Solution
-        Each with a certificate of its own. By more than its errors none is worse than another one in both objectives, and
-        neighbours differ; where one gait is best in both, it is the only point.
+        Each with a certificate of its own. By more than its errors none is worse than another one
+        in both objectives, and neighbours differ; where one gait is best in both, it is the only
+        point.
     gaps : tuple of Gap
-        Between which neighbours nothing was found; elsewhere they are less than twice the even spacing apart.
+        Between which neighbours nothing was found; elsewhere they are less than twice the even
+        spacing apart.
     """
 
     problem: Problem
@@ -89,8 +95,8 @@ class ParetoFront:
         return all(gap.certified for gap in self.gaps)
 
     def plot(self, ax: Any = None) -> Any:
-        """The front and its gaits as a matplotlib Figure; with `ax`, a matplotlib Axes, the front there, and the Axes is
-        returned."""
+        """The front and its gaits as a matplotlib Figure; with `ax`, a matplotlib Axes, the front
+        there, and the Axes is returned."""
         return bound("plot_front")(self) if ax is None else bound("plot_front_values")(ax, self)
 
     def __repr__(self) -> str:
@@ -117,13 +123,13 @@ def pareto_front(
     first, second : Objective or str
         As for `colloc.gaits.problem.Problem`.
     points : int
-        At least 2, the ends; those between are evenly spaced in the second objective. What is no better than another one, or
-        hardly differs from it, is left out; what fills gaps is added.
+        At least 2, the ends; those between are evenly spaced in the second objective. What is no
+        better than another one, or hardly differs from it, is left out; what fills gaps is added.
     starts : int
         From which both ends are the best, and what lies in a gap that no neighbour leads into.
     progress : callable, optional
-        Called with the number of a point, in the order in which they are begun, and its solution, also when it is replaced by a
-        better one.
+        Called with the number of a point, in the order in which they are begun, and its solution,
+        also when it is replaced by a better one.
 
     Raises
     ------
@@ -152,13 +158,17 @@ def pareto_front(
     def put(k: int, solution: Solution) -> None:
         """Keep what is the better solution of a point."""
         value = solution.measured.value
-        if k not in found or (solution.success, value) > (found[k].success, found[k].measured.value + _BETTER * abs(value)):
+        if k not in found or (solution.success, value) > (
+            found[k].success,
+            found[k].measured.value + _BETTER * abs(value),
+        ):
             found[k] = solution
             if progress is not None:
                 progress(k, solution)
 
     def reaching(which: int, level: float, begin: Solution | None) -> Solution:
-        """The best by the other objective of what reaches a level of one, begun at a gait; without one from starts."""
+        """The best by the other objective of what reaches a level of one, begun at a gait; without
+        one from starts."""
         reached = (*problem.at_least, (aims[which], level))
         stated = problem.with_(objective=aims[1 - which], at_least=reached)
         if begin is None:
@@ -169,14 +179,19 @@ def pareto_front(
     for k, aim in zip((0, last), aims, strict=True):
         put(k, _uninterrupted(problem.with_(objective=aim), starts))
         if not found[k].success:
-            raise ProblemError(f"the gait of best {aim.name} is not certified, so there is no front: {found[k].message}")
+            raise ProblemError(
+                f"the gait of best {aim.name} is not certified, so there is no front: "
+                f"{found[k].message}"
+            )
     if len(_spaced(found.values(), aims, last)) > 1:
         levels = np.linspace(_value(found[0], aims[1]), _value(found[last], aims[1]), points)
         for k in range(last - 1, 0, -1):
             put(k, reaching(1, float(levels[k]), found[k + 1]))
         for k in range(1, last):
             put(k, reaching(1, float(levels[k]), found[k - 1]))
-        for k in range(last - 1, 0, -1):  # what reaches more of the second objective and of the first is better here, too
+        for k in range(
+            last - 1, 0, -1
+        ):  # what reaches more of the second objective and of the first is better here, too
             if _value(found[k + 1], aims[0]) > _value(found[k], aims[0]):
                 put(k, reaching(1, float(levels[k]), found[k + 1]))
     front, empty = _spaced(found.values(), aims, last), {}
@@ -202,7 +217,9 @@ def pareto_front(
         empty[pair] = failure or "the best gaits found there are those beside it", not failure
     unknown = "not sought: ask for more points", True
     wide = _wide(front, aims, last)
-    gaps = [Gap(k, *empty.get(pair, unknown)) for k, pair in enumerate(pairwise(front)) if pair in wide]
+    gaps = [
+        Gap(k, *empty.get(pair, unknown)) for k, pair in enumerate(pairwise(front)) if pair in wide
+    ]
     return ParetoFront(problem, aims, tuple(front), tuple(gaps))
 
 
@@ -220,27 +237,38 @@ def _value(solution: Solution, aim: Objective) -> float:
 
 @lru_cache(maxsize=256)
 def _measured(solution: Solution, aim: Objective) -> tuple[float, float]:
-    """An objective of a solution and its error, of its certificate or, where that does not hold what it takes, of a replay."""
+    """An objective of a solution and its error, of its certificate or, where that does not hold
+    what it takes, of a replay."""
     known: Period = solution.certificate
     problem, gait = solution.problem, solution.gait
     if not set(aim.uses) <= set(known.values):
         at: Any = (problem.body, problem.law, gait, solution.delta_per_period)
-        known = replayer(problem.regime)(*at, breaks=gait.corner_phases, objective=aim, turn=problem.rotation or 0.0)
+        known = replayer(problem.regime)(
+            *at, breaks=gait.corner_phases, objective=aim, turn=problem.rotation or 0.0
+        )
     value = aim(known.values)
     return value, abs(value) * known.error_of(aim)
 
 
-def _spaced(solutions: Iterable[Solution], aims: tuple[Objective, Objective], intervals: int) -> list[Solution]:
-    """Certified ones of which, by more than the errors, none is better in both objectives, without near duplicates; of those
-    the first counts."""
+def _spaced(
+    solutions: Iterable[Solution], aims: tuple[Objective, Objective], intervals: int
+) -> list[Solution]:
+    """Certified ones of which, by more than the errors, none is better in both objectives, without
+    near duplicates; of those the first counts."""
     front: list[Solution] = []
     for each in (solution for solution in solutions if solution.success):
         (values, errors), others = _both(each, aims), [_both(other, aims) for other in front]
         if any((values <= other + errors + error).all() for other, error in others):
             continue
-        left = [point for point, (other, error) in zip(front, others, strict=True) if (values < other - errors - error).any()]
+        left = [
+            point
+            for point, (other, error) in zip(front, others, strict=True)
+            if (values < other - errors - error).any()
+        ]
         close = np.ptp([values, *(other for other, _ in others)], axis=0) * _CLOSE / intervals
-        if len(left) == len(front) > 1 and any((abs(values - other) < close).all() for other, _ in others):
+        if len(left) == len(front) > 1 and any(
+            (abs(values - other) < close).all() for other, _ in others
+        ):
             continue
         front = [*left, each]
     return sorted(front, key=lambda each: -_value(each, aims[0]))
@@ -254,7 +282,12 @@ def _both(solution: Solution, aims: tuple[Objective, Objective]) -> np.ndarray:
 def _wide(
     front: list[Solution], aims: tuple[Objective, Objective], intervals: int
 ) -> dict[tuple[Solution, Solution], np.ndarray]:
-    """Neighbours that are too far apart, and how far in each objective, as a share of the whole front."""
+    """Neighbours that are too far apart, and how far in each objective, as a share of the whole
+    front."""
     apart = np.abs(np.diff([_both(each, aims)[0] for each in front], axis=0))
     shares = apart / apart.sum(axis=0)
-    return {pair: size for pair, size in zip(pairwise(front), shares, strict=True) if size.max() * intervals > _APART}
+    return {
+        pair: size
+        for pair, size in zip(pairwise(front), shares, strict=True)
+        if size.max() * intervals > _APART
+    }

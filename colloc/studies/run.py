@@ -1,8 +1,10 @@
-"""Run a study: a wavefront of tasks over any executor, then rounds in which good gaits spread to all their neighbours.
+"""Run a study: a wavefront of tasks over any executor, then rounds in which good gaits spread to
+all their neighbours.
 
-A task waits for the cells its warm starts come from, and takes from nowhere else. So what a study finds does not depend
-on how many workers there are or which is faster. Rounds end when no gait does better in a neighbouring cell, as it is,
-than what is known there; a cell of which that cannot be said although it was tried is marked (`StudyRun.neighbour_value`).
+A task waits for the cells its warm starts come from, and takes from nowhere else. So what a study
+finds does not depend on how many workers there are or which is faster. Rounds end when no gait does
+better in a neighbouring cell, as it is, than what is known there; a cell of which that cannot be
+said although it was tried is marked (`StudyRun.neighbour_value`).
 """
 
 from __future__ import annotations
@@ -17,7 +19,15 @@ from pathlib import Path
 from colloc.gaits.problem import Problem
 from colloc.mechanics.native_kernel import native_kernel
 from colloc.results.outcome import CRASHED, RETRIED
-from colloc.studies.cell import BETTER, Attempt, Work, best_attempt, failed_visit, run_chunk, start_key
+from colloc.studies.cell import (
+    BETTER,
+    Attempt,
+    Work,
+    best_attempt,
+    failed_visit,
+    run_chunk,
+    start_key,
+)
 from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.study import Index, Study
 from colloc.system.errors import ProblemError
@@ -26,7 +36,8 @@ from colloc.system.task_pool import Lost, Task, completed, process_pool
 
 @dataclass(eq=False)
 class CellState:
-    """What is known about a cell: its problem (or why there is none), all attempts, and what gaits of others achieve there."""
+    """What is known about a cell: its problem (or why there is none), all attempts, and what gaits
+    of others achieve there."""
 
     problem: Problem | None
     message: str = ""
@@ -89,39 +100,61 @@ class StudyRun:
                 self.cells[cell] = CellState(None, str(error))
             else:
                 known = problem.hash
-                self.cells[cell] = CellState(problem, "", list(attempts.get(known, [])), dict(scores.get(known, {})))
+                self.cells[cell] = CellState(
+                    problem, "", list(attempts.get(known, [])), dict(scores.get(known, {}))
+                )
         if all(state.problem is None for state in self.cells.values()):
-            raise ProblemError(f"the study {study.name} has no problem in any cell; {next(iter(self.cells.values())).message}")
+            raise ProblemError(
+                f"the study {study.name} has no problem in any cell; "
+                f"{next(iter(self.cells.values())).message}"
+            )
 
     @property
     def missing(self) -> list[Index]:
         """Cells with a problem whose own guess was not tried yet."""
         cells = self.cells.items()
-        return [c for c, state in cells if state.problem is not None and start_key(state.problem.guess) not in state.tried]
+        return [
+            c
+            for c, state in cells
+            if state.problem is not None and start_key(state.problem.guess) not in state.tried
+        ]
 
     def neighbours(self, cell: Index) -> list[Attempt]:
         """The best attempts of the cells around one, as far as there are any."""
-        return [best for near in self.study.around(cell) if (best := self.cells[near].best) is not None]
+        return [
+            best for near in self.study.around(cell) if (best := self.cells[near].best) is not None
+        ]
 
     def neighbour_value(self, cell: Index) -> float:
-        """The most that the best gait of a neighbour, moved into the cell's class and otherwise as it is, achieves there.
+        """The most that the best gait of a neighbour, moved into the cell's class and otherwise as
+        it is, achieves there.
 
-        NaN if there is none. Where it is more than the cell's own value, the search there has missed something.
+        NaN if there is none. Where it is more than the cell's own value, the search there has
+        missed something.
         """
-        scores = [self.cells[cell].scores.get(near.gait_key, math.nan) for near in self.neighbours(cell)]
+        scores = [
+            self.cells[cell].scores.get(near.gait_key, math.nan) for near in self.neighbours(cell)
+        ]
         return max((score for score in scores if not math.isnan(score)), default=math.nan)
 
     def below_neighbour(self, cell: Index) -> bool:
-        """Whether a neighbour's gait does clearly better in the cell than its own best, though it was tried there."""
+        """Whether a neighbour's gait does clearly better in the cell than its own best, though it
+        was tried there."""
         best = self.cells[cell].best
         return best is not None and self.neighbour_value(cell) > (1 + BETTER) * best.outcome.value
 
     def run(
-        self, *, workers: int = 1, executor: Callable[[int], Executor] = process_pool, ahead: int | None = None
+        self,
+        *,
+        workers: int = 1,
+        executor: Callable[[int], Executor] = process_pool,
+        ahead: int | None = None,
     ) -> Iterator[Progress]:
-        """Work on all that is missing; each cell is on the disk before it is yielded. Cells in which nothing was tried are not.
+        """Work on all that is missing; each cell is on the disk before it is yielded. Cells in
+        which nothing was tried are not.
 
-        Arguments are those of `colloc.system.task_pool.completed`; `ahead` is a quarter of the workers, and one, by default.
+        Arguments are those of `colloc.system.task_pool.completed`; `ahead` is a quarter of the
+        workers, and one, by default.
         """
         native_kernel()  # missed once for all workers, or there
         ahead = 1 + workers // 4 if ahead is None else ahead
@@ -143,18 +176,28 @@ class StudyRun:
         return [
             (cell,)
             for cell, state in self.cells.items()
-            if state.problem is not None and any(near.gait_key not in state.scores for near in self.neighbours(cell))
+            if state.problem is not None
+            and any(near.gait_key not in state.scores for near in self.neighbours(cell))
         ]
 
     def _round(
-        self, number: int, chunks: Sequence[tuple[Index, ...]], workers: int, executor: Callable[[int], Executor], ahead: int
+        self,
+        number: int,
+        chunks: Sequence[tuple[Index, ...]],
+        workers: int,
+        executor: Callable[[int], Executor],
+        ahead: int,
     ) -> Iterator[Progress]:
         waiting: dict[int, set[Index]] = {}
         free: deque[int] = deque()
         unlocks: dict[Index, list[int]] = {}
         todo = {cell for chunk in chunks for cell in chunk}
         for k, chunk in enumerate(chunks):
-            needs = {c for cell in chunk for c in self.study.before(cell)} & todo - set(chunk) if number == 0 else set()
+            needs = (
+                {c for cell in chunk for c in self.study.before(cell)} & todo - set(chunk)
+                if number == 0
+                else set()
+            )
             waiting[k] = needs
             for c in needs:
                 unlocks.setdefault(c, []).append(k)
@@ -170,12 +213,20 @@ class StudyRun:
             return Task(k, (tuple(self._work(cell, chunks[k], known) for cell in chunks[k]),))
 
         done = 0
-        for task, result in completed(run_chunk, ready, workers=workers, executor=executor, ahead=ahead):
+        for task, result in completed(
+            run_chunk, ready, workers=workers, executor=executor, ahead=ahead
+        ):
             works = task.arguments[0]
-            visits = [failed_visit(w, CRASHED, result.message) for w in works] if isinstance(result, Lost) else result
+            visits = (
+                [failed_visit(w, CRASHED, result.message) for w in works]
+                if isinstance(result, Lost)
+                else result
+            )
             hashes = {work.cell: work.problem.hash for work in works}
             told = [v for v in visits if v.attempts or v.scores]
-            append_records(self.folder, [Record(hashes[v.cell], tuple(v.attempts), v.scores) for v in told])
+            append_records(
+                self.folder, [Record(hashes[v.cell], tuple(v.attempts), v.scores) for v in told]
+            )
             for found in visits:
                 state = self.cells[found.cell]
                 state.attempts += found.attempts
@@ -188,14 +239,18 @@ class StudyRun:
                 if found.attempts:
                     yield Progress(found.cell, state, found.attempts, number, done, len(todo))
 
-    def _work(self, cell: Index, chunk: tuple[Index, ...], known: dict[Index, Attempt | None] | None) -> Work:
+    def _work(
+        self, cell: Index, chunk: tuple[Index, ...], known: dict[Index, Attempt | None] | None
+    ) -> Work:
         study, state = self.study, self.cells[cell]
         assert state.problem is not None
         first = known is None
         inside = tuple(c for c in study.before(cell) if c in chunk) if first else ()
         near = study.before(cell) if first else study.around(cell)
         best = (self.cells[c].best if known is None else known[c] for c in near if c not in inside)
-        gaits = tuple(a.outcome.gait for a in best if a is not None and a.gait_key not in state.scores)
+        gaits = tuple(
+            a.outcome.gait for a in best if a is not None and a.gait_key not in state.scores
+        )
         own = state.best if known is None else known[cell]
         return Work(
             cell,

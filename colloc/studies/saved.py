@@ -1,5 +1,5 @@
-"""A solve whose result is a file, or several that belong together: they go on from a run that was interrupted, and their end
-removes what was kept for that."""
+"""A solve whose result is a file, or several that belong together: they go on from a run that was
+interrupted, and their end removes what was kept for that."""
 
 from __future__ import annotations
 
@@ -51,7 +51,9 @@ def resumed(
     if fresh:
         run_file(path).unlink(missing_ok=True)
     keep = run_file(path)
-    solution = solve(stated.problem, starts, seconds=seconds, search=search, keep=keep, progress=progress)
+    solution = solve(
+        stated.problem, starts, seconds=seconds, search=search, keep=keep, progress=progress
+    )
     solution.source = stated.source
     if solution.shrunk is not None:
         solution.shrunk.source = stated.source
@@ -59,7 +61,8 @@ def resumed(
 
 
 def save_end(solution: Solution, path: Path) -> list[Saved]:
-    """Save a solution (`colloc.results.kept.save_result`); the run that led to it is kept only if it was interrupted.
+    """Save a solution (`colloc.results.kept.save_result`); the run that led to it is kept only if
+    it was interrupted.
 
     Raises
     ------
@@ -74,8 +77,9 @@ def save_end(solution: Solution, path: Path) -> list[Saved]:
 
 @contextmanager
 def members_kept(folder: Path) -> Iterator[None]:
-    """A block that solves several problems, of which each keeps what it finds in a folder (`member_file`) until the block ends
-    well. After Ctrl-C, which says so, or a power cut, the same block goes on from there."""
+    """A block that solves several problems, of which each keeps what it finds in a folder
+    (`member_file`) until the block ends well. After Ctrl-C, which says so, or a power cut, the same
+    block goes on from there."""
     token = _FOLDER.set(folder)
     try:
         yield

@@ -1,9 +1,11 @@
-"""Gaits that steer: the best of a problem for every turn of a period that is asked for, from sharp right to sharp left.
+"""Gaits that steer: the best of a problem for every turn of a period that is asked for, from sharp
+right to sharp left.
 
-The straight gait comes first, of the problem's own class. The others are sought in the class without symmetry, for no
-symmetric gait turns, each from its neighbour outwards; a turn to the right from the mirror image of that to the left, if that
-is asked for, too, and is of the same body. Gaits that turn on the spot are those of least work for their turn. Joint angles
-between those of two neighbours turn by about as much as lies between, so that a controller can interpolate.
+The straight gait comes first, of the problem's own class. The others are sought in the class
+without symmetry, for no symmetric gait turns, each from its neighbour outwards; a turn to the right
+from the mirror image of that to the left, if that is asked for, too, and is of the same body. Gaits
+that turn on the spot are those of least work for their turn. Joint angles between those of two
+neighbours turn by about as much as lies between, so that a controller can interpolate.
 """
 
 from __future__ import annotations
@@ -58,32 +60,40 @@ class Steering:
     @property
     def certified(self) -> bool:
         """Whether every gait is."""
-        return all(point.success for point in self.points) and (self.on_the_spot is None or self.on_the_spot.certified)
+        return all(point.success for point in self.points) and (
+            self.on_the_spot is None or self.on_the_spot.certified
+        )
 
     @property
     def efficiency(self) -> np.ndarray:
-        """Chord of the arc of a period per work, of every gait: it does not depend on the phase it is begun at."""
+        """Chord of the arc of a period per work, of every gait: it does not depend on the phase it
+        is begun at."""
         return np.array([point.arc.chord / point.work for point in self.points])
 
     @property
     def begins(self) -> tuple[float, ...]:
-        """Phases at which to begin the gaits, each as near as can be to its neighbour that turns less: where a period begins
-        matters for nothing else."""
+        """Phases at which to begin the gaits, each as near as can be to its neighbour that turns
+        less: where a period begins matters for nothing else."""
         t = np.arange(_BEGINS) / _BEGINS
         found = dict.fromkeys(self.turns, 0.0)
         straight = min(self.turns, key=abs)
         gaits = {turn: point.gait for turn, point in zip(self.turns, self.points, strict=True)}
-        for side in ([turn for turn in self.turns if turn > straight], [turn for turn in self.turns[::-1] if turn < straight]):
+        for side in (
+            [turn for turn in self.turns if turn > straight],
+            [turn for turn in self.turns[::-1] if turn < straight],
+        ):
             near = straight
             for turn in side:
                 known, own = gaits[near].angles(t + found[near]), gaits[turn].angles(t)
-                matched = np.fft.ifft((np.fft.fft(own) * np.conj(np.fft.fft(known))).sum(axis=0)).real
+                matched = np.fft.ifft(
+                    (np.fft.fft(own) * np.conj(np.fft.fft(known))).sum(axis=0)
+                ).real
                 found[turn], near = float(t[matched.argmax()]), turn
         return tuple(found[turn] for turn in self.turns)
 
     def table(self, phases: int = 100) -> dict[str, Any]:
-        """What a controller needs, as plain numbers: the turns, their arcs, and joint angles at equal phases from those of
-        `begins`; between two turns angles are interpolated linearly."""
+        """What a controller needs, as plain numbers: the turns, their arcs, and joint angles at
+        equal phases from those of `begins`; between two turns angles are interpolated linearly."""
         t = np.arange(phases) / phases
         arcs = [point.arc for point in self.points]
         more = {} if self.on_the_spot is None else {"on_the_spot": self.on_the_spot.table(phases)}
@@ -91,19 +101,26 @@ class Steering:
             "name": self.problem.name,
             "turn_rad": list(self.turns),
             "chord_body_lengths": [each.chord for each in arcs],
-            "radius_body_lengths": [each.radius if math.isfinite(each.radius) else None for each in arcs],
+            "radius_body_lengths": [
+                each.radius if math.isfinite(each.radius) else None for each in arcs
+            ],
             "work_per_period_weight_times_length": [point.work for point in self.points],
             "status": [point.status for point in self.points],
             "phase": t.tolist(),
             f"{self.problem.body.coordinate}_angles_rad": [
-                point.gait.angles(t + begin).T.tolist() for point, begin in zip(self.points, self.begins, strict=True)
+                point.gait.angles(t + begin).T.tolist()
+                for point, begin in zip(self.points, self.begins, strict=True)
             ],
         }
 
     def plot(self, ax: Any = None, panel: str = "cost") -> Any:
-        """Efficiency against the turn, and the tracks, as a matplotlib Figure; with `ax`, a matplotlib Axes, one of them there,
-        "cost" or "tracks", and the Axes is returned."""
-        return bound("plot_steering")(self) if ax is None else bound("plot_steering_panel")(ax, self, panel)
+        """Efficiency against the turn, and the tracks, as a matplotlib Figure; with `ax`, a
+        matplotlib Axes, one of them there, "cost" or "tracks", and the Axes is returned."""
+        return (
+            bound("plot_steering")(self)
+            if ax is None
+            else bound("plot_steering_panel")(ax, self, panel)
+        )
 
     def __repr__(self) -> str:
         told = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)
@@ -149,10 +166,18 @@ def steer(
     <Steering of quick: +0, +5.73 degrees a period, all certified>
     """
     if not problem.gait.free or problem.regime.slides or problem.rotation != 0:
-        raise ProblemError("steering begins at a gait that is free and goes straight on the level: rotation 0, grade 0.")
-    if not len(turns) or not all(is_number(turn) and abs(turn) < _LARGEST for turn in (*turns, *spot)) or 0 in spot:
         raise ProblemError(
-            f"turns must be angles of less than half a turn a period, and not 0 on the spot; not {[*turns, *spot]!r}."
+            "steering begins at a gait that is free and goes straight on the level: rotation 0, "
+            "grade 0."
+        )
+    if (
+        not len(turns)
+        or not all(is_number(turn) and abs(turn) < _LARGEST for turn in (*turns, *spot))
+        or 0 in spot
+    ):
+        raise ProblemError(
+            f"turns must be angles of less than half a turn a period, and not 0 on the spot; not "
+            f"{[*turns, *spot]!r}."
         )
     check_count(starts=starts)
 
@@ -166,23 +191,39 @@ def steer(
 
     straight = solved(0.0, problem, starts)
     if not straight.success:
-        raise ProblemError(f"the straight gait is not certified, so there is nothing to steer: {straight.message}")
+        raise ProblemError(
+            f"the straight gait is not certified, so there is nothing to steer: {straight.message}"
+        )
     free = {"gait": replace(problem.gait, symmetry=NONE)}
     from_neighbour = free | {"delta_start": problem.delta}
     mirrors = ANTIPODAL in problem.body.symmetries and not one_sided(problem.joint_limit)
 
-    def turned(stated: Problem, wanted: Sequence[float], known: dict[float, Solution]) -> tuple[Solution, ...]:
-        """Outwards from those that are known, to the left first; from all starts if there is none."""
-        for side in ([turn for turn in wanted if turn > 0], [turn for turn in reversed(wanted) if turn < 0]):
+    def turned(
+        stated: Problem, wanted: Sequence[float], known: dict[float, Solution]
+    ) -> tuple[Solution, ...]:
+        """Outwards from those that are known, to the left first; from all starts if there is
+        none."""
+        for side in (
+            [turn for turn in wanted if turn > 0],
+            [turn for turn in reversed(wanted) if turn < 0],
+        ):
             near = known.get(0.0)
             for turn in side:
                 if -turn in known and mirrors:
                     guess = known[-turn].gait.mirrored
-                    near = solved(turn, stated.with_(rotation=turn, guess=guess, **from_neighbour), 1)
+                    near = solved(
+                        turn, stated.with_(rotation=turn, guess=guess, **from_neighbour), 1
+                    )
                 elif near is not None:
-                    near = solved(turn, stated.with_(rotation=turn, guess=near.gait, **from_neighbour), 1)
+                    near = solved(
+                        turn, stated.with_(rotation=turn, guess=near.gait, **from_neighbour), 1
+                    )
                 else:
-                    near = solved(turn, stated.with_(rotation=turn, guess=None, delta_start=None, **free), starts)
+                    near = solved(
+                        turn,
+                        stated.with_(rotation=turn, guess=None, delta_start=None, **free),
+                        starts,
+                    )
                 known[turn] = near
         return tuple(known[turn] for turn in wanted)
 

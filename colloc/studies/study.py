@@ -1,7 +1,9 @@
-"""A study: a grid of problems. Study files are plain Python that states ``STUDY``; they are code, and are executed.
+"""A study: a grid of problems. Study files are plain Python that states ``STUDY``; they are code,
+and are executed.
 
-A cell of the grid is a point, one value of every axis. Starts travel between neighbours: along an axis of numbers from
-the value before, along an axis of texts (a class of gaits, say) from every value before.
+A cell of the grid is a point, one value of every axis. Starts travel between neighbours: along an
+axis of numbers from the value before, along an axis of texts (a class of gaits, say) from every
+value before.
 """
 
 from __future__ import annotations
@@ -24,7 +26,16 @@ from colloc.system.result_names import check_name
 
 Index = tuple[int, ...]
 NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
-COUNTS = ("bilateral", "antipodal", "retraced", "at_slowest", "winding", "below_neighbour", "starts", "starts_certified")
+COUNTS = (
+    "bilateral",
+    "antipodal",
+    "retraced",
+    "at_slowest",
+    "winding",
+    "below_neighbour",
+    "starts",
+    "starts_certified",
+)
 OTHERS = ("delta", "trivial_bound", "upper_bound", "neighbour_value", "seconds", "wave", "forward")
 TEXTS = ("status", "message", "origin", "gait_class", "problem_hash")
 ARRAYS = {"mean": ("joint",), "cos": ("joint", "harmonic"), "sin": ("joint", "harmonic")}
@@ -67,16 +78,27 @@ class Axis:
             given = (self.values,) if isinstance(self.values, str) else self.values
             values = tuple(v if isinstance(v, str) else float(v) for v in given)
         except (TypeError, ValueError, OverflowError):
-            raise ProblemError(f"values of an axis must be numbers or names, not {self.values!r}.") from None
+            raise ProblemError(
+                f"values of an axis must be numbers or names, not {self.values!r}."
+            ) from None
         object.__setattr__(self, "values", values)
         if not isinstance(self.name, str) or not self.name.isidentifier():
-            raise ProblemError(f"the name of an axis must be a Python name, not {shown(self.name)}.")
+            raise ProblemError(
+                f"the name of an axis must be a Python name, not {shown(self.name)}."
+            )
         if self.name in COLUMNS:
-            raise ProblemError(f"an axis cannot be called {self.name}, as a column of the results is: take another name.")
+            raise ProblemError(
+                f"an axis cannot be called {self.name}, as a column of the results is: take "
+                f"another name."
+            )
         if not values or len(set(values)) != len(values):
             raise ProblemError(f"axis {self.name}: values must be distinct, and at least one.")
-        if len({isinstance(v, str) for v in values}) > 1 or not all(isinstance(v, str) or math.isfinite(v) for v in values):
-            raise ProblemError(f"axis {self.name}: values must be finite numbers, or texts, not a mixture.")
+        if len({isinstance(v, str) for v in values}) > 1 or not all(
+            isinstance(v, str) or math.isfinite(v) for v in values
+        ):
+            raise ProblemError(
+                f"axis {self.name}: values must be finite numbers, or texts, not a mixture."
+            )
 
     @property
     def of_texts(self) -> bool:
@@ -94,15 +116,19 @@ class Study:
         Of the results; letters, digits, ``_``, ``-`` and ``.``, as for a problem.
     axes : tuple of Axis
     problem : callable
-        The `Problem` of a cell, called with a keyword for every axis. A cell for which it raises is recorded and skipped.
+        The `Problem` of a cell, called with a keyword for every axis. A cell for which it raises is
+        recorded and skipped.
     cold_starts : int
-        Seeded random starts of every cell, besides the guess of its problem and the warm ones, so that a poor basin does not
-        spread. Each cell has numbers of its own: together they are one search over the grid.
+        Seeded random starts of every cell, besides the guess of its problem and the warm ones, so
+        that a poor basin does not spread. Each cell has numbers of its own: together they are one
+        search over the grid.
     warm_starts : int
-        Of the warm starts that reach a cell first so many are solved: those whose gaits do best there as they are. Any other
-        is solved only if its gait, as it is, does better than all that was found.
+        Of the warm starts that reach a cell first so many are solved: those whose gaits do best
+        there as they are. Any other is solved only if its gait, as it is, does better than all that
+        was found.
     chunk : int
-        Cells along the last axis that make one task, with warm starts travelling inside. More cells cost less scheduling.
+        Cells along the last axis that make one task, with warm starts travelling inside. More cells
+        cost less scheduling.
     time_limit : float
         Seconds for one start.
     seed : int
@@ -111,7 +137,8 @@ class Study:
     --------
     >>> import colloc
     >>> def problem(mu_b):
-    ...     return colloc.Problem("grid", friction=colloc.Friction(mu_b=mu_b), gait=colloc.Harmonic(1, "bilateral"))
+    ...     return colloc.Problem("grid", friction=colloc.Friction(mu_b=mu_b),
+    ...         gait=colloc.Harmonic(1, "bilateral"))
     >>> study = colloc.Study("grid", (colloc.Axis("mu_b", (1, 2)),), problem)
     >>> study.shape
     (2,)
@@ -127,7 +154,9 @@ class Study:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axes", tuple(self.axes) if isinstance(self.axes, Iterable) else (self.axes,))
+        object.__setattr__(
+            self, "axes", tuple(self.axes) if isinstance(self.axes, Iterable) else (self.axes,)
+        )
         if not self.axes or not all(isinstance(axis, Axis) for axis in self.axes):
             raise ProblemError("a study needs at least one Axis.")
         if len({axis.name for axis in self.axes}) != len(self.axes):
@@ -138,11 +167,20 @@ class Study:
         for field, least in (("cold_starts", 0), ("warm_starts", 1), ("chunk", 1), ("seed", 0)):
             value = getattr(self, field)
             if not is_whole(value, least, LARGEST_SEED):
-                raise ProblemError(f"{field} must be a whole number from {least} to {LARGEST_SEED}, not {shown(value)}.")
-        if isinstance(self.time_limit, bool) or not isinstance(self.time_limit, (int, float)) or not self.time_limit > 0:
+                raise ProblemError(
+                    f"{field} must be a whole number from {least} to {LARGEST_SEED}, not "
+                    f"{shown(value)}."
+                )
+        if (
+            isinstance(self.time_limit, bool)
+            or not isinstance(self.time_limit, (int, float))
+            or not self.time_limit > 0
+        ):
             raise ProblemError(f"time_limit must be positive, not {self.time_limit!r}.")
         if math.prod(self.shape) > MOST_CELLS:
-            raise ProblemError(f"a study may have {MOST_CELLS} cells, not {math.prod(self.shape)}; split it.")
+            raise ProblemError(
+                f"a study may have {MOST_CELLS} cells, not {math.prod(self.shape)}; split it."
+            )
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -169,9 +207,13 @@ class Study:
             problem = self.problem(**self.coordinates(cell))
         except Exception as error:
             place = place_of(error)
-            raise ProblemError(f"no problem at {where}: {place}{': ' * bool(place)}{words_of(error)}") from None
+            raise ProblemError(
+                f"no problem at {where}: {place}{': ' * bool(place)}{words_of(error)}"
+            ) from None
         if not isinstance(problem, Problem):
-            raise ProblemError(f"no problem at {where}: the study's function gave a {type(problem).__name__}.")
+            raise ProblemError(
+                f"no problem at {where}: the study's function gave a {type(problem).__name__}."
+            )
         return problem
 
     def before(self, cell: Index) -> list[Index]:
@@ -190,7 +232,11 @@ class Study:
             near: Iterable[int] = (cell[a] + step for step in steps)
             if axis.of_texts:
                 near = range(self.shape[a] if 1 in steps else cell[a])
-            found += [(*cell[:a], i, *cell[a + 1 :]) for i in near if 0 <= i < self.shape[a] and i != cell[a]]
+            found += [
+                (*cell[:a], i, *cell[a + 1 :])
+                for i in near
+                if 0 <= i < self.shape[a] and i != cell[a]
+            ]
         return found
 
     def cold_numbers(self, cell: Index) -> tuple[int, ...]:
@@ -200,11 +246,15 @@ class Study:
 
 
 def read_study_file(path: str | os.PathLike[str]) -> tuple[Study, str]:
-    """Execute a study file; its study and its text. `ProblemError` if there is no such file, it fails (with the line), or
-    states no ``STUDY``."""
+    """Execute a study file; its study and its text. `ProblemError` if there is no such file, it
+    fails (with the line), or states no ``STUDY``."""
     path, names, source = stated_names(path, "study")
     study = names.get("STUDY")
     if not isinstance(study, Study):
-        what = "states no STUDY" if study is None else f"STUDY must be a Study, not {type(study).__name__}"
+        what = (
+            "states no STUDY"
+            if study is None
+            else f"STUDY must be a Study, not {type(study).__name__}"
+        )
         raise ProblemError(f"{path}: {what}; end it with STUDY = Study(...).")
     return study, source

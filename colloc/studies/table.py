@@ -1,4 +1,5 @@
-"""The cells of a study as labelled arrays: best certified gait of each, its class and its bounds."""
+"""The cells of a study as labelled arrays: best certified gait of each, its class and its
+bounds."""
 
 from __future__ import annotations
 
@@ -53,17 +54,23 @@ class StudyTable:
     def to_xarray(self) -> xarray.Dataset:
         """The arrays as an xarray Dataset."""
         arrays = optional("xarray")
-        found = {k: (self.dimensions[k], v, {"units": UNITS.get(k, "1")}) for k, v in self.variables.items()}
+        found = {
+            k: (self.dimensions[k], v, {"units": UNITS.get(k, "1")})
+            for k, v in self.variables.items()
+        }
         return arrays.Dataset(found, dict(self.coordinates), {"name": self.name})
 
 
 def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> StudyTable:
-    """All cells of a run; `known_bound` gives an upper bound on the efficiency of every gait of a problem's body, if one is
-    known."""
+    """All cells of a run; `known_bound` gives an upper bound on the efficiency of every gait of a
+    problem's body, if one is known."""
     study = run.study
     axes = tuple(axis.name for axis in study.axes)
     problems = [state.problem for state in run.cells.values() if state.problem is not None]
-    joints, harmonics = max(p.body.n_joint for p in problems), max(series_class(p).harmonics for p in problems)
+    joints, harmonics = (
+        max(p.body.n_joint for p in problems),
+        max(series_class(p).harmonics for p in problems),
+    )
     variables: dict[str, np.ndarray] = {}
     dimensions: dict[str, tuple[str, ...]] = {}
 
@@ -89,7 +96,10 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
                 variables[name][cell] = value
     coordinates = {axis.name: _coordinate(axis.values) for axis in study.axes}
     coordinates |= {"joint": np.arange(1, joints + 1), "harmonic": np.arange(1, harmonics + 1)}
-    units, labels = {axis.name: axis.units for axis in study.axes}, {axis.name: axis.label or axis.name for axis in study.axes}
+    units, labels = (
+        {axis.name: axis.units for axis in study.axes},
+        {axis.name: axis.label or axis.name for axis in study.axes},
+    )
     return StudyTable(study.name, coordinates, units, labels, variables, dimensions)
 
 
@@ -103,13 +113,20 @@ def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]
     if problem is None:
         return {"status": NO_PROBLEM, "message": state.message}
     outcomes = [a.outcome for a in state.attempts]
-    row: dict[str, Any] = {"problem_hash": problem.hash, "starts": len(outcomes), "status": NOT_TRIED}
+    row: dict[str, Any] = {
+        "problem_hash": problem.hash,
+        "starts": len(outcomes),
+        "status": NOT_TRIED,
+    }
     row["starts_certified"] = sum(o.status == SOLVED for o in outcomes)
     row["seconds"] = sum(o.seconds for o in outcomes)
     row["trivial_bound"] = 1.0 / problem.law.smallest if rate_independent(problem.law) else np.nan
     bound = known_bound(problem)
     row["upper_bound"] = np.nan if bound is None else bound
-    row["neighbour_value"], row["below_neighbour"] = run.neighbour_value(cell), int(run.below_neighbour(cell))
+    row["neighbour_value"], row["below_neighbour"] = (
+        run.neighbour_value(cell),
+        int(run.below_neighbour(cell)),
+    )
     best = state.best
     if best is not None:
         row |= {"status": SOLVED, "origin": best.origin} | _gait_row(problem, best.outcome)
@@ -126,11 +143,17 @@ def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     row["at_slowest"] = int(on_speed_floor(problem, outcome.gait))
     if problem.body.n_joint > 1:
         kind: GaitClass = gait_class(gait, problem.body, problem.law)
-        row |= {name: getattr(kind, name) for name in ("bilateral", "antipodal", "retraced", "winding", "wave", "forward")}
+        row |= {
+            name: getattr(kind, name)
+            for name in ("bilateral", "antipodal", "retraced", "winding", "wave", "forward")
+        }
         row["gait_class"] = kind.label
     return row
 
 
 def cell_text(study: Study, cell: Index) -> str:
     """Coordinates of a cell for people."""
-    return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in study.coordinates(cell).items())
+    return ", ".join(
+        f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}"
+        for k, v in study.coordinates(cell).items()
+    )

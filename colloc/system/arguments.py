@@ -20,27 +20,34 @@ P = ParamSpec("P")
 MOST_PERIODS = 10_000
 """That are followed one by one."""
 STATED_IF_SET = {"stated if set": True}
-"""Metadata of a field that statements name only where it is not its default: what was stated before there was one, stays."""
+"""Metadata of a field that statements name only where it is not its default: what was stated before
+there was one, stays."""
 
 
 def named_arguments(cls: type[T]) -> type[T]:
-    """Make a dataclass refuse arguments it does not have, or lacks, by a `ProblemError` that says which one is meant.
+    """Make a dataclass refuse arguments it does not have, or lacks, by a `ProblemError` that says
+    which one is meant.
 
-    Numbers become Python's own, of the kind that the field has: equal values have equal hashes. Those of `by_name`,
-    if the class has it, are to be given so where they differ: else an `OrderWarning` says how they are read.
+    Numbers become Python's own, of the kind that the field has: equal values have equal hashes.
+    Those of `by_name`, if the class has it, are to be given so where they differ: else an
+    `OrderWarning` says how they are read.
 
     Examples
     --------
     >>> from colloc import Friction
     >>> Friction(mu_x=1)
     Traceback (most recent call last):
-    colloc.system.errors.ProblemError: Friction has no argument 'mu_x'; did you mean mu_t, mu_f or mu_b?
+    colloc.system.errors.ProblemError: Friction has no argument 'mu_x'; did you mean mu_t, mu_f or
+    mu_b?
     >>> Friction(1) == Friction(1.0)
     True
     """
     made = cls.__init__
     _, *taken = inspect.signature(made).parameters.values()  # without self
-    known, needed = [each.name for each in taken], [each.name for each in taken if each.default is each.empty]
+    known, needed = (
+        [each.name for each in taken],
+        [each.name for each in taken if each.default is each.empty],
+    )
 
     @functools.wraps(made)
     def checked(self: T, *given: Any, **named: Any) -> None:
@@ -52,15 +59,26 @@ def named_arguments(cls: type[T]) -> type[T]:
                 hint = f"did you mean {_either(near)}?" if near else f"it takes {', '.join(known)}."
                 raise ProblemError(f"{cls.__name__} has no argument {name!r}; {hint}")
         if len(given) > len(known):
-            raise ProblemError(f"{cls.__name__} has {len(known)} arguments, {', '.join(known)}, and {len(given)} were given.")
-        if missing := [name for name in needed if name in known[len(given) :] and name not in named]:
+            raise ProblemError(
+                f"{cls.__name__} has {len(known)} arguments, {', '.join(known)}, and {len(given)} "
+                f"were given."
+            )
+        if missing := [
+            name for name in needed if name in known[len(given) :] and name not in named
+        ]:
             raise ProblemError(f"{cls.__name__} needs {' and '.join(missing)}.")
         stated = {**dict(zip(known, given, strict=False)), **named}
         if len(stated) < len(given) + len(named):
-            raise ProblemError(f"{cls.__name__} was given {known[len(given) - 1]} twice, by its place and by its name.")
+            raise ProblemError(
+                f"{cls.__name__} was given {known[len(given) - 1]} twice, by its place and by "
+                f"its name."
+            )
         scalars = _scalars(made)
         try:
-            made(self, **{name: _plain(value, scalars.get(name, ())) for name, value in stated.items()})
+            made(
+                self,
+                **{name: _plain(value, scalars.get(name, ())) for name, value in stated.items()},
+            )
         except ProblemError:
             raise
         except Exception:
@@ -71,7 +89,8 @@ def named_arguments(cls: type[T]) -> type[T]:
         if len(set(order.values())) > 1 and order.keys() & known[: len(given)]:
             read = ", ".join(f"{name}={value:g}" for name, value in order.items())
             warnings.warn(
-                f"coefficients by their place, which others write in another order, are read as {cls.__name__}({read}): name "
+                f"coefficients by their place, which others write in another order, are read as "
+                f"{cls.__name__}({read}): name "
                 "them, as here.",
                 OrderWarning,
                 stacklevel=2,
@@ -82,7 +101,8 @@ def named_arguments(cls: type[T]) -> type[T]:
 
 
 def checked_arguments(function: Callable[P, T]) -> Callable[P, T]:
-    """The same function, which refuses arguments that are of no kind its annotations name, by a `ProblemError`."""
+    """The same function, which refuses arguments that are of no kind its annotations name, by a
+    `ProblemError`."""
 
     @functools.wraps(function)
     def checked(*given: P.args, **named: P.kwargs) -> T:
@@ -116,7 +136,11 @@ def _scalars(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
 
 
 def _alternatives(kind: Any) -> tuple[Any, ...]:
-    return get_args(kind) if get_origin(kind) in (Union, UnionType) else (NoneType if kind is None else kind,)
+    return (
+        get_args(kind)
+        if get_origin(kind) in (Union, UnionType)
+        else (NoneType if kind is None else kind,)
+    )
 
 
 def _check_kinds(kinds: Mapping[str, tuple[Any, ...]], stated: Mapping[str, Any]) -> None:
@@ -140,9 +164,19 @@ def _fits(value: Any, kind: Any) -> bool:
     if kind is Callable:
         return callable(value)
     if kind in _SEQUENCES:
-        many = isinstance(value, Iterable) and hasattr(value, "__len__") and not isinstance(value, (str, bytes, Mapping))
-        return many and all(any(_fits(part, each) for each in _alternatives(item)) for part in value)
-    return kind is Any or not isinstance(kind, type) or (not isinstance(value, type) and isinstance(value, kind))
+        many = (
+            isinstance(value, Iterable)
+            and hasattr(value, "__len__")
+            and not isinstance(value, (str, bytes, Mapping))
+        )
+        return many and all(
+            any(_fits(part, each) for each in _alternatives(item)) for part in value
+        )
+    return (
+        kind is Any
+        or not isinstance(kind, type)
+        or (not isinstance(value, type) and isinstance(value, kind))
+    )
 
 
 def _are_numbers(value: Any) -> bool:
@@ -151,13 +185,15 @@ def _are_numbers(value: Any) -> bool:
     except ValueError:  # rows of different lengths
         return False
     numbers = array.dtype.kind in "iuf" or not array.size
-    return numbers and (bool(np.isfinite(array).all()) if array.ndim == 1 else array.ndim > 1)  # of tables others know more
+    # of tables others know more
+    return numbers and (bool(np.isfinite(array).all()) if array.ndim == 1 else array.ndim > 1)
 
 
 _SEQUENCES = tuple, list, Sequence, Iterable
 _SCALARS = {float, int, bool, str, NoneType}
 _WORDS = {
-    float: "a number", int: "a whole number", bool: "True or False", str: "text", NoneType: "None", np.ndarray: "numbers",
+    float: "a number", int: "a whole number", bool: "True or False", str: "text", NoneType: "None",
+    np.ndarray: "numbers",
     Callable: "a function",
 }  # fmt: skip
 
@@ -200,14 +236,18 @@ def is_whole(value: object, least: float = -math.inf, most: float = math.inf) ->
 
 
 def check_finite(positive: bool = False, **numbers: object) -> None:
-    """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is asked)."""
+    """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is
+    asked)."""
     for name, value in numbers.items():
         if not is_number(value) or (positive and not value > 0):
-            raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {shown(value)}.")
+            raise ProblemError(
+                f"{name} must be a {'positive ' * positive}finite number, not {shown(value)}."
+            )
 
 
 def check_count(most: float = math.inf, **numbers: object) -> None:
-    """A `ProblemError` for the first of some numbers that is not whole, at least 1 and at most another."""
+    """A `ProblemError` for the first of some numbers that is not whole, at least 1 and at most
+    another."""
     for name, value in numbers.items():
         if not is_whole(value, 1, most):
             ends = "of at least 1" if most == math.inf else f"from 1 to {most}"

@@ -26,12 +26,14 @@ _HOW = "dask worker ADDRESS --nthreads 1"
 def connected(
     address: str, workers: int, say: Callable[[str], None] = print, patience: float = PATIENCE
 ) -> tuple[Callable[[int], Executor], int]:
-    """What makes executors for `colloc.system.task_pool.completed` of a cluster, and how many workers it has.
+    """What makes executors for `colloc.system.task_pool.completed` of a cluster, and how many
+    workers it has.
 
     Parameters
     ----------
     address : str
-        Of the scheduler, ``tcp://host:8786``; or "local" for a cluster of processes on this machine.
+        Of the scheduler, ``tcp://host:8786``; or "local" for a cluster of processes on this
+        machine.
     workers : int
         Of a local cluster.
     say : callable
@@ -47,24 +49,38 @@ def connected(
     try:
         from distributed import Client
     except ImportError:
-        raise ProblemError("--dask needs the package distributed: pip install 'colloc[dask]'.") from None
-    try:  # for the study alone: what else the process does with Dask, xarray for one, is not sent there
+        raise ProblemError(
+            "--dask needs the package distributed: pip install 'colloc[dask]'."
+        ) from None
+    # for the study alone: what else the process does with Dask, xarray for one, is not sent there
+    try:
         if address == "local":  # any port that is free, for this machine alone
             with environment_of_workers():
-                client = Client(n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", set_as_default=False)
+                client = Client(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    dashboard_address="127.0.0.1:0",
+                    set_as_default=False,
+                )
         else:
             client = Client(address, timeout=_CONNECT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ProblemError(f"no Dask scheduler at {address}: {error}") from None
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL + 1)  # what it has to say is said in a sentence
+    # what it has to say is said in a sentence
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL + 1)
     if not client.nthreads():
-        say(f"the Dask scheduler at {address} has no workers yet; waiting for one, {patience:.0f} s at most")
+        say(
+            f"the Dask scheduler at {address} has no workers yet; waiting for one, {patience:.0f} "
+            f"s at most"
+        )
     try:
         client.wait_for_workers(1, timeout=patience)
     except TimeoutError:
         client.close()
         raise ProblemError(f"{_without_workers(address, patience)}, for example: {_HOW}.") from None
-    return lambda _: DaskExecutor(client, address, patience), max(1, sum(client.nthreads().values()))
+    return lambda _: DaskExecutor(client, address, patience), max(
+        1, sum(client.nthreads().values())
+    )
 
 
 def _without_workers(address: str, patience: float) -> str:
@@ -72,7 +88,8 @@ def _without_workers(address: str, patience: float) -> str:
 
 
 class DaskExecutor(Executor):
-    """The executor of a Dask client, whose futures end with `EngineGone` when its scheduler dies or has no workers."""
+    """The executor of a Dask client, whose futures end with `EngineGone` when its scheduler dies or
+    has no workers."""
 
     def __init__(self, client: Any, address: str, patience: float) -> None:
         self._client, self._address, self._patience = client, address, patience
@@ -85,7 +102,9 @@ class DaskExecutor(Executor):
         told: Future = Future()
         self._waiting.add(told)
         try:
-            self._pool.submit(function, *arguments, **named).add_done_callback(lambda done: self._tell(told, done))
+            self._pool.submit(function, *arguments, **named).add_done_callback(
+                lambda done: self._tell(told, done)
+            )
         except Exception as error:
             if self._scheduler_alive():
                 raise
@@ -111,7 +130,8 @@ class DaskExecutor(Executor):
 
     def _gone(self) -> EngineGone:
         return EngineGone(
-            f"the Dask scheduler at {self._address} is gone; what is done is kept. Start it and give the command again."
+            f"the Dask scheduler at {self._address} is gone; what is done is kept. Start it and "
+            f"give the command again."
         )
 
     def _watch(self) -> None:
@@ -127,11 +147,14 @@ class DaskExecutor(Executor):
                 lost = self._gone()
             elif now - heard > self._patience:
                 lost = EngineGone(
-                    f"the Dask scheduler at {self._address} gave no answer for {self._patience:.0f} s. What is done is kept; "
+                    f"the Dask scheduler at {self._address} gave no answer for "
+                    f"{self._patience:.0f} s. What is done is kept; "
                     "look at the scheduler and the network, and give the same command again."
                 )
             elif now - worked > self._patience:
-                lost = EngineGone(f"{_without_workers(self._address, self._patience)}. What is done is kept.")
+                lost = EngineGone(
+                    f"{_without_workers(self._address, self._patience)}. What is done is kept."
+                )
             else:
                 continue
             for told in list(self._waiting):
@@ -140,7 +163,11 @@ class DaskExecutor(Executor):
     def _workers(self) -> int | None:
         """How many there are; None if the scheduler does not say so in time."""
         try:
-            return len(self._client.sync(self._client.scheduler.ncores, callback_timeout=min(_ANSWER, self._patience)))
+            return len(
+                self._client.sync(
+                    self._client.scheduler.ncores, callback_timeout=min(_ANSWER, self._patience)
+                )
+            )
         except Exception:  # stopped, cut off, or about to die
             return None
 

@@ -15,8 +15,11 @@ class CollocError(Exception):
     """
 
     def __str__(self) -> str:
-        """The sentence, with what would drive a terminal made visible: it may quote files of others."""
-        return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in super().__str__())
+        """The sentence, with what would drive a terminal made visible: it may quote files of
+        others."""
+        return "".join(
+            c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in super().__str__()
+        )
 
 
 class ProblemError(CollocError, ValueError):
@@ -56,11 +59,13 @@ class StoreError(CollocError, OSError):
 
 
 class ReadOnlyRunWarning(UserWarning):
-    """A file that saves work, such as what a solve has found so far, cannot be read or written; the work goes on without it."""
+    """A file that saves work, such as what a solve has found so far, cannot be read or written; the
+    work goes on without it."""
 
 
 class OrderWarning(UserWarning):
-    """Coefficients that differ were given by their place, and texts and programs do not agree on their order."""
+    """Coefficients that differ were given by their place, and texts and programs do not agree on
+    their order."""
 
 
 class SlowWarning(UserWarning):

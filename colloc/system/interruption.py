@@ -1,7 +1,9 @@
-"""Ctrl-C, which compiled code would swallow or turn into another error: it is remembered, and stays an interruption.
+"""Ctrl-C, which compiled code would swallow or turn into another error: it is remembered, and stays
+an interruption.
 
-CasADi reports a KeyboardInterrupt inside a callback on standard error, in nine lines, and lets IPOPT end as if a function
-had failed. So a solve is not interrupted by an exception: it asks between iterations whether to stop (`interrupted`).
+CasADi reports a KeyboardInterrupt inside a callback on standard error, in nine lines, and lets
+IPOPT end as if a function had failed. So a solve is not interrupted by an exception: it asks
+between iterations whether to stop (`interrupted`).
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from colloc.system.early_interruption import end_at_once
 
 @dataclass
 class _Heard:
-    """Whether Ctrl-C came since the outermost block began, and whether the code that runs asks for it by itself."""
+    """Whether Ctrl-C came since the outermost block began, and whether the code that runs asks for
+    it by itself."""
 
     asked: bool = False
     polled: bool = False
@@ -35,7 +38,8 @@ _DEADLINE: ContextVar[float] = ContextVar("deadline", default=float("inf"))
 
 
 def interrupted() -> bool:
-    """Whether Ctrl-C came, or a `time_limit` is over, for code within `interruptible` that can stop by itself."""
+    """Whether Ctrl-C came, or a `time_limit` is over, for code within `interruptible` that can stop
+    by itself."""
     return (_heard.asked and _in_main_thread()) or _time_is_over()
 
 
@@ -57,8 +61,8 @@ def _in_main_thread() -> bool:
 def time_limit(seconds: float) -> Iterator[None]:
     """A block that ends in KeyboardInterrupt, as by Ctrl-C, when so many seconds are over.
 
-    It does so wherever the block is, in the main thread if `interruptible` is around it; compiled code that calls Python has to
-    ask `interrupted`.
+    It does so wherever the block is, in the main thread if `interruptible` is around it; compiled
+    code that calls Python has to ask `interrupted`.
     """
     if seconds == float("inf"):
         yield
@@ -66,7 +70,9 @@ def time_limit(seconds: float) -> Iterator[None]:
     token = _DEADLINE.set(time.monotonic() + seconds)
     # signals reach the main thread alone
     here = None if _in_main_thread() else threading.get_ident()
-    timer = threading.Timer(seconds, _again if here is None else lambda: _raise_in(here, KeyboardInterrupt))
+    timer = threading.Timer(
+        seconds, _again if here is None else lambda: _raise_in(here, KeyboardInterrupt)
+    )
     timer.daemon = True
     try:
         try:
@@ -78,8 +84,9 @@ def time_limit(seconds: float) -> Iterator[None]:
                 if timer.is_alive():
                     timer.join()
             except KeyboardInterrupt:
-                # Sent to a thread whose block had just ended. It has to come: CPython 3.11 looks for a withdrawn one for ever,
-                # and a profiler or debugger that is switched on later stands still at the first function.
+                # Sent to a thread whose block had just ended. It has to come: CPython 3.11 looks
+                # for a withdrawn one for ever, and a profiler or debugger that is switched on later
+                # stands still at the first function.
                 if here is None:
                     raise
     finally:
@@ -110,7 +117,8 @@ def _again() -> None:
 
 
 def _hushed(before: Callable[[Any], object]) -> Callable[[Any], object]:
-    """What to do with exceptions that Python cannot raise, as in a weak reference's callback, where Ctrl-C may fall too.
+    """What to do with exceptions that Python cannot raise, as in a weak reference's callback, where
+    Ctrl-C may fall too.
 
     Python would print it and go on; so it comes again a moment later, without a word.
     """
@@ -128,15 +136,18 @@ def _hushed(before: Callable[[Any], object]) -> Callable[[Any], object]:
 
 @contextlib.contextmanager
 def interruptible(*, polled: bool = True) -> Iterator[None]:
-    """A block that ends in KeyboardInterrupt if Ctrl-C came inside it and became an error there, or nothing at all.
+    """A block that ends in KeyboardInterrupt if Ctrl-C came inside it and became an error there, or
+    nothing at all.
 
-    Only the main thread receives signals, and a handler that somebody else has installed is left alone.
+    Only the main thread receives signals, and a handler that somebody else has installed is left
+    alone.
 
     Parameters
     ----------
     polled : bool
-        The block asks `interrupted` now and then: the first Ctrl-C raises nothing before its end, a second one does at once.
-        False, for a whole command: every Ctrl-C raises at once, and the command may end well after it.
+        The block asks `interrupted` now and then: the first Ctrl-C raises nothing before its end, a
+        second one does at once. False, for a whole command: every Ctrl-C raises at once, and the
+        command may end well after it.
     """
     handler = signal.getsignal(signal.SIGINT) if _in_main_thread() else None
     if handler not in (signal.default_int_handler, end_at_once, _hear):

@@ -1,4 +1,5 @@
-"""What is imported only when it is asked for: functions of higher packages by name, and libraries that may be missing.
+"""What is imported only when it is asked for: functions of higher packages by name, and libraries
+that may be missing.
 
 So a lower package can offer what it must not import; the face of the library says where that is.
 """
@@ -24,20 +25,25 @@ def bind(places: Mapping[str, str]) -> None:
 
 
 def bound(name: str) -> Callable[..., Any]:
-    """The function of that name, which checks its arguments, but for axes, of which drawings know more to say. `KeyError` if
-    nobody has said where it is."""
+    """The function of that name, which checks its arguments, but for axes, of which drawings know
+    more to say. `KeyError` if nobody has said where it is."""
     from colloc.system.arguments import checked_arguments
 
     module, _, function = _WHERE[name].partition(":")
     with _whatever_backend():
         found = getattr(importlib.import_module(module), function)
-    return checked_arguments(found) if isinstance(found, FunctionType) and not name.startswith("plot") else found
+    return (
+        checked_arguments(found)
+        if isinstance(found, FunctionType) and not name.startswith("plot")
+        else found
+    )
 
 
 @contextmanager
 def _whatever_backend() -> Iterator[None]:
-    """Matplotlib cannot be imported where the environment names a backend that is not installed, as a notebook's terminal does.
-    In this block it can; nothing is drawn here with that backend, and where there is one others get it."""
+    """Matplotlib cannot be imported where the environment names a backend that is not installed, as
+    a notebook's terminal does. In this block it can; nothing is drawn here with that backend, and
+    where there is one others get it."""
     named = None if "matplotlib" in sys.modules else os.environ.pop("MPLBACKEND", None)
     try:
         yield
@@ -54,4 +60,6 @@ def optional(library: str) -> Any:
     try:
         return importlib.import_module(library)
     except ImportError:
-        raise CollocError(f"this needs {library}, which is not installed: pip install {library}.") from None
+        raise CollocError(
+            f"this needs {library}, which is not installed: pip install {library}."
+        ) from None

@@ -1,8 +1,10 @@
-"""Values as plain numbers, strings, lists and dictionaries, and back, exact to the last bit: for files of rows.
+"""Values as plain numbers, strings, lists and dictionaries, and back, exact to the last bit: for
+files of rows.
 
-Arrays become the base64 text of their bytes. A dataclass or named tuple becomes its fields and the name of its kind; kinds are
-listed by whoever reads, and nothing else is made from a file. Reading does not run what a kind does when it is made, such as
-scaling vectors to length 1, which would change the last bit.
+Arrays become the base64 text of their bytes. A dataclass or named tuple becomes its fields and the
+name of its kind; kinds are listed by whoever reads, and nothing else is made from a file. Reading
+does not run what a kind does when it is made, such as scaling vectors to length 1, which would
+change the last bit.
 """
 
 from __future__ import annotations
@@ -53,11 +55,19 @@ class Codec:
         if name in self._own:
             return {KIND: name, "of": self._own[name].written(value)}
         if name in self._kinds:
-            named = dict(zip(value._fields, value, strict=True)) if isinstance(value, tuple) else _fields(value)  # type: ignore[attr-defined]
+            named = (
+                dict(zip(value._fields, value, strict=True))  # type: ignore[attr-defined]
+                if isinstance(value, tuple)
+                else _fields(value)
+            )
             return {KIND: name, "of": {key: self.written(part) for key, part in named.items()}}
         if isinstance(value, np.ndarray):
             data = np.ascontiguousarray(value)
-            return {ARRAY: base64.b64encode(data.tobytes()).decode(), "type": data.dtype.str, "shape": list(value.shape)}
+            return {
+                ARRAY: base64.b64encode(data.tobytes()).decode(),
+                "type": data.dtype.str,
+                "shape": list(value.shape),
+            }
         if isinstance(value, np.generic):
             return value.item()
         if isinstance(value, tuple):
@@ -65,7 +75,10 @@ class Codec:
         if isinstance(value, list):
             return [self.written(part) for part in value]
         if isinstance(value, dict):
-            return {KIND: "dict", "of": [[self.written(k), self.written(v)] for k, v in value.items()]}
+            return {
+                KIND: "dict",
+                "of": [[self.written(k), self.written(v)] for k, v in value.items()],
+            }
         if value is None or isinstance(value, (bool, int, float, str)):
             return value
         raise TypeError(f"cannot write a {name}.")

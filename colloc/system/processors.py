@@ -17,7 +17,8 @@ def available_processes() -> int:
 
 
 def available_threads() -> int:
-    """Threads for a batch: ``$OMP_NUM_THREADS`` as for BLAS, else all processors; one in a process that shares them."""
+    """Threads for a batch: ``$OMP_NUM_THREADS`` as for BLAS, else all processors; one in a process
+    that shares them."""
     if multiprocessing.parent_process() is not None:
         return 1
     said = os.environ.get(_SAID, "")
@@ -25,9 +26,10 @@ def available_threads() -> int:
 
 
 def one_thread_each() -> None:
-    """Have linear algebra use one thread, unless the environment says otherwise; before NumPy is loaded.
+    """Have linear algebra use one thread, unless the environment says otherwise; before NumPy is
+    loaded.
 
-    The matrices of a search are small. On two busy cores two threads that wait for each other made SQP with 360 parameters take
-    thirty times the processor time.
+    The matrices of a search are small. On two busy cores two threads that wait for each other made
+    SQP with 360 parameters take thirty times the processor time.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -1,4 +1,5 @@
-"""What a person sees while they wait: one line that is rewritten, with the time left; nothing where nobody watches."""
+"""What a person sees while they wait: one line that is rewritten, with the time left; nothing where
+nobody watches."""
 
 from __future__ import annotations
 
@@ -22,10 +23,12 @@ def duration(seconds: float) -> str:
 
 
 class StatusLine:
-    """A line at the bottom of the terminal: what is being done, for how long, and how long it will take where that is known.
+    """A line at the bottom of the terminal: what is being done, for how long, and how long it will
+    take where that is known.
 
-    Rich redraws it twice a second, since a solve reports nothing for long, and it vanishes at the end. Where the stream (by
-    default standard error) is not a terminal, or the line is not enabled, nothing is written, and Rich is not loaded.
+    Rich redraws it twice a second, since a solve reports nothing for long, and it vanishes at the
+    end. Where the stream (by default standard error) is not a terminal, or the line is not enabled,
+    nothing is written, and Rich is not loaded.
     """
 
     def __init__(self, stream: TextIO | None = None, *, enabled: bool = True) -> None:
@@ -42,8 +45,13 @@ class StatusLine:
         self.clear()
 
     def say(self, text: str, left: float = 0.0) -> None:
-        """Show a text from now on; `left` are the seconds it will probably take from now, 0 if nobody knows."""
-        self._text, self._left, self._since = text, left if math.isfinite(left) else 0.0, time.monotonic()
+        """Show a text from now on; `left` are the seconds it will probably take from now, 0 if
+        nobody knows."""
+        self._text, self._left, self._since = (
+            text,
+            left if math.isfinite(left) else 0.0,
+            time.monotonic(),
+        )
         if not self._shown:
             return
         if self._live is None:
@@ -55,7 +63,8 @@ class StatusLine:
                 console=Console(file=self._stream, highlight=False, markup=False),
                 refresh_per_second=2,
                 transient=True,
-                redirect_stdout=False,  # it may go elsewhere; what is for this terminal is printed after `clear`
+                # it may go elsewhere; what is for this terminal is printed after `clear`
+                redirect_stdout=False,
                 redirect_stderr=True,  # warnings stand above the line
             )
             self._live.start()
@@ -71,4 +80,5 @@ class StatusLine:
         now = time.monotonic()
         line = f"{self._text}   {duration(now - self._begin)}"
         left = self._left - (now - self._since)
-        return f"{line}, about {duration(left)} left" if left > 0.5 else line  # one that has run out is worth nothing
+        # one that has run out is worth nothing
+        return f"{line}, about {duration(left)} left" if left > 0.5 else line

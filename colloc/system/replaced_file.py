@@ -1,4 +1,5 @@
-"""Files that are replaced whole, so that a reader sees the old one or the new one, never a part; and one writer at a time."""
+"""Files that are replaced whole, so that a reader sees the old one or the new one, never a part;
+and one writer at a time."""
 
 from __future__ import annotations
 
@@ -16,14 +17,16 @@ from filelock import FileLock, SoftFileLock, Timeout
 from colloc.system.errors import StoreError
 
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
-"""What a file system without locks says: results are still replaced whole, but two runs are not kept apart."""
+"""What a file system without locks says: results are still replaced whole, but two runs are not
+kept apart."""
 _FORGOTTEN = 3600.0
 """Seconds after which a temporary file is taken for one that a killed process left."""
 
 
 @contextlib.contextmanager
 def replaced_file(path: Path) -> Iterator[str]:
-    """Name of a temporary file beside `path`, which takes its place if the block ends well and vanishes if it does not.
+    """Name of a temporary file beside `path`, which takes its place if the block ends well and
+    vanishes if it does not.
 
     Raises
     ------
@@ -54,7 +57,8 @@ def replaced_file(path: Path) -> Iterator[str]:
 
 @contextlib.contextmanager
 def locked(path: Path, *, wait: bool = False) -> Iterator[None]:
-    """Hold the lock file `path` while the block runs; the system lets go of it when its holder dies.
+    """Hold the lock file `path` while the block runs; the system lets go of it when its holder
+    dies.
 
     Parameters
     ----------
@@ -74,19 +78,29 @@ def locked(path: Path, *, wait: bool = False) -> Iterator[None]:
             lock = held.enter_context(FileLock(path, blocking=wait))
             if not isinstance(lock, SoftFileLock):  # whose file has a content of its own
                 with contextlib.suppress(OSError):  # a full disk does not matter here
-                    path.write_text(f"process {os.getpid()} on {socket.gethostname()}", encoding="utf-8")
+                    path.write_text(
+                        f"process {os.getpid()} on {socket.gethostname()}", encoding="utf-8"
+                    )
         except Timeout:
-            holder = path.read_text(encoding="utf-8", errors="replace")[:200].strip() or "another process"
-            raise StoreError(f"{path.parent} is in use by {holder}; wait for it, or choose another --output.") from None
+            holder = (
+                path.read_text(encoding="utf-8", errors="replace")[:200].strip()
+                or "another process"
+            )
+            raise StoreError(
+                f"{path.parent} is in use by {holder}; wait for it, or choose another --output."
+            ) from None
         except OSError as error:
             if error.errno not in NO_LOCKS:
-                raise StoreError(f"cannot write {path}: {error.strerror or error}; choose another --output.") from None
+                raise StoreError(
+                    f"cannot write {path}: {error.strerror or error}; choose another --output."
+                ) from None
         yield
 
 
 @contextlib.contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Hold a folder while the block runs; others wait. `StoreError` if the folder cannot be made or read."""
+    """Hold a folder while the block runs; others wait. `StoreError` if the folder cannot be made or
+    read."""
     with contextlib.ExitStack() as held:
         try:
             import fcntl

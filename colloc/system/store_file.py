@@ -1,7 +1,9 @@
-"""HDF5 files of results: written whole, for plain h5py, netCDF and xarray to read. Nothing in a file is executed.
+"""HDF5 files of results: written whole, for plain h5py, netCDF and xarray to read. Nothing in a
+file is executed.
 
-Datasets carry ``units`` and ``dims``; texts are UTF-8 of fixed length, padded with NUL, so that **trailing NULs are not kept**.
-What UTF-8 cannot hold (undecodable bytes of a command line) becomes "?".
+Datasets carry ``units`` and ``dims``; texts are UTF-8 of fixed length, padded with NUL, so that
+**trailing NULs are not kept**. What UTF-8 cannot hold (undecodable bytes of a command line) becomes
+"?".
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 
 @contextlib.contextmanager
 def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """An HDF5 file to write, which takes its place if the block ends well. `StoreError` if it cannot be written."""
+    """An HDF5 file to write, which takes its place if the block ends well. `StoreError` if it
+    cannot be written."""
     with replaced_file(Path(path)) as temporary:
         # in memory: where the disk is full, HDF5 closing a file on it can end the process
         image = io.BytesIO()
@@ -52,8 +55,14 @@ def open_file(path: str | os.PathLike[str], kind: str, version: int) -> Iterator
             if (found := attribute(file, "format")) != kind:
                 raise StoreError(f"it is a {found}.")
             if (found := attribute(file, "format_version")) != version:
-                remedy = "Update colloc to read it" if found > version else "Make it again with the command that wrote it"
-                raise StoreError(f"its format is {found}, where this colloc reads {version}. {remedy}.")
+                remedy = (
+                    "Update colloc to read it"
+                    if found > version
+                    else "Make it again with the command that wrote it"
+                )
+                raise StoreError(
+                    f"its format is {found}, where this colloc reads {version}. {remedy}."
+                )
             yield file
     except Exception as error:  # h5py raises many kinds for a damaged file
         why = error if isinstance(error, CollocError) else f"{type(error).__name__}: {error}."
@@ -69,8 +78,8 @@ def mark(file: h5py.File, kind: str, version: int) -> None:
 def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Dataset:
     """A new dataset of numbers or texts, with texts such as its units as attributes.
 
-    ``dims="joint, time"`` names its dimensions also in the way of netCDF: the dataset named like its one dimension is the
-    coordinate, and a dimension without one has a dataset with no data.
+    ``dims="joint, time"`` names its dimensions also in the way of netCDF: the dataset named like
+    its one dimension is the coordinate, and a dimension without one has a dataset with no data.
     """
     dataset = group.create_dataset(name, data=_stored(value))
     if dataset.dtype.kind == "S":
@@ -83,7 +92,9 @@ def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Data
         return dataset
     for axis, (dim, size) in enumerate(zip(dims, dataset.shape, strict=bool(dims))):
         if dim not in group:
-            group.create_dataset(dim, shape=(size,), dtype=">f4").make_scale(f"{_NO_VARIABLE}{size:10d}")
+            group.create_dataset(dim, shape=(size,), dtype=">f4").make_scale(
+                f"{_NO_VARIABLE}{size:10d}"
+            )
         dataset.dims[axis].attach_scale(group[dim])
     return dataset
 
@@ -111,7 +122,8 @@ def _decoded(value: Any) -> Any:
 
 
 def attribute(owner: h5py.Group | h5py.Dataset, name: str) -> Any:
-    """An attribute: a number or text of Python, or an array of them. `StoreError` if it is missing."""
+    """An attribute: a number or text of Python, or an array of them. `StoreError` if it is
+    missing."""
     if name not in owner.attrs:
         raise StoreError(f"attribute {name} of {owner.name} is missing.")
     value = _decoded(owner.attrs[name])
@@ -119,7 +131,8 @@ def attribute(owner: h5py.Group | h5py.Dataset, name: str) -> Any:
 
 
 def array(group: h5py.Group, name: str) -> Any:
-    """The data of a dataset: numbers as a NumPy array, texts decoded. `StoreError` if there is none."""
+    """The data of a dataset: numbers as a NumPy array, texts decoded. `StoreError` if there is
+    none."""
     if not isinstance(group.get(name), h5py.Dataset):
         raise StoreError(f"{group.name.rstrip('/')}/{name} is missing, or not a dataset.")
     return _decoded(group[name][()])

@@ -1,6 +1,8 @@
-"""Run tasks on any `concurrent.futures` executor; a worker that dies costs a repetition, never the run.
+"""Run tasks on any `concurrent.futures` executor; a worker that dies costs a repetition, never the
+run.
 
-Which task comes next is asked only when a worker is free, so tasks may depend on results of earlier ones.
+Which task comes next is asked only when a worker is free, so tasks may depend on results of earlier
+ones.
 """
 
 from __future__ import annotations
@@ -12,7 +14,15 @@ import pickle
 import sys
 import threading
 from collections.abc import Callable, Hashable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from dataclasses import dataclass
 from multiprocessing.connection import wait as wait_for_handles
 from signal import SIG_IGN, SIGINT, signal
@@ -38,7 +48,8 @@ class Task:
 
 @dataclass(frozen=True)
 class Lost:
-    """In place of a result: the engine failed twice to give one (worker killed, out of memory, lost connection)."""
+    """In place of a result: the engine failed twice to give one (worker killed, out of memory, lost
+    connection)."""
 
     message: str
 
@@ -49,8 +60,8 @@ class EngineGone(CollocError, RuntimeError):
 
 @contextlib.contextmanager
 def environment_of_workers() -> Iterator[None]:
-    """Processes started inside use one BLAS thread each, and import no file of the folder instead of another module; the
-    environment is put back afterwards."""
+    """Processes started inside use one BLAS thread each, and import no file of the folder instead
+    of another module; the environment is put back afterwards."""
     before = {name: os.environ.get(name) for name in _ENVIRONMENT}
     os.environ.update(_ENVIRONMENT)
     try:
@@ -79,11 +90,15 @@ def _started() -> None:
 
 
 class _Processes(ProcessPoolExecutor):
-    """Processes that do not run the script which begins them, unless a task is of something it defines: so it needs no
-    ``if __name__ == "__main__"`` for those of colloc alone."""
+    """Processes that do not run the script which begins them, unless a task is of something it
+    defines: so it needs no ``if __name__ == "__main__"`` for those of colloc alone."""
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future:
-        with contextlib.nullcontext() if _is_of_script((function, arguments, named)) else _without_script():
+        with (
+            contextlib.nullcontext()
+            if _is_of_script((function, arguments, named))
+            else _without_script()
+        ):
             return super().submit(function, *arguments, **named)
 
 
@@ -108,10 +123,14 @@ def _without_script() -> Iterator[None]:
 
 
 def process_pool(workers: int) -> Executor:
-    """Fresh processes: they inherit no state, and their number of BLAS threads is settled before NumPy is loaded."""
+    """Fresh processes: they inherit no state, and their number of BLAS threads is settled before
+    NumPy is loaded."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
-        sys.exit(1)  # a worker, in a script without that line: the process that began it does its task itself
-    return _Processes(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_started)
+        # a worker, in a script without that line: the process that began it does its task itself
+        sys.exit(1)
+    return _Processes(
+        workers, mp_context=multiprocessing.get_context("spawn"), initializer=_started
+    )
 
 
 class InThisProcess(Executor):
@@ -141,8 +160,9 @@ def _failure(future: Future) -> BaseException | None:
 def _first_done(pending: dict[Future, Task]) -> set[Future]:
     """Those that are done, as soon as one is.
 
-    Ctrl-C is held back while an executor's locks are taken, here and where tasks are handed over: it could fall between a lock
-    and the block that would open it again, and the executor's own thread, which Python joins at its end, would wait for ever.
+    Ctrl-C is held back while an executor's locks are taken, here and where tasks are handed over:
+    it could fall between a lock and the block that would open it again, and the executor's own
+    thread, which Python joins at its end, would wait for ever.
     """
     done: set[Future] = set()
     while not done:
@@ -164,20 +184,23 @@ def completed(
     Parameters
     ----------
     function : callable
-        Called as ``function(*task.arguments)`` on a worker. It must not raise: an exception counts as a lost worker.
+        Called as ``function(*task.arguments)`` on a worker. It must not raise: an exception counts
+        as a lost worker.
     ready : callable
-        The next task, or None if there is none now. Asked again after each result has been taken; the run ends when
-        there is none and nothing is under way.
+        The next task, or None if there is none now. Asked again after each result has been taken;
+        the run ends when there is none and nothing is under way.
     workers, ahead : int
-        So many tasks, together, are handed over at a time; `ahead` of them wait so that no worker has to.
+        So many tasks, together, are handed over at a time; `ahead` of them wait so that no worker
+        has to.
     executor : callable
-        Makes an executor for a number of workers: processes by default; threads, or the one a Dask client gives
-        (``lambda n: client.get_executor()``), will do.
+        Makes an executor for a number of workers: processes by default; threads, or the one a Dask
+        client gives (``lambda n: client.get_executor()``), will do.
 
     Yields
     ------
     Task, result
-        The result is `Lost` for a task whose worker died, which was tried again alone, and whose worker died again.
+        The result is `Lost` for a task whose worker died, which was tried again alone, and whose
+        worker died again.
 
     Raises
     ------
@@ -221,7 +244,10 @@ def completed(
                         if error is None:
                             yield task, future.result()
                         elif alone:
-                            yield task, Lost(f"its worker failed twice ({type(error).__name__}: {error}).")
+                            yield (
+                                task,
+                                Lost(f"its worker failed twice ({type(error).__name__}: {error})."),
+                            )
                         else:
                             suspects.append(task)
             except BrokenExecutor:
@@ -230,7 +256,10 @@ def completed(
                     raise
                 if alone:
                     for task in pending.values():
-                        yield task, Lost("its worker process died twice (killed, or out of memory).")
+                        yield (
+                            task,
+                            Lost("its worker process died twice (killed, or out of memory)."),
+                        )
                 else:
                     suspects += pending.values()
             except BaseException:

@@ -1,8 +1,10 @@
-"""A gait's motion by adaptive quadrature: orientation, displacement and work to a given accuracy, at any phase.
+"""A gait's motion by adaptive quadrature: orientation, displacement and work to a given accuracy,
+at any phase.
 
-Velocities are solved for at Gauss nodes of panels; a panel is halved until its two halves agree with it. Stick and slip
-give the velocities kinks whose width is of order delta, so the panels shrink towards them and show where they are.
-The panels know nothing of a collocation mesh; this is what a mesh is measured against.
+Velocities are solved for at Gauss nodes of panels; a panel is halved until its two halves agree
+with it. Stick and slip give the velocities kinks whose width is of order delta, so the panels
+shrink towards them and show where they are. The panels know nothing of a collocation mesh; this is
+what a mesh is measured against.
 """
 
 from __future__ import annotations
@@ -29,9 +31,9 @@ _MOST_PANELS = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """Velocities at instants, arrays that end in the same shape: tail velocity ``(3, ...)``, velocity of the centre of mass
-    in the body frame (complex; turned back evenly by the turn of a period), and ``(1 + k, ...)`` power and densities of k
-    quantities."""
+    """Velocities at instants, arrays that end in the same shape: tail velocity ``(3, ...)``,
+    velocity of the centre of mass in the body frame (complex; turned back evenly by the turn of a
+    period), and ``(1 + k, ...)`` power and densities of k quantities."""
 
     z: np.ndarray
     centre: np.ndarray
@@ -43,7 +45,10 @@ class Rates:
 
     def joined(self, other: Rates) -> Rates:
         """Those of these intervals, then of others."""
-        z, gained = (np.concatenate(pair, axis=1) for pair in ((self.z, other.z), (self.gained, other.gained)))
+        z, gained = (
+            np.concatenate(pair, axis=1)
+            for pair in ((self.z, other.z), (self.gained, other.gained))
+        )
         return Rates(z, np.concatenate([self.centre, other.centre]), gained)
 
 
@@ -58,11 +63,19 @@ def rates_at(
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> Rates:
-    """Solved velocities of a path at phases t of any shape, per period, and densities; `near` ``(3, ...)``: tail velocities to
-    start from. Without them phases ascend, and one branch is followed in time where several motions are balanced."""
+    """Solved velocities of a path at phases t of any shape, per period, and densities; `near` ``(3,
+    ...)``: tail velocities to start from. Without them phases ascend, and one branch is followed in
+    time where several motions are balanced."""
     angles, rates = path(t.ravel())
     if near is None:
-        start = on_one_branch(body, friction, angles, rates, delta, body.solve(friction, angles, rates, delta).require().z)
+        start = on_one_branch(
+            body,
+            friction,
+            angles,
+            rates,
+            delta,
+            body.solve(friction, angles, rates, delta).require().z,
+        )
     else:
         start = near.reshape(3, -1)
     solved = body.solve(friction, angles, rates, delta, start=start).require()
@@ -77,28 +90,39 @@ _PIECES = 400, 200
 """Of a whole path, in which a quantity is summed up, and once more for the error."""
 
 
-def totals_along(quantity: Quantity, path: Path, left: np.ndarray, right: np.ndarray, pieces: int) -> np.ndarray:
-    """A quantity of shapes and their rates alone over intervals, ``(n,)``, by Gauss quadrature on so many pieces of each."""
+def totals_along(
+    quantity: Quantity, path: Path, left: np.ndarray, right: np.ndarray, pieces: int
+) -> np.ndarray:
+    """A quantity of shapes and their rates alone over intervals, ``(n,)``, by Gauss quadrature on
+    so many pieces of each."""
     h = (right - left) / pieces
     starts = left[:, None] + h[:, None] * np.arange(pieces)
     t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
     return h * (quantity.of_shapes(*path(t.ravel()))[0].reshape(t.shape) @ PANEL_RULE.b).sum(axis=1)
 
 
-def whole_totals(quantities: Iterable[Quantity], path: Path) -> tuple[dict[str, float], dict[str, float]]:
+def whole_totals(
+    quantities: Iterable[Quantity], path: Path
+) -> tuple[dict[str, float], dict[str, float]]:
     """Quantities of shapes and their rates alone over a period, and their errors."""
     values, errors = {}, {}
     for each in quantities:
-        value, rougher = (float(totals_along(each, path, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)
+        value, rougher = (
+            float(totals_along(each, path, np.zeros(1), np.ones(1), pieces)[0])
+            for pieces in _PIECES
+        )
         values[each.name], errors[each.name] = value, abs(value - rougher)
     return values, errors
 
 
 Increments = tuple[np.ndarray, ...]
-"""Rotation, displacement in the initial body frame (complex), work and quantities of intervals, ``(n,)`` each."""
+"""Rotation, displacement in the initial body frame (complex), work and quantities of intervals,
+``(n,)`` each."""
 
 
-def increments(rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | None = None) -> Increments:
+def increments(
+    rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | None = None
+) -> Increments:
     """Increments of intervals of length h ``(n,)``, from rates at the nodes of the rule ``(n, s)``.
 
     `weights` are those of the rule, or of its integral over a part of the interval.
@@ -118,12 +142,13 @@ class FineMotion:
     """At the panel nodes, ``(n, s)``."""
     theta: np.ndarray
     path: np.ndarray
-    """Orientation, and displacement in the lab (complex, starting with orientation 0) at the edges, ``(n + 1,)`` each."""
+    """Orientation, and displacement in the lab (complex, starting with orientation 0) at the edges,
+    ``(n + 1,)`` each."""
     totals: np.ndarray
     """Work and quantities up to the edges, ``(1 + k, n + 1)``."""
     unresolved: np.ndarray
-    """``(n,)``: relative error of the objective that a panel may still hold: what halving it last changed, at its end and half
-    way."""
+    """``(n,)``: relative error of the objective that a panel may still hold: what halving it last
+    changed, at its end and half way."""
 
     @property
     def work(self) -> np.ndarray:
@@ -136,13 +161,17 @@ class FineMotion:
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
     def velocity(self, t: np.ndarray) -> np.ndarray:
-        """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``: good to start a solve from."""
+        """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``: good
+        to start a solve from."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
-        weights = PANEL_RULE.lagrange(((t - self.edges[k]) / np.diff(self.edges)[k]).ravel()).reshape(*t.shape, -1)
+        weights = PANEL_RULE.lagrange(
+            ((t - self.edges[k]) / np.diff(self.edges)[k]).ravel()
+        ).reshape(*t.shape, -1)
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
     def at(self, t: np.ndarray) -> Increments:
-        """Orientation, displacement, work and quantities at phases t ``(n_time,)``, by the panels' polynomials."""
+        """Orientation, displacement, work and quantities at phases t ``(n_time,)``, by the panels'
+        polynomials."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = np.diff(self.edges)
         weights = PANEL_RULE.integrals((t - self.edges[k]) / h[k]) * h[k][:, None]
@@ -167,7 +196,8 @@ def fine_motion(
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> FineMotion:
-    """Integrate a path between the first and the last of `edges` to a relative error of the efficiency, or another objective.
+    """Integrate a path between the first and the last of `edges` to a relative error of the
+    efficiency, or another objective.
 
     Parameters
     ----------
@@ -179,13 +209,16 @@ def fine_motion(
     edges : (n + 1,)
         First panels; the mesh to be measured is a good choice.
     tolerance : float
-        Panels are halved until the sum of their disagreements is below this. The sum that remains is in the result.
+        Panels are halved until the sum of their disagreements is below this. The sum that remains
+        is in the result.
     shares : callable
-        From way, work, rotation and quantities to what a small change of each changes in the objective, relative to it.
+        From way, work, rotation and quantities to what a small change of each changes in the
+        objective, relative to it.
     quantities : sequence of Quantity
         What is asked for besides.
     turn : float
-        That a period is asked for [rad]: the way is seen from axes that turn evenly (`colloc.gaits.period`).
+        That a period is asked for [rad]: the way is seen from axes that turn evenly
+        (`colloc.gaits.period`).
 
     Raises
     ------
@@ -193,9 +226,13 @@ def fine_motion(
         If the balance cannot be solved at some instant.
     """
 
-    def solved(left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None) -> tuple[Rates, Increments]:
+    def solved(
+        left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None
+    ) -> tuple[Rates, Increments]:
         nodes = left[:, None] + width[:, None] * PANEL_RULE.c
-        rates = rates_at(body, friction, path, delta, nodes, near=near, quantities=quantities, turn=turn)
+        rates = rates_at(
+            body, friction, path, delta, nodes, near=near, quantities=quantities, turn=turn
+        )
         return rates, increments(PANEL_RULE, width, rates)
 
     names = "work", *(quantity.name for quantity in quantities)
@@ -222,11 +259,21 @@ def fine_motion(
         new_rates, new = solved(start, half, near)
         middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
         # the whole panel, and its polynomials half way, against the two halves
-        spin, move = new[0][0::2] + new[0][1::2], new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2]
+        spin, move = (
+            new[0][0::2] + new[0][1::2],
+            new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2],
+        )
         sums = list(zip(new[2:], parts[2:], strict=True))
         differences = (
-            (spin - parts[0][chosen], move - parts[1][chosen], *(n[0::2] + n[1::2] - p[chosen] for n, p in sums)),
-            tuple(half - polynomial for half, polynomial in zip((a[0::2] for a in new), middle, strict=True)),
+            (
+                spin - parts[0][chosen],
+                move - parts[1][chosen],
+                *(n[0::2] + n[1::2] - p[chosen] for n, p in sums),
+            ),
+            tuple(
+                half - polynomial
+                for half, polynomial in zip((a[0::2] for a in new), middle, strict=True)
+            ),
         )
         kept = np.ones(left.size, dtype=bool)
         kept[chosen] = False
@@ -241,15 +288,26 @@ def fine_motion(
         change = sum(
             np.abs(move) * share["distance"]
             + np.abs(spin) * on_spin
-            + sum(np.abs(part) * share.get(name, 0.0) for name, part in zip(names, gained, strict=True))
+            + sum(
+                np.abs(part) * share.get(name, 0.0)
+                for name, part in zip(names, gained, strict=True)
+            )
             for spin, move, *gained in differences
         )
         gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
-        left, width = np.concatenate([left[kept], start])[place], np.concatenate([width[kept], half])[place]
+        left, width = (
+            np.concatenate([left[kept], start])[place],
+            np.concatenate([width[kept], half])[place],
+        )
     return FineMotion(np.append(left, edges[-1]), rates, *_accumulated(parts), gap)
 
 
 def _accumulated(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Orientation, lab displacement, and work and quantities at the edges, from every interval's own."""
+    """Orientation, lab displacement, and work and quantities at the edges, from every interval's
+    own."""
     theta, *totals = (np.concatenate([[0.0], np.cumsum(a)]) for a in (parts[0], *parts[2:]))
-    return theta, np.concatenate([[0.0], np.cumsum(np.exp(1j * theta[:-1]) * parts[1])]), np.stack(totals)
+    return (
+        theta,
+        np.concatenate([[0.0], np.cumsum(np.exp(1j * theta[:-1]) * parts[1])]),
+        np.stack(totals),
+    )

@@ -1,7 +1,8 @@
 r"""How wrong a collocated motion with states is, interval by interval.
 
-What the scheme says of every interval (`colloc.motion.kinds`) is held against the differential equation, solved with steps
-of its own: on a slope that of the heading (`colloc.verification.slope`), with inertia that of the momenta
+What the scheme says of every interval (`colloc.motion.kinds`) is held against the differential
+equation, solved with steps of its own: on a slope that of the heading
+(`colloc.verification.slope`), with inertia that of the momenta
 (`colloc.verification.inertial_motion`).
 """
 
@@ -38,20 +39,25 @@ from colloc.verification.slope import gait_on_slope
 
 
 class CourseOfGait(NamedTuple):
-    """A gait's motion by the differential equation: momenta if they are states, theta, place, work against friction,
-    ``(4 or 7, n)``, at phases in order, seen from axes that turn evenly; and about the error of these."""
+    """A gait's motion by the differential equation: momenta if they are states, theta, place, work
+    against friction, ``(4 or 7, n)``, at phases in order, seen from axes that turn evenly; and
+    about the error of these."""
 
     at: Callable[[np.ndarray], np.ndarray]
     error: float
     sums: Callable[[np.ndarray], np.ndarray] | None = None
-    """Quantities that forces are needed for up to phases in order, ``(k, n)``; None if there are none."""
+    """Quantities that forces are needed for up to phases in order, ``(k, n)``; None if there are
+    none."""
     alone: Callable[..., Any] | None = None
-    """Intervals by themselves (`colloc.motion.kinds.WithInertia.alone`); None: their errors are seen in the whole motion."""
+    """Intervals by themselves (`colloc.motion.kinds.WithInertia.alone`); None: their errors are
+    seen in the whole motion."""
 
 
-def course(control: ControlProblem, gait: Any, delta: float, mesh: Mesh, tolerance: float) -> CourseOfGait:
-    """The motion of a gait, delta per period, to a relative error of the objective, from what the states count
-    in it on a mesh; with inertia it is sought near the motion there."""
+def course(
+    control: ControlProblem, gait: Any, delta: float, mesh: Mesh, tolerance: float
+) -> CourseOfGait:
+    """The motion of a gait, delta per period, to a relative error of the objective, from what the
+    states count in it on a mesh; with inertia it is sought near the motion there."""
     period = _collocated(control, mesh, gait, delta).period
     counts = sum(map(abs, control.aims.objective.shares(period).values()))
     error = tolerance / counts if np.isfinite(counts) else tolerance
@@ -59,26 +65,40 @@ def course(control: ControlProblem, gait: Any, delta: float, mesh: Mesh, toleran
 
 
 @singledispatch
-def course_in(regime: Regime, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
+def course_in(
+    regime: Regime, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
+) -> CourseOfGait:
     """The same in a regime; that of another is registered with ``course_in.register``."""
-    raise NotImplementedError(f"no differential equation is known for {type(regime).__name__}: register one.")
+    raise NotImplementedError(
+        f"no differential equation is known for {type(regime).__name__}: register one."
+    )
 
 
 @course_in.register
-def _on_slope(regime: Slope, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
+def _on_slope(
+    regime: Slope, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
+) -> CourseOfGait:
     asked = [each for each in control.aims.integrals if each.needs_forces]
-    on = gait_on_slope(control.dynamics.body, control.dynamics.law, gait, delta, regime.grade, gait.corner_phases)
+    on = gait_on_slope(
+        control.dynamics.body, control.dynamics.law, gait, delta, regime.grade, gait.corner_phases
+    )
     ran = on.followed(np.array([gait.theta]), error)
     return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
 
 
 @course_in.register
-def _with_inertia(regime: Paced, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
+def _with_inertia(
+    regime: Paced, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
+) -> CourseOfGait:
     dynamics = control.dynamics
     at, regime = (dynamics.body, dynamics.law, gait, delta), regime.at(gait)
-    played = gait_with_inertia(*at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime)
+    played = gait_with_inertia(
+        *at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime
+    )
     kind: Any = kind_of_motion(dynamics)
-    begin, _, slopes = played.closed(kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0])
+    begin, _, slopes = played.closed(
+        kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0]
+    )
     times = 1.0 + np.abs(amplified(slopes)).sum(axis=1).max()
     ran = played.periodic_run(begin, max(error / times, LEAST), slopes)
     return CourseOfGait(ran.course.at, times * ran.aim, alone=kind.alone)
@@ -102,42 +122,73 @@ class _Collocated(NamedTuple):
 
 def _collocated(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> _Collocated:
     kind = kind_of_motion(control.dynamics)
-    own, weights = kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)), stage_weights(mesh)
-    pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA] - kind.turn, own.now.centre, first_theta(kind, own.begin))
+    own, weights = (
+        kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)),
+        stage_weights(mesh),
+    )
+    pose = CollocatedPose.on_mesh(
+        mesh, own.z[OMEGA] - kind.turn, own.now.centre, first_theta(kind, own.begin)
+    )
     now = kind.instants(_shapes(gait, mesh, delta), pose.theta_on(mesh), own.z)
     spent = (weights * own.now.power[mesh.points]).sum(axis=1)
-    summed = {each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1) for each in control.aims.integrals}
-    passed = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), float(spent.sum()), own.begin)
+    summed = {
+        each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1)
+        for each in control.aims.integrals
+    }
+    passed = Passed(
+        complex(pose.place[-1]), float(pose.rotations.sum()), float(spent.sum()), own.begin
+    )
     return _Collocated(own, pose, spent, summed, _period(kind, passed, summed))
 
 
 def _period(kind: Kind, passed: Passed, summed: dict[str, np.ndarray]) -> dict[str, float]:
-    return kind.counted(passed) | {name: kind.periods * float(part.sum()) for name, part in summed.items()}
+    return kind.counted(passed) | {
+        name: kind.periods * float(part.sum()) for name, part in summed.items()
+    }
 
 
-def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> dict[str, Any]:
+def course_defects(
+    control: ControlProblem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait
+) -> dict[str, Any]:
     """Errors of collocating a gait whose motion has states, delta per period, by the names of
-    `colloc.verification.mesh_error.MeshError`: of the work against friction, and none of velocities."""
+    `colloc.verification.mesh_error.MeshError`: of the work against friction, and none of
+    velocities."""
     kind, objective = kind_of_motion(control.dynamics), control.aims.objective
     own, pose, spent, summed, other = _collocated(control, mesh, gait, delta)
     at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
     true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), own.begin)
-    known, followed = {}, iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
+    known, followed = (
+        {},
+        iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1)),
+    )
     for each in control.aims.integrals:
-        known[each.name] = next(followed) if each.needs_forces else totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
+        known[each.name] = (
+            next(followed)
+            if each.needs_forces
+            else totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
+        )
     period = _period(kind, true, known)
     aims, value = objective.shares(period), np.zeros(mesh.n)
-    rotation, energy, displacement = pose.rotations - theta, spent - work, np.diff(pose.place) - (x + 1j * y)
+    rotation, energy, displacement = (
+        pose.rotations - theta,
+        spent - work,
+        np.diff(pose.place) - (x + 1j * y),
+    )
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     if exact.alone is not None:
         shapes = _shapes(gait, mesh, delta)
-        edge_states, near = (at[: len(kind.states)] for at in (at_edges, exact.at(mesh.times)))  # momenta, perhaps theta
+        # momenta, perhaps theta
+        edge_states, near = (at[: len(kind.states)] for at in (at_edges, exact.at(mesh.times)))
         out, ends, alone = exact.alone(mesh, shapes, own, edge_states[:, :-1], near)
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
-        here, spent_alone = np.exp(1j * angle[:-1]), (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
-        # an error of rotation turns everything after it, and by half of it the direction that counts
+        here, spent_alone = (
+            np.exp(1j * angle[:-1]),
+            (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1),
+        )
+        # an error of rotation turns everything after it, and by half of it the direction that
+        # counts
         rest = (place[0] - place[0][0]) + 1j * (place[1] - place[1][0])
         rotation, energy = local.rotations - theta, spent_alone - work
         displacement = here * local.displacements - (x + 1j * y)
@@ -150,7 +201,9 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
         value[~alone] = 1.0
     for name, share in kind.shares(true).items():
         turns = rotation if name == "rotation" else 0.0
-        value += aims.get(name, 0.0) * ((np.conj(share.side) * displacement).real + turns + share.work * energy)
+        value += aims.get(name, 0.0) * (
+            (np.conj(share.side) * displacement).real + turns + share.work * energy
+        )
     value += sum(aims[name] * kind.periods * (summed[name] - known[name]) for name in known)
     if not own.held.all():
         value = np.nan * value

@@ -1,21 +1,26 @@
-"""The balance at delta = 0, between bounds: power and velocities of a body under dry friction, without any regularisation.
+"""The balance at delta = 0, between bounds: power and velocities of a body under dry friction,
+without any regularisation.
 
-A law that is associated (equal coefficients, or the elliptic one) is minus the gradient of its dissipation D, a norm of the
-velocity at each point. At delta = 0 the balance is a cone program over the three rigid velocities z,
+A law that is associated (equal coefficients, or the elliptic one) is minus the gradient of its
+dissipation D, a norm of the velocity at each point. At delta = 0 the balance is a cone program over
+the three rigid velocities z,
 
     P = min over z of the integral of D(v(z)) over the body,
 
-and its dual asks for forces inside of the friction cones that balance. Both sides come from velocities that need not be exact:
+and its dual asks for forces inside of the friction cones that balance. Both sides come from
+velocities that need not be exact:
 
 - above, P <= D(z) for any z;
-- below, friction f at any velocity y and any delta > 0 lies inside of the cones. With G minus its net force (none in balance)
+- below, friction f at any velocity y and any delta > 0 lies inside of the cones. With G minus its
+  net force (none in balance)
 
       D(z) >= -f . v(z) = -f . v(y) + G . (z - y)     for all z.
 
-So every y states a half space with all minimisers in it, since there D is no more than the value above: velocities are known
-between bounds too. Cuts are made with G along the three velocities of the centre of mass, both ways. What a y lacks of its goal
-makes a cut weaker, never wrong: no status of a solver counts. Friction on lines is in closed form, so there is no quadrature.
-Where several motions are balanced at delta = 0, as on feet, the bounds hold them all.
+So every y states a half space with all minimisers in it, since there D is no more than the value
+above: velocities are known between bounds too. Cuts are made with G along the three velocities of
+the centre of mass, both ways. What a y lacks of its goal makes a cut weaker, never wrong: no status
+of a solver counts. Friction on lines is in closed form, so there is no quadrature. Where several
+motions are balanced at delta = 0, as on feet, the bounds hold them all.
 """
 
 from __future__ import annotations
@@ -30,11 +35,13 @@ from colloc.mechanics.law import Law, rate_independent
 from colloc.system.errors import ProblemError
 
 _SMOOTHED, _LEAST = 1e-8, 1e-17
-"""Of the largest rate: delta of the friction, and of the dissipation. What holds gives forces to 1e-16 over the first."""
+"""Of the largest rate: delta of the friction, and of the dissipation. What holds gives forces to
+1e-16 over the first."""
 _ROUNDING = 64 * float(np.finfo(float).eps)
 """Relative: closed forms are known to a few units."""
 _NEWTON, _ROUNDS, _CAP = 6, 4, 0.02
-"""Steps to a cut; rounds of all cuts, each with what the last one knew; the largest gradient, in units of the friction."""
+"""Steps to a cut; rounds of all cuts, each with what the last one knew; the largest gradient, in
+units of the friction."""
 _TOO_FAR = 0.1
 """Part of its goal that a gradient may miss; else the next goal is ten times nearer."""
 
@@ -49,13 +56,14 @@ class DryBalance(NamedTuple):
     z: np.ndarray
     """A tail velocity ``(3, n_time)`` that dissipates no more than `most`."""
     apart: np.ndarray
-    """``(3, n_time)``: how far from it any balanced motion is at most: velocity of the centre of mass in the body's axes, and
-    rotation rate. Infinite where nothing bounds it."""
+    """``(3, n_time)``: how far from it any balanced motion is at most: velocity of the centre of
+    mass in the body's axes, and rotation rate. Infinite where nothing bounds it."""
 
 
 class _Tangent(NamedTuple):
-    """Of a function that is no more than the dissipation, at velocities y ``(3, n_time)`` about the centre of mass: its value
-    with all that rounding may take off, its gradient, and the derivative of that."""
+    """Of a function that is no more than the dissipation, at velocities y ``(3, n_time)`` about the
+    centre of mass: its value with all that rounding may take off, its gradient, and the derivative
+    of that."""
 
     y: np.ndarray
     power: np.ndarray
@@ -65,12 +73,20 @@ class _Tangent(NamedTuple):
     def below(self, apart: np.ndarray) -> np.ndarray:
         """What the dissipation is no less than, wherever no velocity exceeds `apart`."""
         along = self.gradient * self.y
-        return self.power - along.sum(axis=0) - _sums(self.gradient, apart) - _ROUNDING * np.abs(along).sum(axis=0)
+        return (
+            self.power
+            - along.sum(axis=0)
+            - _sums(self.gradient, apart)
+            - _ROUNDING * np.abs(along).sum(axis=0)
+        )
 
     def where(self, better: np.ndarray, other: _Tangent) -> _Tangent:
         """The other one at some instants."""
         return _Tangent(
-            *(np.where(better.reshape(-1, 1, 1) if a.ndim == 3 else better, b, a) for a, b in zip(self, other, strict=True))
+            *(
+                np.where(better.reshape(-1, 1, 1) if a.ndim == 3 else better, b, a)
+                for a, b in zip(self, other, strict=True)
+            )
         )
 
 
@@ -81,7 +97,8 @@ def _sums(gradient: np.ndarray, apart: np.ndarray) -> np.ndarray:
 
 
 class _Body:
-    """Instants in units of their largest rate; velocities about the centre of mass, as seen from those of the tail `z`."""
+    """Instants in units of their largest rate; velocities about the centre of mass, as seen from
+    those of the tail `z`."""
 
     def __init__(self, body: Chain, law: Law, angles: np.ndarray, rates: np.ndarray) -> None:
         self.body, self.law, self.angles, self.rates = body, law, angles, rates
@@ -111,13 +128,15 @@ class _Body:
     def within(self, most: np.ndarray) -> np.ndarray:
         """How far apart two motions are that dissipate no more than `most` each, ``(3, n_time)``.
 
-        The difference of their velocities is that of a rigid body, whose mean speed is then at most b = 2 most / mu. The speed
-        of the centre of pressure is no more than b. Nor is the spin times the mean square distance from there over the largest.
+        The difference of their velocities is that of a rigid body, whose mean speed is then at most
+        b = 2 most / mu. The speed of the centre of pressure is no more than b. Nor is the spin
+        times the mean square distance from there over the largest.
         """
         contact = self.body.contact
         cos, sin, x, y = (of_links[contact.links] for of_links in self.posture)
         place = x + 1j * y + (contact.along + 1j * contact.offset) * (cos + 1j * sin)
-        pressed = (contact.weight * place).sum(axis=0)  # the centre of pressure; weights add up to 1
+        # the centre of pressure; weights add up to 1
+        pressed = (contact.weight * place).sum(axis=0)
         arm = np.abs(place - pressed)
         square = (contact.weight * (arm**2 + contact.length**2 / 12)).sum(axis=0)
         widest = (arm + contact.length / 2).max(axis=0)
@@ -133,7 +152,9 @@ class _Body:
         found, damping = begun, np.ones(goal.shape[1])
         for _ in range(_NEWTON):
             lift = 1e-14 * np.trace(found.slope, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-            step = np.linalg.solve(found.slope + lift, (goal - found.gradient).T[..., None])[..., 0].T
+            step = np.linalg.solve(found.slope + lift, (goal - found.gradient).T[..., None])[
+                ..., 0
+            ].T
             tried = self.tangent(z, found.y + damping * step)
             better = _missed(tried, goal) < _missed(found, goal)
             found, damping = found.where(better, tried), np.where(better, 1.0, 0.25 * damping)
@@ -145,30 +166,33 @@ def _missed(tangent: _Tangent, goal: np.ndarray) -> np.ndarray:
 
 
 def dry_balance(body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarray) -> DryBalance:
-    """Power and velocities of a chain at delta = 0, between bounds, for joint angles and rates ``(n_joint, n_time)``.
+    """Power and velocities of a chain at delta = 0, between bounds, for joint angles and rates
+    ``(n_joint, n_time)``.
 
-    Forces and velocities on parts of a body are evaluated to rounding, which is reckoned with as some units of each sum; this
-    is no interval arithmetic.
+    Forces and velocities on parts of a body are evaluated to rounding, which is reckoned with as
+    some units of each sum; this is no interval arithmetic.
 
     Raises
     ------
     ProblemError
-        If the law is not associated: then a balance does not minimise anything, and there is no such bound; or depends on the
-        speed.
+        If the law is not associated: then a balance does not minimise anything, and there is no
+        such bound; or depends on the speed.
 
     Examples
     --------
     >>> import colloc
     >>> import numpy as np
     >>> from colloc.verification.dry_balance import dry_balance
-    >>> found = dry_balance(colloc.Chain(), colloc.Friction(), np.array([[0.5], [0.2]]), np.array([[1.0], [0.0]]))
+    >>> found = dry_balance(colloc.Chain(), colloc.Friction(), np.array([[0.5], [0.2]]),
+    ...     np.array([[1.0], [0.0]]))
     >>> bool(0 <= found.most - found.least < 1e-12), bool(found.apart.max() < 1e-6)
     (True, True)
     """
     law, largest = body.law(friction), np.abs(rates).max(axis=0)
     if not (law.associated and rate_independent(law)):
         raise ProblemError(
-            f"{law.label} has no bounds for delta = 0: its balance is not the least of a dissipation. "
+            f"{law.label} has no bounds for delta = 0: its balance is not the least of a "
+            f"dissipation. "
             "Equal coefficients and the elliptic law have them."
         )
     speed = np.where(largest > 0, largest, 1.0)
@@ -185,7 +209,10 @@ def dry_balance(body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarra
     nearer = np.ones((3, 2, most.size))
     for _ in range(_ROUNDS):
         gap = np.maximum(most - least, _ROUNDING * most + np.finfo(float).tiny)
-        ease = np.abs(np.linalg.pinv(centre.slope, hermitian=True).diagonal(axis1=1, axis2=2)).T + np.finfo(float).tiny
+        ease = (
+            np.abs(np.linalg.pinv(centre.slope, hermitian=True).diagonal(axis1=1, axis2=2)).T
+            + np.finfo(float).tiny
+        )
         for k in range(3):
             widths = []
             for side, sign in enumerate((1.0, -1.0)):

@@ -1,8 +1,10 @@
-"""A period of a gait at delta = 0: distance, work and efficiency between bounds, by `colloc.verification.dry_balance`.
+"""A period of a gait at delta = 0: distance, work and efficiency between bounds, by
+`colloc.verification.dry_balance`.
 
-A replay at a small delta is corrected for how far dry friction is from it, instant by instant. At every instant of the replay
-the motion under dry friction is bounded, whatever it is. Between two instants it counts as at the worse of them, and the error
-of the replay's quadrature, as it estimates it, is added: these two are estimates, all else is bounds.
+A replay at a small delta is corrected for how far dry friction is from it, instant by instant. At
+every instant of the replay the motion under dry friction is bounded, whatever it is. Between two
+instants it counts as at the worse of them, and the error of the replay's quadrature, as it
+estimates it, is added: these two are estimates, all else is bounds.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ class DryFriction(NamedTuple):
     distance: Between
     work: Between
     open: float
-    """Part of the period at which velocities are not known to 1 % of the largest rate: several motions may be balanced."""
+    """Part of the period at which velocities are not known to 1 % of the largest rate: several
+    motions may be balanced."""
     instants: int
 
     @property
@@ -48,7 +51,9 @@ class DryFriction(NamedTuple):
 
     def __str__(self) -> str:
         least, most = self.efficiency
-        several = f"; the motion is open at {100 * self.open:.2g} % of the period" if self.open else ""
+        several = (
+            f"; the motion is open at {100 * self.open:.2g} % of the period" if self.open else ""
+        )
         return f"d/W between {least:.8f} and {most:.8f}, at {self.instants} instants{several}"
 
     def facts(self) -> dict:
@@ -73,7 +78,8 @@ def dry_friction(
     Raises
     ------
     ProblemError
-        For bodies that are no chains, and laws that have no bounds (`colloc.verification.dry_balance.dry_balance`).
+        For bodies that are no chains, and laws that have no bounds
+        (`colloc.verification.dry_balance.dry_balance`).
 
     Examples
     --------
@@ -84,11 +90,14 @@ def dry_friction(
     d/W between 0.260027
     """
     if not isinstance(body, Chain):
-        raise ProblemError(f"bounds for delta = 0 are there for a Chain, not for a {type(body).__name__}.")
+        raise ProblemError(
+            f"bounds for delta = 0 are there for a Chain, not for a {type(body).__name__}."
+        )
     law = body.law(friction)
     mean_rate = float(np.abs(path(np.linspace(0.0, 1.0, 101))[1]).max(axis=0).mean())
     delta = DRY * (mean_rate or 1.0)
-    dry_balance(body, friction, *(a[:, :1] for a in path(np.array([0.0]))))  # says first if there are no bounds
+    # says first if there are no bounds
+    dry_balance(body, friction, *(a[:, :1] for a in path(np.array([0.0]))))
     replayed = replay(body, friction, path, delta, breaks=breaks, tolerance=tolerance, turn=turn)
     t, z = replayed.tail
     angles, rates = path(t)
@@ -109,8 +118,13 @@ def dry_friction(
     work, error = replayed.work, replayed.errors["work"]
     largest = np.abs(rates).max(axis=0)
     return DryFriction(
-        distance=Between(max(replayed.distance - off_distance, 0.0), replayed.distance + off_distance),
-        work=Between(work - error - integral(power - found.least), work + error + integral(found.most - power)),
+        distance=Between(
+            max(replayed.distance - off_distance, 0.0), replayed.distance + off_distance
+        ),
+        work=Between(
+            work - error - integral(power - found.least),
+            work + error + integral(found.most - power),
+        ),
         open=float(step @ (found.apart.max(axis=0) > OPEN * largest)),
         instants=t.size,
     )

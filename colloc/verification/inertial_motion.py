@@ -1,11 +1,14 @@
-"""A gait played with inertia, period by period alike: by Adams' and Gear's methods, steps of their own, and shooting.
+"""A gait played with inertia, period by period alike: by Adams' and Gear's methods, steps of their
+own, and shooting.
 
-How fast a gait is played matters once the body's mass does. The Froude number Fr = L/(g T^2), length over gravity and the
-period squared, says how much: it is the mass times acceleration of a body that covers its length in a period, over its weight.
-It counts against the coefficient of friction. At Fr = 0 this is `colloc.verification.replay.replay`.
+How fast a gait is played matters once the body's mass does. The Froude number Fr = L/(g T^2),
+length over gravity and the period squared, says how much: it is the mass times acceleration of a
+body that covers its length in a period, over its weight. It counts against the coefficient of
+friction. At Fr = 0 this is `colloc.verification.replay.replay`.
 
-Nothing is shared with collocation but the forces. The momenta after a period are those before it; they are found by Newton's
-method on the map from one to the other, whose derivatives also say whether the motion is stable.
+Nothing is shared with collocation but the forces. The momenta after a period are those before it;
+they are found by Newton's method on the map from one to the other, whose derivatives also say
+whether the motion is stable.
 """
 
 from __future__ import annotations
@@ -36,14 +39,17 @@ from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.played import Numbers, Path, to_tolerance
 
 _ROUGH = 1e-4
-"""Error of the runs that say how the momenta at the end depend on those at the start, over the size of the momenta; less where
-friction is so dry that a step would err by more than a tenth of delta: then bodies that should rest are shaken to and fro."""
+"""Error of the runs that say how the momenta at the end depend on those at the start, over the size
+of the momenta; less where friction is so dry that a step would err by more than a tenth of delta:
+then bodies that should rest are shaken to and fro."""
 _APART = 1e-3
 """How far the runs of that start from each other."""
 _CLOSED = 10.0
-"""Gap between the momenta at start and end that is left open at most, over the error of a run: where steps close it no more."""
+"""Gap between the momenta at start and end that is left open at most, over the error of a run:
+where steps close it no more."""
 _USUAL = 0.125
-"""What the ends of two runs differ by, over the larger of the errors that were asked of their steps: at most, in 19 of 20."""
+"""What the ends of two runs differ by, over the larger of the errors that were asked of their
+steps: at most, in 19 of 20."""
 _MOST_PERIODS = 30
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
@@ -52,17 +58,20 @@ _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 class InertialMotion(Period):
     """A gait played with inertia, over one period of the motion in which all periods are alike.
 
-    The work is that against friction [weight x length]; errors are those of `GaitWithInertia.errors`.
+    The work is that against friction [weight x length]; errors are those of
+    `GaitWithInertia.errors`.
 
     Attributes
     ----------
     froude : float
         Froude number L/(g T^2).
     multipliers : (3,)
-        By what small changes of the momenta are multiplied in a period (Floquet multipliers); stable if all are within 1.
+        By what small changes of the momenta are multiplied in a period (Floquet multipliers);
+        stable if all are within 1.
     phases, states : (n,), (7, n)
-        Where the solver stepped, and Vx, Vy, H (`colloc.mechanics.inertia`), the tail link's orientation, the place of the
-        centre of mass, and the work up to there; orientation and place are seen from axes that turn evenly.
+        Where the solver stepped, and Vx, Vy, H (`colloc.mechanics.inertia`), the tail link's
+        orientation, the place of the centre of mass, and the work up to there; orientation and
+        place are seen from axes that turn evenly.
     """
 
     froude: float
@@ -112,23 +121,34 @@ class GaitWithInertia:
         theta: float = 0.0,
     ) -> None:
         self.body, self.friction, self.path, self.delta = body, friction, path, delta
-        self.froude, self.breaks, self.turn, self.regime, self.theta = froude, breaks, turn, regime, theta
+        self.froude, self.breaks, self.turn, self.regime, self.theta = (
+            froude,
+            breaks,
+            turn,
+            regime,
+            theta,
+        )
         self._rough = min(_ROUGH, 0.1 * delta / STEP)
         self._momenta_of = lru_cache(partial(MomentaAt, body, friction, delta, froude))
 
     def slow_momenta(self) -> np.ndarray:
-        """Those at the start of the period if the gait is played slowly on the level, ``(3,)``: where to begin."""
+        """Those at the start of the period if the gait is played slowly on the level, ``(3,)``:
+        where to begin."""
         angles, rates = self.path(np.full(1, ONE_SIDED))
-        return self.momenta(solve_balance(self.body, self.friction, angles, rates, self.delta).require().z)
+        return self.momenta(
+            solve_balance(self.body, self.friction, angles, rates, self.delta).require().z
+        )
 
     def momenta(self, z: np.ndarray) -> np.ndarray:
-        """Those at the start of the period, ``(3,)``, where the tail link has a velocity ``(3, 1)``."""
+        """Those at the start of the period, ``(3,)``, where the tail link has a velocity ``(3,
+        1)``."""
         angles, rates = self.path(np.full(1, ONE_SIDED))
         posture = self.body.posture(angles)
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
     def run(self, start: np.ndarray, aim: float) -> Course:
-        """`InertialMotion.states` through a period from a state ``(7,)``, or from momenta ``(3,)`` at the origin."""
+        """`InertialMotion.states` through a period from a state ``(7,)``, or from momenta ``(3,)``
+        at the origin."""
         return self._run(np.append(start, [self.theta, 0.0, 0.0, 0.0][start.size - 3 :])[None], aim)
 
     def _run(self, begin: np.ndarray, aim: float) -> Course:
@@ -140,15 +160,19 @@ class GaitWithInertia:
         return followed(slope, begin.ravel(), aim, self.breaks)
 
     def mapped(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States before and after a period ``(7, 2)``, and derivatives of the latter with respect to the momenta before it,
-        ``(7, 3)``, by differences."""
+        """States before and after a period ``(7, 2)``, and derivatives of the latter with respect
+        to the momenta before it, ``(7, 3)``, by differences."""
         begin = np.zeros((4, 7))
-        begin[:, _MOMENTA], begin[:, _THETA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)]), self.theta
+        begin[:, _MOMENTA], begin[:, _THETA] = (
+            start + np.vstack([np.zeros(3), _APART * np.eye(3)]),
+            self.theta,
+        )
         end = self._run(begin, self._rough).states[:, -1].reshape(begin.shape)
         return np.stack([begin[0], end[0]], axis=1), (end[1:] - end[0]).T / _APART
 
     def closed(self, near: np.ndarray) -> Closed:
-        """A period near some momenta that leaves them as they are, but for the error of rough runs."""
+        """A period near some momenta that leaves them as they are, but for the error of rough
+        runs."""
         start = near
         for _ in range(_MOST_PERIODS):
             ends, slopes = self.mapped(start)
@@ -157,12 +181,13 @@ class GaitWithInertia:
             if np.abs(step).max() < _CLOSED * self._rough:
                 return Closed(start, ends, slopes)
         raise NotConvergedError(
-            f"at a Froude number of {self.froude:g} no motion was found in which all periods are alike; try a smaller one."
+            f"at a Froude number of {self.froude:g} no motion was found in which all periods are "
+            f"alike; try a smaller one."
         )
 
     def closed_from(self, near: np.ndarray | None) -> Closed:
-        """`closed` near some momenta; where they are not given or lead nowhere, near the slow ones, or near none: a body that
-        friction hardly brakes keeps what it begins with at rest."""
+        """`closed` near some momenta; where they are not given or lead nowhere, near the slow ones,
+        or near none: a body that friction hardly brakes keeps what it begins with at rest."""
         for begin in (lambda: near, self.slow_momenta):
             with suppress(NotConvergedError):
                 if (momenta := begin()) is not None:
@@ -170,7 +195,8 @@ class GaitWithInertia:
         return self.closed(np.zeros(3))
 
     def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
-        """A period that leaves the momenta as they are, to an error, sought near those of `closed`, with its derivatives."""
+        """A period that leaves the momenta as they are, to an error, sought near those of `closed`,
+        with its derivatives."""
         start, before = near, np.inf
         for _ in range(_MOST_PERIODS):
             ran = self.run(start, aim)
@@ -180,33 +206,46 @@ class GaitWithInertia:
             if size < aim or (before <= size and np.abs(gap).max() < _CLOSED * aim):
                 return PeriodicRun(ran, start, aim)
             before = size
-        raise NotConvergedError(f"at a Froude number of {self.froude:g} the periods do not become alike; try a smaller one.")
+        raise NotConvergedError(
+            f"at a Froude number of {self.froude:g} the periods do not become alike; try a "
+            f"smaller one."
+        )
 
     def errors(self, ran: PeriodicRun, before: PeriodicRun, slopes: np.ndarray) -> Numbers:
         """How wrong `passed` of a run may be, seen from one whose steps might err more.
 
-        From a start s a run ends at F(s) + e, F being the exact map of a period, and e what its steps err by. The true motion
-        starts where the momenta are those at the end, s* = F(s*); so
+        From a start s a run ends at F(s) + e, F being the exact map of a period, and e what its
+        steps err by. The true motion starts where the momenta are those at the end, s* = F(s*); so
 
             s* - s = (I - M)^-1 (gap - e),
 
-        M being the derivatives of the momenta, and gap what is left open. Errors of momenta are multiplied many times where
-        friction brakes little, and so carried with the body through all the period. Of e a bound is the difference of the ends
-        of both runs, had they had one start; but it is the aim at least, as differences vanish now and then.
+        M being the derivatives of the momenta, and gap what is left open. Errors of momenta are
+        multiplied many times where friction brakes little, and so carried with the body through all
+        the period. Of e a bound is the difference of the ends of both runs, had they had one start;
+        but it is the aim at least, as differences vanish now and then.
         """
         (first, last), (other, end) = (each.ends.T for each in (ran, before))
         steps = np.maximum(np.abs(end - last - slopes @ (other - first)[_MOMENTA]), ran.aim)
         return self.changes(ran.ends, slopes, steps, np.abs(last - first)[_MOMENTA])
 
-    def changes(self, ends: np.ndarray, slopes: np.ndarray, steps: np.ndarray, gap: np.ndarray) -> Numbers:
-        """Of `passed` between states ``(7, 2)``, where those at the end err by `steps` ``(7,)``, and momenta do not close by a
-        gap ``(3,)``."""
+    def changes(
+        self, ends: np.ndarray, slopes: np.ndarray, steps: np.ndarray, gap: np.ndarray
+    ) -> Numbers:
+        """Of `passed` between states ``(7, 2)``, where those at the end err by `steps` ``(7,)``,
+        and momenta do not close by a gap ``(3,)``."""
         off = np.column_stack([np.diag(steps), amplified(slopes) * (steps[_MOMENTA] + gap)])
-        numbers, changed = self.passed(ends), [self.passed(np.column_stack([ends[:, 0], ends[:, 1] + each])) for each in off.T]
-        return {name: sum(abs(each[name] - value) for each in changed) for name, value in numbers.items()}
+        numbers, changed = (
+            self.passed(ends),
+            [self.passed(np.column_stack([ends[:, 0], ends[:, 1] + each])) for each in off.T],
+        )
+        return {
+            name: sum(abs(each[name] - value) for each in changed)
+            for name, value in numbers.items()
+        }
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
-        """What `colloc.motion.compiled_momenta` says of a phase and n momenta, with the weight's pull, ``(n, 9)``."""
+        """What `colloc.motion.compiled_momenta` says of a phase and n momenta, with the weight's
+        pull, ``(n, 9)``."""
         angles, rates = self.path(np.array([t]))
         now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
         if self.regime.slides:
@@ -218,16 +257,25 @@ class GaitWithInertia:
         """Of `InertialMotion.states` ``(n, 7)`` at a phase."""
         now, rates = self._at(t, states), np.empty(states.shape)
         moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
-        rates[:, _MOMENTA], rates[:, _THETA], rates[:, _WORK] = now[:, 6:], now[:, 2] - self.turn, now[:, 5]
+        rates[:, _MOMENTA], rates[:, _THETA], rates[:, _WORK] = (
+            now[:, 6:],
+            now[:, 2] - self.turn,
+            now[:, 5],
+        )
         rates[:, 4], rates[:, 5] = moved.real, moved.imag
         return rates
 
     def passed(self, states: np.ndarray) -> dict[str, float]:
-        """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the last."""
+        """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the
+        last."""
         gone = states[:, -1] - states[:, 0]
         way = self.regime.counted(complex(*gone[_PLACE]))
         work = float(gone[_WORK] + self.regime.grade * gone[_PLACE][0])
-        return {"distance": chord_per_way(self.turn) * way.real, "work": work, "rotation": float(gone[_THETA]) + self.turn}
+        return {
+            "distance": chord_per_way(self.turn) * way.real,
+            "work": work,
+            "rotation": float(gone[_THETA]) + self.turn,
+        }
 
 
 class Closed(NamedTuple):
@@ -246,8 +294,8 @@ class PeriodicRun(NamedTuple):
 
     course: Course
     momenta: np.ndarray
-    """At the start of one that would close the gap that is left, ``(3,)``: where a body glides far they are much further away
-    than the gap is wide."""
+    """At the start of one that would close the gap that is left, ``(3,)``: where a body glides far
+    they are much further away than the gap is wide."""
     aim: float
 
     @property
@@ -257,7 +305,8 @@ class PeriodicRun(NamedTuple):
 
 
 def amplified(slopes: np.ndarray) -> np.ndarray:
-    """Derivatives ``(7, 3)`` of the states at the end of a period with respect to what every period adds to the momenta."""
+    """Derivatives ``(7, 3)`` of the states at the end of a period with respect to what every period
+    adds to the momenta."""
     return np.asarray(np.linalg.solve(np.eye(3) - slopes[_MOMENTA].T, slopes.T).T)
 
 
@@ -280,7 +329,13 @@ def gait_with_inertia(
     """A gait of a body, or a `ProblemError` that says why it cannot be played with inertia."""
     (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
     theta = float(getattr(gait, "theta", None) or 0.0)
-    how: Any = {"froude": float(froude), "breaks": at, "turn": turn, "regime": regime, "theta": theta}
+    how: Any = {
+        "froude": float(froude),
+        "breaks": at,
+        "turn": turn,
+        "regime": regime,
+        "theta": theta,
+    }
     return GaitWithInertia(chain, friction, joints, delta, **how)
 
 
@@ -299,7 +354,8 @@ def inertial_motion(
     regime: Regime = LEVEL,
     near: np.ndarray | None = None,
 ) -> InertialMotion:
-    """Play a gait with inertia, once the body has settled to a motion in which all periods are alike.
+    """Play a gait with inertia, once the body has settled to a motion in which all periods are
+    alike.
 
     Parameters
     ----------
@@ -307,26 +363,31 @@ def inertial_motion(
         With the masses of its links.
     friction : Law
     gait : callable
-        Joint angles and rates at phases in [0, 1]; any gait of colloc. Its pace within the period counts.
+        Joint angles and rates at phases in [0, 1]; any gait of colloc. Its pace within the period
+        counts.
     delta : float
         Regularisation speed, per period.
     froude : float
-        Froude number L/(g T^2), above 0: 0.0255 for a body of 1 m in 2 s. What counts is its ratio to the friction coefficient.
+        Froude number L/(g T^2), above 0: 0.0255 for a body of 1 m in 2 s. What counts is its ratio
+        to the friction coefficient.
     tolerance : float
         Relative error of the objective.
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
     objective : Objective
-        Of distance, work, rotation, period [sqrt(length / gravity)] and what shapes and their rates sum up to.
+        Of distance, work, rotation, period [sqrt(length / gravity)] and what shapes and their rates
+        sum up to.
     turn : float
-        Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that turns by as much.
+        Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that
+        turns by as much.
     quantities : iterable of Quantity or str
         What shapes and their rates sum up to and is asked for besides.
     regime : Regime
-        On a slope `problem.regime`, or `colloc.gaits.sloped.Slope`: the gait says where it points, distance and work are as
-        of `colloc.slope_motion`.
+        On a slope `problem.regime`, or `colloc.gaits.sloped.Slope`: the gait says where it points,
+        distance and work are as of `colloc.slope_motion`.
     near : (3,), optional
-        Momenta at phase 0 to begin with, as those of another delta; then as if the gait were played slowly, or else at rest.
+        Momenta at phase 0 to begin with, as those of another delta; then as if the gait were played
+        slowly, or else at rest.
 
     Raises
     ------
@@ -339,12 +400,15 @@ def inertial_motion(
     --------
     >>> import colloc
     >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-    >>> played = colloc.inertial_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-2, froude=0.1, tolerance=1e-3)
+    >>> played = colloc.inertial_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-2,
+    ...     froude=0.1, tolerance=1e-3)
     >>> round(played.efficiency, 3), played.stable
     (0.136, True)
     """
     check_finite(positive=True, froude=froude, delta=delta)
-    played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime)
+    played = gait_with_inertia(
+        body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime
+    )
     start, ends, slopes = played.closed_from(near)
     totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
     period = {"period": float(froude) ** -0.5}
@@ -359,9 +423,13 @@ def inertial_motion(
     usual = played.changes(ends, slopes, np.full(7, _USUAL * tolerance), np.zeros(3))
     lost = objective.relative_error(played.passed(ends) | period | totals[0], usual)
     first = tolerance / max(1.0, lost / tolerance)
-    ran, values, errors = to_tolerance(run, first, objective, tolerance, totals, partial(played.errors, slopes=slopes))
+    ran, values, errors = to_tolerance(
+        run, first, objective, tolerance, totals, partial(played.errors, slopes=slopes)
+    )
     multipliers, course = np.linalg.eigvals(slopes[_MOMENTA]), ran.course
-    return InertialMotion(values, errors, {}, froude, multipliers, phases=course.phases, states=course.states)
+    return InertialMotion(
+        values, errors, {}, froude, multipliers, phases=course.phases, states=course.states
+    )
 
 
 class FromRest(NamedTuple):
@@ -388,7 +456,8 @@ def motion_from_rest(
     grade: float = 0.0,
     theta: float = 0.0,
 ) -> FromRest:
-    """Play a gait from rest: how a body with inertia comes to the motion in which all periods are alike, or glides downhill.
+    """Play a gait from rest: how a body with inertia comes to the motion in which all periods are
+    alike, or glides downhill.
 
     Its momenta are zero at first, while its joints already turn at the gait's rates.
 
@@ -401,8 +470,9 @@ def motion_from_rest(
     tolerance : float
         About the error of the states after a period.
     grade : float
-        Tangent of the inclination of a slope. There gravity, in the Froude number too, is that which presses the body on the
-        ground, and +x is straight uphill; friction need not hold the body.
+        Tangent of the inclination of a slope. There gravity, in the Froude number too, is that
+        which presses the body on the ground, and +x is straight uphill; friction need not hold the
+        body.
     theta : float
         Angle of the tail link from +x at first [rad].
 
@@ -417,7 +487,8 @@ def motion_from_rest(
     --------
     >>> import colloc
     >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-    >>> begun = colloc.motion_from_rest(colloc.Chain(), colloc.Friction(), gait, delta=1e-2, froude=0.1, periods=2)
+    >>> begun = colloc.motion_from_rest(colloc.Chain(), colloc.Friction(), gait, delta=1e-2,
+    ...     froude=0.1, periods=2)
     >>> begun.periods[:, 0].round(3)
     array([0.12 , 0.146])
     """
@@ -425,7 +496,9 @@ def motion_from_rest(
     check_count(MOST_PERIODS, periods=periods)
     check_finite(grade=grade, theta=theta)
     regime = Slope(float(grade)) if grade else LEVEL
-    played = gait_with_inertia(body, friction, gait, delta, froude=froude, breaks=breaks, regime=regime)
+    played = gait_with_inertia(
+        body, friction, gait, delta, froude=froude, breaks=breaks, regime=regime
+    )
     courses: list[tuple[np.ndarray, np.ndarray]] = []
     passed, start = [], np.zeros(7)
     start[_THETA] = theta

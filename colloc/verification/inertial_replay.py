@@ -1,6 +1,7 @@
 """A replay with inertia: what a certificate asks of a gait that is played at some pace.
 
-What a body comes to that sets out from rest is looked at, too: if it is another motion, the gait has several.
+What a body comes to that sets out from rest is looked at, too: if it is another motion, the gait
+has several.
 """
 
 from __future__ import annotations
@@ -40,11 +41,12 @@ def inertial_replay(
     near: Replay | None = None,
     **_: object,
 ) -> Replay:
-    """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`; the
-    regime says its pace. Of a gait replayed `near` another, as at another delta, one motion is looked for where that had one.
+    """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of
+    `colloc.verification.replay.replay`; the regime says its pace. Of a gait replayed `near`
+    another, as at another delta, one motion is looked for where that had one.
 
-    Of the result the residual is the change of the momenta in a period; the work of the joints is that against friction and
-    what the body gains in kinetic energy.
+    Of the result the residual is the change of the momenta in a period; the work of the joints is
+    that against friction and what the body gains in kinetic energy.
     """
     settings: Any = {"breaks": breaks, "turn": turn, "regime": regime}
     played = gait_with_inertia(body, friction, gait, delta, froude=regime.froude, **settings)

@@ -1,9 +1,10 @@
 """When the velocities of a gait have kinks: instants at which a point of a link comes to rest.
 
-The friction on a point of the body has the direction of its velocity, and turns around when that passes through zero. So
-a link on which some point is at rest, or nearly, makes the balance change quickly: like x log|x| when it slides on with
-its centre of rotation inside, like |x| when it comes to rest as a whole. Where mu_f and mu_b differ, the force also has a
-kink whenever the tangential velocity changes its sign. And where a balance ends in a fold, the body jumps to another one.
+The friction on a point of the body has the direction of its velocity, and turns around when that
+passes through zero. So a link on which some point is at rest, or nearly, makes the balance change
+quickly: like x log|x| when it slides on with its centre of rotation inside, like |x| when it comes
+to rest as a whole. Where mu_f and mu_b differ, the force also has a kink whenever the tangential
+velocity changes its sign. And where a balance ends in a fold, the body jumps to another one.
 """
 
 from __future__ import annotations
@@ -21,9 +22,12 @@ _ZOOMS, _SAMPLES = 5, 9
 _SEPARATE = 1e-6
 
 
-def kink_phases(body: Body, friction: Law, path: Path, delta: float, fine: FineMotion) -> np.ndarray:
-    """Phases of kinks and jumps inside the solved part of a gait, ascending, to 1e-3 of the spacing of the panels of its motion
-    there, which are narrow where velocities change quickly; delta is per period."""
+def kink_phases(
+    body: Body, friction: Law, path: Path, delta: float, fine: FineMotion
+) -> np.ndarray:
+    """Phases of kinks and jumps inside the solved part of a gait, ascending, to 1e-3 of the spacing
+    of the panels of its motion there, which are narrow where velocities change quickly; delta is
+    per period."""
     t, velocity = fine.nodes.ravel(), fine.rates.z.reshape(3, -1)
     speed = _slowness(body, friction, path, delta, t, velocity)
     inner = speed[:, 1:-1]
@@ -46,6 +50,8 @@ def kink_phases(body: Body, friction: Law, path: Path, delta: float, fine: FineM
     return found[np.concatenate([[True], np.diff(found) > _SEPARATE])] if found.size else found
 
 
-def _slowness(body: Body, friction: Law, path: Path, delta: float, t: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _slowness(
+    body: Body, friction: Law, path: Path, delta: float, t: np.ndarray, z: np.ndarray
+) -> np.ndarray:
     """What has to vanish for a kink, ``(n_part, n_time)``."""
     return body.slowness(friction, *path(t), delta, z)

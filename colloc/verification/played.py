@@ -1,4 +1,5 @@
-"""What is played, a path through shapes in time, and what a period of it comes to, by whatever method."""
+"""What is played, a path through shapes in time, and what a period of it comes to, by whatever
+method."""
 
 from __future__ import annotations
 
@@ -25,23 +26,28 @@ LEAST = 1e-12
 
 @dataclass(frozen=True)
 class Replay(Period):
-    """A gait replayed over one period: the quantities of a `Period`, and what tells how far they can be trusted.
+    """A gait replayed over one period: the quantities of a `Period`, and what tells how far they
+    can be trusted.
 
-    The distance is that of the centre of mass, by `colloc.gaits.period` where a turn is asked for. Errors are what halving the
-    panels would change, summed as magnitudes, and the residual. Of laws with equal coefficients there are no other motions.
+    The distance is that of the centre of mass, by `colloc.gaits.period` where a turn is asked for.
+    Errors are what halving the panels would change, summed as magnitudes, and the residual. Of laws
+    with equal coefficients there are no other motions.
 
     Attributes
     ----------
     lever : float
         Largest distance of a point of the body from its centre of mass [body lengths].
     actuator_work : float
-        Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
+        Work of the joints, from the moments of the friction forces about them; equals `work` in
+        balance.
     residual : float
-        Largest force or torque left over, at any instant, in units of the largest friction coefficient.
+        Largest force or torque left over, at any instant, in units of the largest friction
+        coefficient.
     error : float
         Relative error of the objective, for the same reasons.
     several : float
-        Part of the period at which several motions are balanced; 0 for equal coefficients, where there is one.
+        Part of the period at which several motions are balanced; 0 for equal coefficients, where
+        there is one.
     shares : (n_share,)
         Largest shares of the actuators' limits; none unless limits were given.
     instants : int
@@ -69,10 +75,14 @@ class Replay(Period):
 
     def __repr__(self) -> str:
         value = f"{self.objective.short} = {self.value:.6g} +- {self.error * abs(self.value):.0e}"
-        return f"<Replay at {self.instants} instants: {value}, d = {self.distance:.6g}, W = {self.work:.6g}>"
+        return (
+            f"<Replay at {self.instants} instants: {value}, d = {self.distance:.6g}, W = "
+            f"{self.work:.6g}>"
+        )
 
     def tail_velocity(self, t: np.ndarray) -> np.ndarray:
-        """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""
+        """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a
+        solve from."""
         known, z = self.tail
         return np.stack([np.interp(t, known, row, period=1.0) for row in z])
 
@@ -88,7 +98,8 @@ class Replay(Period):
 
     @property
     def turning(self) -> float:
-        """How much the distance depends on the point of the body that is followed, relative: rotation times lever over it."""
+        """How much the distance depends on the point of the body that is followed, relative:
+        rotation times lever over it."""
         return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
 
 
@@ -100,27 +111,34 @@ def to_tolerance(
     known: tuple[Numbers, Numbers],
     errors_of: Callable[[Ran, Ran], Numbers] | None = None,
 ) -> tuple[Ran, Numbers, Numbers]:
-    """A differential equation solved with ever smaller errors a step, until these change an objective by less than a relative
-    error: what ran last, the numbers of its period, and their errors.
+    """A differential equation solved with ever smaller errors a step, until these change an
+    objective by less than a relative error: what ran last, the numbers of its period, and their
+    errors.
 
-    `run` takes an error, `first` to begin with, and gives what ran and its numbers; `known` are other numbers, and their
-    errors; `errors_of` says how wrong numbers of what ran may be, seen from what ran with ten times the error. By default that
-    is what they differ by, but half of the error that was asked for at least: differences vanish now and then.
-    `NotConvergedError` if rounding hides the accuracy that is asked for.
+    `run` takes an error, `first` to begin with, and gives what ran and its numbers; `known` are
+    other numbers, and their errors; `errors_of` says how wrong numbers of what ran may be, seen
+    from what ran with ten times the error. By default that is what they differ by, but half of the
+    error that was asked for at least: differences vanish now and then. `NotConvergedError` if
+    rounding hides the accuracy that is asked for.
     """
     aim, before = max(first, LEAST / _TENTH), None
     while aim > 0.5 * LEAST:
         ran, now = run(aim)
         if before is not None:
             if errors_of is None:
-                errors = {name: max(abs(value - before[1][name]), 0.5 * aim) for name, value in now.items()}
+                errors = {
+                    name: max(abs(value - before[1][name]), 0.5 * aim)
+                    for name, value in now.items()
+                }
             else:
                 errors = dict.fromkeys(now, 0.0) | errors_of(ran, before[0])
             errors |= known[1]
             if not objective.relative_error(now | known[0], errors) > tolerance:
                 return ran, now | known[0], errors
         aim, before = _TENTH * aim, (ran, now)
-    raise NotConvergedError(f"the motion cannot be replayed to a relative error of {tolerance:.0e}.")
+    raise NotConvergedError(
+        f"the motion cannot be replayed to a relative error of {tolerance:.0e}."
+    )
 
 
 def lever(body: Body, angles: np.ndarray) -> np.ndarray:

@@ -17,8 +17,8 @@ from colloc.verification.replay import replay
 
 @singledispatch
 def replayer(regime: Regime) -> Callable[..., Replay]:
-    """Replays a gait, with the arguments of `colloc.verification.replay.replay`; for another regime it is registered with
-    ``replayer.register``."""
+    """Replays a gait, with the arguments of `colloc.verification.replay.replay`; for another regime
+    it is registered with ``replayer.register``."""
     return replay
 
 
@@ -34,7 +34,9 @@ def _with_inertia(regime: Paced) -> Callable[..., Replay]:
     return partial(_at_pace, regime)
 
 
-def _at_pace(regime: Paced, body: Body, friction: Law, path: Any, delta: float, **asked: Any) -> Replay:
+def _at_pace(
+    regime: Paced, body: Body, friction: Law, path: Any, delta: float, **asked: Any
+) -> Replay:
     from colloc.verification.inertial_replay import inertial_replay
 
     return inertial_replay(body, friction, path, delta, regime=regime.at(path), **asked)

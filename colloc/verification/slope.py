@@ -1,14 +1,16 @@
-r"""A gait on a slope: the heading becomes an unknown of its own, because the weight pulls down the slope while the body turns.
+r"""A gait on a slope: the heading becomes an unknown of its own, because the weight pulls down the
+slope while the body turns.
 
-On a plane whose inclination has the tangent g, the *grade*, a body presses on the ground with a force of 1 and its weight pulls
-it down along the fall line with g. With theta the angle of the tail link from straight uphill, the pull in the body's axes is
-``-g e^(-i theta)``, and the balance at an instant gives velocities that depend on theta:
+On a plane whose inclination has the tangent g, the *grade*, a body presses on the ground with a
+force of 1 and its weight pulls it down along the fall line with g. With theta the angle of the tail
+link from straight uphill, the pull in the body's axes is ``-g e^(-i theta)``, and the balance at an
+instant gives velocities that depend on theta:
 
     d theta/dt = omega(q, q', theta),      d x/dt = e^(i theta) c(q, q', theta),
 
-c being the velocity of the centre of mass in the body's axes, and x its place in the plane, its real part uphill. On the level
-theta is a sum; here this is an ordinary differential equation, and is solved as one. The joints work against friction and lift
-the body,
+c being the velocity of the centre of mass in the body's axes, and x its place in the plane, its
+real part uphill. On the level theta is a sum; here this is an ordinary differential equation, and
+is solved as one. The joints work against friction and lift the body,
 
     work of the joints = work against friction + g climb,
 
@@ -38,7 +40,8 @@ from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion
 from colloc.verification.played import Path
 
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
-"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
+"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed
+less exactly."""
 _OMEGA = 2
 _LOOSER = 30.0
 _PANELS = 40
@@ -57,22 +60,26 @@ class SlopeMotion:
     course : float
         Direction in which the gait goes on the level, from that of the tail link at phase 0 [rad].
     headings : (n_period + 1,)
-        At the start of every period and the end of the last: the direction in which the gait would go from there on the level,
-        from straight uphill, positive to the left [rad].
+        At the start of every period and the end of the last: the direction in which the gait would
+        go from there on the level, from straight uphill, positive to the left [rad].
     climb, aside : (n_period,)
-        Way of the centre of mass up the fall line, and to the left of it [body lengths along the slope].
+        Way of the centre of mass up the fall line, and to the left of it [body lengths along the
+        slope].
     friction_work, joint_work : (n_period,)
         Work against friction, and of the joints by their moments [pressing force x body length].
     steering : (n_period,)
-        Derivative of the heading at the end of a period with respect to that at its start; always positive.
+        Derivative of the heading at the end of a period with respect to that at its start; always
+        positive.
     error : float
-        Of headings, ways and works at the end: how much they change where steps are allowed 30 times the error.
+        Of headings, ways and works at the end: how much they change where steps are allowed 30
+        times the error.
     several : float
-        Part of the time at which several motions are balanced, by the solver's steps; 0 for laws that leave one. One of them is
-        followed, and no error says what the others would change.
+        Part of the time at which several motions are balanced, by the solver's steps; 0 for laws
+        that leave one. One of them is followed, and no error says what the others would change.
     phases, states : (n,), (6, n)
-        Where the solver stepped, counted from the first start, and its unknowns: theta, way up and aside, work against
-        friction and of the joints, logarithm of the steering, all but theta from the first start.
+        Where the solver stepped, counted from the first start, and its unknowns: theta, way up and
+        aside, work against friction and of the joints, logarithm of the steering, all but theta
+        from the first start.
     """
 
     grade: float
@@ -89,9 +96,14 @@ class SlopeMotion:
     states: np.ndarray
 
     def __repr__(self) -> str:
-        count = f"{self.climb.size} period{'s' * (self.climb.size > 1)} on a grade of {self.grade:g}"
+        count = (
+            f"{self.climb.size} period{'s' * (self.climb.size > 1)} on a grade of {self.grade:g}"
+        )
         ends = f"heading {self.headings[0]:.4f} -> {self.headings[-1]:.4f}"
-        return f"<SlopeMotion of {count}: climb {self.climb.sum():.6g}, work of the joints {self.joint_work.sum():.6g}, {ends}>"
+        return (
+            f"<SlopeMotion of {count}: climb {self.climb.sum():.6g}, work of the joints "
+            f"{self.joint_work.sum():.6g}, {ends}>"
+        )
 
     @property
     def turn(self) -> float:
@@ -117,16 +129,31 @@ class GaitOnSlope(NamedTuple):
     def course(self, tolerance: float) -> float:
         """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
         edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), self.breaks)
-        way = fine_motion(self.body, self.friction, self.path, self.delta, edges, tolerance, lambda period: _OF_WAY).path[-1]
+        way = fine_motion(
+            self.body,
+            self.friction,
+            self.path,
+            self.delta,
+            edges,
+            tolerance,
+            lambda period: _OF_WAY,
+        ).path[-1]
         return float(np.angle(way)) if abs(way) > tolerance else 0.0
 
     def followed(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
-        """The unknowns ``(6,)`` through a period, from those at its begin, of which theta is the first; no step is longer than
-        `longest`."""
-        return followed(self._rates, np.append(begin, np.zeros(6 - begin.size)), tolerance * _UNKNOWNS, self.breaks, longest)
+        """The unknowns ``(6,)`` through a period, from those at its begin, of which theta is the
+        first; no step is longer than `longest`."""
+        return followed(
+            self._rates,
+            np.append(begin, np.zeros(6 - begin.size)),
+            tolerance * _UNKNOWNS,
+            self.breaks,
+            longest,
+        )
 
     def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
-        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the steps of the solver."""
+        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the steps of
+        the solver."""
         if not quantities:
             return np.empty((0, ends.size))
         edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
@@ -138,16 +165,23 @@ class GaitOnSlope(NamedTuple):
         return upto[:, np.searchsorted(edges, ends)]
 
     def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
-        """Part of the time at which several motions are balanced, from phases and orientations there, ``(n,)``."""
+        """Part of the time at which several motions are balanced, from phases and orientations
+        there, ``(n,)``."""
         if self.friction.associated:
             return 0.0
         angles, rates = self.path(phases % 1.0)
-        at, load = (self.body, self.friction, angles, rates, self.delta), self.slope.pull(theta[None])
+        at, load = (
+            (self.body, self.friction, angles, rates, self.delta),
+            self.slope.pull(theta[None]),
+        )
         several = all_balanced_velocities(*at, load).number > 1
         return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
 
-    def run(self, course: float, heading: float, periods: int, tolerance: float, longest: float = np.inf) -> SlopeMotion:
-        """The motion through periods from a heading, without its error; no step is longer than `longest`."""
+    def run(
+        self, course: float, heading: float, periods: int, tolerance: float, longest: float = np.inf
+    ) -> SlopeMotion:
+        """The motion through periods from a heading, without its error; no step is longer than
+        `longest`."""
         ends, phases, states = [np.append(heading - course, np.zeros(5))], [], []
         for period in range(periods):
             t, through, _ = self.followed(ends[-1], tolerance, longest)
@@ -158,34 +192,68 @@ class GaitOnSlope(NamedTuple):
         climb, aside, friction_work, joint_work, steering = np.diff(sums)
         ways = climb, aside, friction_work, joint_work
         unknown = np.concatenate(phases), np.concatenate(states, axis=1)
-        return SlopeMotion(self.slope.grade, course, theta + course, *ways, np.exp(steering), np.nan, np.nan, *unknown)
+        return SlopeMotion(
+            self.slope.grade,
+            course,
+            theta + course,
+            *ways,
+            np.exp(steering),
+            np.nan,
+            np.nan,
+            *unknown,
+        )
 
-    def _rates(self, t: float, state: np.ndarray, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next balance may start."""
+    def _rates(
+        self, t: float, state: np.ndarray, near: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next
+        balance may start."""
         shapes, theta = (*self.path(np.array([t])), self.delta), state[0]
-        solved, now, _, on_theta = balance_on_slope(self.body, self.friction, self.slope, shapes, np.array([theta]), start=near)
+        solved, now, _, on_theta = balance_on_slope(
+            self.body, self.friction, self.slope, shapes, np.array([theta]), start=near
+        )
         if not solved.converged.all():
             raise NotConvergedError(
-                f"no balance at phase {t:.4f} on a slope of grade {self.slope.grade:g} (residual {solved.residual[0]:.1e}): "
-                "friction may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
+                f"no balance at phase {t:.4f} on a slope of grade {self.slope.grade:g} (residual "
+                f"{solved.residual[0]:.1e}): "
+                "friction may be too weak to hold the body in that direction, so that it slides "
+                "down; try a gentler slope."
             )
         moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
-        unknowns = now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], on_theta[_OMEGA, 0]
+        unknowns = (
+            now.z[_OMEGA, 0],
+            moved.real,
+            moved.imag,
+            now.power[0],
+            now.actuator_power[0],
+            on_theta[_OMEGA, 0],
+        )
         return np.array(unknowns), solved.z
 
     def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
-        """What formulas see at phases, from the orientations there ``(n,)``, and what balance leaves over, ``(n,)``."""
-        at, load = (self.body, self.friction, *self.path(phases), self.delta), self.slope.pull(theta[None])
+        """What formulas see at phases, from the orientations there ``(n,)``, and what balance
+        leaves over, ``(n,)``."""
+        at, load = (
+            (self.body, self.friction, *self.path(phases), self.delta),
+            self.slope.pull(theta[None]),
+        )
         solved = solve_balance(*at, load=load)
         return Instants(*at, z=solved.z, load=load), solved.residual
 
 
 def gait_on_slope(
-    body: Body, friction: Law, gait: Path, delta: float, grade: float, breaks: np.ndarray | tuple[float, ...]
+    body: Body,
+    friction: Law,
+    gait: Path,
+    delta: float,
+    grade: float,
+    breaks: np.ndarray | tuple[float, ...],
 ) -> GaitOnSlope:
     """A gait of a body on a slope, or a `ProblemError` that says why it cannot be there."""
     chain = checked_chain(body, friction, grade)
-    return GaitOnSlope(chain, friction, gait, delta, tuple(sorted(float(t) for t in breaks)), Slope(float(grade)))
+    return GaitOnSlope(
+        chain, friction, gait, delta, tuple(sorted(float(t) for t in breaks)), Slope(float(grade))
+    )
 
 
 def slope_motion(
@@ -207,8 +275,8 @@ def slope_motion(
     ----------
     body : Chain
     friction : Law
-        Coefficients are in units of the force that presses the body on the slope, its weight times the cosine of the
-        inclination; so are all forces and works.
+        Coefficients are in units of the force that presses the body on the slope, its weight times
+        the cosine of the inclination; so are all forces and works.
     gait : callable
         Joint angles and rates at phases in [0, 1]; any gait of colloc.
     delta : float
@@ -216,14 +284,16 @@ def slope_motion(
     grade : float
         Tangent of the inclination, from 0.
     heading : float, optional
-        At the start: the direction in which the gait would go on the level, from straight uphill, positive to the left [rad].
-        Of a gait that goes nowhere on the level, the direction of its tail link at phase 0. By default 0, or of a solution's
-        gait for a slope its own.
+        At the start: the direction in which the gait would go on the level, from straight uphill,
+        positive to the left [rad]. Of a gait that goes nowhere on the level, the direction of its
+        tail link at phase 0. By default 0, or of a solution's gait for a slope its own.
     theta : float, optional
-        The same by the direction of the tail link at phase 0 from straight uphill; instead of a heading.
+        The same by the direction of the tail link at phase 0 from straight uphill; instead of a
+        heading.
     periods : int
     tolerance : float
-        Of headings, ways and works over a period, about; what is left is stated (`SlopeMotion.error`).
+        Of headings, ways and works over a period, about; what is left is stated
+        (`SlopeMotion.error`).
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
 
@@ -232,7 +302,8 @@ def slope_motion(
     ProblemError
         For a body that is no chain, or a slope that is steeper than friction can hold.
     NotConvergedError
-        If no balance is found at some instant: unequal coefficients may hold the body in one direction and not in another.
+        If no balance is found at some instant: unequal coefficients may hold the body in one
+        direction and not in another.
 
     Examples
     --------
@@ -241,7 +312,8 @@ def slope_motion(
     >>> import colloc
     >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
     >>> for grade in (0.0, 0.05, 0.1):
-    ...     ran = colloc.slope_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-4, grade=grade)
+    ...     ran = colloc.slope_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-4,
+    ...         grade=grade)
     ...     print(ran.climb.round(3), ran.joint_work.round(3))
     [0.268] [1.03]
     [0.181] [1.041]
@@ -257,4 +329,8 @@ def slope_motion(
     heading = (heading or 0.0) if theta is None else theta + course
     loose = on.run(course, heading, periods, _LOOSER * tolerance).states[:5, -1]
     ran = on.run(course, heading, periods, tolerance)
-    return replace(ran, error=float(np.abs(ran.states[:5, -1] - loose).max()), several=on.several(ran.phases, ran.states[0]))
+    return replace(
+        ran,
+        error=float(np.abs(ran.states[:5, -1] - loose).max()),
+        several=on.several(ran.phases, ran.states[0]),
+    )

@@ -1,8 +1,10 @@
-"""Independent replay of a gait on a slope: the differential equation of its heading, by Adams' method with steps of its own.
+"""Independent replay of a gait on a slope: the differential equation of its heading, by Adams'
+method with steps of its own.
 
-It shares nothing with collocation but the law of friction (`colloc.verification.slope`). The equation is solved with
-ever smaller errors a step until the last tenth of them changes the objective by less than is allowed. The work of the joints is
-taken from work against friction and the climb, and beside it from the moments in the joints.
+It shares nothing with collocation but the law of friction (`colloc.verification.slope`). The
+equation is solved with ever smaller errors a step until the last tenth of them changes the
+objective by less than is allowed. The work of the joints is taken from work against friction and
+the climb, and beside it from the moments in the joints.
 """
 
 from __future__ import annotations
@@ -15,7 +17,14 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import LENGTH, PathLimit, PathLimits, Quantity, limits_of, quantities_of
+from colloc.mechanics.densities import (
+    LENGTH,
+    PathLimit,
+    PathLimits,
+    Quantity,
+    limits_of,
+    quantities_of,
+)
 from colloc.mechanics.law import Law
 from colloc.motion.follow import Course
 from colloc.verification.adaptive_motion import whole_totals
@@ -43,26 +52,39 @@ def slope_replay(
     limits: Iterable[PathLimit] | PathLimits = (),
     **_: object,
 ) -> Replay:
-    """A period of a gait that says where it points, on a slope: arguments as of `colloc.verification.replay.replay`.
+    """A period of a gait that says where it points, on a slope: arguments as of
+    `colloc.verification.replay.replay`.
 
-    Of the result the distance is the way in the direction that counts, the work that of the joints; what other balanced motions
-    would change is not known, only for which part of the time there are any. `NotConvergedError` if no balance is found at some
-    instant, or rounding hides the accuracy that is asked for.
+    Of the result the distance is the way in the direction that counts, the work that of the joints;
+    what other balanced motions would change is not known, only for which part of the time there are
+    any. `NotConvergedError` if no balance is found at some instant, or rounding hides the accuracy
+    that is asked for.
     """
     asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
     followed = tuple(each for each in asked if each.needs_forces)
-    on, limits = gait_on_slope(body, friction, gait, delta, slope.grade, breaks), limits_of(limits, body.n_joint)
+    on, limits = (
+        gait_on_slope(body, friction, gait, delta, slope.grade, breaks),
+        limits_of(limits, body.n_joint),
+    )
     totals = whole_totals([each for each in asked if not each.needs_forces], gait)
 
     def run(aim: float) -> tuple[tuple[Course, float], dict[str, float]]:
         ran = on.followed(np.array([gait.theta]), aim, _LONGEST / instants)
         theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
         way = slope.counted(complex(climb, aside))
-        found = {"distance": way.real, "work": float(spent + slope.grade * climb), "rotation": float(theta)}
+        found = {
+            "distance": way.real,
+            "work": float(spent + slope.grade * climb),
+            "rotation": float(theta),
+        }
         sums = on.totals(ran, followed, np.ones(1))[:, 0].tolist()
-        return (ran, way.imag), found | {each.name: total for each, total in zip(followed, sums, strict=True)}
+        return (ran, way.imag), found | {
+            each.name: total for each, total in zip(followed, sums, strict=True)
+        }
 
-    (ran, across), values, errors = to_tolerance(run, _FIRST * tolerance, objective, tolerance, totals)
+    (ran, across), values, errors = to_tolerance(
+        run, _FIRST * tolerance, objective, tolerance, totals
+    )
     now, residual = on.instants(ran.phases % 1.0, ran.states[0])
     done = limits.at(now) if limits.names else np.empty((0, ran.phases.size))
     return Replay(

@@ -1,17 +1,19 @@
-"""A gait as joint angles over time for a machine: a period in seconds, and joint speeds it can follow.
+"""A gait as joint angles over time for a machine: a period in seconds, and joint speeds it can
+follow.
 
-Dry friction does not know how fast a path is run through, so distance and work per period do not depend on pacing (up to
-the influence of delta). With phase t in [0, 1] and time tau in seconds, pacing is ``d tau/dt = p(t)``; joint j then moves
-at ``|dq_j/dt| / p``. Speed limits v_j ask for ``p >= s(t) = max_j |dq_j/dt| / v_j``, and the least change of an even pace
-that takes T seconds is
+Dry friction does not know how fast a path is run through, so distance and work per period do not
+depend on pacing (up to the influence of delta). With phase t in [0, 1] and time tau in seconds,
+pacing is ``d tau/dt = p(t)``; joint j then moves at ``|dq_j/dt| / p``. Speed limits v_j ask for ``p
+>= s(t) = max_j |dq_j/dt| / v_j``, and the least change of an even pace that takes T seconds is
 
     p(t) = max(level, s(t)),   level such that  int p dt = T;
 
 T = int s dt, with level = 0, is the fastest: some joint is at its limit all the time.
 
-A machine comes to it from rest (`approach`): over a period the gait grows out of the straight body, ``a(t) q(t)``,
-where a rises from 0 to 1 and is flat at both ends, so that joints begin at rest and enter the period with its angles and
-speeds. No joint bends farther than the gait bends it. Where a joint would be too fast, the clock slows down.
+A machine comes to it from rest (`approach`): over a period the gait grows out of the straight body,
+``a(t) q(t)``, where a rises from 0 to 1 and is flat at both ends, so that joints begin at rest and
+enter the period with its angles and speeds. No joint bends farther than the gait bends it. Where a
+joint would be too fast, the clock slows down.
 """
 
 from __future__ import annotations
@@ -65,7 +67,8 @@ def timed(
     rate : float
         Samples a second.
     period : float, optional
-        Seconds, rounded up to a whole number of samples; by default the shortest that the limits allow.
+        Seconds, rounded up to a whole number of samples; by default the shortest that the limits
+        allow.
     limits : (n_joint,) or float, optional
         Largest joint speeds [rad/s].
     keep_pace : bool
@@ -74,12 +77,17 @@ def timed(
     Raises
     ------
     ProblemError
-        If neither a period nor limits are given, a number is unusable, or the period is too short for the limits.
+        If neither a period nor limits are given, a number is unusable, or the period is too short
+        for the limits.
     """
     if not np.isfinite(rate) or rate <= 0:
         raise ProblemError(f"the sample rate must be positive, not {rate:g}.")
     vertices, _ = path(_PHASES)
-    most = np.full(len(vertices), np.inf) if limits is None else one_each(limits, len(vertices), "joint speed limit")
+    most = (
+        np.full(len(vertices), np.inf)
+        if limits is None
+        else one_each(limits, len(vertices), "joint speed limit")
+    )
     slowest = _slowest(vertices, most, keep_pace)
     shortest = float(slowest.mean())
     if period is None and limits is None:
@@ -90,12 +98,14 @@ def timed(
     if wanted < shortest * (1 - 1e-9):
         kept = " at the gait's own pace, which matters here" if keep_pace else ""
         raise ProblemError(
-            f"a period of {wanted:g} s is too short for the joint speed limits{kept}; use at least {shortest:.6g} s."
+            f"a period of {wanted:g} s is too short for the joint speed limits{kept}; use at least "
+            f"{shortest:.6g} s."
         )
     count = int(np.ceil(wanted * rate - 1e-9))
     if not 4 <= count <= MOST_SAMPLES:
         raise ProblemError(
-            f"{count:g} samples a period are too {'few' if count < 4 else 'many'}; change the rate or the period."
+            f"{count:g} samples a period are too {'few' if count < 4 else 'many'}; change the rate "
+            f"or the period."
         )
     period = count / rate
     pace = np.maximum(_level(slowest, period), slowest)
@@ -119,7 +129,8 @@ class Approach(NamedTuple):
 
 
 def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approach:
-    """The way of joints from 0, at rest, into a trajectory, no faster than limits ``(n_joint,)`` [rad/s] that this keeps.
+    """The way of joints from 0, at rest, into a trajectory, no faster than limits ``(n_joint,)``
+    [rad/s] that this keeps.
 
     Examples
     --------
@@ -131,7 +142,9 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    closed = (np.append(rows, rows[:, :1], axis=1) for rows in (trajectory.angles, trajectory.speeds))
+    closed = (
+        np.append(rows, rows[:, :1], axis=1) for rows in (trajectory.angles, trajectory.speeds)
+    )
     cycle = CubicHermiteSpline(np.append(trajectory.time, trajectory.period), *closed, axis=1)
     share = np.linspace(0.0, 1.0, _APPROACH + 1)
     grown = share**3 * (10.0 + share * (6.0 * share - 15.0))
@@ -143,13 +156,16 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
     clock = np.append(0.0, np.cumsum(pace)) * step
     time = np.arange(-int(np.ceil(clock[-1] * rate - 1e-9)), 0) / rate
     at = time + clock[-1]
-    bent, turning = (np.array([np.interp(at, clock, row) for row in rows]) for rows in (angles, speeds))
+    bent, turning = (
+        np.array([np.interp(at, clock, row) for row in rows]) for rows in (angles, speeds)
+    )
     side = np.clip(np.searchsorted(clock, at, side="right") - 1, 0, pace.size - 1)
     return Approach(time, bent, np.clip(turning / pace[side], -limits[:, None], limits[:, None]))
 
 
 def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) -> float:
-    """Seconds that a path takes at least with joint speeds ``(n_joint,)`` [rad/s], at its own pace or at any.
+    """Seconds that a path takes at least with joint speeds ``(n_joint,)`` [rad/s], at its own pace
+    or at any.
 
     Examples
     --------
@@ -161,31 +177,37 @@ def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) 
 
 
 def _slowest(vertices: np.ndarray, limits: np.ndarray, keep_pace: bool) -> np.ndarray:
-    """Seconds per phase that speed limits ask for, on every side of a path as a polygon, ``(n - 1,)``: it is off by less than
-    1e-6 rad, and limits hold exactly between the samples too."""
+    """Seconds per phase that speed limits ask for, on every side of a path as a polygon, ``(n -
+    1,)``: it is off by less than 1e-6 rad, and limits hold exactly between the samples too."""
     slowest = (np.abs(np.diff(vertices, axis=1)) * (_PHASES.size - 1) / limits[:, None]).max(axis=0)
     return np.full_like(slowest, slowest.max()) if keep_pace else slowest
 
 
 def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: str) -> np.ndarray:
-    """Limits that are positive numbers, ``(n_joint,)``, from one for all or one each; `what` one of them is."""
+    """Limits that are positive numbers, ``(n_joint,)``, from one for all or one each; `what` one of
+    them is."""
     try:
         given = np.asarray(limits, dtype=float).ravel()
     except (TypeError, ValueError):
         raise ProblemError(f"{what}s must be numbers, not {shown(limits)}.") from None
     if given.size not in (1, n_joint):
-        raise ProblemError(f"{given.size} {what}s for {n_joint} joints; give one for all, or one each.")
+        raise ProblemError(
+            f"{given.size} {what}s for {n_joint} joints; give one for all, or one each."
+        )
     if not np.isfinite(given).all() or given.min() <= 0:
         raise ProblemError(f"{what}s must be positive, not {given.tolist()}.")
     return np.broadcast_to(given, n_joint)
 
 
 def _level(slowest: np.ndarray, period: float) -> float:
-    """The even pace that lower bounds are raised to so that the mean of the larger of both is `period`."""
+    """The even pace that lower bounds are raised to so that the mean of the larger of both is
+    `period`."""
 
     from scipy.optimize import brentq
 
     def excess(level: float) -> float:
         return float(np.maximum(level, slowest).mean()) - period
 
-    return 0.0 if excess(0.0) >= 0 else float(brentq(excess, 0.0, 2 * period, xtol=1e-14, rtol=1e-14))
+    return (
+        0.0 if excess(0.0) >= 0 else float(brentq(excess, 0.0, 2 * period, xtol=1e-14, rtol=1e-14))
+    )

@@ -1,9 +1,11 @@
-r"""A guaranteed upper bound for a three-link body under associated friction: certificates for whole cells (docs/bound.md).
+r"""A guaranteed upper bound for a three-link body under associated friction: certificates for whole
+cells (docs/bound.md).
 
-Cells are boxes of (angle 1, angle 2, s) with rates (1, s), |s| <= 1; the symmetries give the rest, or the same cells of the
-body turned end for end. Over a cell, gain and power
-of the balanced motion differ from what interpolates their values at the corners by at most what `guarantee.enclosure` and
-`guarantee.potential_range` say, so their ratio is largest at a corner. Cells that fail are split in eight.
+Cells are boxes of (angle 1, angle 2, s) with rates (1, s), |s| <= 1; the symmetries give the rest,
+or the same cells of the body turned end for end. Over a cell, gain and power
+of the balanced motion differ from what interpolates their values at the corners by at most what
+`guarantee.enclosure` and `guarantee.potential_range` say, so their ratio is largest at a corner.
+Cells that fail are split in eight.
 """
 
 from __future__ import annotations
@@ -24,21 +26,33 @@ from colloc.mechanics.contact import crossing_sums
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.system.processors import available_threads
-from research.guarantee.enclosure import CORNERS, WIDER, Allowance, Cells, by_convexity, by_loads, corner_motions, least_power
+from research.guarantee.enclosure import (
+    CORNERS,
+    WIDER,
+    Allowance,
+    Cells,
+    by_convexity,
+    by_loads,
+    corner_motions,
+    least_power,
+)
 from research.guarantee.potential_range import PotentialRange
 
 _CHUNK = 8000
 _FIRST = 0.07
 """Largest side of the first cells: larger ones are never closed."""
 _LAYERS = (1e-9, 1e-6, 1e-4, 1e-3, 4e-3, 8.75e-3, 0.0175, 0.035)
-"""Rates of angle 2 between 0 and the first cells' size. Where one joint turns alone two links rest, and slide with the other
-joint however slowly it turns. The motion there is homogeneous: what a cell may not know of it is in proportion to its speed."""
+"""Rates of angle 2 between 0 and the first cells' size. Where one joint turns alone two links rest,
+and slide with the other joint however slowly it turns. The motion there is homogeneous: what a cell
+may not know of it is in proportion to its speed."""
 _THIN = 0.5
-"""Size in s over that in the angles below which s is not halved: so slow a joint moves all in proportion."""
+"""Size in s over that in the angles below which s is not halved: so slow a joint moves all in
+proportion."""
 _LEAST = 1e-6
 """Share of the power at a corner that has to be left for it to be known to 1e-9 with rounding."""
 _LOAD = 4.0
-"""Times the root of the cell's size: 1/multiplier of the loads. It balances what they move with what interpolation loses."""
+"""Times the root of the cell's size: 1/multiplier of the loads. It balances what they move with
+what interpolation loses."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +83,8 @@ class Guarantee:
 
 @dataclass(frozen=True, eq=False)
 class _Lattice:
-    """Points between given edges, each interval of an axis halved so many times; cells are named by integers."""
+    """Points between given edges, each interval of an axis halved so many times; cells are named by
+    integers."""
 
     edges: tuple[np.ndarray, ...]
     levels: tuple[int, int, int]
@@ -89,37 +104,54 @@ class _Lattice:
         """The cells of some names ``(3, n)``."""
         low, size = self.box(index)
         corner = (index[:, :, None] + CORNERS.T[:, None, :]).reshape(3, -1)
-        extent = [(edges.size << level) + 1 for edges, level in zip(self.edges, self.levels, strict=True)]
+        extent = [
+            (edges.size << level) + 1 for edges, level in zip(self.edges, self.levels, strict=True)
+        ]
         code = (corner[0] * extent[1] + corner[1]) * extent[2] + corner[2]
         _, first, back = np.unique(code, return_index=True, return_inverse=True)
         points = np.stack([self.coordinate(axis, corner[axis, first]) for axis in range(3)])
         return Cells(low, size, points, back.reshape(-1, 8))
 
-    def halved(self, index: np.ndarray, parents: np.ndarray) -> list[tuple[_Lattice, np.ndarray, np.ndarray]]:
-        """Lattices with parts of some cells, and what is known of each; cells that are thin in s are halved in angles only."""
+    def halved(
+        self, index: np.ndarray, parents: np.ndarray
+    ) -> list[tuple[_Lattice, np.ndarray, np.ndarray]]:
+        """Lattices with parts of some cells, and what is known of each; cells that are thin in s
+        are halved in angles only."""
         size, found = self.box(index)[1], []
         thin = size[2] < _THIN * size[:2].min(axis=0)
         for cells, cut in ((thin, np.array([1, 1, 0])), (~thin, np.ones(3, dtype=int))):
             parts = CORNERS[(cut >= CORNERS).all(axis=1)].T
-            halves = ((1 + cut)[:, None, None] * index[:, cells, None] + parts[:, None, :]).reshape(3, -1)
+            halves = ((1 + cut)[:, None, None] * index[:, cells, None] + parts[:, None, :]).reshape(
+                3, -1
+            )
             levels = tuple((np.array(self.levels) + cut).tolist())
-            found.append((_Lattice(self.edges, levels), halves, np.repeat(parents[cells], parts.shape[1])))
+            found.append(
+                (_Lattice(self.edges, levels), halves, np.repeat(parents[cells], parts.shape[1]))
+            )
         return found
 
 
-def cell_bounds(body: Chain, friction: Friction, potential: PotentialRange, cells: Cells, goal: float) -> np.ndarray:
-    """Upper bounds of gain over power in the cells, ``(n,)``, under associated friction, mu_t = 1; infinite if unknown.
+def cell_bounds(
+    body: Chain, friction: Friction, potential: PotentialRange, cells: Cells, goal: float
+) -> np.ndarray:
+    """Upper bounds of gain over power in the cells, ``(n,)``, under associated friction, mu_t = 1;
+    infinite if unknown.
 
     Loads are tried where convexity alone does not bring the bound below `goal`.
     """
     motions = corner_motions(body, friction, cells)
-    gain, power = potential.corner_gain(cells, motions)[cells.at], least_power(body, friction, cells, motions)[cells.at]
+    gain, power = (
+        potential.corner_gain(cells, motions)[cells.at],
+        least_power(body, friction, cells, motions)[cells.at],
+    )
     beyond, reference = potential.trial_error(cells, motions), potential.reference(cells)
 
     def largest(chosen: np.ndarray, allowed: Allowance) -> np.ndarray:
         below = power[chosen] - allowed.power[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
-            value = WIDER * ((gain[chosen] + (beyond[chosen] + allowed.gain)[:, None]) / below).max(axis=1)
+            value = WIDER * ((gain[chosen] + (beyond[chosen] + allowed.gain)[:, None]) / below).max(
+                axis=1
+            )
         # the rounding of what is left is as small as that of a sum only if much is left
         return np.where((below > _LEAST * power[chosen]).all(axis=1) & (value >= 0), value, np.inf)
 
@@ -136,30 +168,46 @@ def cell_bounds(body: Chain, friction: Friction, potential: PotentialRange, cell
 
 
 def _uncrossed(body: Chain, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Mask of boxes of angles ``(2, n)``, none of which holds both signs of an angle, that may hold a shape without crossing.
+    """Mask of boxes of angles ``(2, n)``, none of which holds both signs of an angle, that may hold
+    a shape without crossing.
 
-    Links cross where two sums exceed pi (`colloc.mechanics.contact`). The first rises with angle 2, and with angle 1 it rises,
-    or rises and then falls: over a box of positive angles it is least at a corner. So is the second.
+    Links cross where two sums exceed pi (`colloc.mechanics.contact`). The first rises with angle 2,
+    and with angle 1 it rises, or rises and then falls: over a box of positive angles it is least at
+    a corner. So is the second.
     """
     low, high = np.where(low.sum(axis=0) < 0, (-high, -low), (low, high))
-    near, turned = (crossing_sums(body, np.stack(each), 0) for each in ((low[0], low[1]), (high[0], low[1])))
+    near, turned = (
+        crossing_sums(body, np.stack(each), 0) for each in ((low[0], low[1]), (high[0], low[1]))
+    )
     other = crossing_sums(body, np.stack([low[0], high[1]]), 0)
-    crossed = (np.minimum(near[0], turned[0]) > np.pi + 1e-9) & (np.minimum(near[1], other[1]) > np.pi + 1e-9)
+    crossed = (np.minimum(near[0], turned[0]) > np.pi + 1e-9) & (
+        np.minimum(near[1], other[1]) > np.pi + 1e-9
+    )
     return ~(crossed[0] & (low >= 0.0).all(axis=0))
 
 
 def _first_edges(knots: np.ndarray, reversible: bool) -> tuple[np.ndarray, ...]:
     """Of angle 1, of angle 2 and of s: with all knots, and no interval longer than `_FIRST`.
 
-    Mirror image and reversal in time together change the signs of the angles and not of their rates.
+    Mirror image and reversal in time together change the signs of the angles and not of their
+    rates.
     """
     knots = np.unique(np.concatenate([knots, [0.0]]))
     counts = np.ceil(np.diff(knots) / _FIRST).astype(int)
-    edges = np.concatenate([np.linspace(a, b, m, endpoint=False) for a, b, m in zip(knots, knots[1:], counts, strict=False)])
+    edges = np.concatenate(
+        [
+            np.linspace(a, b, m, endpoint=False)
+            for a, b, m in zip(knots, knots[1:], counts, strict=False)
+        ]
+    )
     edges = np.append(edges, knots[-1])
     thin = np.array(_LAYERS)
     rates = np.concatenate([thin, np.linspace(_FIRST, 1.0, int(np.ceil(1.0 / _FIRST)))])
-    return edges[edges >= 0.0] if reversible else edges, edges, np.concatenate([-rates[::-1], [0.0], rates])
+    return (
+        edges[edges >= 0.0] if reversible else edges,
+        edges,
+        np.concatenate([-rates[::-1], [0.0], rates]),
+    )
 
 
 def certify(
@@ -172,12 +220,14 @@ def certify(
     deepest: int = 12,
     part: tuple[int, int] = (1, 1),
 ) -> Guarantee:
-    """Prove that no gait of a three-link body exceeds `target`, or as low a value as the time allows.
+    """Prove that no gait of a three-link body exceeds `target`, or as low a value as the time
+    allows.
 
     Parameters
     ----------
     domain : Domain
-        Three links, and associated friction: equal coefficients, or `colloc.laws.elliptic.Elliptic`.
+        Three links, and associated friction: equal coefficients, or
+        `colloc.laws.elliptic.Elliptic`.
     space, free
         The potential, as `colloc.bounds.sampled.Bound` or a kept one has it.
     target : float
@@ -186,8 +236,8 @@ def certify(
     deepest : int
         Number of times a cell may be halved.
     part : (int, int)
-        (k, n): the k-th of n parts of the first cells, so that several processes, or several runs, may share them. What is
-        guaranteed is the largest value of all parts.
+        (k, n): the k-th of n parts of the first cells, so that several processes, or several runs,
+        may share them. What is guaranteed is the largest value of all parts.
 
     Raises
     ------
@@ -196,10 +246,18 @@ def certify(
     """
     body, friction = domain.body, domain.friction
     odd = not friction.reversible or all(k % 2 for k in space.harmonics)
-    if not friction.associated or body.n_link != 3 or body.weights or body.feet or not (odd and 1 in space.harmonics):
+    if (
+        not friction.associated
+        or body.n_link != 3
+        or body.weights
+        or body.feet
+        or not (odd and 1 in space.harmonics)
+    ):
         raise ProblemError(
-            "a bound is guaranteed only for three links without feet or weights of their own, associated friction (equal "
-            "coefficients, or the elliptic law), and harmonics from 1 on, odd ones where mu_b = mu_f; otherwise the sampled "
+            "a bound is guaranteed only for three links without feet or weights of their own, "
+            "associated friction (equal "
+            "coefficients, or the elliptic law), and harmonics from 1 on, odd ones where mu_b = "
+            "mu_f; otherwise the sampled "
             "value stands."
         )
     begin, unit = time.process_time(), friction.in_units_of(friction.mu_t)
@@ -208,18 +266,28 @@ def certify(
         views.append((Chain(body.lengths[::-1]), space.turned(free)))
     left, examined, deepened = [np.empty(0)], 0, 0
     for view, potential in views:
-        cover = _Cover(view, unit, PotentialRange(space, potential), target * friction.mu_t, begin + seconds, deepest)
+        cover = _Cover(
+            view,
+            unit,
+            PotentialRange(space, potential),
+            target * friction.mu_t,
+            begin + seconds,
+            deepest,
+        )
         values, count, level = cover.closed(part)
         left.append(values)
         examined, deepened = examined + count, max(deepened, level)
     still = np.concatenate(left)
     worst = float(still.max(initial=0.0)) / friction.mu_t
-    return Guarantee(max(target, worst), target, int(still.size), examined, deepened, time.process_time() - begin)
+    return Guarantee(
+        max(target, worst), target, int(still.size), examined, deepened, time.process_time() - begin
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Cover:
-    """Cells of one view of a body, under friction of mu_t = 1, and what they have to prove until when [processor time]."""
+    """Cells of one view of a body, under friction of mu_t = 1, and what they have to prove until
+    when [processor time]."""
 
     body: Chain
     friction: Friction
@@ -229,9 +297,12 @@ class _Cover:
     deepest: int
 
     def closed(self, part: tuple[int, int]) -> tuple[np.ndarray, int, int]:
-        """What is known of the cells that stay open, the number of cells examined, and how often they were halved."""
+        """What is known of the cells that stay open, the number of cells examined, and how often
+        they were halved."""
         edges = _first_edges(self.potential.spline.knots, self.friction.reversible)
-        index = np.stack([a.ravel() for a in np.meshgrid(*(np.arange(e.size - 1) for e in edges), indexing="ij")])
+        index = np.stack(
+            [a.ravel() for a in np.meshgrid(*(np.arange(e.size - 1) for e in edges), indexing="ij")]
+        )
         index = np.array_split(index, part[1], axis=1)[part[0] - 1]
         work = deque([(_Lattice(edges, (0, 0, 0)), index, np.full(index.shape[1], np.inf))])
         left, examined, level = [np.empty(0)], 0, 0
@@ -242,7 +313,9 @@ class _Cover:
                 kept = _uncrossed(self.body, low[:2], low[:2] + size[:2])
                 index, values, level = index[:, kept], values[kept], lattice.levels[0]
 
-                def bounds(first: int, lattice: _Lattice = lattice, index: np.ndarray = index) -> np.ndarray | None:
+                def bounds(
+                    first: int, lattice: _Lattice = lattice, index: np.ndarray = index
+                ) -> np.ndarray | None:
                     if time.process_time() > self.end:
                         return None
                     cells = lattice.cells(index[:, first : first + _CHUNK])
@@ -251,7 +324,9 @@ class _Cover:
                 starts = range(0, index.shape[1], _CHUNK)
                 for first, found in zip(starts, pool.map(bounds, starts), strict=True):
                     if found is not None:
-                        values[first : first + _CHUNK] = np.fmin(values[first : first + _CHUNK], found)
+                        values[first : first + _CHUNK] = np.fmin(
+                            values[first : first + _CHUNK], found
+                        )
                         examined += found.size
                 still = ~(values <= self.goal)
                 if level == self.deepest or time.process_time() > self.end:
@@ -262,6 +337,11 @@ class _Cover:
 
 
 def with_guarantee(bound: Bound, certificate: Guarantee) -> Bound:
-    """The bound together with what was proved; what is still missing is named if cells were left open."""
-    missing = "" if certificate.open_cells == 0 else f"{certificate.open_cells} of {certificate.cells} cells left open"
+    """The bound together with what was proved; what is still missing is named if cells were left
+    open."""
+    missing = (
+        ""
+        if certificate.open_cells == 0
+        else f"{certificate.open_cells} of {certificate.cells} cells left open"
+    )
     return dataclasses.replace(bound, guaranteed=certificate.guaranteed, missing=missing)

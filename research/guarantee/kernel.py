@@ -1,6 +1,7 @@
 """The guarantee's own C and C++ (folder `native`), compiled for the process, and calls.
 
-The C finds motions, in floating point, with the library's headers. The C++ says what they prove, in interval arithmetic.
+The C finds motions, in floating point, with the library's headers. The C++ says what they prove, in
+interval arithmetic.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ _PROOFS = {
 
 
 def guarantee_kernel(body: Links) -> ctypes.CDLL | None:
-    """The compiled functions, or None without a compiler, or where NumPy has to do. `StoreError` if the compiler fails."""
+    """The compiled functions, or None without a compiler, or where NumPy has to do. `StoreError` if
+    the compiler fails."""
     return None if c_compiler() is None or native_kernel.native_kernel(body) is None else _library()
 
 
@@ -45,13 +47,22 @@ def proofs() -> ctypes.CDLL:
 
 def proof_flags() -> list[str]:
     """The same for C++."""
-    return ["-std=c++17", "-fno-exceptions", "-fno-rtti", *(flag for flag in FLAGS if "-std" not in flag)]
+    return [
+        "-std=c++17",
+        "-fno-exceptions",
+        "-fno-rtti",
+        *(flag for flag in FLAGS if "-std" not in flag),
+    ]
 
 
 def call(name: str, *arguments: np.ndarray | float) -> None:
     """A function of `proofs`; arrays by their addresses, copied if they are not contiguous."""
-    given = [np.ascontiguousarray(each) if isinstance(each, np.ndarray) else each for each in arguments]
-    getattr(proofs(), name)(*(address(each) if isinstance(each, np.ndarray) else each for each in given))
+    given = [
+        np.ascontiguousarray(each) if isinstance(each, np.ndarray) else each for each in arguments
+    ]
+    getattr(proofs(), name)(
+        *(address(each) if isinstance(each, np.ndarray) else each for each in given)
+    )
 
 
 def _with_signatures(library: ctypes.CDLL, signatures: dict) -> ctypes.CDLL:
@@ -62,7 +73,11 @@ def _with_signatures(library: ctypes.CDLL, signatures: dict) -> ctypes.CDLL:
 
 @cache
 def _library() -> ctypes.CDLL:
-    headers = {each.name: each.read_text("ascii") for each in native_kernel.SOURCES.iterdir() if each.name.endswith(".h")}
+    headers = {
+        each.name: each.read_text("ascii")
+        for each in native_kernel.SOURCES.iterdir()
+        if each.name.endswith(".h")
+    }
     return _with_signatures(compiled_library(SOURCES / "guarantee.c", FLAGS, headers), _SIGNATURES)
 
 
@@ -81,7 +96,20 @@ def compiled_loaded(
     n_time = angles.shape[1]
     given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, load, start)]
     velocity, potential, power = np.empty((3, n_time)), np.empty(n_time), np.empty(n_time)
-    forces, residual, leftover_power = np.empty((body.n_link, 3, n_time)), np.empty((2, n_time)), np.empty(n_time)
+    forces, residual, leftover_power = (
+        np.empty((body.n_link, 3, n_time)),
+        np.empty((2, n_time)),
+        np.empty(n_time),
+    )
     found = velocity, potential, power, forces, residual, leftover_power
-    call_for_all(library.colloc_loaded, body, friction, n_time, *map(address, given), delta, steps, *map(address, found))
+    call_for_all(
+        library.colloc_loaded,
+        body,
+        friction,
+        n_time,
+        *map(address, given),
+        delta,
+        steps,
+        *map(address, found),
+    )
     return found

@@ -1,7 +1,8 @@
-"""A concertina crawler followed to small bumps: distance, work and efficiency against epsilon, with fitted orders.
+"""A concertina crawler followed to small bumps: distance, work and efficiency against epsilon, with
+fitted orders.
 
-The regularisation has to fall with epsilon, because the speeds of the bump do: ``delta = delta_0 (epsilon/epsilon_0)^2``
-keeps delta over the bump's speed falling too (paper, section VI).
+The regularisation has to fall with epsilon, because the speeds of the bump do: ``delta = delta_0
+(epsilon/epsilon_0)^2`` keeps delta over the bump's speed falling too (paper, section VI).
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ DELTA_0, EPSILON_0 = 1e-4, 0.2
 
 @dataclass(frozen=True)
 class Crawler:
-    """A concertina crawler and the friction it crawls on, whose work inside the bumps' regions is told apart."""
+    """A concertina crawler and the friction it crawls on, whose work inside the bumps' regions is
+    told apart."""
 
     body: Concertina
     friction: Friction = Friction()
@@ -43,8 +45,13 @@ class Crawler:
     def with_(self, **changes: Any) -> Crawler:
         """A copy with some fields changed, also those of the body."""
         own = {f.name for f in fields(self)}
-        body = replace(self.body, **{name: value for name, value in changes.items() if name not in own})
-        return replace(self, **({"body": body} | {name: value for name, value in changes.items() if name in own}))
+        body = replace(
+            self.body, **{name: value for name, value in changes.items() if name not in own}
+        )
+        return replace(
+            self,
+            **({"body": body} | {name: value for name, value in changes.items() if name in own}),
+        )
 
     @property
     def bound(self) -> float:
@@ -53,16 +60,21 @@ class Crawler:
 
     def period(self, **settings: Any) -> Period:
         """Distance and work of one period; settings as for `scripts.models.period.period`."""
-        return period(self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings)
+        return period(
+            self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings
+        )
 
     def measured_period(self, **settings: Any) -> Period:
         """The same with an error estimate, see `scripts.models.period.measured_period`."""
-        return measured_period(self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings)
+        return measured_period(
+            self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings
+        )
 
 
 @dataclass(frozen=True)
 class EpsilonPoint:
-    """A crawler at one epsilon; `errors` are for d, W_inner, W_outer and efficiency, see `epsilon_point`."""
+    """A crawler at one epsilon; `errors` are for d, W_inner, W_outer and efficiency, see
+    `epsilon_point`."""
 
     epsilon: float
     delta: float
@@ -86,15 +98,23 @@ def delta_for(epsilon: float, delta_0: float = DELTA_0, epsilon_0: float = EPSIL
 def epsilon_point(crawler: Crawler, *, intervals: int = 2, **settings: Any) -> EpsilonPoint:
     """The crawler's period with an error bar.
 
-    The error is the difference from half the intervals and a lower panel order, plus the difference from a computation
-    at four times delta, which bounds what a further decrease of delta would change as long as that is at most half of it.
+    The error is the difference from half the intervals and a lower panel order, plus the difference
+    from a computation at four times delta, which bounds what a further decrease of delta would
+    change as long as that is at most half of it.
     """
     fine = crawler.measured_period(intervals=intervals, **settings)
-    softer = crawler.with_(delta=4 * crawler.delta).period(intervals=max(1, intervals // 2), **settings)
+    softer = crawler.with_(delta=4 * crawler.delta).period(
+        intervals=max(1, intervals // 2), **settings
+    )
     coarse = crawler.period(intervals=max(1, intervals // 2), **settings)
     errors = {
         name: float(fine.errors[source] + abs(getattr(softer, name) - getattr(coarse, name)))
-        for name, source in (("d", "d"), ("W_inner", "W_inner"), ("W_outer", "W"), ("efficiency", "efficiency"))
+        for name, source in (
+            ("d", "d"),
+            ("W_inner", "W_inner"),
+            ("W_outer", "W"),
+            ("efficiency", "efficiency"),
+        )
     }
     return EpsilonPoint(
         crawler.body.epsilon,
@@ -127,10 +147,12 @@ def fitted_orders(points: list[EpsilonPoint], bound: float) -> dict[str, float]:
 def table(points: list[EpsilonPoint]) -> str:
     """The points as text, one line each."""
     head = (
-        f"{'epsilon':>9} {'delta':>8} {'d':>12} {'W_inner':>12} {'W_outer':>12} {'W_outer/d':>10} {'efficiency':>11} {'+-':>8}"
+        f"{'epsilon':>9} {'delta':>8} {'d':>12} {'W_inner':>12} {'W_outer':>12} "
+        f"{'W_outer/d':>10} {'efficiency':>11} {'+-':>8}"
     )
     lines = [
-        f"{p.epsilon:9.4g} {p.delta:8.1e} {p.d:12.6e} {p.W_inner:12.6e} {p.W_outer:12.6e} {p.W_outer / p.d:10.6f} "
+        f"{p.epsilon:9.4g} {p.delta:8.1e} {p.d:12.6e} {p.W_inner:12.6e} {p.W_outer:12.6e} "
+        f"{p.W_outer / p.d:10.6f} "
         f"{p.efficiency:11.7f} {p.errors['efficiency']:8.1e}"
         for p in points
     ]

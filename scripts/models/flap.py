@@ -1,11 +1,13 @@
 """The paper's figure 4: a straight body with two flaps that open and close like a pair of wings.
 
-The flaps are hinged at the body's left end (its tail) and turn in opposite directions, so the net force is along the
-body and it can only slide along itself. Its friction is then +-mu per unit length or none, and a shorter pair of flaps
-cannot balance any of these: kinetic friction has no solution. It is a tree, not a chain: both flaps hang on link 0.
+The flaps are hinged at the body's left end (its tail) and turn in opposite directions, so the net
+force is along the body and it can only slide along itself. Its friction is then +-mu per unit
+length or none, and a shorter pair of flaps cannot balance any of these: kinetic friction has no
+solution. It is a tree, not a chain: both flaps hang on link 0.
 
-For one velocity V of the body, with flap force f along it at V = 0 and body length l, the delta-regularised balance
-``l V/sqrt(V^2 + delta^2) = f`` gives ``V/delta -> f/sqrt(l^2 - f^2)`` as delta -> 0.
+For one velocity V of the body, with flap force f along it at V = 0 and body length l, the
+delta-regularised balance ``l V/sqrt(V^2 + delta^2) = f`` gives ``V/delta -> f/sqrt(l^2 - f^2)`` as
+delta -> 0.
 """
 
 from __future__ import annotations
@@ -24,10 +26,11 @@ _PARENT_OF_FLAPS = 0
 
 @dataclass(frozen=True)
 class FlapBody(Chain):
-    """A straight body, link 0, with flaps 1 and 2 hinged at its tail; "joint angles" are the flaps' angles from it.
+    """A straight body, link 0, with flaps 1 and 2 hinged at its tail; "joint angles" are the flaps'
+    angles from it.
 
-    Everything a `Chain` computes follows from which joints turn a link and which links lead to its midpoint, so only
-    these two tables differ.
+    Everything a `Chain` computes follows from which joints turn a link and which links lead to its
+    midpoint, so only these two tables differ.
     """
 
     lengths: tuple[float, ...] = (0.8, 0.1, 0.1)
@@ -45,7 +48,8 @@ class FlapBody(Chain):
         return full if reference is None else full - full[reference]
 
     def joints(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Ends in drawing order, ``(4, n_time)``: tip of flap 1, hinge, tip of flap 2, head of the body."""
+        """Ends in drawing order, ``(4, n_time)``: tip of flap 1, hinge, tip of flap 2, head of the
+        body."""
         first, second = (self.lengths[1 + k] * np.exp(1j * angles[k]) for k in range(2))
         tips = np.stack([first, 0 * first, second, 0 * first + self.lengths[0]])
         return tips.real, tips.imag
@@ -57,8 +61,11 @@ def flap_motion(opening: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.n
     return np.stack([opening, -opening]), np.stack([rate, -rate])
 
 
-def axial_force(body: FlapBody, friction: Friction, opening: float, rate: float, V: np.ndarray, delta: float) -> np.ndarray:
-    """Net friction along the body, ``(n,)``, when it slides along itself with velocities V; the others vanish."""
+def axial_force(
+    body: FlapBody, friction: Friction, opening: float, rate: float, V: np.ndarray, delta: float
+) -> np.ndarray:
+    """Net friction along the body, ``(n,)``, when it slides along itself with velocities V; the
+    others vanish."""
     V = np.asarray(V, dtype=float)
     angles, rates = flap_motion(np.full(V.size, opening), np.full(V.size, rate))
     z = np.zeros((3, V.size))
@@ -69,5 +76,7 @@ def axial_force(body: FlapBody, friction: Friction, opening: float, rate: float,
 
 def flap_gap(body: FlapBody, friction: Friction, opening: float, rate: float) -> KineticGap:
     """Unbalanced axial force under kinetic friction just below rest, at rest and just above."""
-    below, rest, above = axial_force(body, friction, opening, rate, np.array([-1e-9, 0.0, 1e-9]), 1e-18)
+    below, rest, above = axial_force(
+        body, friction, opening, rate, np.array([-1e-9, 0.0, 1e-9]), 1e-18
+    )
     return KineticGap(float(below), float(rest), float(above))

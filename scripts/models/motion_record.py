@@ -1,4 +1,5 @@
-"""A gait's motion in the lab frame, sampled over one period: where the joints and ends are, and how fast they move."""
+"""A gait's motion in the lab frame, sampled over one period: where the joints and ends are, and how
+fast they move."""
 
 from __future__ import annotations
 
@@ -33,7 +34,9 @@ class Record(NamedTuple):
     speeds: np.ndarray
 
 
-def record(body: Chain, friction: Friction, path: Path, delta: float, instants: int = 2000) -> Record:
+def record(
+    body: Chain, friction: Friction, path: Path, delta: float, instants: int = 2000
+) -> Record:
     """Solve and integrate a gait over one period on `instants` + 1 phases (paper, section II)."""
     t = np.linspace(0.0, 1.0, instants + 1)
     angles, rates = path(t)
@@ -45,14 +48,17 @@ def record(body: Chain, friction: Friction, path: Path, delta: float, instants: 
 
     theta = cumulative_simpson(z[2], x=t, initial=0.0)
     rate = (z[0] + 1j * z[1]) * np.exp(1j * theta)
-    tail = cumulative_simpson(rate.real, x=t, initial=0.0) + 1j * cumulative_simpson(rate.imag, x=t, initial=0.0)
+    tail = cumulative_simpson(rate.real, x=t, initial=0.0) + 1j * cumulative_simpson(
+        rate.imag, x=t, initial=0.0
+    )
     x, y = body.joints(angles)
     lab = (tail + (x + 1j * y) * np.exp(1j * theta)) * np.exp(-1j * np.angle(tail[-1]))
     return Record(t, lab.real, lab.imag, speeds)
 
 
 def third_slowest_dips(t: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Phases in (0, 1) at which the third slowest of four ends is locally slowest, and that speed; slowest first.
+    """Phases in (0, 1) at which the third slowest of four ends is locally slowest, and that speed;
+    slowest first.
 
     At these instants two of three links are almost static.
     """

@@ -1,8 +1,9 @@
 """Distance, work and efficiency of a smooth body over one period, with an error estimate.
 
-The balance is solved at the Gauss nodes of every stage of the motion (paper, eqs. theta0 to y0, dist, W and eta);
-orientation and path follow by integrating the tail's velocity. Where the second half period mirrors the first, only
-the first is solved: its sideways displacement and rotation are undone, its work and advance repeated.
+The balance is solved at the Gauss nodes of every stage of the motion (paper, eqs. theta0 to y0,
+dist, W and eta); orientation and path follow by integrating the tail's velocity. Where the second
+half period mirrors the first, only the first is solved: its sideways displacement and rotation are
+undone, its work and advance repeated.
 """
 
 from __future__ import annotations
@@ -28,11 +29,13 @@ class Period:
     d : float
         Distance [body lengths].
     W, W_inner : float
-        Work against friction [weight x length], and the part of it done within the region asked for.
+        Work against friction [weight x length], and the part of it done within the region asked
+        for.
     rotation : float
         Net rotation over the period [rad]; zero by symmetry for an antipodal motion.
     errors : dict of str to float
-        Difference of each of d, W, W_inner and efficiency from a coarser computation, where one was made; else empty.
+        Difference of each of d, W, W_inner and efficiency from a coarser computation, where one was
+        made; else empty.
     path : (3, n_time)
         Tail position and orientation at the nodes.
     nodes : SmoothSolution
@@ -57,7 +60,15 @@ class Period:
         return self.W - self.W_inner
 
 
-def period(motion: Motion, friction: Law, delta: float, *, intervals: int = 4, nodes: int = 6, **settings: Any) -> Period:
+def period(
+    motion: Motion,
+    friction: Law,
+    delta: float,
+    *,
+    intervals: int = 4,
+    nodes: int = 6,
+    **settings: Any,
+) -> Period:
     """Distance and work of one period.
 
     Parameters
@@ -100,7 +111,10 @@ def period(motion: Motion, friction: Law, delta: float, *, intervals: int = 4, n
         theta = theta - 0.5 * turned
     place, moved = integral((u + 1j * v) * np.exp(1j * theta))
     repeats = 2.0 if motion.antipodal else 1.0
-    W, W_inner = (repeats * float(integral(p.reshape(t.shape))[1].real) for p in (solution.power, solution.power_inside))
+    W, W_inner = (
+        repeats * float(integral(p.reshape(t.shape))[1].real)
+        for p in (solution.power, solution.power_inside)
+    )
     return Period(
         2.0 * abs(moved.real) if motion.antipodal else abs(moved),
         W,
@@ -113,10 +127,21 @@ def period(motion: Motion, friction: Law, delta: float, *, intervals: int = 4, n
 
 
 def measured_period(
-    motion: Motion, friction: Law, delta: float, *, intervals: int = 8, order: int = 8, **settings: Any
+    motion: Motion,
+    friction: Law,
+    delta: float,
+    *,
+    intervals: int = 8,
+    order: int = 8,
+    **settings: Any,
 ) -> Period:
-    """`period`, with its difference from half the intervals in time and two orders less in arc length as the error."""
+    """`period`, with its difference from half the intervals in time and two orders less in arc
+    length as the error."""
     fine = period(motion, friction, delta, intervals=intervals, order=order, **settings)
-    coarse = period(motion, friction, delta, intervals=max(1, intervals // 2), order=order - 2, **settings)
+    coarse = period(
+        motion, friction, delta, intervals=max(1, intervals // 2), order=order - 2, **settings
+    )
     names = ("d", "W", "W_inner", "efficiency")
-    return replace(fine, errors={name: abs(getattr(fine, name) - getattr(coarse, name)) for name in names})
+    return replace(
+        fine, errors={name: abs(getattr(fine, name) - getattr(coarse, name)) for name in names}
+    )

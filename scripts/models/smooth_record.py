@@ -31,11 +31,13 @@ class Snapshots(NamedTuple):
     y: np.ndarray
 
 
-def snapshots(motion: Motion, friction: Friction, delta: float, count: int = 10, panels: int = 100) -> Snapshots:
+def snapshots(
+    motion: Motion, friction: Friction, delta: float, count: int = 10, panels: int = 100
+) -> Snapshots:
     """The body at `count` + 1 equally spaced phases of one period (paper, eqs. theta0 to y0).
 
-    For drawing: velocities are integrated by Simpson's rule on a uniform grid, panels are refined to 1e-7 only. `count` is
-    even; of an antipodal motion half a period is solved.
+    For drawing: velocities are integrated by Simpson's rule on a uniform grid, panels are refined
+    to 1e-7 only. `count` is even; of an antipodal motion half a period is solved.
     """
     if count < 2 or count % 2:
         raise ProblemError(f"count must be even and at least 2, not {count!r}.")
@@ -49,7 +51,9 @@ def snapshots(motion: Motion, friction: Friction, delta: float, count: int = 10,
     if motion.antipodal:
         theta = theta - 0.5 * theta[half]  # the path then advances along x
     rate = (z[0] + 1j * z[1]) * np.exp(1j * theta)
-    tail = cumulative_simpson(rate.real, x=t, initial=0.0) + 1j * cumulative_simpson(rate.imag, x=t, initial=0.0)
+    tail = cumulative_simpson(rate.real, x=t, initial=0.0) + 1j * cumulative_simpson(
+        rate.imag, x=t, initial=0.0
+    )
 
     keep = slice(None, None, _STEPS_BETWEEN)
     grid = PanelGrid(np.linspace(0.0, 1.0, panels + 1)[:, None] * np.ones((1, count + 1)))
@@ -58,6 +62,7 @@ def snapshots(motion: Motion, friction: Friction, delta: float, count: int = 10,
     lab = tail[keep] + (x + 1j * y) * np.exp(1j * theta[keep])
     if abs(tail[-1]) > 1e-9:
         advance = np.angle(tail[-1])
-        # antipodal paths lie along x already, up to rounding; seen from the other side they advance to the right
+        # antipodal paths lie along x already, up to rounding; seen from the other side they advance
+        # to the right
         lab = lab * np.exp(-1j * (np.pi * round(advance / np.pi) if motion.antipodal else advance))
     return Snapshots(t[keep], lab.real, lab.imag)

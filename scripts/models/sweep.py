@@ -1,10 +1,12 @@
-"""Distance, work and efficiency of many ellipse gaits: direct, or through the velocity map; local maxima, refined.
+"""Distance, work and efficiency of many ellipse gaits: direct, or through the velocity map; local
+maxima, refined.
 
-With a body that reads the same from both ends and mu_b = mu_f, the second half period of an ellipse gait repeats the
-displacement and the work of the first (see `gaits.symmetry`), so instants ``t_k = (k + 1/2)/n``, k < n/2, are the midpoint
-rule with n instants over the whole period. The rule is of second order: velocities have kinks where links stick.
-Displacement is that of the middle of the body, which the symmetry maps to itself; its velocity and rotation are those of
-the middle link, so no sines and cosines of the posture enter.
+With a body that reads the same from both ends and mu_b = mu_f, the second half period of an ellipse
+gait repeats the displacement and the work of the first (see `gaits.symmetry`), so instants ``t_k =
+(k + 1/2)/n``, k < n/2, are the midpoint rule with n instants over the whole period. The rule is of
+second order: velocities have kinks where links stick. Displacement is that of the middle of the
+body, which the symmetry maps to itself; its velocity and rotation are those of the middle link, so
+no sines and cosines of the posture enter.
 """
 
 from __future__ import annotations
@@ -42,7 +44,9 @@ class Performance(NamedTuple):
     @property
     def efficiency(self) -> np.ndarray:
         """d/W; 0 for a gait that does no work."""
-        return np.divide(self.distance, self.work, out=np.zeros_like(self.work), where=self.work > 0)
+        return np.divide(
+            self.distance, self.work, out=np.zeros_like(self.work), where=self.work > 0
+        )
 
 
 @dataclass(frozen=True)
@@ -74,12 +78,17 @@ class Route:
 
     def __post_init__(self) -> None:
         if self.body.n_link != 3 or not self.body.symmetric or not self.friction.reversible:
-            raise ProblemError("a sweep over ellipse gaits needs three links that are symmetric end to end and mu_b = mu_f.")
+            raise ProblemError(
+                "a sweep over ellipse gaits needs three links that are symmetric end to end and "
+                "mu_b = mu_f."
+            )
         if not self.direct and self.velocity_map is None:
             raise ProblemError("the route through the map needs a velocity_map.")
         known = self.velocity_map
         if known is not None and (known.body != self.body or known.friction != self.friction):
-            raise ProblemError("the velocity map was made for another body or other friction coefficients.")
+            raise ProblemError(
+                "the velocity map was made for another body or other friction coefficients."
+            )
 
     def tail_velocity(self, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
         """Tail velocities (u, v, omega), ``(3, n_time)``."""
@@ -88,7 +97,15 @@ class Route:
             z = self.velocity_map.tail_velocity(angles, rates, method=self.method)
         if not self.direct:
             return z  # type: ignore[return-value]
-        solved = solve_balance(self.body, self.friction, angles, rates, self.delta, start=z, tolerance=_DIRECT_TOLERANCE)
+        solved = solve_balance(
+            self.body,
+            self.friction,
+            angles,
+            rates,
+            self.delta,
+            start=z,
+            tolerance=_DIRECT_TOLERANCE,
+        )
         return solved.require().z
 
 
@@ -108,7 +125,12 @@ def _chunk_performance(gaits: np.ndarray, *, route: Route, instants: int) -> Per
 
 
 def performance(
-    route: Route, gaits: np.ndarray, *, instants: int = 100, processes: int | None = 1, label: str = ""
+    route: Route,
+    gaits: np.ndarray,
+    *,
+    instants: int = 100,
+    processes: int | None = 1,
+    label: str = "",
 ) -> Performance:
     """Distance and work of ellipse gaits.
 
@@ -118,7 +140,8 @@ def performance(
     gaits : (3, n_gait)
         A0, A1, B1 of each.
     instants : int
-        Even number of instants per period; half of them are evaluated, the symmetry gives the others.
+        Even number of instants per period; half of them are evaluated, the symmetry gives the
+        others.
     processes : int, optional
         None uses all processors.
     label : str
@@ -136,12 +159,18 @@ def performance(
         raise ProblemError(f"instants must be even and at least 4, not {instants}.")
     chunks = max(1, -(-gaits.shape[1] * instants // 2 // _CHUNK_INSTANTS))
     tasks = np.array_split(gaits, chunks, axis=1)
-    results = parallel_map(partial(_chunk_performance, route=route, instants=instants), tasks, processes=processes, label=label)
+    results = parallel_map(
+        partial(_chunk_performance, route=route, instants=instants),
+        tasks,
+        processes=processes,
+        label=label,
+    )
     return Performance(*(np.concatenate(parts) for parts in zip(*results, strict=True)))
 
 
 def local_maxima(values: np.ndarray) -> np.ndarray:
-    """Indices ``(n_maximum, ndim)`` of nodes above all their neighbours (diagonals too; NaN counts as lower), best first."""
+    """Indices ``(n_maximum, ndim)`` of nodes above all their neighbours (diagonals too; NaN counts
+    as lower), best first."""
     filled = np.where(np.isnan(values), -np.inf, values)
     padded = np.pad(filled, 1, constant_values=-np.inf)
     highest = np.full(values.shape, -np.inf)
@@ -177,7 +206,8 @@ class Maximum:
 
 
 def _climbed(route: Route, start: np.ndarray, instants: int, size: float) -> np.ndarray:
-    """(A0, fraction of the largest amplitude, direction) that maximises the efficiency, by Nelder and Mead's simplex."""
+    """(A0, fraction of the largest amplitude, direction) that maximises the efficiency, by Nelder
+    and Mead's simplex."""
 
     def gait(x: np.ndarray) -> np.ndarray:
         A0, direction = abs(x[0]), np.clip(x[2], 0.0, 0.5 * np.pi)
@@ -190,14 +220,19 @@ def _climbed(route: Route, start: np.ndarray, instants: int, size: float) -> np.
         beyond = max(0.0, x[1] - 1.0)  # leads back to the boundary
         return float(-performance(route, gait(x), instants=instants).efficiency[0] + beyond)
 
-    simplex = start + size * np.vstack([np.zeros(3), np.eye(3) * np.where(start[1] > 1 - size, [1, -1, 1], 1)])
+    simplex = start + size * np.vstack(
+        [np.zeros(3), np.eye(3) * np.where(start[1] > 1 - size, [1, -1, 1], 1)]
+    )
     options = {"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-10, "maxfev": 400}
     found = minimize(loss, start, method="Nelder-Mead", options=options).x
     return gait(found)[:, 0]
 
 
-def refined_maximum(route: Route, gait: np.ndarray, *, instants: int = 800, size: float = 0.02) -> Maximum:
-    """Climb from a gait (A0, A1, B1) to the local maximum of the efficiency nearby, and replay it directly.
+def refined_maximum(
+    route: Route, gait: np.ndarray, *, instants: int = 800, size: float = 0.02
+) -> Maximum:
+    """Climb from a gait (A0, A1, B1) to the local maximum of the efficiency nearby, and replay it
+    directly.
 
     Parameters
     ----------
@@ -213,7 +248,13 @@ def refined_maximum(route: Route, gait: np.ndarray, *, instants: int = 800, size
 
     def coordinates(values: np.ndarray) -> np.ndarray:
         direction = np.arctan2(values[2], values[1])
-        return np.array([values[0], np.hypot(*values[1:]) / largest_amplitude(body, values[0], direction), direction])
+        return np.array(
+            [
+                values[0],
+                np.hypot(*values[1:]) / largest_amplitude(body, values[0], direction),
+                direction,
+            ]
+        )
 
     coarse = _climbed(route, coordinates(np.asarray(gait, dtype=float)), instants // 2, size)
     fine = _climbed(route, coordinates(coarse), instants, 0.25 * size)
@@ -225,7 +266,13 @@ def refined_maximum(route: Route, gait: np.ndarray, *, instants: int = 800, size
 
 
 def distinct_maxima(
-    route: Route, values: np.ndarray, gaits: np.ndarray, *, most: int = 40, apart: float = 0.1, instants: int = 800
+    route: Route,
+    values: np.ndarray,
+    gaits: np.ndarray,
+    *,
+    most: int = 40,
+    apart: float = 0.1,
+    instants: int = 800,
 ) -> list[Maximum]:
     """The different local maxima that the maxima of a grid climb to, best first.
 
@@ -233,7 +280,8 @@ def distinct_maxima(
     ----------
     route : Route
     values : (n_A0, n_A1, n_B1)
-        Efficiency on the grid, NaN at inadmissible gaits. Steps in its boundary make maxima that climb elsewhere.
+        Efficiency on the grid, NaN at inadmissible gaits. Steps in its boundary make maxima that
+        climb elsewhere.
     gaits : (3, n_A0, n_A1, n_B1)
     most : int
         Candidates followed, best first.

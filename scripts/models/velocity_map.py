@@ -1,19 +1,22 @@
-r"""The velocity map (the paper's "connection"): tail velocities of a three-link body, tabulated and interpolated.
+r"""The velocity map (the paper's "connection"): tail velocities of a three-link body, tabulated and
+interpolated.
 
-The balance is homogeneous of degree 1 in the joint rates as long as delta scales along with them. So it is enough to
-tabulate tail velocities over *faces* of the square of rates: joint angles x ratio of the rates, with one rate equal to
-1 and the other, ``ratio``, in [-1, 1] (paper, section V). With mu_b = mu_f the velocities change sign with the rates and
-two faces do; else there are four. Elsewhere
+The balance is homogeneous of degree 1 in the joint rates as long as delta scales along with them.
+So it is enough to tabulate tail velocities over *faces* of the square of rates: joint angles x
+ratio of the rates, with one rate equal to 1 and the other, ``ratio``, in [-1, 1] (paper, section
+V). With mu_b = mu_f the velocities change sign with the rates and two faces do; else there are
+four. Elsewhere
 
     z(angles, rates) = |rate_k| z_face(angles, rate_other / rate_k),        |rate_k| the larger of the two.
 
-Delta: the map holds ``delta``, relative to the larger rate. It returns the velocities at regularisation speed
-``delta |rate_k|``, which follows the gait's pace; a solve at a fixed regularisation speed differs from it. The
-difference is of the order of delta where no link sticks (`scripts/reproduce_paper.py` measures it).
+Delta: the map holds ``delta``, relative to the larger rate. It returns the velocities at
+regularisation speed ``delta |rate_k|``, which follows the gait's pace; a solve at a fixed
+regularisation speed differs from it. The difference is of the order of delta where no link sticks
+(`scripts/reproduce_paper.py` measures it).
 
-Angles enter through sines and cosines, so the map is 2 pi-periodic in them and has no edges there; in the ratio one node
-beyond either end serves the stencils. The velocities are continuous but have kinks where a link starts to stick:
-one of these lies on ratio = 0 and is kept on nodes.
+Angles enter through sines and cosines, so the map is 2 pi-periodic in them and has no edges there;
+in the ratio one node beyond either end serves the stencils. The velocities are continuous but have
+kinks where a link starts to stick: one of these lies on ratio = 0 and is kept on nodes.
 """
 
 from __future__ import annotations
@@ -45,9 +48,10 @@ class VelocityMap:
     delta : float
         Regularisation speed relative to the larger joint rate.
     values : (n_face, n_angle, n_angle, n_ratio + 2, 3)
-        (u, v, omega) at unit larger rate. Faces: rate 1 = 1, rate 2 = 1; then, if mu_b != mu_f, rate 1 = -1, rate 2 = -1.
-        Angles are ``2 pi k / n_angle - pi``; ratios are ``2 (k - 1)/(n_ratio - 1) - 1``, a node more at either end. On the
-        faces of negative rates both rates are negated.
+        (u, v, omega) at unit larger rate. Faces: rate 1 = 1, rate 2 = 1; then, if mu_b != mu_f,
+        rate 1 = -1, rate 2 = -1. Angles are ``2 pi k / n_angle - pi``; ratios are ``2 (k -
+        1)/(n_ratio - 1) - 1``, a node more at either end. On the faces of negative rates both rates
+        are negated.
     """
 
     body: Chain
@@ -59,9 +63,19 @@ class VelocityMap:
         faces = 2 if self.friction.reversible else 4
         shape = self.values.shape
         if self.body.n_link != 3:
-            raise ProblemError(f"a velocity map needs a body of three links, not {self.body.n_link}.")
-        if len(shape) != 5 or shape[0] != faces or shape[1] != shape[2] or shape[4] != 3 or min(shape[1:4]) < 4:
-            raise ProblemError(f"values must have shape ({faces}, n_angle, n_angle, n_ratio + 2, 3), not {shape}.")
+            raise ProblemError(
+                f"a velocity map needs a body of three links, not {self.body.n_link}."
+            )
+        if (
+            len(shape) != 5
+            or shape[0] != faces
+            or shape[1] != shape[2]
+            or shape[4] != 3
+            or min(shape[1:4]) < 4
+        ):
+            raise ProblemError(
+                f"values must have shape ({faces}, n_angle, n_angle, n_ratio + 2, 3), not {shape}."
+            )
         # wrapped: one node before and two after, for the widest stencil
         wrapped = np.pad(self.values, ((0, 0), (1, 2), (1, 2), (0, 0), (0, 0)), mode="wrap")
         object.__setattr__(self, "_wrapped", np.ascontiguousarray(wrapped))
@@ -85,10 +99,13 @@ class VelocityMap:
         return _ratio_nodes(self.n_ratio)[1:-1]
 
     def face(self, index: int) -> np.ndarray:
-        """Nodal velocities of a face without the extra nodes, ``(n_angle, n_angle, n_ratio, 3)``."""
+        """Nodal velocities of a face without the extra nodes, ``(n_angle, n_angle, n_ratio,
+        3)``."""
         return self.values[index, :, :, 1:-1]
 
-    def tail_velocity(self, angles: np.ndarray, rates: np.ndarray, *, method: str = "cubic") -> np.ndarray:
+    def tail_velocity(
+        self, angles: np.ndarray, rates: np.ndarray, *, method: str = "cubic"
+    ) -> np.ndarray:
         """Tail velocities (u, v, omega) in the body frame, by scaling and interpolation.
 
         Parameters
@@ -114,16 +131,25 @@ class VelocityMap:
         else:
             scale, face = np.abs(leading), face + 2 * (leading < 0)
 
-        i, wi = _stencil((angles[0] + np.pi) * (self.n_angle / (2 * np.pi)), self.n_angle, width, periodic=True)
-        j, wj = _stencil((angles[1] + np.pi) * (self.n_angle / (2 * np.pi)), self.n_angle, width, periodic=True)
-        k, wk = _stencil((ratio + 1.0) * (0.5 * (self.n_ratio - 1)), self.n_ratio - 1, width, periodic=False)
+        i, wi = _stencil(
+            (angles[0] + np.pi) * (self.n_angle / (2 * np.pi)), self.n_angle, width, periodic=True
+        )
+        j, wj = _stencil(
+            (angles[1] + np.pi) * (self.n_angle / (2 * np.pi)), self.n_angle, width, periodic=True
+        )
+        k, wk = _stencil(
+            (ratio + 1.0) * (0.5 * (self.n_ratio - 1)), self.n_ratio - 1, width, periodic=False
+        )
 
         table: np.ndarray = self._wrapped  # type: ignore[attr-defined]
         _, n1, n2, n3, _ = table.shape
         flat = table.reshape(-1)
         # windows of `width` nodes along the ratio lie together in memory: one gather each
         windows = np.lib.stride_tricks.as_strided(
-            flat, shape=(flat.size // 3 - width + 1, 3 * width), strides=(3 * flat.itemsize, flat.itemsize), writeable=False
+            flat,
+            shape=(flat.size // 3 - width + 1, 3 * width),
+            strides=(3 * flat.itemsize, flat.itemsize),
+            writeable=False,
         )
         corner = ((face * n1 + i) * n2 + j) * n3 + k
         along_ratio = np.zeros((angles.shape[1], 3 * width))
@@ -144,8 +170,11 @@ def _ratio_nodes(n_ratio: int) -> np.ndarray:
     return 2.0 * np.arange(-1, n_ratio + 1) / (n_ratio - 1) - 1.0
 
 
-def _stencil(x: np.ndarray, cells: int, width: int, *, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
-    """First node of the stencils round coordinates x (in cells), in a table with one more node before x = 0; weights."""
+def _stencil(
+    x: np.ndarray, cells: int, width: int, *, periodic: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """First node of the stencils round coordinates x (in cells), in a table with one more node
+    before x = 0; weights."""
     cell = np.floor(x).astype(np.intp)
     if not periodic:
         cell = np.clip(cell, 0, cells - 1)
@@ -164,7 +193,13 @@ def face_rates(friction: Friction) -> list[tuple[int, int]]:
 
 
 def _solve_row(
-    task: tuple[int, int, int], *, body: Chain, friction: Friction, delta: float, n_angle: int, n_ratio: int
+    task: tuple[int, int, int],
+    *,
+    body: Chain,
+    friction: Friction,
+    delta: float,
+    n_angle: int,
+    n_ratio: int,
 ) -> np.ndarray:
     """Velocities at all nodes with one first angle on one face, ``(n_angle, n_ratio + 2, 3)``."""
     leading, sign, row = task
@@ -215,10 +250,15 @@ def velocity_map(
     if body.n_link != 3:
         raise ProblemError(f"a velocity map needs a body of three links, not {body.n_link}.")
     if n_angle < 4 or n_ratio < 3 or n_ratio % 2 == 0:
-        raise ProblemError(f"a velocity map needs n_angle >= 4 and an odd n_ratio >= 3, not {n_angle} and {n_ratio}.")
+        raise ProblemError(
+            f"a velocity map needs n_angle >= 4 and an odd n_ratio >= 3, not {n_angle} and "
+            f"{n_ratio}."
+        )
     faces = face_rates(friction)
     tasks = [(leading, sign, row) for leading, sign in faces for row in range(n_angle)]
-    solve = partial(_solve_row, body=body, friction=friction, delta=delta, n_angle=n_angle, n_ratio=n_ratio)
+    solve = partial(
+        _solve_row, body=body, friction=friction, delta=delta, n_angle=n_angle, n_ratio=n_ratio
+    )
     rows = parallel_map(solve, tasks, processes=processes, label=label)
     values = np.stack(rows).reshape(len(faces), n_angle, n_angle, n_ratio + 2, 3)
     return VelocityMap(body, friction, delta, values)
@@ -226,12 +266,14 @@ def velocity_map(
 
 @dataclass(frozen=True)
 class MapError:
-    """Differences of interpolated from directly solved tail velocities at random shapes and rates, larger rate 1.
+    """Differences of interpolated from directly solved tail velocities at random shapes and rates,
+    larger rate 1.
 
     Attributes
     ----------
     largest, rms, median : float
-        Of the largest component of (u, v, omega/2) at an instant; omega/2 is of the size of the head's velocity.
+        Of the largest component of (u, v, omega/2) at an instant; omega/2 is of the size of the
+        head's velocity.
     """
 
     largest: float
@@ -239,13 +281,18 @@ class MapError:
     median: float
 
 
-def map_error(velocity_map: VelocityMap, *, method: str = "cubic", samples: int = 20_000, seed: int = 0) -> MapError:
-    """Compare the map with direct solves (tolerance 1e-11) at shapes and rates drawn uniformly from their ranges."""
+def map_error(
+    velocity_map: VelocityMap, *, method: str = "cubic", samples: int = 20_000, seed: int = 0
+) -> MapError:
+    """Compare the map with direct solves (tolerance 1e-11) at shapes and rates drawn uniformly from
+    their ranges."""
     rng = np.random.default_rng(seed)
     angles = rng.uniform(-np.pi, np.pi, (2, samples))
     rates = rng.uniform(-1.0, 1.0, (2, samples))
     rates /= np.abs(rates).max(axis=0)
-    solved = solve_balance(velocity_map.body, velocity_map.friction, angles, rates, velocity_map.delta).require()
+    solved = solve_balance(
+        velocity_map.body, velocity_map.friction, angles, rates, velocity_map.delta
+    ).require()
     difference = np.abs(velocity_map.tail_velocity(angles, rates, method=method) - solved.z)
     difference[2] *= 0.5
     worst = difference.max(axis=0)

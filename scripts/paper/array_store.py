@@ -25,7 +25,8 @@ def write_arrays(
     units: Mapping[str, str] | None = None,
     attributes: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write arrays (numbers, strings or NumPy arrays by name; "a/b" makes a group) with what describes them.
+    """Write arrays (numbers, strings or NumPy arrays by name; "a/b" makes a group) with what
+    describes them.
 
     Parameters
     ----------
@@ -35,7 +36,8 @@ def write_arrays(
     units : mapping, optional
         Unit or dimensions of an array, by name.
     attributes : mapping, optional
-        Of the file, as JSON where they are not plain numbers or strings. The command line and versions are added.
+        Of the file, as JSON where they are not plain numbers or strings. The command line and
+        versions are added.
 
     Raises
     ------
@@ -45,7 +47,11 @@ def write_arrays(
     path = Path(path)
     described = {
         "command": " ".join(sys.orig_argv[1:]),
-        "versions": {"python": sys.version.split()[0], "numpy": np.__version__, "h5py": h5py.__version__},
+        "versions": {
+            "python": sys.version.split()[0],
+            "numpy": np.__version__,
+            "h5py": h5py.__version__,
+        },
         "conventions": (colloc.__doc__ or "").strip(),
         **(attributes or {}),
     }
@@ -54,7 +60,9 @@ def write_arrays(
         for key, value in arrays.items():
             put(file, key, value, units=(units or {}).get(key, "1"))
         for key, value in described.items():
-            put_attribute(file, key, value if isinstance(value, (str, int, float)) else json.dumps(value))
+            put_attribute(
+                file, key, value if isinstance(value, (str, int, float)) else json.dumps(value)
+            )
 
 
 def read_arrays(path: Path) -> dict[str, Any]:
@@ -77,7 +85,8 @@ def read_arrays(path: Path) -> dict[str, Any]:
 
 
 def read_attribute(path: Path, name: str) -> Any:
-    """One attribute of the file, or None if the file or the attribute is missing, or the file is damaged."""
+    """One attribute of the file, or None if the file or the attribute is missing, or the file is
+    damaged."""
     try:
         with open_file(path, KIND, VERSION) as file:
             return attribute(file, name)

@@ -7,7 +7,13 @@ from functools import partial
 import numpy as np
 
 from problems import concertina, concertina_anisotropic
-from scripts.models.epsilon_study import Crawler, EpsilonPoint, delta_for, epsilon_point, fitted_orders
+from scripts.models.epsilon_study import (
+    Crawler,
+    EpsilonPoint,
+    delta_for,
+    epsilon_point,
+    fitted_orders,
+)
 from scripts.models.smooth_record import snapshots
 from scripts.paper.parallel import parallel_map
 from scripts.paper.study import Arrays, Context
@@ -17,18 +23,22 @@ CRAWLERS = {
     "forward easiest": Crawler.of(concertina_anisotropic.PROBLEMS[0]),
     "transverse easiest": Crawler.of(concertina_anisotropic.PROBLEM),
 }
-"""The paper's crawler, one whose forward friction is smallest, and one with two bumps whose transverse friction is."""
+"""The paper's crawler, one whose forward friction is smallest, and one with two bumps whose
+transverse friction is."""
 
 SHOWN = ("isotropic", "transverse easiest")
 
 
 def _point(task: tuple[str, float], *, intervals: int) -> EpsilonPoint:
     name, epsilon = task
-    return epsilon_point(CRAWLERS[name].with_(epsilon=epsilon, delta=delta_for(epsilon)), intervals=intervals)
+    return epsilon_point(
+        CRAWLERS[name].with_(epsilon=epsilon, delta=delta_for(epsilon)), intervals=intervals
+    )
 
 
 def crawlers(context: Context) -> Arrays:
-    """Distance, work inside and outside the bumps, and efficiency as epsilon falls; snapshots at the ends of stages."""
+    """Distance, work inside and outside the bumps, and efficiency as epsilon falls; snapshots at
+    the ends of stages."""
     settings = context.settings
     epsilons = settings["epsilons"]
     tasks = [(name, epsilon) for name in CRAWLERS for epsilon in epsilons]
@@ -48,6 +58,8 @@ def crawlers(context: Context) -> Arrays:
         if name not in SHOWN:
             continue
         shown = crawler.with_(epsilon=settings["shown"], delta=delta_for(settings["shown"]))
-        made = snapshots(shown.body.prescribed(), shown.friction, shown.delta, settings["snapshots"], panels=200)
+        made = snapshots(
+            shown.body.prescribed(), shown.friction, shown.delta, settings["snapshots"], panels=200
+        )
         result |= {f"{name}/t": made.t, f"{name}/x": made.x, f"{name}/y": made.y}
     return result

@@ -1,4 +1,5 @@
-"""Every computed figure of the paper, redrawn from the stored parts of `scripts/reproduce_paper.py`."""
+"""Every computed figure of the paper, redrawn from the stored parts of
+`scripts/reproduce_paper.py`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Figures of maps: admissible paths (7), velocity map (8), static friction (9), distance, work and efficiency (11, 12)."""
+"""Figures of maps: admissible paths (7), velocity map (8), static friction (9), distance, work and
+efficiency (11, 12)."""
 
 from __future__ import annotations
 
@@ -75,7 +76,9 @@ def figure_8(made: Arrays, folder: Path) -> list[Path]:
     a1, a2 = np.meshgrid(angles, angles, indexing="ij")
     for face in range(2):
         for component in range(3):
-            axes: Any = figure.add_axes((0.0 + 0.33 * component, 0.52 - 0.5 * face, 0.25, 0.43), projection="3d")
+            axes: Any = figure.add_axes(
+                (0.0 + 0.33 * component, 0.52 - 0.5 * face, 0.25, 0.43), projection="3d"
+            )
             field = values[face, :, :, 1:-1, component]
             shown = np.where(inside[:, :, None], field, np.nan)
             low, high = np.nanmin(shown[:, :, chosen]), np.nanmax(shown[:, :, chosen])
@@ -83,7 +86,8 @@ def figure_8(made: Arrays, folder: Path) -> list[Path]:
             colours[np.isnan(shown)] = (1, 1, 1, 0)
             for k in chosen:
                 axes.plot_surface(
-                    a1, a2, np.full_like(a1, ratios[k]), facecolors=colours[:, :, k], rstride=1, cstride=1,
+                    a1, a2, np.full_like(a1, ratios[k]), facecolors=colours[:, :, k], rstride=1,
+                    cstride=1,
                     shade=False, linewidth=0, antialiased=False, rasterized=True,
                 )  # fmt: skip
             _label_angles(axes)
@@ -103,7 +107,11 @@ def figure_9(made: Arrays, folder: Path) -> list[Path]:
     figure = Figure(figsize=(10, 6.6))
     grid = figure.add_gridspec(4, 6, height_ratios=(1, 1, 0.12, 1.5))
     nodes, ratios = made["angles"], made["ratios"]
-    chosen = np.unique(np.round(np.interp((-1, -0.5, -0.05, 0, 0.05, 0.5), ratios, np.arange(ratios.size))).astype(int))
+    chosen = np.unique(
+        np.round(np.interp((-1, -0.5, -0.05, 0, 0.05, 0.5), ratios, np.arange(ratios.size))).astype(
+            int
+        )
+    )
     colours = [style.SKY, style.ORANGE, style.VERMILION]
     inside = _admissible_square(nodes)
     for face in range(2):
@@ -112,14 +120,28 @@ def figure_9(made: Arrays, folder: Path) -> list[Path]:
             axes.contourf(nodes, nodes, inside.T, levels=[0.5, 1.5], colors=["#eef2f4"])
             held = (made[f"speed_{face}"][:, :, k] < made["threshold"]) & inside
             link = made[f"link_{face}"][:, :, k]
-            axes.pcolormesh(nodes, nodes, np.where(held, link, np.nan).T, cmap=ListedColormap(colours), vmin=-0.5, vmax=2.5)
+            axes.pcolormesh(
+                nodes,
+                nodes,
+                np.where(held, link, np.nan).T,
+                cmap=ListedColormap(colours),
+                vmin=-0.5,
+                vmax=2.5,
+            )
             _label_angles(axes)
             axes.set_aspect("equal")
             axes.set_title(rf"$\dot{{\Delta\theta}}_{2 - face} = {ratios[k]:g}$", fontsize=8)
             if column == 0:
                 panel_marks.letter(axes, "AB"[face])
     for index, colour in enumerate(colours):
-        figure.text(0.3 + 0.16 * index, 0.385, f"link {index + 1} slow", color=colour, fontsize=9, fontweight="bold")
+        figure.text(
+            0.3 + 0.16 * index,
+            0.385,
+            f"link {index + 1} slow",
+            color=colour,
+            fontsize=9,
+            fontweight="bold",
+        )
     below = grid[3, :].subgridspec(1, 4)
     draw_cases([figure.add_subplot(below[0, i]) for i in range(4)], made, "worked", "CDEF")
     return style.save(figure, folder / "figure-09-static-friction")
@@ -135,29 +157,54 @@ def figure_11(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
     for a, (key, name), text in zip(axes, _MEASURES, "ABC", strict=True):
         drawn = _filled(a, made["A1"], made["B1"], made[key])
         figure.colorbar(drawn, ax=a, shrink=0.85)
-        a.set(xlabel=r"$A_1$", ylabel=r"$B_1$", title=f"{key}, {name}", xlim=(0, np.pi), ylim=(0, 2.3))
+        a.set(
+            xlabel=r"$A_1$", ylabel=r"$B_1$", title=f"{key}, {name}", xlim=(0, np.pi), ylim=(0, 2.3)
+        )
         a.plot([0, 2.2], [0, 2.2], ":", color="white", lw=0.8)
         a.set_aspect("equal")
         panel_marks.letter(a, text)
     for gait, label in zip(found["gaits"], ("D", "", "", ""), strict=False):
         if abs(gait[0]) < 0.05:
             axes[2].plot(gait[1], gait[2], "*", color=style.VERMILION, ms=8, clip_on=False)
-            axes[2].annotate(label, gait[1:], xytext=(-10, -12), textcoords="offset points", color="white", fontweight="bold")
+            axes[2].annotate(
+                label,
+                gait[1:],
+                xytext=(-10, -12),
+                textcoords="offset points",
+                color="white",
+                fontweight="bold",
+            )
     return style.save(figure, folder / "figure-11-no-offset")
 
 
 def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
-    """Distance, work and efficiency for various A0: slices, the other half being the mirror image."""
+    """Distance, work and efficiency for various A0: slices, the other half being the mirror
+    image."""
     wanted = (0.0, 0.55, 1.1, 1.65, 2.2, 2.59)
     slices = [int(np.argmin(np.abs(made["A0"] - a))) for a in wanted]
-    margins = {"left": 0.05, "right": 0.92, "bottom": 0.1, "top": 0.93, "hspace": 0.25, "wspace": 0.1}
-    figure, axes = style.subplots(3, len(slices), figsize=(11, 4.8), sharex=True, sharey=True, gridspec_kw=margins)
+    margins = {
+        "left": 0.05,
+        "right": 0.92,
+        "bottom": 0.1,
+        "top": 0.93,
+        "hspace": 0.25,
+        "wspace": 0.1,
+    }
+    figure, axes = style.subplots(
+        3, len(slices), figsize=(11, 4.8), sharex=True, sharey=True, gridspec_kw=margins
+    )
     figure.set_layout_engine("none")  # many axes of equal scale collapse under it
     for row, ((key, name), text) in enumerate(zip(_MEASURES, "ABC", strict=True)):
         field = made[f"{key}_direct"]
         top = float(np.nanmax(field[slices]))
         for a, k in zip(axes[row], slices, strict=True):
-            drawn = a.contourf(made["A1"], made["B1"], field[k].T, levels=np.linspace(0, top, 21), cmap=style.SEQUENTIAL)
+            drawn = a.contourf(
+                made["A1"],
+                made["B1"],
+                field[k].T,
+                levels=np.linspace(0, top, 21),
+                cmap=style.SEQUENTIAL,
+            )
             a.set(xlim=(0, np.pi), ylim=(0, 2.3))
             a.set_aspect("equal")
             if row == 0:
@@ -168,5 +215,7 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
                 a.plot(*found["gaits"][near, 1:].T, "*", color=style.VERMILION, ms=8, clip_on=False)
         axes[row, 0].set_ylabel(r"$B_1$")
         panel_marks.letter(axes[row, 0], text)
-        figure.colorbar(drawn, ax=axes[row], label=name, fraction=0.02, pad=0.01, ticks=MaxNLocator(4))
+        figure.colorbar(
+            drawn, ax=axes[row], label=name, fraction=0.02, pad=0.01, ticks=MaxNLocator(4)
+        )
     return style.save(figure, folder / "figure-12-maps-with-offset")

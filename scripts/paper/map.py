@@ -16,7 +16,8 @@ OTHERS = {
     "anisotropic": (Chain(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)),
     "unequal links": (Chain((0.25, 0.45, 0.3)), Friction()),
 }
-"""Snake-like coefficients (paper, introduction), which need four faces, and a body without symmetry."""
+"""Snake-like coefficients (paper, introduction), which need four faces, and a body without
+symmetry."""
 
 
 def connection(context: Context) -> Arrays:
@@ -27,7 +28,13 @@ def connection(context: Context) -> Arrays:
         start = time.perf_counter()
         label = f"velocity map {n}"
         made = velocity_map(
-            BODY, ISOTROPIC, settings["delta"], n_angle=n, n_ratio=n + 1, processes=context.processes, label=label
+            BODY,
+            ISOTROPIC,
+            settings["delta"],
+            n_angle=n,
+            n_ratio=n + 1,
+            processes=context.processes,
+            label=label,
         )
         seconds.append(time.perf_counter() - start)
         for method in STENCILS:
@@ -46,7 +53,14 @@ def connection(context: Context) -> Arrays:
     for name, (body, friction) in OTHERS.items():
         rows = []
         for n in settings["other_resolutions"]:
-            made = velocity_map(body, friction, settings["delta"], n_angle=n, n_ratio=n + 1, processes=context.processes)
+            made = velocity_map(
+                body,
+                friction,
+                settings["delta"],
+                n_angle=n,
+                n_ratio=n + 1,
+                processes=context.processes,
+            )
             e = map_error(made, samples=settings["samples"])
             rows.append((e.largest, e.rms, e.median))
         result[f"other/{name}/errors"] = np.array(rows)

@@ -17,14 +17,20 @@ Result = TypeVar("Result")
 
 
 def parallel_map(
-    function: Callable[[Task], Result], tasks: Sequence[Task], *, processes: int | None = None, label: str = ""
+    function: Callable[[Task], Result],
+    tasks: Sequence[Task],
+    *,
+    processes: int | None = None,
+    label: str = "",
 ) -> list[Result]:
-    """``[function(task) for task in tasks]``, on `processes` processes (all available ones by default).
+    """``[function(task) for task in tasks]``, on `processes` processes (all available ones by
+    default).
 
     Parameters
     ----------
     function : callable
-        Picklable: a module-level function, or a partial of one. It travels with every chunk of tasks.
+        Picklable: a module-level function, or a partial of one. It travels with every chunk of
+        tasks.
     tasks : sequence
     processes : int, optional
         1 stays in this process.
@@ -35,7 +41,9 @@ def parallel_map(
 
     def watched(results):
         hidden = not label or not sys.stderr.isatty()
-        return list(track(results, label, total=len(tasks), console=Console(stderr=True), disable=hidden))
+        return list(
+            track(results, label, total=len(tasks), console=Console(stderr=True), disable=hidden)
+        )
 
     if count <= 1:
         return watched(map(function, tasks))

@@ -23,7 +23,9 @@ class Row:
     verdict: str
 
 
-def number_row(what: str, printed: str, computed: float, error: float, source: str, unit: str = "") -> Row:
+def number_row(
+    what: str, printed: str, computed: float, error: float, source: str, unit: str = ""
+) -> Row:
     """A row for a printed number; `error` is absolute, `source` says where it comes from."""
     value = float(printed)
     decimals = len(printed.partition(".")[2])
@@ -33,7 +35,9 @@ def number_row(what: str, printed: str, computed: float, error: float, source: s
     else:
         verdict = f"printed value {100 * (value / computed - 1):+.1f} %" if computed else "differs"
     digits = 6 if error == 0 else int(np.clip(np.ceil(-np.log10(error)) + 1, 2, 9))
-    return Row(what, f"{printed}{unit}", f"{computed:.{digits}f}{unit}", f"{error:.1g} ({source})", verdict)
+    return Row(
+        what, f"{printed}{unit}", f"{computed:.{digits}f}{unit}", f"{error:.1g} ({source})", verdict
+    )
 
 
 def statement_row(what: str, printed: str, computed: str, holds: bool, error: str = "-") -> Row:

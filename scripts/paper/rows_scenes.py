@@ -109,7 +109,11 @@ def waves(study: PaperStudy) -> Iterator[Row]:
             f"{dW:.0e} (half the intervals)",
         )
         yield statement_row(
-            f"figure {name}: d, isotropic", "less than 0.005", f"{d:.5f}", d - dd < 0.005, f"{dd:.0e} (half the intervals)"
+            f"figure {name}: d, isotropic",
+            "less than 0.005",
+            f"{d:.5f}",
+            d - dd < 0.005,
+            f"{dd:.0e} (half the intervals)",
         )
 
 
@@ -126,9 +130,13 @@ def wave_parameters(study: PaperStudy) -> Iterator[Row]:
         )
     sharp = np.array(study.settings("wave_parameters")["steepness"], dtype=float)
     if sharp.size >= 3:
-        # the corners' length falls like 1/steepness, and so does what they waste: 1/efficiency is nearly linear in it
+        # the corners' length falls like 1/steepness, and so does what they waste: 1/efficiency is
+        # nearly linear in it
         cost = 1 / made["efficiency"][: sharp.size]
-        limits = [(cost[k + 1] * sharp[k + 1] - cost[k] * sharp[k]) / (sharp[k + 1] - sharp[k]) for k in (-3, -2)]
+        limits = [
+            (cost[k + 1] * sharp[k + 1] - cost[k] * sharp[k]) / (sharp[k + 1] - sharp[k])
+            for k in (-3, -2)
+        ]
         yield Row(
             "wave A: corners infinitely sharp",
             "0.93",
@@ -136,7 +144,13 @@ def wave_parameters(study: PaperStudy) -> Iterator[Row]:
             f"{abs(1 / limits[1] - 1 / limits[0]):.3f} (extrapolated from the sharpest three)",
             f"{1 / limits[1] - 0.93:+.3f}",
         )
-    yield Row("wave B: mu_t that gives the printed value", "100", f"{float(made['mu_t_for_B']):.0f}", "1 (root search)", "-")
+    yield Row(
+        "wave B: mu_t that gives the printed value",
+        "100",
+        f"{float(made['mu_t_for_B']):.0f}",
+        "1 (root search)",
+        "-",
+    )
 
 
 def crawlers(study: PaperStudy) -> Iterator[Row]:
@@ -148,12 +162,17 @@ def crawlers(study: PaperStudy) -> Iterator[Row]:
         for key, printed in (("d", 1), ("W_inner", 2), ("W_outer", 1)):
             order = float(made[f"{name}/order/{key}"])
             yield statement_row(
-                f"crawler, {name}: order of {key} in epsilon", str(printed), f"{order:.3f}", abs(order - printed) < 0.1, "fit"
+                f"crawler, {name}: order of {key} in epsilon",
+                str(printed),
+                f"{order:.3f}",
+                abs(order - printed) < 0.1,
+                "fit",
             )
         share = made[f"{name}/efficiency"][smallest] / made[f"{name}/bound"]
         error = made[f"{name}/error_efficiency"][smallest] / made[f"{name}/bound"]
         yield statement_row(
-            f"crawler, {name}: efficiency at epsilon = {epsilon:g}, of the bound {float(made[f'{name}/bound']):g}",
+            f"crawler, {name}: efficiency at epsilon = {epsilon:g}, of the bound "
+            f"{float(made[f'{name}/bound']):g}",
             "1 + O(epsilon)",
             f"{share:.5f}",
             bool(abs(1 - share) < 20 * epsilon),

@@ -1,4 +1,5 @@
-"""Rows of the table on three-link bodies: map, sweeps, optima, influence of delta, the two best motions."""
+"""Rows of the table on three-link bodies: map, sweeps, optima, influence of delta, the two best
+motions."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ def sweep(study: PaperStudy) -> Iterator[Row]:
     yield Row(
         f"sweep over {count} gaits at 100 instants: largest efficiency error of the map route",
         "not printed",
-        f"{np.nanmax(difference):.1e} from the direct route; {s['sample_error_mapped'].max():.1e} from 1600 instants",
+        f"{np.nanmax(difference):.1e} from the direct route; {s['sample_error_mapped'].max():.1e} "
+        f"from 1600 instants",
         f"direct route: {s['sample_error_direct'].max():.1e} from 1600 instants",
         "-",
     )
@@ -73,7 +75,12 @@ def pacing(study: PaperStudy) -> Iterator[Row]:
             "against the direct route",
             "-",
         )
-    for relative, d, e in zip(made["relative"], made["paced_distance_change"], made["paced_efficiency_change"], strict=True):
+    for relative, d, e in zip(
+        made["relative"],
+        made["paced_distance_change"],
+        made["paced_efficiency_change"],
+        strict=True,
+    ):
         yield Row(
             f"delta = {relative:g} times the larger rate instead of 1e-4 per period, {count} gaits",
             "not printed",
@@ -91,12 +98,15 @@ def plane(study: PaperStudy) -> Iterator[Row]:
         "0.261",
         float(p["rim_distance"][best]),
         float(p["rim_distance_error"][best]) + 1e-6,
-        f"time step; at A1 = {p['rim'][1, best]:.3f}, B1 = {p['rim'][2, best]:.3f}, on the limit of contact",
+        f"time step; at A1 = {p['rim'][1, best]:.3f}, B1 = {p['rim'][2, best]:.3f}, on the limit "
+        f"of contact",
     )
     d = p["distance"]
     largest = np.nanmax(d)
     lines = max(np.nanmax(d[0]), np.nanmax(d[:, 0]))
-    yield statement_row("distance along A1 = 0 and along B1 = 0", "0", f"at most {lines:.1e}", lines < 1e-3)
+    yield statement_row(
+        "distance along A1 = 0 and along B1 = 0", "0", f"at most {lines:.1e}", lines < 1e-3
+    )
     diagonal, side = np.diag(d), np.asarray(p["A1"])
     modest = float(np.nanmax(diagonal[side <= 1.4]))
     yield statement_row(
@@ -124,7 +134,8 @@ def plane(study: PaperStudy) -> Iterator[Row]:
     yield statement_row(
         "W at A0 = 0 does not depend on the direction in (A1, B1)",
         "nearly",
-        f"varies by a factor {factors.max():.2f} at amplitude {p['circle_radius'][factors.argmax()]:g}, "
+        f"varies by a factor {factors.max():.2f} at amplitude "
+        f"{p['circle_radius'][factors.argmax()]:g}, "
         f"{factors.min():.2f} at {p['circle_radius'][factors.argmin()]:g}",
         bool(factors.max() < 1.25),
     )
@@ -141,23 +152,41 @@ def optima(study: PaperStudy) -> Iterator[Row]:
     by_delta = influence["distance_work_efficiency"][: len(found["gaits"]), :, 2]
     drift = np.abs(by_delta / by_delta[:, -1:] - 1)[:, list(influence["deltas"]).index(1e-4)]
     contact = int(found["at_contact"].sum())
-    listed = ", ".join(f"{e:.4f} (A0 = {g[0]:.2f})" for e, g in zip(found["efficiency"], found["gaits"], strict=True))
+    listed = ", ".join(
+        f"{e:.4f} (A0 = {g[0]:.2f})"
+        for e, g in zip(found["efficiency"], found["gaits"], strict=True)
+    )
     yield Row(
         "local maxima of the efficiency",
         "3",
         f"{len(found['gaits'])}, {contact} of them at the limit of contact: {listed}",
         "grid neighbours, climbed",
-        "the three printed, and one more at the limit of contact" if len(found["gaits"]) == 4 else "-",
+        "the three printed, and one more at the limit of contact"
+        if len(found["gaits"]) == 4
+        else "-",
     )
     for name, i, printed, A0 in zip(
-        ("first", "second", "third"), places, ("0.259", "0.207", "0.094"), ("0", "1.1", "2.5"), strict=True
+        ("first", "second", "third"),
+        places,
+        ("0.259", "0.207", "0.094"),
+        ("0", "1.1", "2.5"),
+        strict=True,
     ):
-        e, gait, moved = float(found["efficiency"][i]), found["gaits"][i], float(found["position_error"][i])
+        e, gait, moved = (
+            float(found["efficiency"][i]),
+            found["gaits"][i],
+            float(found["position_error"][i]),
+        )
         # a maximum loses to second order in its position; the landscape varies over about a radian
         error = e * float(found["relative_error"][i] + drift[i] + moved**2)
-        where = f"time step, delta, position; at A0 = {gait[0]:.3f}, A1 = {gait[1]:.3f}, B1 = {gait[2]:.3f}"
+        where = (
+            f"time step, delta, position; at A0 = {gait[0]:.3f}, A1 = {gait[1]:.3f}, B1 = "
+            f"{gait[2]:.3f}"
+        )
         yield number_row(f"efficiency of the {name} maximum", printed, e, error, where)
-        yield number_row(f"A0 of the {name} maximum", A0, float(gait[0]), moved, "search with half the instants")
+        yield number_row(
+            f"A0 of the {name} maximum", A0, float(gait[0]), moved, "search with half the instants"
+        )
     for A0, best in zip(found["named_A0"], found["named_best"], strict=True):
         yield Row(
             f"best efficiency at exactly A0 = {A0:g}",
@@ -170,19 +199,29 @@ def optima(study: PaperStudy) -> Iterator[Row]:
     first, second = places[:2]
     for key, printed in (("distance", "0.37"), ("work", "0.47")):
         ratio = float(found[key][second] / found[key][first])
-        moves = [_relative_slope(swept, key, found["gaits"][i]) * float(found["position_error"][i]) for i in (first, second)]
+        moves = [
+            _relative_slope(swept, key, found["gaits"][i]) * float(found["position_error"][i])
+            for i in (first, second)
+        ]
         what = f"{key} of the second maximum over that of the first"
         yield number_row(what, printed, ratio, ratio * sum(moves), "position of the maxima")
     d = float(found["distance"][first])
-    moved = d * _relative_slope(swept, "distance", found["gaits"][first]) * float(found["position_error"][first])
+    moved = (
+        d
+        * _relative_slope(swept, "distance", found["gaits"][first])
+        * float(found["position_error"][first])
+    )
     yield number_row("distance of the first maximum", "0.26", d, moved, "position of the maximum")
 
 
 def _relative_slope(swept: Arrays, key: str, gait: np.ndarray) -> float:
-    """Largest relative change of a swept measure per radian, from the grid node nearest to a gait to its neighbours."""
+    """Largest relative change of a swept measure per radian, from the grid node nearest to a gait
+    to its neighbours."""
     axes = [swept[name] for name in ("A0", "A1", "B1")]
     values = swept[f"{key}_direct"]
-    distance = sum((a - g) ** 2 for a, g in zip(np.meshgrid(*axes, indexing="ij"), np.abs(gait), strict=True))
+    distance = sum(
+        (a - g) ** 2 for a, g in zip(np.meshgrid(*axes, indexing="ij"), np.abs(gait), strict=True)
+    )
     node = np.unravel_index(np.argmin(np.where(np.isnan(values), np.inf, distance)), values.shape)
     near = values[tuple(slice(max(0, k - 1), k + 2) for k in node)]
     return float(np.nanmax(np.abs(near / values[node] - 1)) / (axes[0][1] - axes[0][0]))
@@ -219,12 +258,25 @@ def motions(study: PaperStudy) -> Iterator[Row]:
         t, speed = third_slowest_dips(made[f"{name}/t"], made[f"{name}/speeds"])
         index = int(made[f"{name}/index"])
         # the phase at which a shape is passed moves with the position of the maximum
-        moved = float(found["position_error"][index] / (2 * np.pi * found["gaits"][index, 1:].min()))
+        moved = float(
+            found["position_error"][index] / (2 * np.pi * found["gaits"][index, 1:].min())
+        )
         for value in printed:
             near = np.abs(t - float(value)) < 0.05
             if not near.any():
-                yield Row(f"motion {name}: three ends almost static at t =", value, "no such instant", "-", "does not hold")
+                yield Row(
+                    f"motion {name}: three ends almost static at t =",
+                    value,
+                    "no such instant",
+                    "-",
+                    "does not hold",
+                )
                 continue
             i = np.flatnonzero(near)[0]
-            what = f"motion {name}: three of four ends almost static at t = (third slowest end moves at {speed[i]:.1e})"
-            yield number_row(what, value, float(t[i]), 2 * step + moved, "time step, position of the maximum")
+            what = (
+                f"motion {name}: three of four ends almost static at t = (third slowest end "
+                f"moves at {speed[i]:.1e})"
+            )
+            yield number_row(
+                what, value, float(t[i]), 2 * step + moved, "time step, position of the maximum"
+            )

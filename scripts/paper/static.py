@@ -1,4 +1,5 @@
-"""Parts of the reproduction that concern static friction: regions, worked and symmetric cases, the flap body."""
+"""Parts of the reproduction that concern static friction: regions, worked and symmetric cases, the
+flap body."""
 
 from __future__ import annotations
 
@@ -28,7 +29,9 @@ from scripts.paper.study import Arrays, Context
 BODY, ISOTROPIC = Chain(), Friction()
 
 
-def _slice(ratio: float, leading: int, nodes: np.ndarray, delta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _slice(
+    ratio: float, leading: int, nodes: np.ndarray, delta: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Slowest speed, slowest link and admissibility at all shapes, for one ratio of rates."""
     a1, a2 = (a.ravel() for a in np.meshgrid(nodes, nodes, indexing="ij"))
     angles, rates = np.stack([a1, a2]), np.empty((2, a1.size))
@@ -36,18 +39,28 @@ def _slice(ratio: float, leading: int, nodes: np.ndarray, delta: float) -> tuple
     z = solve_balance(BODY, ISOTROPIC, angles, rates, delta).require().z
     speed, link = slowest_link(BODY, ISOTROPIC, angles, rates, z, delta)
     shape = (nodes.size, nodes.size)
-    return speed.reshape(shape), link.reshape(shape), (crossing_depth(BODY, angles) < 1e-9).reshape(shape)
+    return (
+        speed.reshape(shape),
+        link.reshape(shape),
+        (crossing_depth(BODY, angles) < 1e-9).reshape(shape),
+    )
 
 
 def static(context: Context) -> Arrays:
-    """Where a link is slower than 1e-3, for both leading rates; the worked and the symmetric cases as delta falls."""
+    """Where a link is slower than 1e-3, for both leading rates; the worked and the symmetric cases
+    as delta falls."""
     settings, delta = context.settings, context.settings["delta"]
     nodes = np.linspace(-np.pi, np.pi, settings["nodes"])
     ratios = np.linspace(-1, 1, settings["ratios"])
     result: Arrays = {"angles": nodes, "ratios": ratios, "threshold": SLOW, "delta": delta}
     for leading in (0, 1):
         solve = partial(_slice, leading=leading, nodes=nodes, delta=delta)
-        rows = parallel_map(solve, list(ratios), processes=context.processes, label=f"static regions, rate {leading + 1} = 1")
+        rows = parallel_map(
+            solve,
+            list(ratios),
+            processes=context.processes,
+            label=f"static regions, rate {leading + 1} = 1",
+        )
         speed, link, inside = (np.stack(a, axis=-1) for a in zip(*rows, strict=True))
         result |= {f"speed_{leading}": speed, f"link_{leading}": link}
     result["inside"] = inside[:, :, 0]
@@ -60,7 +73,11 @@ def static(context: Context) -> Arrays:
     for d in settings["deltas"]:
         z = solve_balance(BODY, ISOTROPIC, angles, rates, d).require().z
         fractions.append((slowest_link(BODY, ISOTROPIC, angles, rates, z, d)[0] < SLOW).mean())
-    result |= {"fraction_deltas": np.array(settings["deltas"]), "fraction": np.array(fractions), "samples": angles.shape[1]}
+    result |= {
+        "fraction_deltas": np.array(settings["deltas"]),
+        "fraction": np.array(fractions),
+        "samples": angles.shape[1],
+    }
 
     for figure, cases in (("worked", WORKED_CASES), ("symmetric", SYMMETRIC_CASES)):
         for case in cases:
@@ -97,7 +114,8 @@ def _gap_arrays(case: Case, unknown: np.ndarray, delta: float) -> Arrays:
 
 
 def flap(context: Context) -> Arrays:
-    """The flap body of figure 4: kinetic friction has no solution at any opening, and what delta gives."""
+    """The flap body of figure 4: kinetic friction has no solution at any opening, and what delta
+    gives."""
     settings = context.settings
     body = FlapBody(tuple(settings["lengths"]))
     openings = np.linspace(0.05, 0.5 * np.pi - 0.05, settings["openings"])
@@ -120,6 +138,8 @@ def flap(context: Context) -> Arrays:
         "limit": fraction / np.sqrt(1 - fraction**2),
         "example": settings["example"],
         "example_V": V,
-        "example_force": np.array([axial_force(body, ISOTROPIC, settings["example"], 1.0, V, d) for d in (1e-4, 1e-12)]),
+        "example_force": np.array(
+            [axial_force(body, ISOTROPIC, settings["example"], 1.0, V, d) for d in (1e-4, 1e-12)]
+        ),
     }
     return result

@@ -1,8 +1,10 @@
-"""Resumable studies: named parts, each a function from settings to named arrays, computed once and kept in HDF5.
+"""Resumable studies: named parts, each a function from settings to named arrays, computed once and
+kept in HDF5.
 
-A part is finished when its file carries the fingerprint of its settings, of the source text of its module and of every
-colloc or scripts module that one leads to, and of the parts it needs. Change any of them, and it is computed again.
-Modules that only carry numbers about (this one, storing, running in parallel) do not count.
+A part is finished when its file carries the fingerprint of its settings, of the source text of its
+module and of every colloc or scripts module that one leads to, and of the parts it needs. Change
+any of them, and it is computed again. Modules that only carry numbers about (this one, storing,
+running in parallel) do not count.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ _CARRIERS = {"scripts.paper.study", "scripts.paper.array_store", "scripts.paper.
 
 @dataclass(frozen=True)
 class Context:
-    """What a part is computed with: its settings, the arrays of the parts it needs by name, and processes to use."""
+    """What a part is computed with: its settings, the arrays of the parts it needs by name, and
+    processes to use."""
 
     settings: Mapping[str, Any]
     needed: Mapping[str, Arrays]
@@ -73,8 +76,11 @@ def _source(module: str) -> str | None:
 
 
 @cache
-def source_closure(module: str, packages: tuple[str, ...] = ("colloc", "scripts", "problems")) -> dict[str, str]:
-    """Source text of a module and of all modules of `packages` it imports, directly or not, by name."""
+def source_closure(
+    module: str, packages: tuple[str, ...] = ("colloc", "scripts", "problems")
+) -> dict[str, str]:
+    """Source text of a module and of all modules of `packages` it imports, directly or not, by
+    name."""
     found: dict[str, str] = {}
     todo = [module]
     while todo:
@@ -84,7 +90,11 @@ def source_closure(module: str, packages: tuple[str, ...] = ("colloc", "scripts"
             continue
         found[name] = text
         for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in packages:
+            if (
+                isinstance(node, ast.ImportFrom)
+                and node.module
+                and node.module.split(".")[0] in packages
+            ):
                 todo += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
     return found
 
@@ -109,7 +119,9 @@ class PaperStudy:
         """
         unknown = [name for name in names if name not in self.parts]
         if unknown:
-            raise ProblemError(f"there is no part {unknown[0]!r}; the parts are {', '.join(self.parts)}.")
+            raise ProblemError(
+                f"there is no part {unknown[0]!r}; the parts are {', '.join(self.parts)}."
+            )
         wanted = set(names)
         for name in reversed(self.parts):
             if name in wanted:

@@ -1,4 +1,5 @@
-"""The table results/paper.md: one row for every number the paper prints, made from the stored parts only."""
+"""The table results/paper.md: one row for every number the paper prints, made from the stored parts
+only."""
 
 from __future__ import annotations
 
@@ -52,7 +53,15 @@ def table(study: PaperStudy) -> str:
             missing.append(part)
             continue
         for row in rows(study):
-            lines.append(f"| {row.what} | {row.printed} | {row.computed} | {row.error} | {row.verdict} | `{part}` |")
+            lines.append(
+                f"| {row.what} | {row.printed} | {row.computed} | {row.error} | {row.verdict} | "
+                f"`{part}` |"
+            )
     if missing:
-        lines += ["", "Not computed yet, or inputs have changed since: " + ", ".join(f"`{name}`" for name in missing) + "."]
+        lines += [
+            "",
+            "Not computed yet, or inputs have changed since: "
+            + ", ".join(f"`{name}`" for name in missing)
+            + ".",
+        ]
     return "\n".join(lines) + "\n"

@@ -1,4 +1,5 @@
-"""Parts of the reproduction that concern three-link bodies: sweeps, optima, and what delta changes."""
+"""Parts of the reproduction that concern three-link bodies: sweeps, optima, and what delta
+changes."""
 
 from __future__ import annotations
 
@@ -29,24 +30,42 @@ def sweep(context: Context) -> Arrays:
     known = stored_map(context.needed["connection"])
     grid = gait_grid(BODY, np.pi / settings["steps"])
     gaits, result = grid.gaits, _grid_arrays(grid)
-    mapped, direct = Route(BODY, ISOTROPIC, delta, known, direct=False), Route(BODY, ISOTROPIC, delta, known)
+    mapped, direct = (
+        Route(BODY, ISOTROPIC, delta, known, direct=False),
+        Route(BODY, ISOTROPIC, delta, known),
+    )
     found = {}
     for name, route in (("mapped", mapped), ("direct", direct)):
         start = time.perf_counter()
         found[name] = performance(
-            route, gaits, instants=settings["instants"], processes=context.processes, label=f"sweep, {name}"
+            route,
+            gaits,
+            instants=settings["instants"],
+            processes=context.processes,
+            label=f"sweep, {name}",
         )
         result[f"seconds_{name}"] = time.perf_counter() - start
         result[f"distance_{name}"] = grid.unflattened(found[name].distance)
         result[f"work_{name}"] = grid.unflattened(found[name].work)
         result[f"efficiency_{name}"] = grid.unflattened(found[name].efficiency)
     sample = gaits[:, :: settings["sample_every"]]
-    fine = performance(direct, sample, instants=16 * settings["instants"], processes=context.processes, label="sweep, fine")
+    fine = performance(
+        direct,
+        sample,
+        instants=16 * settings["instants"],
+        processes=context.processes,
+        label="sweep, fine",
+    )
     result["sample"], result["sample_efficiency"] = sample, fine.efficiency
     for name in found:
-        result[f"sample_error_{name}"] = np.abs(found[name].efficiency[:: settings["sample_every"]] - fine.efficiency)
+        result[f"sample_error_{name}"] = np.abs(
+            found[name].efficiency[:: settings["sample_every"]] - fine.efficiency
+        )
     by_method = [
-        np.abs(performance(Route(BODY, ISOTROPIC, delta, known, False, m), sample).efficiency - fine.efficiency).max()
+        np.abs(
+            performance(Route(BODY, ISOTROPIC, delta, known, False, m), sample).efficiency
+            - fine.efficiency
+        ).max()
         for m in STENCILS
     ]
     result["sample_error_by_method"] = np.array(by_method)
@@ -54,12 +73,19 @@ def sweep(context: Context) -> Arrays:
 
 
 def plane(context: Context) -> Arrays:
-    """The plane A0 = 0 on a finer grid, directly, and the lines on which the paper expects no motion."""
+    """The plane A0 = 0 on a finer grid, directly, and the lines on which the paper expects no
+    motion."""
     settings = context.settings
     known = stored_map(context.needed["connection"])
     route = Route(BODY, ISOTROPIC, settings["delta"], known)
     grid = gait_grid(BODY, np.pi / settings["steps"], A0=np.zeros(1))
-    done = performance(route, grid.gaits, instants=settings["instants"], processes=context.processes, label="plane A0 = 0")
+    done = performance(
+        route,
+        grid.gaits,
+        instants=settings["instants"],
+        processes=context.processes,
+        label="plane A0 = 0",
+    )
     result = _grid_arrays(grid)
     result |= {
         "distance": grid.unflattened(done.distance)[0],
@@ -71,7 +97,8 @@ def plane(context: Context) -> Arrays:
     radius = largest_amplitude(BODY, np.zeros_like(angle), angle)
     rim = np.stack([0 * angle, radius * np.cos(angle), radius * np.sin(angle)])
     rim_done, rim_coarse = (
-        performance(route, rim, instants=n * settings["instants"], processes=context.processes) for n in (8, 4)
+        performance(route, rim, instants=n * settings["instants"], processes=context.processes)
+        for n in (8, 4)
     )
     result |= {"rim": rim, "rim_distance": rim_done.distance, "rim_work": rim_done.work}
     # second order: the finer rule has a third of the difference
@@ -84,8 +111,11 @@ def plane(context: Context) -> Arrays:
     return result
 
 
-def _line_maximum(route: Route, A0: float, direction: np.ndarray, fractions: np.ndarray) -> np.ndarray:
-    """(A1, B1, efficiency) of the best gait with a given A0 over a grid of directions and fractions of the boundary."""
+def _line_maximum(
+    route: Route, A0: float, direction: np.ndarray, fractions: np.ndarray
+) -> np.ndarray:
+    """(A1, B1, efficiency) of the best gait with a given A0 over a grid of directions and fractions
+    of the boundary."""
     d, f = (a.ravel() for a in np.meshgrid(direction, fractions, indexing="ij"))
     amplitude = f * largest_amplitude(BODY, np.full_like(d, A0), d)
     gaits = np.stack([np.full_like(d, A0), amplitude * np.cos(d), amplitude * np.sin(d)])
@@ -101,7 +131,9 @@ def optima(context: Context) -> Arrays:
     route = Route(BODY, ISOTROPIC, settings["delta"], known)
     swept = context.needed["sweep"]
     gaits = np.stack(np.meshgrid(swept["A0"], swept["A1"], swept["B1"], indexing="ij"))
-    maxima = distinct_maxima(route, swept["efficiency_direct"], gaits, instants=settings["instants"])
+    maxima = distinct_maxima(
+        route, swept["efficiency_direct"], gaits, instants=settings["instants"]
+    )
     result: Arrays = {
         "gaits": np.array([(m.A0, m.A1, m.B1) for m in maxima]),
         "position_error": np.array([m.position_error for m in maxima]),
@@ -132,7 +164,8 @@ def _replayed(task: tuple[tuple[float, float, float], float]) -> tuple[float, fl
 
 
 def delta_influence(context: Context) -> Arrays:
-    """How distance, work and efficiency of the maxima, in their order, and of random gaits change with delta."""
+    """How distance, work and efficiency of the maxima, in their order, and of random gaits change
+    with delta."""
     settings = context.settings
     rng = np.random.default_rng(settings["seed"])
     gaits = [tuple(g) for g in context.needed["optima"]["gaits"]]
@@ -156,7 +189,9 @@ def motions(context: Context) -> Arrays:
     result: Arrays = {}
     order = [int(np.argmin(np.abs(found["gaits"][:, 0] - a))) for a in (0.0, 1.1)]
     for name, index in zip("DF", order, strict=True):
-        made = record(BODY, ISOTROPIC, _path(*found["gaits"][index]), settings["delta"], settings["instants"])
+        made = record(
+            BODY, ISOTROPIC, _path(*found["gaits"][index]), settings["delta"], settings["instants"]
+        )
         result |= {
             f"{name}/t": made.t,
             f"{name}/speeds": made.speeds,

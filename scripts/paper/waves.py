@@ -1,4 +1,5 @@
-"""Parts of the reproduction that concern smooth bodies: travelling and standing waves (figures 5 and 6)."""
+"""Parts of the reproduction that concern smooth bodies: travelling and standing waves (figures 5
+and 6)."""
 
 from __future__ import annotations
 
@@ -14,7 +15,10 @@ from scripts.models.smooth_record import snapshots
 from scripts.paper.parallel import parallel_map
 from scripts.paper.study import Arrays, Context
 
-TRANSVERSE_EASY, ALONG_EASY = Friction(mu_t=1, mu_f=100, mu_b=100), Friction(mu_t=100, mu_f=1, mu_b=1)
+TRANSVERSE_EASY, ALONG_EASY = (
+    Friction(mu_t=1, mu_f=100, mu_b=100),
+    Friction(mu_t=100, mu_f=1, mu_b=1),
+)
 WAVES: dict[str, tuple[str, Friction]] = {
     "5A": ("triangular", TRANSVERSE_EASY),
     "5B": ("sine", ALONG_EASY),
@@ -26,7 +30,11 @@ Task = tuple[str, dict, tuple[float, float, float], float, dict]
 """Kind of wave, its parameters, (mu_t, mu_f, mu_b), delta, and settings of the quadrature."""
 
 
-_MAKERS: dict[str, Callable[..., Motion]] = {"triangular": tanh_wave, "sine": sine_wave, "standing": standing_wave}
+_MAKERS: dict[str, Callable[..., Motion]] = {
+    "triangular": tanh_wave,
+    "sine": sine_wave,
+    "standing": standing_wave,
+}
 
 
 def _motion(kind: str, **parameters: float) -> Motion:
@@ -54,13 +62,18 @@ def _view(task: tuple[str, float, int]) -> dict:
 def waves(context: Context) -> Arrays:
     """Distance, work and efficiency of the waves, with errors, and snapshots."""
     settings = context.settings
-    tasks = [(name, settings["delta"], settings["intervals"].get(name, settings["default_intervals"])) for name in WAVES]
+    tasks = [
+        (name, settings["delta"], settings["intervals"].get(name, settings["default_intervals"]))
+        for name in WAVES
+    ]
     rows = parallel_map(_wave, tasks, processes=context.processes, label="waves")
     result: Arrays = {}
     for name, row in zip(WAVES, rows, strict=True):
         result |= {f"{name}/{key}": value for key, value in row.items()}
     views = parallel_map(
-        _view, [(name, settings["delta"], settings["snapshots"]) for name in WAVES], processes=context.processes
+        _view,
+        [(name, settings["delta"], settings["snapshots"]) for name in WAVES],
+        processes=context.processes,
     )
     for name, view in zip(WAVES, views, strict=True):
         result |= {f"{name}/{key}": value for key, value in view.items()}
@@ -74,7 +87,8 @@ def _efficiency(task: Task) -> float:
 
 
 def wave_parameters(context: Context) -> Arrays:
-    """Which parameters would give the efficiencies printed for waves A (0.93) and B (0.76): one changed at a time."""
+    """Which parameters would give the efficiencies printed for waves A (0.93) and B (0.76): one
+    changed at a time."""
     delta = context.settings["delta"]
     tasks: list[Task] = []
     names = []
@@ -90,7 +104,9 @@ def wave_parameters(context: Context) -> Arrays:
     for panels, order in context.settings["coarse"]:
         quadrature = {"panels": panels, "order": order, "quadrature_tolerance": 0.0}
         tasks.append(("triangular", {}, (1, 100, 100), delta, quadrature))
-        names.append(f"A: printed parameters, arc length under-resolved ({panels} panels of {order} nodes)")
+        names.append(
+            f"A: printed parameters, arc length under-resolved ({panels} panels of {order} nodes)"
+        )
     for mu in context.settings["mu_B"]:
         tasks.append(("sine", {}, (mu, 1, 1), delta, {}))
         names.append(f"B: mu_t = {mu:g} instead of 100")

@@ -1,4 +1,5 @@
-"""No gait beats the bound: thousands of random harmonic gaits and polygons, for several frictions."""
+"""No gait beats the bound: thousands of random harmonic gaits and polygons, for several
+frictions."""
 
 import dataclasses
 from functools import cache
@@ -33,7 +34,8 @@ def isotropic() -> Bound:
 
 
 def antipodal_fourier(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random gaits q(t + 1/2) = -q(t): the second half mirrors the first, so any friction closes the rotation."""
+    """Random gaits q(t + 1/2) = -q(t): the second half mirrors the first, so any friction closes
+    the rotation."""
     t = (np.arange(STEPS) + 0.5) / STEPS
     k = 2 * np.pi * np.array([1, 3, 5])
     a, b = rng.standard_normal((2, 2, count, 3)) * [1.0, 0.4, 0.2]
@@ -45,7 +47,8 @@ def antipodal_fourier(rng: np.random.Generator, count: int) -> tuple[np.ndarray,
 
 
 def antipodal_polygons(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random polygons of three corners and their opposites, run through at constant speed on each side."""
+    """Random polygons of three corners and their opposites, run through at constant speed on each
+    side."""
     corners = rng.uniform(-1.0, 1.0, (2, count, 3)) * rng.uniform(0.1, 2.05, count)[:, None]
     corners = np.concatenate([corners, -corners], axis=2)
     sides = np.roll(corners, -1, axis=2) - corners
@@ -55,11 +58,14 @@ def antipodal_polygons(rng: np.random.Generator, count: int) -> tuple[np.ndarray
 
 
 def replayed(motion: CoulombMotion, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of the middle link and work per period of gaits stored one after the other, ``(count,)`` each."""
+    """Distance of the middle link and work per period of gaits stored one after the other,
+    ``(count,)`` each."""
     spin = motion.spin.reshape(count, STEPS) / STEPS
     heading = np.cumsum(spin, axis=1) - 0.5 * spin
     v = (motion.velocity[0] + 1j * motion.velocity[1]).reshape(count, STEPS)
-    return np.abs((np.exp(1j * heading) * v).mean(axis=1)), motion.power.reshape(count, STEPS).mean(axis=1)
+    return np.abs((np.exp(1j * heading) * v).mean(axis=1)), motion.power.reshape(count, STEPS).mean(
+        axis=1
+    )
 
 
 def ratios(friction: Friction, q: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, CoulombMotion]:
@@ -94,48 +100,65 @@ def test_no_random_gait_beats_the_bound(mu):
 
 
 def test_a_bound_is_pinned_from_both_sides(isotropic):
-    """It is reached at the motion it names, no smaller than the program's optimum, and random motions do not exceed it."""
-    value = lambda q, r: Samples(isotropic.potential_space(Chain()), balanced_motion(Chain(), Friction(), q, r, 1e-6)).ratio(  # noqa: E731
-        np.array(isotropic.coefficients)
-    )[0]
+    """It is reached at the motion it names, no smaller than the program's optimum, and random
+    motions do not exceed it."""
+
+    def value(q, r):
+        samples = Samples(
+            isotropic.potential_space(Chain()), balanced_motion(Chain(), Friction(), q, r, 1e-6)
+        )
+        return samples.ratio(np.array(isotropic.coefficients))[0]
+
     reached = value(np.array(isotropic.angles)[:, None], np.array(isotropic.rates)[:, None])
     assert reached[0] == pytest.approx(isotropic.sampled, rel=1e-6)
-    # in 16 runs with other seeds and settings five rounds left 0.6 to 24 % between them, as the samples happened to fall
+    # in 16 runs with other seeds and settings five rounds left 0.6 to 24 % between them, as the
+    # samples happened to fall
     assert isotropic.floor <= isotropic.sampled <= 1.3 * isotropic.floor
     rng = np.random.default_rng(23)
     q, turn = rng.uniform(-np.pi, np.pi, (2, 4000)), rng.uniform(0, 2 * np.pi, 4000)
     inside = admissible(Chain(), q)
-    assert value(q[:, inside], np.stack([np.cos(turn), np.sin(turn)])[:, inside]).max() < isotropic.sampled
-    # of this coarse program with harmonic 1 (0.4796 to 0.4803 in those runs); finer ones come down to 0.459, and small gaits at
-    # the fold reach 0.456
+    assert (
+        value(q[:, inside], np.stack([np.cos(turn), np.sin(turn)])[:, inside]).max()
+        < isotropic.sampled
+    )
+    # of this coarse program with harmonic 1 (0.4796 to 0.4803 in those runs); finer ones come down
+    # to 0.459, and small gaits at the fold reach 0.456
     assert isotropic.floor == pytest.approx(0.480, rel=0.003)
 
 
 def test_a_sampled_bound_holds_at_random_motions_within_a_percent():
-    """How far samples can be trusted: motions that were never sampled exceed the coarse bound by little."""
+    """How far samples can be trusted: motions that were never sampled exceed the coarse bound by
+    little."""
     bound = efficiency_bound(Chain(), Friction(), 2.0, budget=ODD)
     rng = np.random.default_rng(22)
     turn = rng.uniform(0, 2 * np.pi, 8000)
-    motion = balanced_motion(Chain(), Friction(), rng.uniform(-2, 2, (2, 8000)), np.stack([np.cos(turn), np.sin(turn)]))
+    motion = balanced_motion(
+        Chain(), Friction(), rng.uniform(-2, 2, (2, 8000)), np.stack([np.cos(turn), np.sin(turn)])
+    )
     ratio = Samples(bound.potential_space(Chain()), motion).ratio(np.array(bound.coefficients))[0]
     assert ratio.max() < 1.05 * bound.sampled
 
 
 def test_infinitesimal_triangle_reaches_two_fifths():
-    """Design value derived for shapes (c, -c) with c > 1.8: two joints one after the other, then undone together."""
+    """Design value derived for shapes (c, -c) with c > 1.8: two joints one after the other, then
+    undone together."""
     gait = small_gait(Chain(), Friction(), np.array([2.2, -2.2]), directions=360)
     assert abs(gait.efficiency - 0.4) < 1e-4
     np.testing.assert_allclose(gait.rates @ gait.weights, 0.0, atol=1e-9)
 
 
 def test_small_gaits_at_the_fold_generate_their_directions():
-    """0.45606 at (pi, 0) from any first set of directions: the creases are found, where fixed sets stop at 0.452."""
-    values = [small_gait(Chain(), Friction(), np.array([np.pi, 0.0]), n, 4).efficiency for n in (60, 74)]
+    """0.45606 at (pi, 0) from any first set of directions: the creases are found, where fixed sets
+    stop at 0.452."""
+    values = [
+        small_gait(Chain(), Friction(), np.array([np.pi, 0.0]), n, 4).efficiency for n in (60, 74)
+    ]
     np.testing.assert_allclose(values, 0.45606, atol=2e-4)
 
 
 def test_small_gait_is_what_a_small_polygon_does():
-    """The linear program against a replay of the polygon it proposes; rotation of order size^2 is left open."""
+    """The linear program against a replay of the polygon it proposes; rotation of order size^2 is
+    left open."""
     shape = np.array([2.2, -2.2])
     gait = small_gait(Chain(), Friction(), shape, directions=360)
     for size in (0.04, 0.02):
@@ -145,17 +168,22 @@ def test_small_gait_is_what_a_small_polygon_does():
         q = (corners[:, :, None] + sides[:, :, None] * part).reshape(2, -1)
         motion = balanced_motion(Chain(), Friction(), q, np.repeat(sides, 20, axis=1) / 20)
         heading = np.cumsum(motion.spin) - 0.5 * motion.spin
-        distance = abs(np.sum(np.exp(1j * heading) * (motion.velocity[0] + 1j * motion.velocity[1])))
+        distance = abs(
+            np.sum(np.exp(1j * heading) * (motion.velocity[0] + 1j * motion.velocity[1]))
+        )
         assert abs(distance / motion.power.sum() - gait.efficiency) < 0.05 * size
 
 
 def test_small_gaits_stay_below_the_bound(isotropic):
     for shape in ((np.pi, 0.0), (0.0, 0.0), (1.2, -0.3), (2.0, 1.0)):
-        assert small_gait(Chain(), Friction(), np.array(shape), 90, 8).efficiency < isotropic.sampled
+        assert (
+            small_gait(Chain(), Friction(), np.array(shape), 90, 8).efficiency < isotropic.sampled
+        )
 
 
 def test_shapes_at_which_few_directions_do_not_close_are_passed_over(monkeypatch):
-    """So it is at four links with friction (0.5, 1, 5) and the 36 directions of the first look: that ended the search."""
+    """So it is at four links with friction (0.5, 1, 5) and the 36 directions of the first look:
+    that ended the search."""
 
     def failing(body, friction, shape, *settings):
         if settings and shape[0] > 0:
@@ -169,11 +197,14 @@ def test_shapes_at_which_few_directions_do_not_close_are_passed_over(monkeypatch
 
 
 def test_the_start_of_a_search_counts_where_it_is_better_than_its_end(monkeypatch):
-    """As at four straight links, which do 0.7319: values from a few directions led away from them, to 0.7311."""
+    """As at four straight links, which do 0.7319: values from a few directions led away from them,
+    to 0.7311."""
 
     def misleading(body, friction, shape, *settings):
         size = float(np.abs(shape).max())
-        return SmallGait(size if settings and settings[0] == 180 else -size, 0.0, np.empty((2, 0)), np.empty(0))
+        return SmallGait(
+            size if settings and settings[0] == 180 else -size, 0.0, np.empty((2, 0)), np.empty(0)
+        )
 
     monkeypatch.setattr(infinitesimal, "small_gait", misleading)
     best, shape = best_small_gait(Chain(), Friction(), 2.0, steps=4, refined=1)
@@ -181,8 +212,9 @@ def test_the_start_of_a_search_counts_where_it_is_better_than_its_end(monkeypatc
 
 
 def test_four_straight_links_crawl_sideways_by_bends_of_no_size():
-    """Within 0.1 % of the sampled bound for joints within 2.5, 0.7322. Climbs of directions along the axes ended at 0.7254 to
-    0.7304, by how many directions they began with; across the axes they agree."""
+    """Within 0.1 % of the sampled bound for joints within 2.5, 0.7322. Climbs of directions along
+    the axes ended at 0.7254 to 0.7304, by how many directions they began with; across the axes they
+    agree."""
     found = [small_gait(Chain((0.25,) * 4), Friction(), np.zeros(3), count) for count in (180, 400)]
     assert all(0.7314 < one.efficiency < 0.7322 for one in found)
     assert all(abs(np.cos(one.heading)) < 1e-6 for one in found)
@@ -191,13 +223,17 @@ def test_four_straight_links_crawl_sideways_by_bends_of_no_size():
 
 
 def test_small_gaits_of_many_joints_begin_with_directions_where_joints_and_links_rest():
-    """Five straight links: from directions at random alone, the column generation ended at 0.8624."""
-    assert small_gait(Chain((0.2,) * 5), Friction(), np.zeros(4)).efficiency == pytest.approx(0.8640, abs=2e-4)
+    """Five straight links: from directions at random alone, the column generation ended at
+    0.8624."""
+    assert small_gait(Chain((0.2,) * 5), Friction(), np.zeros(4)).efficiency == pytest.approx(
+        0.8640, abs=2e-4
+    )
 
 
 @pytest.mark.slow
 def test_the_best_small_gait_is_found_along_a_ridge_that_no_axis_follows():
-    """At (3, 1, 1) it lies on the line where both ends are bent alike; a search along the axes ends at 0.188 beside it."""
+    """At (3, 1, 1) it lies on the line where both ends are bent alike; a search along the axes ends
+    at 0.188 beside it."""
     best, shape = best_small_gait(Chain(), Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0), 2.5)
     assert best.efficiency > 0.208
     assert shape[0] == pytest.approx(-shape[1], abs=5e-3)

@@ -1,11 +1,14 @@
-"""The best small gait known at the fold, in rational arithmetic: efficiency 462/1013 as a matter of integers.
+"""The best small gait known at the fold, in rational arithmetic: efficiency 462/1013 as a matter of
+integers.
 
-At joint angles (pi, 0) the first link lies on the second, so the body is a rod of twice a link's length whose first half is
-double. All velocities are lateral. In units of a link, xi in [0, 1] along each link away from the first joint, they are
+At joint angles (pi, 0) the first link lies on the second, so the body is a rod of twice a link's
+length whose first half is double. All velocities are lateral. In units of a link, xi in [0, 1]
+along each link away from the first joint, they are
 
     a + w1 xi (first link),      a + w2 xi (second),      a + w2 + w3 xi (third).
 
-Dry friction of isotropic unit coefficient pushes with the sign of the velocity; a link at rest pushes back with up to as much.
+Dry friction of isotropic unit coefficient pushes with the sign of the velocity; a link at rest
+pushes back with up to as much.
 """
 
 from fractions import Fraction as F
@@ -63,7 +66,8 @@ def push(motion):
 def test_each_motion_is_in_balance(name):
     force, torque = push(MOTIONS[name])
     if name == "the first link turns":
-        # the second link, at rest beneath it, holds it: it pushes with the whole of its friction, the third with none
+        # the second link, at rest beneath it, holds it: it pushes with the whole of its friction,
+        # the third with none
         assert (force, torque) == (F(1), F(1, 2))
     else:
         assert (force, torque) == (0, 0)
@@ -83,7 +87,10 @@ def test_its_efficiency_is_462_over_1013():
 def missing(monkeypatch, delta):
     """How much less than the exact value the linear program finds at a finite regularisation."""
     monkeypatch.setattr(infinitesimal, "_DELTA", delta)
-    return 462 / 1013 - infinitesimal.small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
+    return (
+        462 / 1013
+        - infinitesimal.small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
+    )
 
 
 def test_the_linear_program_over_directions_finds_the_same_value(monkeypatch):

@@ -1,4 +1,5 @@
-"""The multipliers of the bound's program are a motion: they close in the mean, and travel as far as the program says."""
+"""The multipliers of the bound's program are a motion: they close in the mean, and travel as far as
+the program says."""
 
 import numpy as np
 import pytest
@@ -23,7 +24,9 @@ LIMIT = 2.5
 def found():
     domain = Domain(Chain(), Friction(), LIMIT)
     space = PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True)
-    optimum = exchanged_optimum(domain, space, shapes=10, directions=24, rounds=4, starts=20, tolerance=1e-2)
+    optimum = exchanged_optimum(
+        domain, space, shapes=10, directions=24, rounds=4, starts=20, tolerance=1e-2
+    )
     return space, optimum
 
 
@@ -36,7 +39,9 @@ def test_the_measure_travels_as_the_program_says(found):
 def test_no_potential_of_the_space_changes_what_the_measure_travels(found):
     space, optimum = found
     measure = optimum.measure
-    matrix, constant = Samples(space, measure.motion).rows(np.arange(measure.weight.size), measure.heading)
+    matrix, constant = Samples(space, measure.motion).rows(
+        np.arange(measure.weight.size), measure.heading
+    )
     # the rate of every potential of the space vanishes in the mean, up to the penalty on roughness
     mean = measure.weight @ matrix
     sizes = np.abs(matrix).T @ measure.weight
@@ -54,7 +59,9 @@ def test_knots_are_worth_something_only_where_the_measure_does_not_close(found):
     assert np.allclose(inner, -inner[::-1])
     assert set(np.round(space.spline.knots, 9)) <= set(np.round(more.spline.knots, 9))
     # of the two places it took the better
-    values = [worth(with_knots(space, np.array([place])), optimum.measure) for place in (0.625, 1.875)]
+    values = [
+        worth(with_knots(space, np.array([place])), optimum.measure) for place in (0.625, 1.875)
+    ]
     assert np.abs(inner - (0.625, 1.875)[int(np.argmax(values))]).min() < 1e-9
 
 
@@ -63,19 +70,29 @@ def test_a_kept_potential_is_the_one_that_was_found(found, tmp_path):
     domain, path = Domain(Chain(), Friction(), LIMIT), tmp_path / "potentials.json"
     path.write_text("[]")
     for more in (space, with_knots(space, np.array([1.9]))):
-        free = optimum.free if more is space else np.random.default_rng(5).standard_normal(more.size)
+        free = (
+            optimum.free if more is space else np.random.default_rng(5).standard_normal(more.size)
+        )
         keep(Kept(domain, more, free, optimum.floor), path)
         kept, motion = potentials(path)[-1], optimum.measure.motion
         assert (kept.domain, kept.program) == (domain, optimum.floor)
-        ratios = [Samples(each, motion).ratio(given)[0] for each, given in ((more, free), (kept.space, kept.free))]
+        ratios = [
+            Samples(each, motion).ratio(given)[0]
+            for each, given in ((more, free), (kept.space, kept.free))
+        ]
         assert np.allclose(*ratios, atol=1e-12)
     assert len(potentials(path)) == 2
 
 
 def test_a_potential_is_checked_by_samples_that_were_not_chosen_for_it(found):
     space, optimum = found
-    domain, settings = Domain(Chain(), Friction(), LIMIT), {"shapes": 20, "directions": 48, "starts": 100}
-    values = [largest_ratio(domain, space, optimum.free, seed=seed, **settings)[0] for seed in (1, 2)]
+    domain, settings = (
+        Domain(Chain(), Friction(), LIMIT),
+        {"shapes": 20, "directions": 48, "starts": 100},
+    )
+    values = [
+        largest_ratio(domain, space, optimum.free, seed=seed, **settings)[0] for seed in (1, 2)
+    ]
     assert values[0] == pytest.approx(values[1], abs=2e-3)
     # four rounds were too few: what they missed shows
     assert min(values) > optimum.floor
@@ -85,8 +102,13 @@ def test_a_potential_is_checked_by_samples_that_were_not_chosen_for_it(found):
 
 @pytest.mark.slow
 def test_more_knots_lower_the_program(found):
-    domain, space = Domain(Chain(), Friction(), LIMIT), PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True)
-    more = exchanged_optimum(domain, space, intervals=6, shapes=10, directions=24, rounds=8, starts=40, tolerance=1e-2)
+    domain, space = (
+        Domain(Chain(), Friction(), LIMIT),
+        PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True),
+    )
+    more = exchanged_optimum(
+        domain, space, intervals=6, shapes=10, directions=24, rounds=8, starts=40, tolerance=1e-2
+    )
     assert more.space.spline.intervals == 6
     assert more.space.spline.graded
     assert more.floor < found[1].floor - 1e-3
@@ -101,7 +123,9 @@ def motions(angles, weight):
 
 def test_a_measure_round_the_straight_body_shows_a_path_with_both_symmetries():
     turn = np.linspace(0.05, 1.5, 40)
-    shapes = np.stack([1.5 * np.cos(turn) + 0.9 * np.sin(turn), -1.5 * np.cos(turn) + 0.9 * np.sin(turn)], axis=1)
+    shapes = np.stack(
+        [1.5 * np.cos(turn) + 0.9 * np.sin(turn), -1.5 * np.cos(turn) + 0.9 * np.sin(turn)], axis=1
+    )
     path = motions(shapes, np.full(40, 1 / 40)).path()
     t = np.linspace(0.0, 1.0, 101)
     q = path.angles(t)

@@ -11,7 +11,13 @@ from scipy.optimize import linprog
 
 from colloc import solve_balance
 from colloc.bounds import cutting_plane, potential
-from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental, swaps_ends, two_resting
+from colloc.bounds.coulomb_motion import (
+    CoulombMotion,
+    balanced_motion,
+    fundamental,
+    swaps_ends,
+    two_resting,
+)
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
@@ -45,7 +51,9 @@ def test_ratios_of_many_motions_are_those_of_all_at_once(monkeypatch):
     motion = balanced_motion(Chain(), Friction(), *random_points(5, 50))
     free = np.random.default_rng(6).normal(size=space.size)
     monkeypatch.setattr(potential, "_AT_ONCE", 7)
-    np.testing.assert_allclose(largest_ratios(space, free, motion), Samples(space, motion).ratio(free)[0], rtol=1e-12)
+    np.testing.assert_allclose(
+        largest_ratios(space, free, motion), Samples(space, motion).ratio(free)[0], rtol=1e-12
+    )
 
 
 def test_splines_add_up_to_one_and_differentiate():
@@ -87,7 +95,12 @@ def test_sums_over_few_joints_have_no_mixed_difference_in_more_and_miss_nothing(
         assert np.linalg.matrix_rank(basis.toarray()) == basis.shape[1]
         moved, difference = rng.uniform(-2, 2, q.shape), 0.0
         for corner in product((0, 1), repeat=together + 1):
-            mixed = np.where((np.arange(n_joint) < together + 1)[:, None] & (np.resize(corner, n_joint)[:, None] > 0), moved, q)
+            mixed = np.where(
+                (np.arange(n_joint) < together + 1)[:, None]
+                & (np.resize(corner, n_joint)[:, None] > 0),
+                moved,
+                q,
+            )
             difference = difference + (-1) ** sum(corner) * (spline.matrix(mixed) @ basis).toarray()
         assert np.abs(difference).max() < 1e-12
 
@@ -109,18 +122,20 @@ def test_two_links_rest_while_those_between_buckle_or_turn_as_a_four_bar_linkage
         change = seen(shapes + h * rates, i, j) - seen(shapes - h * rates, i, j)
         held += np.abs(change).max(axis=0) < 1e-7 * h
     assert (held >= 1).all()
-    # every shape has the linkage of all five links, those with a straight joint inside what buckles there too
+    # every shape has the linkage of all five links, those with a straight joint inside what buckles
+    # there too
     assert shapes.shape[1] >= 60 + 40
 
 
 def test_lattices_of_four_links_hold_what_buckles_between_two_resting_links():
-    """Links 2 and 3 of the straight body with the ends at rest: without it a bound had converged at 0.717, where loops of no
-    size about the straight body do 0.732."""
+    """Links 2 and 3 of the straight body with the ends at rest: without it a bound had converged at
+    0.717, where loops of no size about the straight body do 0.732."""
     motion = Domain(Chain((0.25,) * 4), Friction(), 2.5).lattice(6, 10, 0.2)
     buckles = np.abs(np.abs(motion.rates.T @ np.array([1, -2, 1])) / np.sqrt(6) - 1) < 1e-9
     assert buckles.sum() > 20
     assert (motion.angles[1, buckles] == 0).all()
-    # where links 2 and 3 alone move, at 1/sqrt(6) about an end; bodies that pay less by moving the ends too do so
+    # where links 2 and 3 alone move, at 1/sqrt(6) about an end; bodies that pay less by moving the
+    # ends too do so
     least = 0.25**2 / np.sqrt(6)
     assert motion.power[buckles].max() < 1.001 * least
     assert np.isclose(motion.power[buckles], least, rtol=1e-3).mean() > 0.2
@@ -144,7 +159,9 @@ def test_largest_gain_is_the_maximum_over_heading():
     rng = np.random.default_rng(5)
     amplitudes = {k: rng.standard_normal(200) + 1j * rng.standard_normal(200) for k in (1, 3)}
     theta = np.linspace(0, 2 * np.pi, 4001)
-    brute = np.max([np.real(sum(np.exp(1j * k * t) * a for k, a in amplitudes.items())) for t in theta], axis=0)
+    brute = np.max(
+        [np.real(sum(np.exp(1j * k * t) * a for k, a in amplitudes.items())) for t in theta], axis=0
+    )
     gain, heading = largest_gain(amplitudes)
     np.testing.assert_allclose(gain, brute, rtol=1e-4)
     at = np.real(sum(np.exp(1j * k * heading) * a for k, a in amplitudes.items()))
@@ -158,17 +175,27 @@ def test_rows_are_the_gain_and_its_derivatives():
     free = 0.1 * np.random.default_rng(7).standard_normal(space.size)
     chosen, heading = np.arange(motion.size), np.random.default_rng(8).uniform(0, 6, motion.size)
     matrix, constant = samples.rows(chosen, heading)
-    gain = np.real(sum(np.exp(1j * k * heading) * a for k, a in samples.amplitudes(free).items())) / motion.power
+    gain = (
+        np.real(sum(np.exp(1j * k * heading) * a for k, a in samples.amplitudes(free).items()))
+        / motion.power
+    )
     np.testing.assert_allclose(matrix @ free + constant, gain, rtol=1e-10, atol=1e-12)
 
 
-@pytest.mark.parametrize("lengths", [(0.4, 0.2, 0.4), (0.2, 0.3, 0.3, 0.2), (0.15, 0.2, 0.3, 0.2, 0.15)], ids=len)
+@pytest.mark.parametrize(
+    "lengths", [(0.4, 0.2, 0.4), (0.2, 0.3, 0.3, 0.2), (0.15, 0.2, 0.3, 0.2, 0.15)], ids=len
+)
 @pytest.mark.parametrize("mu", FRICTIONS)
 def test_mirror_images_and_end_swap_move_alike(mu, lengths):
-    """The symmetries that halve the unknowns hold for the solved motions, and so for the ratio of any symmetric potential."""
+    """The symmetries that halve the unknowns hold for the solved motions, and so for the ratio of
+    any symmetric potential."""
     friction, body, rng = coulomb(*mu), Chain(lengths), np.random.default_rng(9)
     q, r = rng.uniform(-2.0, 2.0, (body.n_joint, 80)), rng.normal(size=(body.n_joint, 80))
-    space = PotentialSpace(TensorSpline(body.n_joint, 2.0, 4), (1,) if friction.reversible else (0, 1), swaps_ends(body))
+    space = PotentialSpace(
+        TensorSpline(body.n_joint, 2.0, 4),
+        (1,) if friction.reversible else (0, 1),
+        swaps_ends(body),
+    )
     free = 0.1 * np.random.default_rng(10).standard_normal(space.size)
     ratio = Samples(space, balanced_motion(body, friction, q, r)).ratio(free)[0]
     assert swaps_ends(body)
@@ -178,7 +205,8 @@ def test_mirror_images_and_end_swap_move_alike(mu, lengths):
 
 
 def test_centre_of_mass_gives_exactly_one_for_isotropic_friction():
-    """|int V ds| <= int |V| ds, with equality for a translation: the centre of mass alone proves 1 and no less."""
+    """|int V ds| <= int |V| ds, with equality for a translation: the centre of mass alone proves 1
+    and no less."""
     body, rng = Chain(), np.random.default_rng(11)
     q, r = random_points(12, 2000)
     z = rng.standard_normal((3, 2000))
@@ -192,7 +220,8 @@ def test_centre_of_mass_gives_exactly_one_for_isotropic_friction():
 
 
 def test_two_links_with_reversible_friction_cannot_move():
-    """A path in one angle retraces itself, so the true bound is 0; splines approach it as their knots get finer."""
+    """A path in one angle retraces itself, so the true bound is 0; splines approach it as their
+    knots get finer."""
     budgets = [Budget(n, (1,), 64, 1, first=n) for n in (8, 16, 32)]
     begin = time.process_time()
     bounds = [efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=budget) for budget in budgets]
@@ -203,24 +232,34 @@ def test_two_links_with_reversible_friction_cannot_move():
 
 
 def test_a_bound_says_whether_the_last_climbs_still_found_more():
-    few, enough = (efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(8, (1,), 64, 1, n)) for n in (1, 24))
+    few, enough = (
+        efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(8, (1,), 64, 1, n))
+        for n in (1, 24)
+    )
     assert (few.converged, enough.converged) == (False, True)
     assert few.sampled > 1.05 * enough.sampled
 
 
 @pytest.mark.slow
 def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
-    bound = efficiency_bound(Chain((0.5, 0.5)), Friction(mu_t=1.0, mu_f=1.0, mu_b=3.0), budget=Budget(8, (0, 1), 32, 2, 3, 20))
+    bound = efficiency_bound(
+        Chain((0.5, 0.5)),
+        Friction(mu_t=1.0, mu_f=1.0, mu_b=3.0),
+        budget=Budget(8, (0, 1), 32, 2, 3, 20),
+    )
     assert 0.05 < bound.sampled < 1.0
 
 
 def test_minimax_program_agrees_with_a_simplex_solver():
-    """The interior-point optimum against HiGHS, and its multipliers as a proof of the value (weak duality)."""
+    """The interior-point optimum against HiGHS, and its multipliers as a proof of the value (weak
+    duality)."""
     rng = np.random.default_rng(15)
     rows, constants = rng.standard_normal((60, 8)), rng.uniform(0.0, 1.0, 60)
     best = smallest_maximum(sparse.csr_matrix(rows), constants, sparse.csr_matrix((8, 8)))
     left = np.hstack([rows, -np.ones((60, 1))])
-    simplex = linprog(np.eye(9)[8], A_ub=left, b_ub=-constants, bounds=(None, None), method="highs-ds")
+    simplex = linprog(
+        np.eye(9)[8], A_ub=left, b_ub=-constants, bounds=(None, None), method="highs-ds"
+    )
     assert best.value == pytest.approx(simplex.fun, abs=1e-6)
     assert best.weights.sum() == pytest.approx(1.0, abs=1e-6)
     np.testing.assert_allclose(rows.T @ best.weights, 0.0, atol=1e-6)
@@ -229,18 +268,22 @@ def test_minimax_program_agrees_with_a_simplex_solver():
 
 @pytest.mark.parametrize("n_joint", [2, 3])
 def test_roughness_is_the_integral_of_squared_second_derivatives(n_joint):
-    """f = x^2 y on [-a, a]^n, interpolated exactly by cubic splines: |D^2 f|^2, 4 y^2 + 8 x^2, gives 16 a^4 (2 a)^(n-2)."""
+    """f = x^2 y on [-a, a]^n, interpolated exactly by cubic splines: |D^2 f|^2, 4 y^2 + 8 x^2,
+    gives 16 a^4 (2 a)^(n-2)."""
     a = 1.3
     spline = TensorSpline(n_joint, a, 4)
     q = np.random.default_rng(16).uniform(-a, a, (n_joint, 800))
     c = np.linalg.lstsq(spline.matrix(q).toarray(), q[0] ** 2 * q[1], rcond=None)[0]
     np.testing.assert_allclose(spline.matrix(q) @ c, q[0] ** 2 * q[1], atol=1e-10)
     # the midpoint rule with 8 points an axis misses 1/64 of the mean square
-    assert c @ spline.roughness @ c == pytest.approx(16 * a**4 * (2 * a) ** (n_joint - 2) * (1 - 1 / 64), rel=1e-9)
+    assert c @ spline.roughness @ c == pytest.approx(
+        16 * a**4 * (2 * a) ** (n_joint - 2) * (1 - 1 / 64), rel=1e-9
+    )
 
 
 def test_climbs_find_the_summit_of_a_crease():
-    """A crease at an angle to all axes: coordinate steps would stop on it, random directions do not."""
+    """A crease at an angle to all axes: coordinate steps would stop on it, random directions do
+    not."""
     domain = Domain(Chain(), Friction(), 2.0)
     start = domain.lattice(6, 12).take(np.arange(0, 120, 4))
 
@@ -255,7 +298,8 @@ def test_climbs_find_the_summit_of_a_crease():
 
 
 def test_peaks_where_one_joint_turns_alone_are_met_and_climbed_along():
-    """Seen at (1.82, -1.82) with rates (1, 0): a cone that falls by 3.6 a radian, so that no lattice of directions meets it."""
+    """Seen at (1.82, -1.82) with rates (1, 0): a cone that falls by 3.6 a radian, so that no
+    lattice of directions meets it."""
     domain = Domain(Chain(), Friction(), 2.5)
     lattice = domain.lattice(8, 24, 0.37)
     alone = np.flatnonzero(lattice.rates[1] == 0)
@@ -272,7 +316,8 @@ def test_peaks_where_one_joint_turns_alone_are_met_and_climbed_along():
 
 @pytest.mark.parametrize("shift", [0.0, 0.37])
 def test_lattices_hold_the_corners_between_limit_and_contact(shift):
-    """A potential that had converged at 0.8609 stood at 1.0283 in such a corner, (2.5, 1.8911), where nothing was sampled."""
+    """A potential that had converged at 0.8609 stood at 1.0283 in such a corner, (2.5, 1.8911),
+    where nothing was sampled."""
     angles = Domain(Chain(), Friction(mu_t=0.5, mu_f=1, mu_b=5), 2.5).lattice(8, 6, shift).angles
     assert np.abs(angles - np.array([[2.5], [1.89109]])).sum(axis=0).min() < 1e-4
     assert np.isclose(angles.max(), 2.5)  # and the limit
@@ -291,7 +336,9 @@ def test_what_a_check_finds_is_sampled_and_checked_again(monkeypatch):
         add(program, motion)
 
     monkeypatch.setattr(cutting_plane._Program, "add", noted)
-    found = exchanged_optimum(domain, space, shapes=6, directions=12, rounds=12, starts=10, tolerance=0.3)
+    found = exchanged_optimum(
+        domain, space, shapes=6, directions=12, rounds=12, starts=10, tolerance=0.3
+    )
     assert not answers
     assert found.converged
     assert found.top < 1.5
@@ -302,7 +349,9 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     tiny = Budget(intervals=3, harmonics=(1,), shapes=6, directions=6, rounds=1, starts=10)
     cache = tmp_path / "bounds.sqlite"
     first = efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
-    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: pytest.fail("not taken from the cache"))
+    monkeypatch.setattr(
+        "colloc.bounds.sampled.compute_bound", lambda *_: pytest.fail("not taken from the cache")
+    )
     assert efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache) == first
     assert "gap 0.1000" in first.report(first.sampled - 0.1)
     assert "not certified between" in first.report(0.3)
@@ -319,17 +368,23 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
 
 
 def test_more_joints_have_coarser_potentials_by_default(monkeypatch):
-    """No more unknowns than a solver can hold: with the 12 intervals of three links four would have 1,700."""
+    """No more unknowns than a solver can hold: with the 12 intervals of three links four would have
+    1,700."""
 
     def unknowns(domain, budget):
         n_joint, harmonics = domain.body.n_joint, usual_harmonics(domain.body, domain.friction)
-        return PotentialSpace(TensorSpline(n_joint, 2.0, budget.intervals), harmonics, True, budget.together).size
+        return PotentialSpace(
+            TensorSpline(n_joint, 2.0, budget.intervals), harmonics, True, budget.together
+        ).size
 
     monkeypatch.setattr("colloc.bounds.sampled.compute_bound", unknowns)
     assert all(50 < efficiency_bound(Chain((1 / n,) * n), Friction()) < 250 for n in (3, 4, 5))
 
 
-@pytest.mark.parametrize(("body", "limit", "match"), [(Chain(), 4.0, "joint_limit"), (Chain((1 / 6,) * 6), 2.0, "5 links")])
+@pytest.mark.parametrize(
+    ("body", "limit", "match"),
+    [(Chain(), 4.0, "joint_limit"), (Chain((1 / 6,) * 6), 2.0, "5 links")],
+)
 def test_impossible_requests_are_refused(body, limit, match):
     with pytest.raises(ProblemError, match=match):
         efficiency_bound(body, Friction(), limit)
@@ -337,7 +392,8 @@ def test_impossible_requests_are_refused(body, limit, match):
 
 @pytest.mark.parametrize("lengths", [(0.4, 0.6), (0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
 def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
-    """The midpoint of the middle link, or the middle joint along the mean heading there, from positions a moment later."""
+    """The midpoint of the middle link, or the middle joint along the mean heading there, from
+    positions a moment later."""
     body, rng, h = Chain(lengths), np.random.default_rng(41), 1e-6
     n = body.n_link
     angles, rates = rng.uniform(-1, 1, (n - 1, 20)), rng.normal(size=(n - 1, 20))
@@ -348,7 +404,9 @@ def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
         heading = z[2] * t + np.concatenate([[np.zeros(20)], np.cumsum(angles + rates * t, axis=0)])
         along = np.array(lengths)[:, None] * np.exp(1j * heading)
         place, beside = along[: n // 2].sum(axis=0), heading[(n - 1) // 2]
-        return (z[0] + 1j * z[1]) * t + place + (n % 2) * along[n // 2] / 2, (heading[n // 2] + beside) / 2
+        return (z[0] + 1j * z[1]) * t + place + (n % 2) * along[n // 2] / 2, (
+            heading[n // 2] + beside
+        ) / 2
 
     (before, turned_before), (after, turned), (_, heading) = middle(-h), middle(h), middle(0.0)
     velocity = (after - before) / (2 * h) * np.exp(-1j * heading)
@@ -358,9 +416,13 @@ def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
 def test_on_feet_the_centre_of_pressure_is_followed_and_no_faster_than_friction_pays_for(lengths):
-    """Its velocity in the axes of the middle, from places of the feet a moment later; so no potential at all says 1/mu."""
+    """Its velocity in the axes of the middle, from places of the feet a moment later; so no
+    potential at all says 1/mu."""
     n, rng, h = len(lengths), np.random.default_rng(43), 1e-6
-    body = Chain(lengths, feet=(Foot(0, 0.2, weight=0.4), Foot(n - 1, 0.9, weight=0.3), Foot(n - 1, 0.1, weight=0.3)))
+    body = Chain(
+        lengths,
+        feet=(Foot(0, 0.2, weight=0.4), Foot(n - 1, 0.9, weight=0.3), Foot(n - 1, 0.1, weight=0.3)),
+    )
     law = Friction(0.5, 0.5, 0.5)
     angles, rates = rng.uniform(-1, 1, (n - 1, 20)), rng.normal(size=(n - 1, 20))
     z = solve_balance(body, law, angles, rates, 1e-9).require().z
@@ -369,7 +431,9 @@ def test_on_feet_the_centre_of_pressure_is_followed_and_no_faster_than_friction_
     def pressed(t):
         heading = z[2] * t + np.concatenate([[np.zeros(20)], np.cumsum(angles + rates * t, axis=0)])
         along = np.array(lengths)[:, None] * np.exp(1j * heading)
-        place = [along[: foot.link].sum(axis=0) + foot.place * along[foot.link] for foot in body.feet]
+        place = [
+            along[: foot.link].sum(axis=0) + foot.place * along[foot.link] for foot in body.feet
+        ]
         middle = (heading[n // 2] + heading[(n - 1) // 2]) / 2
         return (z[0] + 1j * z[1]) * t + np.array([0.4, 0.3, 0.3]) @ place, middle
 
@@ -379,7 +443,9 @@ def test_on_feet_the_centre_of_pressure_is_followed_and_no_faster_than_friction_
 
 
 def test_on_two_feet_a_link_the_bound_lies_between_the_best_small_gait_and_friction_alone():
-    bound = efficiency_bound(Chain(feet=2), Friction(), 1.0, budget=Budget(4, (1,), 8, 16, 4, starts=60, tolerance=0.01))
+    bound = efficiency_bound(
+        Chain(feet=2), Friction(), 1.0, budget=Budget(4, (1,), 8, 16, 4, starts=60, tolerance=0.01)
+    )
     assert small_gait(Chain(feet=2), Friction(), np.zeros(2)).efficiency < bound.sampled < 0.75
 
 
@@ -402,7 +468,8 @@ def test_lattices_of_four_links_have_other_directions_everywhere_and_creases_whe
 
 
 def test_lattices_of_five_links_are_no_larger_than_those_of_four():
-    """They hold what a tensor grid would: joints at their limit and straight, and shapes where links just touch."""
+    """They hold what a tensor grid would: joints at their limit and straight, and shapes where
+    links just touch."""
     sizes = [Domain(Chain((1 / n,) * n), Friction(), 3.0).lattice(4, 10, 0.2).size for n in (4, 5)]
     assert sizes[1] < 2 * sizes[0]
     domain = Domain(Chain((0.2,) * 5), Friction(), 3.0)
@@ -410,49 +477,80 @@ def test_lattices_of_five_links_are_no_larger_than_those_of_four():
     assert domain.holds(shapes).all()
     free = (np.abs(shapes) < 2.97).all(axis=0)
     touching = ~domain.holds(1.01 * shapes)[free]
-    for special in (np.isclose(np.abs(shapes), 3.0).any(axis=0), (shapes == 0.0).any(axis=0), touching):
+    for special in (
+        np.isclose(np.abs(shapes), 3.0).any(axis=0),
+        (shapes == 0.0).any(axis=0),
+        touching,
+    ):
         assert 0.05 < special.mean() < 0.95
 
 
 def test_climbs_go_along_creases_where_one_joint_rests():
-    """A crease in the rate of joint 2 at every shape: only steps that leave it at rest stay on the crease."""
+    """A crease in the rate of joint 2 at every shape: only steps that leave it at rest stay on the
+    crease."""
     domain = Domain(Chain((0.25,) * 4), Friction(), 2.5)
     lattice = domain.lattice(4, 10, 0.2)
-    start = lattice.take(np.flatnonzero((lattice.rates[1] == 0) & (lattice.rates[0] * lattice.rates[2] != 0))[:40])
+    start = lattice.take(
+        np.flatnonzero((lattice.rates[1] == 0) & (lattice.rates[0] * lattice.rates[2] != 0))[:40]
+    )
 
     def crease(motion: CoulombMotion) -> np.ndarray:
         turn = np.arctan2(motion.rates[2], motion.rates[0])
-        return -30 * np.abs(motion.rates[1]) + np.cos(2 * (turn - 0.4)) - ((motion.angles - 0.3) ** 2).sum(axis=0)
+        return (
+            -30 * np.abs(motion.rates[1])
+            + np.cos(2 * (turn - 0.4))
+            - ((motion.angles - 0.3) ** 2).sum(axis=0)
+        )
 
     top = domain.summits(crease, start, 0.5, 0.3, 40, np.random.default_rng(19))
     assert np.median(crease(top)) > 0.99
 
 
 def test_the_exchange_does_not_drop_what_it_will_miss():
-    """Dropped as soon as it is slack, an inequality is broken again two programs later: 15 exchanges then still left samples
-    above the program's value by 4.5, where with patience they end below the excess asked for."""
+    """Dropped as soon as it is slack, an inequality is broken again two programs later: 15
+    exchanges then still left samples above the program's value by 4.5, where with patience they end
+    below the excess asked for."""
     domain = Domain(Chain(), Friction(), 2.5)
     rng = np.random.default_rng(0)
     program = cutting_plane._Program.begun(
-        Samples(PotentialSpace(TensorSpline(2, 2.5, 6), (1, 3), True), domain.lattice(20, 48)), rng, 1e-5
+        Samples(PotentialSpace(TensorSpline(2, 2.5, 6), (1, 3), True), domain.lattice(20, 48)),
+        rng,
+        1e-5,
     )
     assert program.settle(0.01) < program.best.value + 0.01
 
 
 @pytest.mark.parametrize(
-    "changes", [{"friction": Viscous(normal=2.0, tangential=1.0)}, {"body": ModalBody(2)}], ids=["drag", "smooth"]
+    "changes",
+    [{"friction": Viscous(normal=2.0, tangential=1.0)}, {"body": ModalBody(2)}],
+    ids=["drag", "smooth"],
 )
 def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_path):
-    usual = {"guess": None, "body": Chain(), "friction": Friction(), "gait": Harmonic(1, "antipodal")}
+    usual = {
+        "guess": None,
+        "body": Chain(),
+        "friction": Friction(),
+        "gait": Harmonic(1, "antipodal"),
+    }
     problem = Problem("other", **(usual | changes))
     assert upper_bound(problem, tmp_path, compute=False) is None
-    with pytest.raises(ProblemError, match="chains of links under Coulomb friction, or the elliptic law, only"):
+    with pytest.raises(
+        ProblemError, match="chains of links under Coulomb friction, or the elliptic law, only"
+    ):
         upper_bound(problem, tmp_path, compute=True)
 
 
-def test_a_tighter_bound_is_offered_where_one_can_be_computed_and_nowhere_else(tmp_path, monkeypatch):
+def test_a_tighter_bound_is_offered_where_one_can_be_computed_and_nowhere_else(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr("colloc.bounds.sampled.efficiency_bound", lambda *domain, cache: "computed")
-    for body in (Chain(), Chain((0.2,) * 5), Chain((1 / 6,) * 6), Chain((1 / 9,) * 9), ModalBody(2)):
+    for body in (
+        Chain(),
+        Chain((0.2,) * 5),
+        Chain((1 / 6,) * 6),
+        Chain((1 / 9,) * 9),
+        ModalBody(2),
+    ):
         problem = Problem("other", body=body, gait=Harmonic(1, "antipodal"))
         try:
             computed = upper_bound(problem, tmp_path, compute=True) == "computed"
@@ -466,4 +564,6 @@ def test_a_tighter_bound_is_offered_where_one_can_be_computed_and_nowhere_else(t
 def test_no_bound_is_offered_of_gaits_that_turn_or_are_sought_for_something_else(changed):
     usual = Problem("usual", gait=Harmonic(1))
     assert refusal(usual) == ""
-    assert "of the efficiency, on the level, of gaits that do not turn" in refusal(usual.with_(**changed))
+    assert "of the efficiency, on the level, of gaits that do not turn" in refusal(
+        usual.with_(**changed)
+    )

@@ -1,6 +1,8 @@
-"""Budgets of counts that no machine disturbs: iterations, evaluations, nonzeros, instructions. Times are in benchmarks/.
+"""Budgets of counts that no machine disturbs: iterations, evaluations, nonzeros, instructions.
+Times are in benchmarks/.
 
-A budget is the count measured when it was written plus a margin of a quarter; raise one only with a reason.
+A budget is the count measured when it was written plus a margin of a quarter; raise one only with a
+reason.
 """
 
 import numpy as np
@@ -35,13 +37,20 @@ def test_instructions_of_a_point(links, formulation, value, jacobian, hessian):
     assert local.hessian.n_instructions() <= hessian
 
 
-@pytest.mark.parametrize(("formulation", "jacobian", "hessian"), [("implicit velocity", 170, 85), ("full", 400, 260)])
+@pytest.mark.parametrize(
+    ("formulation", "jacobian", "hessian"), [("implicit velocity", 170, 85), ("full", 400, 260)]
+)
 def test_nonzeros_grow_by_so_many_for_every_interval(formulation, jacobian, hessian):
-    """Half a period, three links, three points an interval: sparsity is what keeps a solve linear in the mesh."""
+    """Half a period, three links, three points an interval: sparsity is what keeps a solve linear
+    in the mesh."""
     counts = []
     for intervals in (20, 40):
         problem = Problem(
-            "p", ellipse(0.3, 1, 0.5), gait=Harmonic(1, "bilateral"), intervals=intervals, formulation=formulation
+            "p",
+            ellipse(0.3, 1, 0.5),
+            gait=Harmonic(1, "bilateral"),
+            intervals=intervals,
+            formulation=formulation,
         )
         options = oracles(transcribe(control_problem(problem)).assembly).options
         counts.append((options["jac_g"].nnz_out(1), options["hess_lag"].nnz_out(0)))
@@ -51,7 +60,9 @@ def test_nonzeros_grow_by_so_many_for_every_interval(formulation, jacobian, hess
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
-def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_mesh_only(formulation):
+def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_mesh_only(
+    formulation,
+):
     """No symmetry: the net rotation couples all intervals."""
     fill = []
     for intervals in (20, 40):
@@ -94,7 +105,9 @@ def test_panels_and_steps_of_a_smooth_body():
     assert solved.iterations.max() <= 100
 
 
-@pytest.mark.parametrize(("name", "iterations", "levels"), [("three_link", 65, 10), ("three_link_offset", 65, 10)])
+@pytest.mark.parametrize(
+    ("name", "iterations", "levels"), [("three_link", 65, 10), ("three_link_offset", 65, 10)]
+)
 def test_effort_of_a_solve(solved, name, iterations, levels):
     solution, _ = solved(name)
     assert sum(level.iterations for level in solution.history) <= iterations

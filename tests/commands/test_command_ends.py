@@ -1,4 +1,5 @@
-"""Commands end in a sentence and an exit code: early Ctrl-C, full disks, encodings, odd names, broken caches."""
+"""Commands end in a sentence and an exit code: early Ctrl-C, full disks, encodings, odd names,
+broken caches."""
 
 import io
 import json
@@ -36,7 +37,9 @@ QUICK = """
 from colloc import *
 PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=0.3, delta_start=0.3, intervals=12)
 """
-needs_full = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+needs_full = pytest.mark.skipif(
+    not os.path.exists("/dev/full"), reason="no device that is always full"
+)
 
 
 @pytest.fixture
@@ -52,7 +55,12 @@ def quick(tmp_path):
 
 def command(*words, **options):
     """A run of the installed command in a process of its own, its output as bytes."""
-    return subprocess.run([sys.executable, "-m", "colloc", *map(str, words)], capture_output=True, check=False, **options)
+    return subprocess.run(
+        [sys.executable, "-m", "colloc", *map(str, words)],
+        capture_output=True,
+        check=False,
+        **options,
+    )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
@@ -60,7 +68,9 @@ def command(*words, **options):
 def test_ctrl_c_while_libraries_are_imported_ends_without_a_traceback(module, quick, tmp_path):
     """The signal comes from inside the import, as early as that library is asked for."""
     (tmp_path / "library").mkdir()
-    (tmp_path / "library" / f"{module}.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    (tmp_path / "library" / f"{module}.py").write_text(
+        "import signal\nsignal.raise_signal(signal.SIGINT)\n"
+    )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "library")}
     done = command("solve", quick, "--output", f"{tmp_path}/", env=environment)
     assert done.returncode == 130
@@ -68,13 +78,17 @@ def test_ctrl_c_while_libraries_are_imported_ends_without_a_traceback(module, qu
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-@pytest.mark.parametrize("words", [["colloc", "solve"], ["colloc.solve"], ["colloc", "verify", "--json"]])
+@pytest.mark.parametrize(
+    "words", [["colloc", "solve"], ["colloc.solve"], ["colloc", "verify", "--json"]]
+)
 @pytest.mark.parametrize("module", ["argparse", "dataclasses"])
 def test_ctrl_c_before_the_command_is_known_ends_without_a_traceback(module, words, tmp_path):
     """These are what the modules that every command begins with import first."""
     (tmp_path / f"{module}.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-m", *words, "x"], capture_output=True, check=False, env=environment)
+    done = subprocess.run(
+        [sys.executable, "-m", *words, "x"], capture_output=True, check=False, env=environment
+    )
     assert done.returncode == 130
     assert done.stderr.decode() == "colloc: interrupted; nothing was written.\n"
     if "--json" in words:
@@ -83,13 +97,17 @@ def test_ctrl_c_before_the_command_is_known_ends_without_a_traceback(module, wor
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_ctrl_c_inside_text_that_is_executed_is_an_exit_code_too(quick, tmp_path):
-    """As in a dataclass that is made: Python would end the process by the signal, whatever the command returned."""
+    """As in a dataclass that is made: Python would end the process by the signal, whatever the
+    command returned."""
     (tmp_path / "library").mkdir()
     text = "exec('import signal; signal.raise_signal(signal.SIGINT)')"
     (tmp_path / "library" / "numpy.py").write_text(text)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "library")}
     done = command("solve", quick, "--output", f"{tmp_path}/", env=environment)
-    assert (done.returncode, done.stderr.decode()) == (130, "colloc: interrupted; nothing was written.\n")
+    assert (done.returncode, done.stderr.decode()) == (
+        130,
+        "colloc: interrupted; nothing was written.\n",
+    )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
@@ -112,23 +130,37 @@ def test_a_full_disk_behind_standard_output_is_said_once(words, buffered, result
     environment = {**os.environ, "PYTHONUNBUFFERED": "" if buffered else "1"}
     with open("/dev/full", "wb") as full:
         done = subprocess.run(
-            [sys.executable, "-m", "colloc", *words, *map(str, files)], stdout=full, stderr=subprocess.PIPE, env=environment
+            [sys.executable, "-m", "colloc", *words, *map(str, files)],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            env=environment,
         )
     assert done.returncode == 2
-    assert done.stderr.decode() == "colloc: cannot read or write the output: No space left on device.\n"
+    assert (
+        done.stderr.decode()
+        == "colloc: cannot read or write the output: No space left on device.\n"
+    )
 
 
-@pytest.mark.parametrize(("encoding", "shown"), [("ascii", "cos 2 pi t"), ("cp1252", "cos 2 pi t"), ("utf-8", "cos 2πt")])
-def test_letters_that_an_encoding_lacks_are_printed_as_words(encoding, shown, three_link, monkeypatch):
+@pytest.mark.parametrize(
+    ("encoding", "shown"), [("ascii", "cos 2 pi t"), ("cp1252", "cos 2 pi t"), ("utf-8", "cos 2πt")]
+)
+def test_letters_that_an_encoding_lacks_are_printed_as_words(
+    encoding, shown, three_link, monkeypatch
+):
     printed = io.BytesIO()
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(printed, encoding=encoding))
-    assert exit_code(lambda: print("\n".join(summary_lines(three_link, None, verbose=True))) or 0) == 0
+    assert (
+        exit_code(lambda: print("\n".join(summary_lines(three_link, None, verbose=True))) or 0) == 0
+    )
     assert shown in printed.getvalue().decode(encoding)
 
 
 def test_a_solve_ends_well_on_a_terminal_without_greek(quick, tmp_path):
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
-    done = command("solve", quick, "--no-figure", "--verbose", "--output", f"{tmp_path}/", env=environment)
+    done = command(
+        "solve", quick, "--no-figure", "--verbose", "--output", f"{tmp_path}/", env=environment
+    )
     assert done.returncode in (0, 4)
     assert b"cos 2 pi t" in done.stdout
     assert done.stderr == b""
@@ -139,7 +171,10 @@ def test_a_solve_ends_well_on_a_terminal_without_greek(quick, tmp_path):
     [
         (["animate", "RESULT", "--output", "x.avi"], "x.avi should end in .gif or .mp4"),
         (["animate", "RESULT", "--format", "mp4", "--output", "x.gif"], "x.gif should end in .mp4"),
-        (["export", "RESULT", "--period", "4", "--output", "x.xlsx"], "x.xlsx should end in .csv or .json"),
+        (
+            ["export", "RESULT", "--period", "4", "--output", "x.xlsx"],
+            "x.xlsx should end in .csv or .json",
+        ),
         (["report", "RESULT", "--output", "x.htm"], "x.htm should end in .html"),
         (["solve", "QUICK", "--output", "out.txt"], "out.txt should end in .h5"),
         (["solve", "QUICK", "--output", "x" * 300 + ".h5"], "too long"),
@@ -150,7 +185,9 @@ def test_a_solve_ends_well_on_a_terminal_without_greek(quick, tmp_path):
         (["verify", "y" * 300], "File name too long"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_and_nothing_is_made(words, message, quick, result, tmp_path, capsys, monkeypatch):
+def test_what_cannot_be_meant_is_refused_and_nothing_is_made(
+    words, message, quick, result, tmp_path, capsys, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     assert colloc([{"RESULT": str(result), "QUICK": quick}.get(word, word) for word in words]) == 2
@@ -171,19 +208,33 @@ def test_a_folder_whose_name_has_an_ending_is_named_with_a_slash(result, tmp_pat
 def test_a_long_name_of_a_problem_is_refused(tmp_path, capsys):
     (tmp_path / "p.py").write_text(QUICK.replace('"quick"', f'"{"x" * 300}"'))
     assert colloc(["solve", str(tmp_path / "p.py"), "--output", f"{tmp_path}/"]) == 2
-    assert "name has 300 characters; files are named after it, and 200 are allowed" in capsys.readouterr().err
+    assert (
+        "name has 300 characters; files are named after it, and 200 are allowed"
+        in capsys.readouterr().err
+    )
     (tmp_path / "p.py").write_text(QUICK.replace('"quick"', f'"{"x" * 200}"'))
-    assert colloc(["solve", str(tmp_path / "p.py"), "--output", f"{tmp_path}/", "--quiet", "--no-figure"]) in (0, 4)
+    assert colloc(
+        ["solve", str(tmp_path / "p.py"), "--output", f"{tmp_path}/", "--quiet", "--no-figure"]
+    ) in (0, 4)
 
 
 def test_a_start_of_another_body_is_named(three_link, tmp_path, capsys):
     start = save(three_link, tmp_path / "three.h5")
-    assert colloc(["solve", "problems/four_link.py", "--start", str(start), "--output", f"{tmp_path}/"]) == 2
+    assert (
+        colloc(
+            ["solve", "problems/four_link.py", "--start", str(start), "--output", f"{tmp_path}/"]
+        )
+        == 2
+    )
     assert f"the gait of {start} cannot be the guess: guess has 2 joints" in capsys.readouterr().err
 
 
 def test_errors_are_one_json_object_where_json_is_asked_for(result, tmp_path, capsys):
-    for words in (["solve", "nope.py", "--json"], ["verify", str(result), "--tolerance", "3", "--json"], ["solve", "--json"]):
+    for words in (
+        ["solve", "nope.py", "--json"],
+        ["verify", str(result), "--tolerance", "3", "--json"],
+        ["solve", "--json"],
+    ):
         assert colloc(words) == 2
         printed = capsys.readouterr()
         error = json.loads(printed.out)
@@ -204,7 +255,15 @@ def test_a_broken_cache_of_bounds_is_left_alone(cache, quick, tmp_path):
     if cache == "FOLDER":
         path.mkdir()
     elif cache == "ENTRY":
-        put_rows(path, CACHE, {bound_key(Domain(problem.body, problem.friction, problem.joint_limit), BUDGET): {"a": 1}})
+        put_rows(
+            path,
+            CACHE,
+            {
+                bound_key(Domain(problem.body, problem.friction, problem.joint_limit), BUDGET): {
+                    "a": 1
+                }
+            },
+        )
     elif cache == "KIND":
         put_rows(path, "another kind", {"a": 1})
     else:
@@ -213,9 +272,12 @@ def test_a_broken_cache_of_bounds_is_left_alone(cache, quick, tmp_path):
         assert upper_bound(problem, tmp_path, compute=False) is None
 
 
-def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bound(quick, tmp_path, monkeypatch):
+def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bound(
+    quick, tmp_path, monkeypatch
+):
     problem = read_problem_file(quick).problem
-    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: problem.friction)  # anything with fields
+    # anything with fields
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: problem.friction)
     (tmp_path / "file").write_text("in the way of the folder")
     with pytest.warns(UserWarning, match="cannot write .*The bound is not kept"):
         assert upper_bound(problem, tmp_path / "file" / "below", compute=True) is problem.friction
@@ -232,13 +294,25 @@ def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(quick, tmp_path, c
 
 def test_a_bound_that_cannot_be_computed_costs_no_summary(tmp_path, capsys):
     (tmp_path / "p.py").write_text(QUICK.replace("delta=0.3,", 'delta=0.3, objective="speed",'))
-    assert colloc(["solve", str(tmp_path / "p.py"), "--bound", "--no-figure", "--output", f"{tmp_path}/"]) == 2
+    assert (
+        colloc(
+            ["solve", str(tmp_path / "p.py"), "--bound", "--no-figure", "--output", f"{tmp_path}/"]
+        )
+        == 2
+    )
     printed = capsys.readouterr()
     assert "quick:" in printed.out
-    assert "no bound: upper bounds are of the efficiency, on the level, of gaits that do not turn" in printed.err
+    assert (
+        "no bound: upper bounds are of the efficiency, on the level, of gaits that do not turn"
+        in printed.err
+    )
     assert "--bound" not in printed.out  # nobody is sent to ask again
     with pytest.raises(ProblemError, match="at most 5 links, not 6"):
-        upper_bound(Problem("six", body=Chain((1 / 6,) * 6), gait=Harmonic(1, "antipodal")), tmp_path, compute=True)
+        upper_bound(
+            Problem("six", body=Chain((1 / 6,) * 6), gait=Harmonic(1, "antipodal")),
+            tmp_path,
+            compute=True,
+        )
 
 
 def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys):
@@ -251,7 +325,9 @@ def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys)
 
 
 @pytest.mark.parametrize("words", [[], ["--json"]])
-def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(words, quick, tmp_path, capsys, monkeypatch):
+def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(
+    words, quick, tmp_path, capsys, monkeypatch
+):
     def full(*_):
         raise StoreError("cannot write quick.h5: No space left on device.")
 
@@ -265,8 +341,12 @@ def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(words, quick, tm
     else:
         assert "efficiency d/W" in printed.out
         assert "saved" not in printed.out
-    assert printed.err == "colloc: the result is not saved: cannot write quick.h5: No space left on device.\n"
-    assert {p.suffix for p in tmp_path.iterdir()} == {".py", ".sqlite"}  # the run, from which the same command goes on
+    assert (
+        printed.err
+        == "colloc: the result is not saved: cannot write quick.h5: No space left on device.\n"
+    )
+    # the run, from which the same command goes on
+    assert {p.suffix for p in tmp_path.iterdir()} == {".py", ".sqlite"}
     monkeypatch.undo()
     assert colloc(["solve", quick, "--output", f"{tmp_path}/", "--no-figure"]) in (0, 4)
     assert {p.suffix for p in tmp_path.iterdir()} == {".py", ".h5"}
@@ -277,9 +357,12 @@ def interrupt(*_, **__):
 
 
 @pytest.mark.parametrize(
-    "where", ["colloc.bounds.optimality_gap.upper_bound", "colloc.pictures.solution_figure.solution_figure"]
+    "where",
+    ["colloc.bounds.optimality_gap.upper_bound", "colloc.pictures.solution_figure.solution_figure"],
 )
-def test_ctrl_c_after_the_result_is_saved_says_that_it_is(where, quick, tmp_path, capsys, monkeypatch):
+def test_ctrl_c_after_the_result_is_saved_says_that_it_is(
+    where, quick, tmp_path, capsys, monkeypatch
+):
     monkeypatch.setattr(where, interrupt)
     assert colloc(["solve", quick, "--output", f"{tmp_path}/"]) == 130
     (result,) = tmp_path.glob("*.h5")
@@ -344,15 +427,34 @@ def test_many_intervals_are_announced(quick, tmp_path, capsys, monkeypatch):
 
 
 def test_a_command_imports_nothing_heavy_before_it_can_end_well():
-    code = "import sys, colloc.commands.main; print(any(name in sys.modules for name in ('numpy', 'scipy', 'casadi', 'h5py')))"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
+    code = (
+        "import sys, colloc.commands.main; print(any(name in sys.modules for name in ('numpy', "
+        "'scipy', 'casadi', 'h5py')))"
+    )
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout
+        == "False\n"
+    )
 
 
 @pytest.mark.parametrize(
     "words",
     [
         ["report", "RESULT"],
-        ["animate", "RESULT", "--periods", "1", "--seconds", "0.3", "--fps", "10", "--width", "200"],
+        [
+            "animate",
+            "RESULT",
+            "--periods",
+            "1",
+            "--seconds",
+            "0.3",
+            "--fps",
+            "10",
+            "--width",
+            "200",
+        ],
         ["export", "RESULT", "--period", "4"],
         ["compare", "RESULT", "RESULT"],
         ["verify", "RESULT"],
@@ -383,18 +485,32 @@ def stated(folder, text):
 
 
 @pytest.mark.parametrize("large", ["file", "description"])
-def test_what_results_could_not_keep_is_refused_before_the_search(large, tmp_path, capsys, monkeypatch):
+def test_what_results_could_not_keep_is_refused_before_the_search(
+    large, tmp_path, capsys, monkeypatch
+):
     monkeypatch.setattr("colloc.studies.saved.resumed", lambda *_, **__: pytest.fail("searched"))
     text = QUICK + "# " + "x" * 2**20 + "\n"
     if large == "description":
-        text = "from colloc import *\nimport numpy as np\nt = np.arange(30000) / 30000 * 2 * np.pi\n"
-        text += "PROBLEM = Problem('wide', Corners(np.array([np.cos(t), np.sin(t)]), 'none'), gait=Polygon(8, 'none'))\n"
+        text = (
+            "from colloc import *\nimport numpy as np\nt = np.arange(30000) / 30000 * 2 * np.pi\n"
+        )
+        text += (
+            "PROBLEM = Problem('wide', Corners(np.array([np.cos(t), np.sin(t)]), 'none'), "
+            "gait=Polygon(8, 'none'))\n"
+        )
     assert colloc(["solve", stated(tmp_path, text), "--output", f"{tmp_path}/"]) == 2
-    assert re.search(r"p\.py.* has \d{7} bytes, and results keep at most 1048576", capsys.readouterr().err)
+    assert re.search(
+        r"p\.py.* has \d{7} bytes, and results keep at most 1048576", capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize(
-    "raised", ["GeneratorExit", "type('Own', (BaseException,), {})('no')", "BaseExceptionGroup('x', [GeneratorExit()])"]
+    "raised",
+    [
+        "GeneratorExit",
+        "type('Own', (BaseException,), {})('no')",
+        "BaseExceptionGroup('x', [GeneratorExit()])",
+    ],
 )
 def test_whatever_a_problem_file_raises_is_a_sentence(raised, tmp_path, capsys):
     assert colloc(["solve", stated(tmp_path, f"x = 1\nraise {raised}\n")]) == 2
@@ -419,13 +535,17 @@ def test_what_a_problem_file_and_its_parts_print_does_not_spoil_the_one_object(t
     text = (
         PRINTING
         + "\n".join(reversed(own.splitlines()))
-        + QUICK.replace("from colloc import *", "").replace('"quick", ', '"quick", body=Talkative(), guess=')
+        + QUICK.replace("from colloc import *", "").replace(
+            '"quick", ', '"quick", body=Talkative(), guess='
+        )
     )
     file = stated(tmp_path, text)
     try:
         assert colloc(["solve", file, "--output", f"{tmp_path}/", "--json"]) in (0, 4)
     finally:
-        gait_fields.BODIES[:] = [kind for kind in gait_fields.BODIES if kind.__name__ != "Talkative"]
+        gait_fields.BODIES[:] = [
+            kind for kind in gait_fields.BODIES if kind.__name__ != "Talkative"
+        ]
     printed = capsys.readouterr()
     assert json.loads(printed.out)["name"] == "quick"
     assert "hello from the file" in printed.err
@@ -443,16 +563,21 @@ def test_what_is_printed_while_one_object_is_asked_for_goes_to_standard_error(ca
 
 
 def shell(line, folder):
-    """A line of a shell with colloc as a function; its exit code (of the first of a pipe), output and errors."""
+    """A line of a shell with colloc as a function; its exit code (of the first of a pipe), output
+    and errors."""
     program = f'colloc() {{ "{sys.executable}" -m colloc "$@"; }}; set -o pipefail; {line}'
-    done = subprocess.run(["bash", "-c", program], capture_output=True, text=True, check=False, cwd=folder)
+    done = subprocess.run(
+        ["bash", "-c", program], capture_output=True, text=True, check=False, cwd=folder
+    )
     return done.returncode, done.stdout, done.stderr
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
 @pytest.mark.parametrize("closed", [">&-", ">&- 2>&-", "<&- >&- 2>&-"])
 def test_closed_streams_change_nothing_but_what_is_printed(closed, quick, tmp_path):
-    code, out, complaint = shell(f"colloc solve {quick} --no-figure --output {tmp_path}/ {closed}", tmp_path)
+    code, out, complaint = shell(
+        f"colloc solve {quick} --no-figure --output {tmp_path}/ {closed}", tmp_path
+    )
     assert code in (0, 4)
     assert (out, complaint) == ("", "")
     (result,) = tmp_path.glob("*.h5")
@@ -468,10 +593,26 @@ def test_a_pipe_that_is_closed_early_is_one_sentence_and_a_code_of_its_own(resul
 
 def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_path):
     """An installation without a compiler has no extension module."""
-    shutil.copytree(Path(ending.__file__).parents[1], tmp_path / "colloc", ignore=shutil.ignore_patterns("_kernel.*"))
+    shutil.copytree(
+        Path(ending.__file__).parents[1],
+        tmp_path / "colloc",
+        ignore=shutil.ignore_patterns("_kernel.*"),
+    )
     environment = {**os.environ, "PATH": "", "PYTHONPATH": str(tmp_path)}
-    words = "multistart", quick, "--starts", "2", "--workers", "2", "--quiet", "--output", f"{tmp_path}/"
+    words = (
+        "multistart",
+        quick,
+        "--starts",
+        "2",
+        "--workers",
+        "2",
+        "--quiet",
+        "--output",
+        f"{tmp_path}/",
+    )
     done = command(*words, env=environment, cwd=tmp_path)
     assert done.returncode in (0, 3)
-    assert done.stderr.decode().startswith("colloc: the balance is solved by NumPy, 10 to 60 times more slowly: the compiled")
+    assert done.stderr.decode().startswith(
+        "colloc: the balance is solved by NumPy, 10 to 60 times more slowly: the compiled"
+    )
     assert done.stderr.decode().count("\n") == 1

@@ -1,4 +1,5 @@
-"""The command line: exit codes, one clear sentence for bad input, and failed solves that harm nothing."""
+"""The command line: exit codes, one clear sentence for bad input, and failed solves that harm
+nothing."""
 
 import json
 import subprocess
@@ -25,7 +26,9 @@ def problem(tmp_path):
     return write
 
 
-@pytest.mark.parametrize(("options", "kinds"), [([], {"h5", "png"}), (["--pdf"], {"h5", "png", "pdf"})])
+@pytest.mark.parametrize(
+    ("options", "kinds"), [([], {"h5", "png"}), (["--pdf"], {"h5", "png", "pdf"})]
+)
 def test_a_good_problem_is_solved_saved_and_drawn(options, kinds, problem, tmp_path, capsys):
     code = main([problem(GOOD), "--output", str(tmp_path / "out"), *options])
     printed = capsys.readouterr().out
@@ -48,17 +51,23 @@ BAD = {
     "syntax": ("a = 1\nb = = 2\n", "line 2"),
     "python error": ("a = 1\n\nb = 1/0\n", "line 3"),
     "negative friction": (
-        GOOD.replace("PROBLEM = Problem(", "PROBLEM = Problem(friction=Friction(mu_t=-1, mu_f=1, mu_b=1), "),
+        GOOD.replace(
+            "PROBLEM = Problem(", "PROBLEM = Problem(friction=Friction(mu_t=-1, mu_f=1, mu_b=1), "
+        ),
         "mu_t",
     ),
     "nan friction": (
-        GOOD.replace("PROBLEM = Problem(", "PROBLEM = Problem(friction=Friction(mu_t=1, mu_f=float('nan'), mu_b=1), "),
+        GOOD.replace(
+            "PROBLEM = Problem(",
+            "PROBLEM = Problem(friction=Friction(mu_t=1, mu_f=float('nan'), mu_b=1), ",
+        ),
         "mu_f",
     ),
     "delta": (GOOD.replace("delta=0.3", "delta=-1e-4"), "delta must be positive"),
     "joint limit": (GOOD.replace("1.4, 0.8", "4.0, 0.8"), "inadmissible: joint"),
     "crossing": (
-        "from colloc import *\nPROBLEM = Problem('x', Fourier([2.4, 2.4], [[0.3], [0.1]], [[0.0], [0.2]]))\n",
+        "from colloc import *\nPROBLEM = Problem('x', Fourier([2.4, 2.4], [[0.3], [0.1]], [[0.0], "
+        "[0.2]]))\n",
         "cross each other",
     ),
     "mesh": (GOOD.replace("intervals=12", "intervals=1"), "mesh is too small"),
@@ -98,7 +107,9 @@ def test_bad_options_and_files(problem, tmp_path, capsys):
     assert "unrecognized arguments: --turbo" in capsys.readouterr().err
 
 
-def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(problem, tmp_path, capsys, monkeypatch):
+def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(
+    problem, tmp_path, capsys, monkeypatch
+):
     good = tmp_path / "quick.h5"
     good.write_bytes(b"a good result")
     monkeypatch.setattr("colloc.search.ipopt.EXACT", 1e-30)
@@ -113,6 +124,8 @@ def test_help_is_quick_and_does_not_need_casadi():
         "import sys; from colloc.__main__ import start\ntry: start(['solve', '--help'])\n"
         "except SystemExit: print('casadi' in sys.modules)"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     assert result.stdout.rstrip().endswith("False")
     assert "Exit codes" in result.stdout

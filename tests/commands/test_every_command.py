@@ -9,7 +9,10 @@ from colloc.commands.main import SUBCOMMANDS
 from colloc.commands.main import main as colloc
 from colloc.results.store import save
 
-PARSERS = {name: importlib.import_module(f"colloc.commands.{module}")._parser() for name, (module, _) in SUBCOMMANDS.items()}
+PARSERS = {
+    name: importlib.import_module(f"colloc.commands.{module}")._parser()
+    for name, (module, _) in SUBCOMMANDS.items()
+}
 PROBLEM = "from colloc import *\nPROBLEM = Problem('quick', gait=Harmonic(1, 'bilateral'))\n"
 STUDY = """from colloc import *
 STUDY = Study("quick", (Axis("mu_t", (1, 2)),), lambda mu_t: Problem("q", friction=Friction(mu_t=mu_t)))
@@ -35,23 +38,72 @@ def test_every_command_has_the_same_options_for_printing(name):
 
 
 REFUSED = {
-    "init": ["", "x.txt", "problem.py", "nowhere/below.py", "a,b.py", "new.py --links 2", "new.py --links x"],
+    "init": [
+        "",
+        "x.txt",
+        "problem.py",
+        "nowhere/below.py",
+        "a,b.py",
+        "new.py --links 2",
+        "new.py --links x",
+    ],
     "solve": ["", "nope.py", "folder.py", "fails.py", "empty.py", "good.h5", "text.h5"]
-    + [f"problem.py --{option}" for option in ("delta nan", "delta x", "mesh 1.5", "scheme no", "start nope.h5", "starts 0")]
-    + [f"problem.py --{option}" for option in ("seconds 0", "seconds nan", "search no", "output x.txt", "no-such")],
+    + [
+        f"problem.py --{option}"
+        for option in ("delta nan", "delta x", "mesh 1.5", "scheme no", "start nope.h5", "starts 0")
+    ]
+    + [
+        f"problem.py --{option}"
+        for option in ("seconds 0", "seconds nan", "search no", "output x.txt", "no-such")
+    ],
     "multistart": ["", "nope.py", "fails.py", "good.h5"]
-    + [f"problem.py --{option}" for option in ("starts 0", "workers 0", "seed -1", "sampler no", "time-limit nan")],
+    + [
+        f"problem.py --{option}"
+        for option in ("starts 0", "workers 0", "seed -1", "sampler no", "time-limit nan")
+    ],
     "open": ["", "nope.h5", "text.h5", "good.h5", "good.h5 --start 1"],
-    "sweep": ["", "nope.py", "fails.py", "problem.py", "study.py --workers 0", "study.py --chunk 0", "study.py --workers x"],
-    "verify": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --tolerance 0", "good.h5 --tolerance nan"],
+    "sweep": [
+        "",
+        "nope.py",
+        "fails.py",
+        "problem.py",
+        "study.py --workers 0",
+        "study.py --chunk 0",
+        "study.py --workers x",
+    ],
+    "verify": [
+        "",
+        "nope.h5",
+        "text.h5",
+        "problem.py",
+        "good.h5 --tolerance 0",
+        "good.h5 --tolerance nan",
+    ],
     "compare": ["", "good.h5", "good.h5 nope.h5", "text.h5 good.h5"],
-    "report": ["", "nope.h5", "text.h5", "good.h5 --problem nope.py", "good.h5 --output x.txt", "good.h5 --period 1"],
+    "report": [
+        "",
+        "nope.h5",
+        "text.h5",
+        "good.h5 --problem nope.py",
+        "good.h5 --output x.txt",
+        "good.h5 --period 1",
+    ],
     "animate": ["", "nope.h5", "text.h5"]
-    + [f"good.h5 --{option}" for option in ("periods 0", "seconds nan", "fps 0", "width 0", "format avi", "output x.avi")],
+    + [
+        f"good.h5 --{option}"
+        for option in ("periods 0", "seconds nan", "fps 0", "width 0", "format avi", "output x.avi")
+    ],
     "export": ["", "nope.h5", "text.h5", "good.h5"]
     + [
         f"good.h5 --period 4 --{option}"
-        for option in ("rate nan", "max-speed 0", "max-speed 1 2 3", "periods 0", "format x", "mass 1")
+        for option in (
+            "rate nan",
+            "max-speed 0",
+            "max-speed 1 2 3",
+            "periods 0",
+            "format x",
+            "mass 1",
+        )
     ],
     "evaluate": [
         "",
@@ -62,15 +114,38 @@ REFUSED = {
         "problem.py good.h5",
         "problem.py text.h5 --period x",
     ],
-    "robot": ["", "nope.h5 --length 1 --mass 1 --period 1", "good.h5", "good.h5 --length 1 --mass 1"]
-    + [f"good.h5 --{words}" for words in ("length 0 --mass 1 --period 1", "length 1 --mass nan --period 1")]
-    + [f"good.h5 --length 1 --mass 1 --period {words}" for words in ("-5", "1 --max-speed 0", "1 --max-torque 1 2 3")],
+    "robot": [
+        "",
+        "nope.h5 --length 1 --mass 1 --period 1",
+        "good.h5",
+        "good.h5 --length 1 --mass 1",
+    ]
+    + [
+        f"good.h5 --{words}"
+        for words in ("length 0 --mass 1 --period 1", "length 1 --mass nan --period 1")
+    ]
+    + [
+        f"good.h5 --length 1 --mass 1 --period {words}"
+        for words in ("-5", "1 --max-speed 0", "1 --max-torque 1 2 3")
+    ],
     "steer": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
-    + [f"problem.py --{option}" for option in ("turn 200", "turn x", "turn nan", "starts 0", "output x.txt")],
+    + [
+        f"problem.py --{option}"
+        for option in ("turn 200", "turn x", "turn nan", "starts 0", "output x.txt")
+    ],
     "pareto": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
-    + [f"problem.py --{option}" for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")],
+    + [
+        f"problem.py --{option}"
+        for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")
+    ],
     "sensitivity": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --no-such"],
-    "referee": ["--table nope.json", "--table text.h5", "--add good.h5", "--add nope.h5 --by me", "--only nobody"],
+    "referee": [
+        "--table nope.json",
+        "--table text.h5",
+        "--add good.h5",
+        "--add nope.h5 --by me",
+        "--only nobody",
+    ],
 }
 
 
@@ -87,7 +162,11 @@ def test_bad_input_is_refused_in_one_sentence_and_as_one_json_object(name, place
             said.append(printed)
         assert said[0].out == "", words
         told = json.loads(said[1].out)
-        assert told == {"status": "error", "message": said[0].err.removeprefix("colloc: ").rstrip("\n"), "exit_code": 2}, words
+        assert told == {
+            "status": "error",
+            "message": said[0].err.removeprefix("colloc: ").rstrip("\n"),
+            "exit_code": 2,
+        }, words
     assert sorted(place.iterdir()) == before
 
 
@@ -95,9 +174,19 @@ def test_what_is_wrong_is_named_without_words_of_programmers(place, capsys):
     for words, message in (
         ("solve problem.py --mesh x", "--mesh must be a whole number, not 'x'"),
         ("solve problem.py --delta x", "--delta must be a number, not 'x'"),
-        ("export good.h5 --format x", "--format must be one of 'csv', 'json', 'mjcf', 'urdf', not 'x'"),
-        ("evaluate problem.py good.h5", "good.h5 is no text of numbers in UTF-8: a CSV file is read here"),
-        ("open good.h5", "good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not beside it"),
+        (
+            "export good.h5 --format x",
+            "--format must be one of 'csv', 'json', 'mjcf', 'urdf', not 'x'",
+        ),
+        (
+            "evaluate problem.py good.h5",
+            "good.h5 is no text of numbers in UTF-8: a CSV file is read here",
+        ),
+        (
+            "open good.h5",
+            "good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not "
+            "beside it",
+        ),
     ):
         assert colloc(words.split()) == 2
         assert message in capsys.readouterr().err

@@ -1,4 +1,5 @@
-"""A robot can use it: whatever the pacing, the exported samples do what the result does, within the joint speed limits."""
+"""A robot can use it: whatever the pacing, the exported samples do what the result does, within the
+joint speed limits."""
 
 import csv
 import json
@@ -24,7 +25,9 @@ from colloc.verification.replay import replay
 from colloc.verification.trajectory import timed
 
 WAVE = Fourier(
-    np.array([0.2, 0.0, -0.3]), np.array([[0.9], [0.2], [0.1]]), np.array([[0.1, 0.2], [0.8, 0.1], [0.3, 0.4]])[:, :1]
+    np.array([0.2, 0.0, -0.3]),
+    np.array([[0.9], [0.2], [0.1]]),
+    np.array([[0.1, 0.2], [0.8, 0.1], [0.3, 0.4]])[:, :1],
 )
 
 
@@ -39,11 +42,16 @@ def path_through(angles):
     return lambda t: (spline(t), spline(t, 1))
 
 
-@pytest.mark.parametrize("settings", [{"period": 3.0}, {"limits": 2.0}, {"limits": np.array([1.0, 2.5, 4.0]), "period": 9.0}])
+@pytest.mark.parametrize(
+    "settings",
+    [{"period": 3.0}, {"limits": 2.0}, {"limits": np.array([1.0, 2.5, 4.0]), "period": 9.0}],
+)
 def test_distance_and_work_do_not_depend_on_pacing(settings):
     body, friction = Chain((0.25,) * 4), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
     before = replay(body, friction, path_of(WAVE), 1e-4)
-    after = replay(body, friction, path_through(timed(path_of(WAVE), 200.0, **settings).angles), 1e-4)
+    after = replay(
+        body, friction, path_through(timed(path_of(WAVE), 200.0, **settings).angles), 1e-4
+    )
     assert after.distance == pytest.approx(before.distance, rel=2e-4)
     assert after.work == pytest.approx(before.work, rel=2e-4)
 
@@ -107,7 +115,8 @@ def written(path):
     """Times, angles and speeds of a file."""
     columns = pandas.read_csv(path, comment="#")
     return columns["time_s"].to_numpy(), *(
-        columns[[name for name in columns if name.endswith(end)]].to_numpy().T for end in ("_rad", "_rad_per_s")
+        columns[[name for name in columns if name.endswith(end)]].to_numpy().T
+        for end in ("_rad", "_rad_per_s")
     )
 
 
@@ -116,7 +125,9 @@ def written(path):
     [{"period": 4.0}, {"max_speed": [2.0, 1.5]}, {"max_speed": 1.0, "period": 20.0, "periods": 2}],
     ids=["even", "fast", "slower"],
 )
-def test_an_export_leads_from_straight_at_rest_into_the_gait_within_speed_limits(three_link, how, tmp_path):
+def test_an_export_leads_from_straight_at_rest_into_the_gait_within_speed_limits(
+    three_link, how, tmp_path
+):
     stated = three_link.export(tmp_path / "x.csv", rate=200, **how)
     time, angles, speeds = written(tmp_path / "x.csv")
     np.testing.assert_allclose(np.diff(time), 1 / 200, atol=1e-8)
@@ -129,7 +140,10 @@ def test_an_export_leads_from_straight_at_rest_into_the_gait_within_speed_limits
     assert (np.abs(speeds) <= limits * (1 + 1e-6)).all()
     steps = np.diff(angles) * 200
     assert (np.abs(steps) <= limits * (1 + 1e-5)).all()  # angles have 9 digits
-    np.testing.assert_allclose(steps, 0.5 * (speeds[:, 1:] + speeds[:, :-1]), atol=0.02 * limits.max())  # no jump anywhere
+    # no jump anywhere
+    np.testing.assert_allclose(
+        steps, 0.5 * (speeds[:, 1:] + speeds[:, :-1]), atol=0.02 * limits.max()
+    )
     assert np.abs(angles).max() <= np.abs(angles[:, first:]).max() + 1e-6
 
 
@@ -146,7 +160,9 @@ def test_the_way_into_a_gait_keeps_the_speed_limit_of_its_problem(unsolved, tmp_
 def test_torques_on_the_way_into_a_gait_come_to_be_those_of_the_gait(unsolved, tmp_path):
     """Also where they depend on speeds: in a medium that drags."""
     drag = {"friction": Viscous(normal=2, tangential=1), "objective": "towing"}
-    solution = unsolved(Problem("drag", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **drag))
+    solution = unsolved(
+        Problem("drag", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **drag)
+    )
     solution.export(tmp_path / "x.csv", period=4.0, rate=50.0, length=1.2, mass=3.0)
     columns = pandas.read_csv(tmp_path / "x.csv", comment="#")
     torques = columns[["joint_1_N_m", "joint_2_N_m"]].to_numpy().T
@@ -156,7 +172,9 @@ def test_torques_on_the_way_into_a_gait_come_to_be_those_of_the_gait(unsolved, t
 
 
 def test_a_way_on_which_the_body_crosses_itself_is_refused(three_link, tmp_path, monkeypatch):
-    monkeypatch.setattr(Chain, "crossing_depth", lambda body, angles: np.full(angles.shape[1], 0.01))
+    monkeypatch.setattr(
+        Chain, "crossing_depth", lambda body, angles: np.full(angles.shape[1], 0.01)
+    )
     with pytest.raises(ProblemError, match="crosses itself on the way from straight"):
         three_link.export(tmp_path / "x.csv", period=4)
     three_link.export(tmp_path / "x.csv", period=4, ramp=False)
@@ -202,7 +220,13 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     lines = (tmp_path / "x.csv").read_text().splitlines()
     facts = dict(line[2:].split(": ", 1) for line in lines if line.startswith("#"))
     rows = list(csv.reader(line for line in lines if not line.startswith("#")))
-    assert rows[0] == ["time_s", "joint_1_rad", "joint_2_rad", "joint_1_rad_per_s", "joint_2_rad_per_s"]
+    assert rows[0] == [
+        "time_s",
+        "joint_1_rad",
+        "joint_2_rad",
+        "joint_1_rad_per_s",
+        "joint_2_rad_per_s",
+    ]
     values = np.array(rows[1:], dtype=float)
     assert values[0, 0] == pytest.approx(-float(facts["ramp_s"]))
     values = values[values[:, 0] >= 0]
@@ -213,9 +237,13 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     problem = three_link.problem
     replayed = replay(problem.body, problem.friction, path_through(values[:n, 1:3].T), 1e-4)
     assert replayed.efficiency == pytest.approx(json.loads(facts["efficiency"]), rel=2e-4)
-    assert replayed.distance == pytest.approx(json.loads(facts["distance_per_period_body_lengths"]), rel=2e-4)
+    assert replayed.distance == pytest.approx(
+        json.loads(facts["distance_per_period_body_lengths"]), rel=2e-4
+    )
 
-    assert main([str(file), "--period", "4", "--no-ramp", "--output", str(tmp_path / "y.json")]) == 0
+    assert (
+        main([str(file), "--period", "4", "--no-ramp", "--output", str(tmp_path / "y.json")]) == 0
+    )
     data = json.loads((tmp_path / "y.json").read_text())
     assert np.shape(data["angles_rad"]) == (2, 200)
     assert data["status"] == "solved"
@@ -232,39 +260,68 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     ],
     ids=["drag", "power limit"],
 )
-def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hold(changes, unsolved, tmp_path):
-    solution = unsolved(Problem("paced", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **changes))
+def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hold(
+    changes, unsolved, tmp_path
+):
+    solution = unsolved(
+        Problem("paced", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **changes)
+    )
     problem, limits = solution.problem, np.array([2.0, 1.5])
     stated = solution.export(tmp_path / "x.json", max_speed=limits, rate=400, ramp=False)
     written = json.loads((tmp_path / "x.json").read_text())
-    made = replay(problem.body, problem.friction, path_through(np.array(written["angles_rad"])), 1e-2)
+    made = replay(
+        problem.body, problem.friction, path_through(np.array(written["angles_rad"])), 1e-2
+    )
     assert made.work == pytest.approx(stated["work_per_period_weight_times_length"], rel=2e-4)
     assert made.distance == pytest.approx(stated["distance_per_period_body_lengths"], rel=2e-4)
     speeds = np.abs(written["speeds_rad_per_s"]).max(axis=1) / limits
     assert 0.99 < speeds.max() <= 1 + 1e-9  # the period is the shortest
     assert "the gait's own" in stated["pace"]
-    with pytest.raises(ProblemError, match=r"too short for the joint speed limits at the gait's own pace.*use at least"):
+    with pytest.raises(
+        ProblemError,
+        match=r"too short for the joint speed limits at the gait's own pace.*use at least",
+    ):
         solution.export(tmp_path / "x.json", max_speed=limits, period=0.99 * stated["period_s"])
 
 
 def test_with_inertia_it_is_said_of_which_robot_the_numbers_are(unsolved, tmp_path):
     """Of one whose length makes the period the pace that was solved for: L = Fr g T^2."""
-    solution = unsolved(Problem("fast", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, froude=0.05))
+    solution = unsolved(
+        Problem("fast", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, froude=0.05)
+    )
     stated = solution.export(tmp_path / "x.csv", period=2.0)
     assert stated["froude_number"] == 0.05
     assert "of a robot of 1.96 m in this period" in stated["pace"]
     # the period is made one of whole samples, which may be another pace by a little
     period = float(np.sqrt(1.2 / (9.81 * 0.05)))
-    assert solution.export(tmp_path / "x.csv", period=period, length=1.2, mass=3.0, rate=10)["period_s"] > 1.01 * period
+    assert (
+        solution.export(tmp_path / "x.csv", period=period, length=1.2, mass=3.0, rate=10)[
+            "period_s"
+        ]
+        > 1.01 * period
+    )
 
 
 def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
     guess = Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
-    solution = unsolved(Problem("soft", guess, ModalBody(2, panels=4), Friction(mu_t=3), Harmonic(1, "antipodal"), intervals=6))
+    solution = unsolved(
+        Problem(
+            "soft",
+            guess,
+            ModalBody(2, panels=4),
+            Friction(mu_t=3),
+            Harmonic(1, "antipodal"),
+            intervals=6,
+        )
+    )
     assert str(solution.gait).startswith("mode 1: ")
     assert repr(solution.gait) == "<Fourier of 2 modes>"
     solution.export(tmp_path / "soft.csv", period=4)
-    header = next(line for line in (tmp_path / "soft.csv").read_text().splitlines() if not line.startswith("#"))
+    header = next(
+        line
+        for line in (tmp_path / "soft.csv").read_text().splitlines()
+        if not line.startswith("#")
+    )
     assert header == "time_s,mode_1_rad,mode_2_rad,mode_1_rad_per_s,mode_2_rad_per_s"
     data = solution.to_xarray()
     assert data.modes.dims == data.mode_rates.dims == ("mode", "t")
@@ -274,8 +331,15 @@ def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
     with h5py.File(save(solution, tmp_path / "soft.h5")) as file:
         held = [*file["motion"], *file["gait"]]
         assert {"modes", "mode_rates", "mode"} <= set(held)
-    told = [*data.variables, *solution.to_dataframe(), *held, report_page(solution), *summary_lines(solution, None)]
-    assert not [text for text in told if "joint" in str(text).replace("joint_limit", "")]  # a field, of any body
+    told = [
+        *data.variables,
+        *solution.to_dataframe(),
+        *held,
+        report_page(solution),
+        *summary_lines(solution, None),
+    ]
+    # a field, of any body
+    assert not [text for text in told if "joint" in str(text).replace("joint_limit", "")]
 
 
 def test_a_corner_where_every_joint_rests_does_not_stop_the_clock():

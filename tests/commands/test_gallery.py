@@ -1,4 +1,5 @@
-"""Every file in problems/ is solved, agrees with its own reference, and with the numbers that the gallery prints."""
+"""Every file in problems/ is solved, agrees with its own reference, and with the numbers that the
+gallery prints."""
 
 import json
 
@@ -9,7 +10,8 @@ from scripts.gallery import PICTURES, TABLE, examples, solved_row
 
 NUMBERS = json.loads(TABLE.read_text())
 SLOW = 4.0
-"""Files that took longer [s of processor time], or whose time is not known, are left to the slow tests."""
+"""Files that took longer [s of processor time], or whose time is not known, are left to the slow
+tests."""
 
 
 def cases():
@@ -23,7 +25,9 @@ def test_the_example_does_what_it_says(example, solved):
     row = solved_row(solved(example.name)[0])
     assert row["status"] == "solved"
     if example.reference is not None:
-        assert row["efficiency"] == pytest.approx(example.reference.efficiency, abs=example.reference.tolerance)
+        assert row["efficiency"] == pytest.approx(
+            example.reference.efficiency, abs=example.reference.tolerance
+        )
     if example.name in NUMBERS:
         before = NUMBERS[example.name]
         allowed = 3e-5 + 3 * (before["error"] + row["error"])

@@ -1,5 +1,5 @@
-"""Commands that solve several problems one after another: what an interrupted one has solved, the same command does not solve
-again."""
+"""Commands that solve several problems one after another: what an interrupted one has solved, the
+same command does not solve again."""
 
 import pytest
 

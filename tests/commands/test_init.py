@@ -1,4 +1,5 @@
-"""A problem file for somebody who has none yet: it runs as it is, says what its lines mean, and replaces nothing."""
+"""A problem file for somebody who has none yet: it runs as it is, says what its lines mean, and
+replaces nothing."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
         bodies.append(read_problem_file(path).problem.body)
     assert bodies[0].lengths == pytest.approx([22 / 104, 30 / 104, 30 / 104, 22 / 104])
     assert bodies[1].lengths == pytest.approx(bodies[0].lengths)
-    assert bodies[0] == Chain(bodies[0].lengths, feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(4)))
+    assert bodies[0] == Chain(
+        bodies[0].lengths, feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(4))
+    )
 
 
 def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_path):
@@ -47,7 +50,11 @@ def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_
 
 @pytest.mark.parametrize(
     ("name", "links", "says"),
-    [("mine.py", "2", "3 to 12"), ("mine.txt", "4", "end in .py"), ("my body.py", "4", "letters, digits")],
+    [
+        ("mine.py", "2", "3 to 12"),
+        ("mine.txt", "4", "end in .py"),
+        ("my body.py", "4", "letters, digits"),
+    ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(name, links, says, tmp_path, capsys):
     assert main([str(tmp_path / name), "--links", links]) == BAD_PROBLEM

@@ -20,9 +20,15 @@ def test_every_problem_file_is_solved_by_its_command(name, tmp_path):
     saved = re.escape(f"saved {tmp_path}/{name}.h5, {tmp_path}/{name}.png")
     heading = rf"{name}: solved in [\d.]+ s( \([^\n]*\))?\n"
     value = r"  (efficiency d/W|speed d/L|turning θ/W|towing d²/W) +\d+\.\d+ "
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}  # scripts are no part of what is installed
+    # scripts are no part of what is installed
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, *command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        [sys.executable, *command],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     assert re.search(rf"{heading}{value}(.|\n)*{saved}\n$", done.stdout), done.stdout

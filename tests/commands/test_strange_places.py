@@ -1,4 +1,5 @@
-"""Where people run it: without a home, a language or a place to keep code; odd folders, names and file masks; old files."""
+"""Where people run it: without a home, a language or a place to keep code; odd folders, names and
+file masks; old files."""
 
 import os
 import subprocess
@@ -13,13 +14,19 @@ QUICK = """# Länge der Schlange: µ_t = 1
 from colloc import *
 PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=0.3, delta_start=0.3, intervals=12)
 """
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX environments and permissions")
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="POSIX environments and permissions"
+)
 
 
 def run(words, without=(), **environment):
     """``colloc`` in a process of its own whose environment has been changed."""
     kept = {name: value for name, value in os.environ.items() if name not in without}
-    return subprocess.run([sys.executable, "-m", "colloc", *map(str, words)], capture_output=True, env=kept | environment)
+    return subprocess.run(
+        [sys.executable, "-m", "colloc", *map(str, words)],
+        capture_output=True,
+        env=kept | environment,
+    )
 
 
 @pytest.fixture
@@ -37,7 +44,9 @@ OF_A_USER = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "LANG")
 
 
 def solved_and_verified(place, words, without, environment):
-    done = run(["solve", place / "quick.py", "--output", f"{place}/", *words], without, **environment)
+    done = run(
+        ["solve", place / "quick.py", "--output", f"{place}/", *words], without, **environment
+    )
     assert done.returncode in (0, 4), done.stderr
     assert b"Traceback" not in done.stderr
     result = next(place.glob("quick*.h5"))
@@ -45,11 +54,15 @@ def solved_and_verified(place, words, without, environment):
     checked = run(["verify", result], without, **environment)
     assert checked.returncode == done.returncode
     slowly = b"colloc: the balance is solved by NumPy, 10 to 60 times more slowly: "
-    assert checked.stderr == b"" or (checked.stderr.startswith(slowly) and checked.stderr.count(b"\n") == 1)
+    assert checked.stderr == b"" or (
+        checked.stderr.startswith(slowly) and checked.stderr.count(b"\n") == 1
+    )
 
 
 def test_a_solve_needs_nothing_of_the_user(place):
-    solved_and_verified(place, ["--no-figure"], OF_A_USER, {**NO_LANGUAGE, "PYTHONIOENCODING": "cp1252"})
+    solved_and_verified(
+        place, ["--no-figure"], OF_A_USER, {**NO_LANGUAGE, "PYTHONIOENCODING": "cp1252"}
+    )
 
 
 @pytest.mark.slow
@@ -64,7 +77,10 @@ def test_nor_does_a_figure(without, environment, place):
 
 def test_text_files_are_utf_8_whatever_the_language(place, three_link):
     result = save(three_link, place / "Länge.h5")
-    for words, name in ((["export", result, "--period", "4"], "*.csv"), (["report", result], "*.html")):
+    for words, name in (
+        (["export", result, "--period", "4"], "*.csv"),
+        (["report", result], "*.html"),
+    ):
         done = run([*words, "--output", f"{place}/"], **NO_LANGUAGE)
         assert done.returncode == 0, done.stderr
         (written,) = place.glob(name)
@@ -72,7 +88,8 @@ def test_text_files_are_utf_8_whatever_the_language(place, three_link):
 
 
 def test_a_name_as_long_as_systems_allow_is_kept(three_link, tmp_path):
-    path = save(three_link, tmp_path / ("ä" * 100 + ".h5"))  # 203 bytes; with those of the temporary file below 255
+    # 203 bytes; with those of the temporary file below 255
+    path = save(three_link, tmp_path / ("ä" * 100 + ".h5"))
     assert load(path).certificate == three_link.certificate
 
 

@@ -1,4 +1,5 @@
-"""What a solve ends with: a few lines that a person reads, and numbers that mean the same as everywhere else."""
+"""What a solve ends with: a few lines that a person reads, and numbers that mean the same as
+everywhere else."""
 
 import json
 import re
@@ -32,8 +33,15 @@ def test_a_result_is_told_in_three_lines_and_its_checks_in_one(three_link):
 
 
 def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
-    bad = [Check("closure", 2e-3, 1e-9, "joint angles after one period"), Check("second order", 0.3, 1e-2, "a saddle")]
-    good = [check for check in three_link.certificate.checks if check.name not in ("closure", "second order")]
+    bad = [
+        Check("closure", 2e-3, 1e-9, "joint angles after one period"),
+        Check("second order", 0.3, 1e-2, "a saddle"),
+    ]
+    good = [
+        check
+        for check in three_link.certificate.checks
+        if check.name not in ("closure", "second order")
+    ]
     failed = replace(three_link, certificate=replace(three_link.certificate, checks=(*good, *bad)))
     lines = summary_lines(failed, None)
     assert f"  {bad[0].line()}" in lines
@@ -46,14 +54,17 @@ LOOP = ellipse(0.0, 1.2, 0.8)
 
 
 def told_of_limits(gait=LOOP, **limits):
-    """What the summary says of the limits of a gait, usually one whose joints bend by 1.2 and 0.8 rad at two phases."""
+    """What the summary says of the limits of a gait, usually one whose joints bend by 1.2 and 0.8
+    rad at two phases."""
     stated = Problem("limited", gait=Harmonic(1), delta=1e-2, **limits)
     found = evaluate(stated, gait)
     return found, [line[18:] for line in summary_lines(found, None) if line.startswith("  limits ")]
 
 
 def test_the_share_of_every_limit_that_a_gait_uses_is_told_with_its_unit():
-    found, lines = told_of_limits(joint_limit=2.0, speed_limit=10.0, torque_limit=0.05, power_limit=(0.2, 0.4))
+    found, lines = told_of_limits(
+        joint_limit=2.0, speed_limit=10.0, torque_limit=0.05, power_limit=(0.2, 0.4)
+    )
     shares = summary_dict(found, None, None, None)["limits"]
     assert list(shares) == ["joint angles", "joint speed", "torque", "power"]
     t = np.linspace(0, 1, 4001)
@@ -62,39 +73,54 @@ def test_the_share_of_every_limit_that_a_gait_uses_is_told_with_its_unit():
     assert shares["joint speed"] == pytest.approx(np.abs(rates).max() / 10.0, rel=1e-5)
     torques = joint_torques(found, t)
     assert shares["torque"] == pytest.approx(np.abs(torques).max() / 0.05, rel=1e-3)
-    assert shares["power"] == pytest.approx(((torques * rates).max(axis=1) / [0.2, 0.4]).max(), rel=1e-3)
+    assert shares["power"] == pytest.approx(
+        ((torques * rates).max(axis=1) / [0.2, 0.4]).max(), rel=1e-3
+    )
     of_speed, of_torque = f"{100 * shares['joint speed']:.0f}", f"{100 * shares['torque']:.0f}"
     assert lines == [
-        f"joint angles {100 * shares['joint angles']:.0f} %, joint speed {of_speed} % of 10 rad per period, "
+        f"joint angles {100 * shares['joint angles']:.0f} %, joint speed {of_speed} % of 10 rad "
+        f"per period, "
         f"torque {of_torque} % of 0.05 weight x body length, power {100 * shares['power']:.0f} %"
     ]
 
 
 def test_limits_that_no_gait_could_reach_are_named_with_what_it_could_need():
-    """1.5 N m and 40 rad/s of a robot's motors, typed where other units are meant: a third of the body on a floor of friction 1
-    has a torque of 1/18 at most, and one harmonic within 2 rad a speed of 4 pi."""
+    """1.5 N m and 40 rad/s of a robot's motors, typed where other units are meant: a third of the
+    body on a floor of friction 1 has a torque of 1/18 at most, and one harmonic within 2 rad a
+    speed of 4 pi."""
     _, lines = told_of_limits(joint_limit=2.0, speed_limit=40.0, torque_limit=1.5, power_limit=2.0)
     assert lines[1:] == [
         "speed_limit 40 cannot matter: no gait needs more than 12.6 rad per period, its unit",
-        "torque_limit 1.5 cannot matter: no gait needs more than 0.0556 weight x body length, its unit",
-        "power_limit 2 cannot matter: no gait needs more than 0.698 weight x body length per period, its unit",
+        "torque_limit 1.5 cannot matter: no gait needs more than 0.0556 weight x body length, "
+        "its unit",
+        "power_limit 2 cannot matter: no gait needs more than 0.698 weight x body length per "
+        "period, its unit",
     ]
 
 
 def test_a_limit_of_all_joints_matters_if_it_does_to_one_and_one_of_each_is_named_by_its_joint():
-    """The outer joints of four links with short ends need 0.02 at most, the inner one more than that."""
-    body, wave = Chain((0.2, 0.3, 0.3, 0.2)), Fourier(np.zeros(3), [[0.2], [0.9], [0.2]], [[0.5], [0.0], [-0.5]])
+    """The outer joints of four links with short ends need 0.02 at most, the inner one more than
+    that."""
+    body, wave = (
+        Chain((0.2, 0.3, 0.3, 0.2)),
+        Fourier(np.zeros(3), [[0.2], [0.9], [0.2]], [[0.5], [0.0], [-0.5]]),
+    )
     found, lines = told_of_limits(wave, body=body, torque_limit=0.1)
     assert summary_dict(found, None, None, None)["limits"]["torque"] * 0.1 > 0.02
     assert not lines[1:]
     _, lines = told_of_limits(wave, body=body, torque_limit=(0.1, 0.1, 0.01))
     assert len(lines) == 2
-    assert lines[1].startswith("torque_limit 0.1 of joint 1 cannot matter: no gait needs more than 0.02 weight")
+    assert lines[1].startswith(
+        "torque_limit 0.1 of joint 1 cannot matter: no gait needs more than 0.02 weight"
+    )
 
 
 def test_a_speed_that_decides_says_how_far_joints_can_swing():
     _, lines = told_of_limits(joint_limit=2.0, speed_limit=7.54)
-    assert lines[1:] == ["speed_limit 7.54 rad per period, its unit, lets a joint swing by 216 of 229 degrees at most"]
+    assert lines[1:] == [
+        "speed_limit 7.54 rad per period, its unit, lets a joint swing by 216 of 229 degrees "
+        "at most"
+    ]
 
 
 def test_where_nothing_is_limited_nothing_is_told_of_limits():
@@ -110,8 +136,11 @@ def test_verbose_tells_every_check_the_search_and_the_gait(three_link):
 
 
 def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_path):
-    """The collocated ones differ from them by more than their errors, so here they are made to differ by much."""
-    solution = replace(three_link, answer=replace(three_link.answer, value=9.0, distance=9.0, work=9.0))
+    """The collocated ones differ from them by more than their errors, so here they are made to
+    differ by much."""
+    solution = replace(
+        three_link, answer=replace(three_link.answer, value=9.0, distance=9.0, work=9.0)
+    )
     facts = summary_dict(replace(solution, shrunk=solution), tmp_path, None, None)
     for name in ("value", "efficiency", "distance", "work"):
         assert facts[name] == facts["certificate"][name] == getattr(three_link.certificate, name)
@@ -120,7 +149,16 @@ def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_pa
 
 def test_what_solve_prints_is_what_the_file_and_verify_say(tmp_path, capsys):
     (tmp_path / "quick.py").write_text(QUICK)
-    words = ["solve", str(tmp_path / "quick.py"), "--starts", "1", "--no-figure", "--output", f"{tmp_path}/", "--json"]
+    words = [
+        "solve",
+        str(tmp_path / "quick.py"),
+        "--starts",
+        "1",
+        "--no-figure",
+        "--output",
+        f"{tmp_path}/",
+        "--json",
+    ]
     assert colloc(words) == 0
     facts = json.loads(capsys.readouterr().out)
     certificate = load(tmp_path / "quick.h5").certificate
@@ -136,4 +174,6 @@ def test_what_solve_prints_is_what_the_file_and_verify_say(tmp_path, capsys):
     assert "cos 2πt" not in printed
     assert colloc([*words[:-1], "--verbose"]) == 0
     assert "cos 2πt" in capsys.readouterr().out
-    assert facts["value"] == pytest.approx(facts["certificate"]["efficiency_at_zero_delta"], rel=1e-2)
+    assert facts["value"] == pytest.approx(
+        facts["certificate"]["efficiency_at_zero_delta"], rel=1e-2
+    )

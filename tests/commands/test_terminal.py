@@ -1,4 +1,5 @@
-"""Every command in a terminal, to its end, as a person runs it: there progress is shown, and nowhere else."""
+"""Every command in a terminal, to its end, as a person runs it: there progress is shown, and
+nowhere else."""
 
 import re
 import sys
@@ -60,7 +61,8 @@ def quick(tmp_path_factory):
 
 
 def shown(words, folder, code=0, **environment):
-    """What stands on the screen after a program, which ends with that exit code, hides no cursor and leaves no progress."""
+    """What stands on the screen after a program, which ends with that exit code, hides no cursor
+    and leaves no progress."""
     ended, written = run_in_terminal([sys.executable, "-m", *words], folder, **environment)
     lines, cursor = screen(written)
     assert ended == code, written
@@ -81,13 +83,17 @@ def test_no_command_is_left_out():
     assert COMMANDS.keys() == SUBCOMMANDS.keys()
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in COMMANDS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in COMMANDS]
+)
 def test_every_command_ends_well_in_a_terminal(name, quick, tmp_path):
     place(quick, tmp_path, *(path.name for path in quick.iterdir() if path.is_file()))
     shown(["colloc", name, *COMMANDS[name].split()], tmp_path)
 
 
-def test_the_first_command_of_the_readme_shows_how_far_it_is_and_then_the_answer_alone(quick, tmp_path):
+def test_the_first_command_of_the_readme_shows_how_far_it_is_and_then_the_answer_alone(
+    quick, tmp_path
+):
     place(quick, tmp_path, "quick.py")
     said, written = shown(["colloc.solve", "quick.py"], tmp_path)
     assert "quick: explore, 0 of 32; best d/W = 0." in written

@@ -24,7 +24,11 @@ from colloc.results.store import load, save
 
 def changed(solution, certificate=None, answer=None):
     return Solution(
-        solution.problem, answer or solution.answer, certificate or solution.certificate, solution.seconds, solution.source
+        solution.problem,
+        answer or solution.answer,
+        certificate or solution.certificate,
+        solution.seconds,
+        solution.source,
     )
 
 
@@ -34,7 +38,9 @@ def test_verify_certifies_without_loading_casadi_or_matplotlib(three_link, tmp_p
         "import sys; from colloc.commands.main import main; code = main(['verify', sys.argv[1]]);"
         "print(code, [m for m in ('casadi', 'matplotlib') if m in sys.modules])"
     )
-    result = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        [sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True
+    )
     assert result.stdout.splitlines()[-1] == "0 []"
     assert "three_link: certified" in result.stdout
     assert result.stderr == ""
@@ -63,7 +69,12 @@ def test_verify_finds_a_tampered_certificate_and_a_tampered_gait(three_link, tmp
 
 
 STATED = ("distance", "work", "rotation", "length")
-NUMBERS = [*STATED, "distance_error", "work_error", *(name for name in checks.NUMBERS if name != "instants")]
+NUMBERS = [
+    *STATED,
+    "distance_error",
+    "work_error",
+    *(name for name in checks.NUMBERS if name != "instants"),
+]
 
 
 def by_another_program(path, change):
@@ -73,9 +84,13 @@ def by_another_program(path, change):
 
 
 @pytest.mark.parametrize("name", NUMBERS)
-def test_every_number_of_a_certificate_is_held_against_a_new_one(name, three_link, tmp_path, capsys):
+def test_every_number_of_a_certificate_is_held_against_a_new_one(
+    name, three_link, tmp_path, capsys
+):
     path = save(three_link, tmp_path / "x.h5")
-    by_another_program(path, lambda group: group.attrs.modify(name, 0.01 + 1.01 * group.attrs[name]))
+    by_another_program(
+        path, lambda group: group.attrs.modify(name, 0.01 + 1.01 * group.attrs[name])
+    )
     assert recheck.main([str(path), "--json"]) == 4
     told = json.loads(capsys.readouterr().out)
     assert told["complaint"].startswith("the file certifies ")
@@ -91,9 +106,17 @@ def test_a_number_that_no_replay_was_asked_for_is_believed_of_nobody(three_link,
 
 def test_what_is_no_number_of_a_replay_is_held_against_it_too(three_link, tmp_path, capsys):
     checks = three_link.certificate.checks
-    lax = tuple(replace(check, threshold=1.0) if check.name == "second order" else check for check in checks)
-    for other, said in ((lax, "allows 1e+00 for the check 'second order'"), (checks[:-1], "has not the checks of a new one")):
-        file = save(changed(three_link, certificate=replace(three_link.certificate, checks=other)), tmp_path / "x.h5")
+    lax = tuple(
+        replace(check, threshold=1.0) if check.name == "second order" else check for check in checks
+    )
+    for other, said in (
+        (lax, "allows 1e+00 for the check 'second order'"),
+        (checks[:-1], "has not the checks of a new one"),
+    ):
+        file = save(
+            changed(three_link, certificate=replace(three_link.certificate, checks=other)),
+            tmp_path / "x.h5",
+        )
         assert recheck.main([str(file), "--json"]) == 4
         assert said in json.loads(capsys.readouterr().out)["complaint"]
 
@@ -133,11 +156,14 @@ def test_gaits_are_compared_where_start_phase_and_the_symmetries_of_body_and_fri
     def found(*parts):
         return SimpleNamespace(problem=problem, gait=Fourier(*parts))
 
-    gait, later = found(mean, cos, sin), found(-mean, -sin, cos)  # the mirror image, begun elsewhere
+    # the mirror image, begun elsewhere
+    gait, later = (found(mean, cos, sin), found(-mean, -sin, cos))
     assert compare.gait_distance(gait, later) < 1e-9
     turned = -mean[::-1], -cos[::-1], -sin[::-1]
     others = {"turned": turned, "backwards": (mean, cos, -sin), "both": (*turned[:2], -turned[2])}
-    assert {name for name, other in others.items() if compare.gait_distance(gait, found(*other)) < 1e-9} == alike
+    assert {
+        name for name, other in others.items() if compare.gait_distance(gait, found(*other)) < 1e-9
+    } == alike
 
 
 def test_gaits_of_other_bodies_are_not_compared(three_link):
@@ -173,7 +199,9 @@ def test_every_subcommand_answers_help_without_casadi():
         "    try: main([name, '--help'])\n"
         "    except SystemExit as ended: print(name, ended.code, 'casadi' in sys.modules)"
     )
-    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    printed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
     for name in SUBCOMMANDS:
         assert f"usage: colloc {name} " in printed
         assert f"\n{name} 0 False\n" in printed
@@ -185,7 +213,11 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
     assert all(f"  {name} " in printed for name in SUBCOMMANDS)
     assert main([]) == 2
     capsys.readouterr()
-    for words, hint in ((["repot"], "colloc report?"), (["x.py"], "colloc solve x.py?"), (["zzzz"], "choose one of init,")):
+    for words, hint in (
+        (["repot"], "colloc report?"),
+        (["x.py"], "colloc solve x.py?"),
+        (["zzzz"], "choose one of init,"),
+    ):
         assert main(words) == 2
         assert hint in capsys.readouterr().err
     assert main(["--version"]) == 0

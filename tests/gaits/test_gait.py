@@ -16,11 +16,15 @@ def random_gait(seed, n_joint=3, harmonics=3):
 
 def test_rates_are_the_derivative_of_angles():
     gait, h = random_gait(1), 1e-6
-    np.testing.assert_allclose((gait.angles(T + h) - gait.angles(T - h)) / (2 * h), gait.rates(T), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(
+        (gait.angles(T + h) - gait.angles(T - h)) / (2 * h), gait.rates(T), rtol=1e-6, atol=1e-6
+    )
 
 
 @pytest.mark.parametrize("n_joint", [1, 2, 3, 4])
-@pytest.mark.parametrize(("symmetry", "harmonics"), [("none", 1), ("none", 3), ("bilateral", 2), ("antipodal", 3)])
+@pytest.mark.parametrize(
+    ("symmetry", "harmonics"), [("none", 1), ("none", 3), ("bilateral", 2), ("antipodal", 3)]
+)
 def test_members_have_the_symmetry_of_their_class(n_joint, symmetry, harmonics):
     gait_class = Harmonic(harmonics, symmetry)
     rng = np.random.default_rng(2)
@@ -35,7 +39,9 @@ def test_members_have_the_symmetry_of_their_class(n_joint, symmetry, harmonics):
 
 @pytest.mark.parametrize("harmonics", [2, 6])
 def test_an_even_harmonic_that_antipodal_gaits_cannot_have_is_refused(harmonics):
-    with pytest.raises(ProblemError, match=rf"odd harmonics only.*ask for {harmonics - 1} or {harmonics + 1}"):
+    with pytest.raises(
+        ProblemError, match=rf"odd harmonics only.*ask for {harmonics - 1} or {harmonics + 1}"
+    ):
         Harmonic(harmonics, "antipodal")
     assert harmonics_within(harmonics, "antipodal") == Harmonic(harmonics - 1, "antipodal")
 
@@ -43,7 +49,9 @@ def test_an_even_harmonic_that_antipodal_gaits_cannot_have_is_refused(harmonics)
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
 @pytest.mark.parametrize("n_joint", [1, 2, 3])
 @pytest.mark.parametrize("harmonics", [1, 2, 3, 4])
-def test_every_class_that_can_be_made_has_gaits_of_its_highest_harmonic(harmonics, n_joint, symmetry):
+def test_every_class_that_can_be_made_has_gaits_of_its_highest_harmonic(
+    harmonics, n_joint, symmetry
+):
     gait_class = harmonics_within(harmonics, symmetry)
     rng = np.random.default_rng(5)
     gait = gait_class.fourier(rng.normal(size=gait_class.size(n_joint)), n_joint)
@@ -56,7 +64,9 @@ def test_parameters_and_gait_are_inverse_to_each_other(symmetry):
     rng = np.random.default_rng(3)
     p = rng.normal(size=gait_class.size(2))
     if symmetry != "bilateral":
-        p[gait_class.size(2) // 2] += 0  # any member with a non-negative first cosine is its own canonical form
+        p[gait_class.size(2) // 2] += (
+            0  # any member with a non-negative first cosine is its own canonical form
+        )
         gait = gait_class.fourier(p, 2)
         if gait.cos[0, 0] < 0:
             p = gait_class.parameters(gait)

@@ -1,4 +1,5 @@
-"""Classes that are linear in their parameters: B-splines and columns of one's own, against Fourier series and differences."""
+"""Classes that are linear in their parameters: B-splines and columns of one's own, against Fourier
+series and differences."""
 
 import numpy as np
 import pytest
@@ -25,11 +26,18 @@ ELLIPSES = [
     np.stack([np.sin(2 * np.pi * PHASES)] * 2),
     np.stack([np.ones(96), -np.ones(96)]),
 ]
-CLASSES = [BSpline(8, symmetry="bilateral"), BSpline(7, 3), Basis(FOUR, "antipodal"), Basis(ELLIPSES)]
+CLASSES = [
+    BSpline(8, symmetry="bilateral"),
+    BSpline(7, 3),
+    Basis(FOUR, "antipodal"),
+    Basis(ELLIPSES),
+]
 
 
 def member(gait_class, n_joint=2, seed=1):
-    return gait_class.member(np.random.default_rng(seed).normal(size=gait_class.size(n_joint)), n_joint)
+    return gait_class.member(
+        np.random.default_rng(seed).normal(size=gait_class.size(n_joint)), n_joint
+    )
 
 
 @pytest.mark.parametrize("gait_class", [BSpline(9, 3), BSpline(8, 4), BSpline(10, 5), Basis(FOUR)])
@@ -37,7 +45,9 @@ def test_derivatives_of_the_functions_are_those_of_differences_and_a_period_clos
     h = 1e-6
     slope = (gait_class.functions(T + h) - gait_class.functions(T - h)) / (2 * h)
     np.testing.assert_allclose(gait_class.functions(T, 1), slope, atol=1e-6 * np.abs(slope).max())
-    np.testing.assert_allclose(gait_class.functions(T + 1.0), gait_class.functions(T), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(
+        gait_class.functions(T + 1.0), gait_class.functions(T), rtol=0, atol=1e-11
+    )
 
 
 def test_b_splines_add_up_to_one():
@@ -48,7 +58,9 @@ def test_b_splines_add_up_to_one():
 @pytest.mark.parametrize("degree", [3, 4, 5])
 def test_a_wave_is_met_at_the_order_of_the_splines(degree):
     wave = colloc.ellipse(0.2, 1.3, 0.8)
-    off = [np.abs(BSpline(n, degree).through(wave).angles(T) - wave.angles(T)).max() for n in (12, 24)]
+    off = [
+        np.abs(BSpline(n, degree).through(wave).angles(T) - wave.angles(T)).max() for n in (12, 24)
+    ]
     assert np.log2(off[0] / off[1]) == pytest.approx(degree + 1, abs=0.3)
 
 
@@ -65,7 +77,9 @@ def test_members_have_the_symmetry_of_their_class_and_are_found_again(symmetry, 
         }
         np.testing.assert_allclose(images[symmetry], gait.angles(T), atol=1e-8)
         v = gait_class.parameters(gait)
-        np.testing.assert_allclose(gait_class.member(v, n_joint).table, gait.table, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(
+            gait_class.member(v, n_joint).table, gait.table, rtol=0, atol=1e-10
+        )
         # as anybody's gait: by its angles alone
         again = gait_class.member(gait_class.parameters(gait.mapped(np.eye(n_joint))), n_joint)
         np.testing.assert_allclose(again.angles(T), gait.angles(T), atol=1e-4)
@@ -76,12 +90,16 @@ def test_members_have_the_symmetry_of_their_class_and_are_found_again(symmetry, 
 def test_what_a_class_says_of_its_parameters_is_true_of_its_gaits(gait_class, body):
     gait, t = member(gait_class), np.arange(4000) / 4000
     v, (first, second) = gait_class.parameters(gait), gait.angles(t)
-    assert v @ gait_class.mean_square_rate(2) @ v == pytest.approx((gait.rates(t) ** 2).sum(axis=0).mean(), rel=1e-4)
+    assert v @ gait_class.mean_square_rate(2) @ v == pytest.approx(
+        (gait.rates(t) ** 2).sum(axis=0).mean(), rel=1e-4
+    )
     area = 0.5 * np.sum(first * np.roll(second, -1) - second * np.roll(first, -1))
     assert v @ gait_class.enclosed_area(2) @ v == pytest.approx(area, rel=1e-4, abs=1e-9)
     np.testing.assert_allclose(gait.scaled(-3.0).angles(t), -3.0 * gait.angles(t))
     for parameters in (v, *np.eye(v.size)):
-        low, high = gait_class.bounds(body, body.largest_angles(gait_class.member(parameters, 2).angles(t)).max())
+        low, high = gait_class.bounds(
+            body, body.largest_angles(gait_class.member(parameters, 2).angles(t)).max()
+        )
         assert np.all((low - 1e-9 <= parameters) & (parameters <= high + 1e-9))
     points = gait_class.fewest_intervals(3)[0] * 3
     assert 4 * gait_class.harmonics <= points < max(4 * gait_class.harmonics + 3, 7)
@@ -93,7 +111,9 @@ def test_random_combinations_of_columns_are_drawn_about_rest_each_up_to_a_radian
     drawn, opposite = (gait_class.drawn(u, 2).angles(T) for u in (unit, 1 - unit))
     np.testing.assert_allclose(drawn, -opposite, rtol=0, atol=1e-12)
     for one in 0.5 + 0.5 * np.eye(unit.size):
-        assert np.abs(gait_class.drawn(one, 2).angles(gait_class.instants)).max() == pytest.approx(1.0)
+        assert np.abs(gait_class.drawn(one, 2).angles(gait_class.instants)).max() == pytest.approx(
+            1.0
+        )
 
 
 @pytest.mark.parametrize("unit", [0.01, 40])
@@ -108,11 +128,17 @@ def test_a_hop_moves_angles_by_normals_of_its_step_whatever_the_units_of_a_colum
 
 
 def test_a_search_begins_with_a_wave_or_where_a_class_has_none_with_all_of_it_as_fast():
-    wave, twice = colloc.ellipse(0.0, 1.2, 0.7), [np.cos(4 * np.pi * PHASES), np.sin(4 * np.pi * PHASES)]
+    wave, twice = (
+        colloc.ellipse(0.0, 1.2, 0.7),
+        [np.cos(4 * np.pi * PHASES), np.sin(4 * np.pi * PHASES)],
+    )
     for gait_class in (*CLASSES, Basis(twice)):
         assert gait_class.first_guess(wave).shape_speed == pytest.approx(wave.shape_speed)
     np.testing.assert_allclose(BSpline(24).first_guess(wave).angles(T), wave.angles(T), atol=1e-4)
-    assert np.ptp(Basis(twice).first_guess(wave).angles(T) / np.sum(Basis(twice).functions(T), axis=0)) < 1e-9
+    assert (
+        np.ptp(Basis(twice).first_guess(wave).angles(T) / np.sum(Basis(twice).functions(T), axis=0))
+        < 1e-9
+    )
 
 
 def test_a_symmetry_halves_the_parameters():
@@ -121,11 +147,18 @@ def test_a_symmetry_halves_the_parameters():
 
 
 def test_starts_of_many_knots_are_as_smooth_as_three_harmonics():
-    assert [BSpline(knots).dimension(2) for knots in (5, 12, 64)] == [Harmonic(n).dimension(2) for n in (2, 3, 3)]
+    assert [BSpline(knots).dimension(2) for knots in (5, 12, 64)] == [
+        Harmonic(n).dimension(2) for n in (2, 3, 3)
+    ]
 
 
-@pytest.mark.parametrize("gait_class", [Harmonic(1), Harmonic(12), Harmonic(12, "bilateral"), BSpline(8, symmetry="bilateral")])
-def test_a_mesh_grows_from_sixteen_intervals_a_period_or_two_a_wave_and_not_from_twice_as_many(gait_class):
+@pytest.mark.parametrize(
+    "gait_class",
+    [Harmonic(1), Harmonic(12), Harmonic(12, "bilateral"), BSpline(8, symmetry="bilateral")],
+)
+def test_a_mesh_grows_from_sixteen_intervals_a_period_or_two_a_wave_and_not_from_twice_as_many(
+    gait_class,
+):
     last = gait_class.fraction
     edges = gait_class.first_edges(np.linspace(0.0, last, 200))
     assert (edges[0], edges[-1]) == (0.0, last)
@@ -188,7 +221,8 @@ def test_what_a_search_of_splines_finds_is_kept_as_it_appears(tmp_path):
 
 @pytest.mark.slow
 def test_many_knots_approach_what_many_harmonics_give():
-    """0.4023 of eight harmonics. More numbers of either kind make sharper features, so the limit is from both sides."""
+    """0.4023 of eight harmonics. More numbers of either kind make sharper features, so the limit is
+    from both sides."""
     splines = colloc.solve(Problem("splines", gait=BSpline(16, symmetry="bilateral")))
     waves = colloc.solve(Problem("waves", gait=Harmonic(8, "bilateral")))
     assert splines.status == waves.status == "solved"
@@ -197,16 +231,24 @@ def test_many_knots_approach_what_many_harmonics_give():
 
 @pytest.mark.slow
 def test_splines_with_inertia_are_certified():
-    assert colloc.solve(Problem("paced", gait=BSpline(8, symmetry="antipodal"), froude=1e-3), starts=4).status == "solved"
+    assert (
+        colloc.solve(
+            Problem("paced", gait=BSpline(8, symmetry="antipodal"), froude=1e-3), starts=4
+        ).status
+        == "solved"
+    )
 
 
 @pytest.mark.parametrize(
     ("column", "least", "most"),
-    [(bump, 1.0, (10, 1.5, 1.2)), (lambda t: np.abs(np.sin(np.pi * (t - 0.3141))) ** 3, 0.3, (4, 4, 4))],
+    [
+        (bump, 1.0, (10, 1.5, 1.2)),
+        (lambda t: np.abs(np.sin(np.pi * (t - 0.3141))) ** 3, 0.3, (4, 4, 4)),
+    ],
 )
 def test_interpolation_states_its_error(column, least, most):
-    """Well where steps are small; of few samples it is too large, as their error has not yet come to fall fast. Of a rough one
-    it is known to a factor."""
+    """Well where steps are small; of few samples it is too large, as their error has not yet come
+    to fall fast. Of a rough one it is known to a factor."""
     for n, factor in zip((24, 48, 96), most, strict=True):
         basis, t = Basis([column(np.arange(n) / n)]), np.linspace(0, 1, 5001)
         true = np.abs(basis.functions(t)[0] - column(t)).max() / column(t).max()
@@ -222,15 +264,29 @@ def test_columns_have_the_harmonics_that_hold_all_but_a_millionth_of_their_mean_
 
 
 def test_a_file_of_columns_is_read_with_or_without_its_last_line_and_by_even_steps_only(tmp_path):
-    """The last line is the first again where every column is back to a tenth of a step: the last but one of the last is too."""
+    """The last line is the first again where every column is back to a tenth of a step: the last
+    but one of the last is too."""
     t, path = np.linspace(0, 3, 97), tmp_path / "columns.csv"
     rows = np.column_stack([t, *(bump(t / 3 - late) for late in (0.0, 0.25, -0.5 / 96))])
-    again = rows + 0.08 * np.abs(np.diff(rows[:, 1:], axis=0)).max(axis=1).mean() * (t == 3)[:, None] * [0, 1, 1, 1]
+    again = rows + 0.08 * np.abs(np.diff(rows[:, 1:], axis=0)).max(axis=1).mean() * (t == 3)[
+        :, None
+    ] * [0, 1, 1, 1]
     for kept in (rows, rows[:-1], again):
         np.savetxt(path, kept, delimiter=",", header="time,one,two,three", comments="")
-        np.testing.assert_allclose(Basis(str(path)).functions(T), Basis(list(rows[:-1, 1:].T)).functions(T), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            Basis(str(path)).functions(T),
+            Basis(list(rows[:-1, 1:].T)).functions(T),
+            rtol=0,
+            atol=1e-12,
+        )
     for times in (-t, 0 * t, np.where(t == 3, 3.01, t), 0.01 * np.where(t == 3, 3.01, t)):
-        np.savetxt(path, np.column_stack([times, rows[:, 1:]]), delimiter=",", header="time,one,two,three", comments="")
+        np.savetxt(
+            path,
+            np.column_stack([times, rows[:, 1:]]),
+            delimiter=",",
+            header="time,one,two,three",
+            comments="",
+        )
         with pytest.raises(ProblemError, match="must rise by even steps"):
             Basis(str(path))
 
@@ -252,8 +308,14 @@ def test_a_joint_may_rest_in_a_column():
         (lambda: Basis("nowhere.csv"), "cannot read nowhere.csv"),
         (lambda: Basis(3), "a sequence of columns"),
         (lambda: Problem("twice", gait=Basis([bump, bump])), "depend on one another"),
-        (lambda: Problem("one", gait=Basis([lambda t: bump(t - 0.1)], "bilateral")), "no symmetry 'bilateral'"),
-        (lambda: Problem("long", body=Chain((0.25,) * 4), gait=Basis(ELLIPSES)), "angles of 2 joints, and the body has 3"),
+        (
+            lambda: Problem("one", gait=Basis([lambda t: bump(t - 0.1)], "bilateral")),
+            "no symmetry 'bilateral'",
+        ),
+        (
+            lambda: Problem("long", body=Chain((0.25,) * 4), gait=Basis(ELLIPSES)),
+            "angles of 2 joints, and the body has 3",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(made, words):

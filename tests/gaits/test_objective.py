@@ -1,4 +1,5 @@
-"""An objective is one expression: the same value, gradient and symbol for all who ask, and nothing of a file is executed."""
+"""An objective is one expression: the same value, gradient and symbol for all who ask, and nothing
+of a file is executed."""
 
 import pickle
 
@@ -10,7 +11,14 @@ from colloc import Harmonic, Objective, Problem, ProblemError
 from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.objective import DRIVEN, EFFICIENCY, NAMED, QUANTITIES, SPEED, TURNING
 
-PERIOD = {"distance": 0.31, "work": 1.3, "rotation": 0.7, "length": 8.0, "driven_work": 1.5, "period": 3.0}
+PERIOD = {
+    "distance": 0.31,
+    "work": 1.3,
+    "rotation": 0.7,
+    "length": 8.0,
+    "driven_work": 1.5,
+    "period": 3.0,
+}
 EXPRESSIONS = [
     *NAMED,
     "distance / (work + 0.1 * length)",
@@ -35,7 +43,10 @@ def test_values_gradients_and_symbols_agree(text):
 
 
 def test_gradients_of_every_operation_are_those_of_differences():
-    objective, h = Objective("sqrt(distance) * abs(rotation - 1) / length**-1 + 3 - (2 - work) / +work"), 1e-6
+    objective, h = (
+        Objective("sqrt(distance) * abs(rotation - 1) / length**-1 + 3 - (2 - work) / +work"),
+        1e-6,
+    )
     for name, slope in objective.partials(PERIOD).items():
         up, down = (objective(PERIOD | {name: PERIOD[name] + side * h}) for side in (1, -1))
         assert slope == pytest.approx((up - down) / (2 * h), rel=1e-8)
@@ -44,8 +55,10 @@ def test_gradients_of_every_operation_are_those_of_differences():
 @pytest.mark.parametrize(
     "text",
     [
-        "__import__('os').remove('x')", "distance.real", "distance if work else 0", "distance**work", "lambda: 1",
-        "True * work", "speeed", "distance /", "", "f'{work}'", "distance / 0", "9**9**9 * distance", "-distance", "work < 2",
+        "__import__('os').remove('x')", "distance.real", "distance if work else 0",
+        "distance**work", "lambda: 1",
+        "True * work", "speeed", "distance /", "", "f'{work}'", "distance / 0",
+        "9**9**9 * distance", "-distance", "work < 2",
         "abs(1, 2)",
         "1 + " * 200 + "distance", "-" * 450 + "distance",
     ],
@@ -69,20 +82,31 @@ def test_the_power_of_friction_that_an_objective_is_proportional_to():
 
 def test_what_is_usual_is_not_stated_so_a_problem_has_one_hash():
     problem = Problem("h1", gait=Harmonic(1, "bilateral"))
-    assert problem.with_(objective="distance / work", rotation=0.0, at_least={}).hash == problem.hash
+    assert (
+        problem.with_(objective="distance / work", rotation=0.0, at_least={}).hash == problem.hash
+    )
     assert "objective" not in problem.to_dict()
 
 
 def test_a_problem_with_an_objective_comes_back_from_its_statement():
     problem = Problem(
-        "turning", gait=Harmonic(2), objective=Objective("rotation / work", "turn"), rotation=None, at_least={"speed": 0.01}
+        "turning",
+        gait=Harmonic(2),
+        objective=Objective("rotation / work", "turn"),
+        rotation=None,
+        at_least={"speed": 0.01},
     )
     again = Problem.from_dict(problem.to_dict())
     assert again.objective == problem.objective
     assert again.rotation is None
     assert again.at_least == ((SPEED, 0.01),)
     assert pickle.loads(pickle.dumps(problem)).hash == problem.hash  # as it goes to other processes
-    assert again.hash == problem.hash == statement_hash(problem.to_dict()) != problem.with_(at_least={}).hash
+    assert (
+        again.hash
+        == problem.hash
+        == statement_hash(problem.to_dict())
+        != problem.with_(at_least={}).hash
+    )
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,9 @@ CLASSES = [Serpenoid(2, "none"), Serpenoid(2, "bilateral"), Serpenoid(3, "antipo
 
 def moved(gait_class, seed=1):
     """A space of the class, and parameters that are no wave of the usual guess."""
-    space, v = space_near(Problem("s", body=FIVE, friction=SNAKE, gait=gait_class), Problem("g", body=FIVE).guess)
+    space, v = space_near(
+        Problem("s", body=FIVE, friction=SNAKE, gait=gait_class), Problem("g", body=FIVE).guess
+    )
     return space, v + 0.05 * np.random.default_rng(seed).standard_normal(v.size)
 
 
@@ -46,24 +48,33 @@ def test_gradients_are_those_of_finite_differences(gait_class):
     gradient = program.gradient(v)  # first: balances asked for later begin at these
     program.place_rows(v)
     steps = h * np.eye(v.size)
-    numeric = [(program.objective(v + step) - program.objective(v - step)) / (2 * h) for step in steps]
+    numeric = [
+        (program.objective(v + step) - program.objective(v - step)) / (2 * h) for step in steps
+    ]
     np.testing.assert_allclose(gradient, numeric, atol=1e-8)
-    rows = np.transpose([(program.rows(v + step) - program.rows(v - step)) / (2 * h) for step in steps])
+    rows = np.transpose(
+        [(program.rows(v + step) - program.rows(v - step)) / (2 * h) for step in steps]
+    )
     np.testing.assert_allclose(program.row_slopes(v), rows, atol=1e-7)
 
 
 @pytest.mark.parametrize("gait_class", CLASSES, ids=str)
 def test_the_full_program_says_what_the_search_does(gait_class):
-    """At a member all its equations hold, and the objectives agree; with another lag it is no member."""
+    """At a member all its equations hold, and the objectives agree; with another lag it is no
+    member."""
     space, v = moved(gait_class)
     reduced, full = ReducedProgram(space, 1e-2), transcribed(space.control.problem)
     x = feasible_point(full, space.full_parameters(v), 1e-2)
     found = oracles(full.assembly)
-    p = found.parameter_vector(1e-2 / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]]))
+    p = found.parameter_vector(
+        1e-2 / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]])
+    )
     assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(reduced.objective(v), rel=1e-8)
 
     def beyond():
-        return np.abs(np.array(found.options["jac_g"](x, p)[0]).ravel()[full.groups["members"]]).max()
+        return np.abs(
+            np.array(found.options["jac_g"](x, p)[0]).ravel()[full.groups["members"]]
+        ).max()
 
     assert beyond() < 1e-14
     x[full.layout.parameters[0, 0]] += 0.1

@@ -1,4 +1,5 @@
-"""Shapes and rates that are hard for a balance solver, as one table: name, joint angles, joint rates."""
+"""Shapes and rates that are hard for a balance solver, as one table: name, joint angles, joint
+rates."""
 
 import numpy as np
 

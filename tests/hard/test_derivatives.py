@@ -1,6 +1,8 @@
-"""Jacobian and Hessian of every block of the nonlinear program against differences, at random and at hard points.
+"""Jacobian and Hessian of every block of the nonlinear program against differences, at random and
+at hard points.
 
-Differences are central, of fourth order, with steps in proportion to delta, over which the law changes.
+Differences are central, of fourth order, with steps in proportion to delta, over which the law
+changes.
 """
 
 import casadi as ca
@@ -22,8 +24,17 @@ from tests.shared.laws import coulomb
 STENCIL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
 THREE, FOUR = Chain(), Chain((0.2, 0.35, 0.3, 0.15))
 STICK = [name for name in HARD if name.startswith(("stick", "symmetric"))]
-FOLDS = ["both folded the same way", "both folded opposite ways", "tail folded back, opening only", "nearly folded"]
-STRAIGHT = ["straight body, both joints bend alike", "nearly straight", "second joint at 1e-9 of the first"]
+FOLDS = [
+    "both folded the same way",
+    "both folded opposite ways",
+    "tail folded back, opening only",
+    "nearly folded",
+]
+STRAIGHT = [
+    "straight body, both joints bend alike",
+    "nearly straight",
+    "second joint at 1e-9 of the first",
+]
 
 
 def derivative(function, x, step):
@@ -37,7 +48,8 @@ def derivative(function, x, step):
 
 
 def check(local, x, delta, step, parameters=None, tolerance=1e-6):
-    """Jacobian and Hessian of a `LocalFunction` at x; `parameters` gives what depends on x (the solved velocity)."""
+    """Jacobian and Hessian of a `LocalFunction` at x; `parameters` gives what depends on x (the
+    solved velocity)."""
     given = parameters or (lambda at: np.zeros((local.n_parameter, 1)))
 
     def value(at):
@@ -52,7 +64,9 @@ def check(local, x, delta, step, parameters=None, tolerance=1e-6):
     np.testing.assert_allclose(found, exact, atol=tolerance * np.abs(exact).max())
     weight = np.random.default_rng(5).normal(size=local.n_out)
     hessian = np.zeros((local.n_local, local.n_local))
-    hessian[local.hess_row, local.hess_col] = np.array(local.hessian(x, given(x), delta, weight)).ravel()
+    hessian[local.hess_row, local.hess_col] = np.array(
+        local.hessian(x, given(x), delta, weight)
+    ).ravel()
     hessian += np.triu(hessian, 1).T
     found = derivative(lambda at: jacobian(at).T @ weight, x, step)
     np.testing.assert_allclose(found, hessian, atol=tolerance * max(np.abs(hessian).max(), 1e-12))
@@ -64,7 +78,9 @@ def balanced_point(body, friction, angles, rates, delta, formulation):
     n = body.n_joint
 
     def solved(at):
-        return solve_balance(body, friction, at[1 : 1 + n, None], at[1 + n : 1 + 2 * n, None], delta, tolerance=1e-14).z
+        return solve_balance(
+            body, friction, at[1 : 1 + n, None], at[1 + n : 1 + 2 * n, None], delta, tolerance=1e-14
+        ).z
 
     z = solve_balance(body, friction, angles, rates, delta, tolerance=1e-13).require().z
     now = instant(body, friction, angles, rates, z, delta)
@@ -74,7 +90,9 @@ def balanced_point(body, friction, angles, rates, delta, formulation):
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
-@pytest.mark.parametrize(("body", "law"), [(THREE, (1, 1, 1)), (THREE, (1.7, 1, 1.3)), (FOUR, (10, 1, 3))], ids=str)
+@pytest.mark.parametrize(
+    ("body", "law"), [(THREE, (1, 1, 1)), (THREE, (1.7, 1, 1.3)), (FOUR, (10, 1, 3))], ids=str
+)
 def test_point_function_at_random_points(formulation, body, law):
     friction, rng = coulomb(*law), np.random.default_rng(6)
     local = point_function(formulation, body, friction)
@@ -84,7 +102,14 @@ def test_point_function_at_random_points(formulation, body, law):
             x, solved = balanced_point(body, friction, angles, rates, delta, formulation)
             if formulation == "full":
                 x = x + 0.01 * rng.normal(size=x.size)
-            check(local, x, delta, 2e-3 * delta if formulation == "full" else 1e-2 * min(delta, 0.1), solved, 2e-5)
+            check(
+                local,
+                x,
+                delta,
+                2e-3 * delta if formulation == "full" else 1e-2 * min(delta, 0.1),
+                solved,
+                2e-5,
+            )
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
@@ -100,7 +125,8 @@ def test_point_function_at_hard_points(formulation, names):
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
 def test_point_function_where_nothing_moves(formulation):
-    """Frozen joints, everything at rest: friction is linear there, with a finite slope mu / delta."""
+    """Frozen joints, everything at rest: friction is linear there, with a finite slope mu /
+    delta."""
     friction, delta = Friction(mu_t=3, mu_f=1, mu_b=1), 1e-2
     local = point_function(formulation, THREE, friction)
     x, solved = balanced_point(THREE, friction, (0.7, -0.4), (0.0, 0.0), delta, formulation)
@@ -126,7 +152,11 @@ def test_every_other_block(name, block):
         check(block.function, x, 1e-3, 1e-3, lambda at, own=own: own, 1e-8)
 
 
-@pytest.mark.parametrize("angles", [(np.pi, np.pi / 2), (2 * np.pi / 3, 2 * np.pi / 3), (np.pi, 0.0), (0.0, 0.0)], ids=str)
+@pytest.mark.parametrize(
+    "angles",
+    [(np.pi, np.pi / 2), (2 * np.pi / 3, 2 * np.pi / 3), (np.pi, 0.0), (0.0, 0.0)],
+    ids=str,
+)
 def test_contact_at_its_corners(angles):
     """The smoothed minimum bends within 1e-3 rad of the corner; its derivatives hold there too."""
     from colloc.mechanics.contact import crossing_bounds
@@ -140,7 +170,8 @@ def test_contact_at_its_corners(angles):
 
 @pytest.mark.parametrize("vs", [0.0, 0.3])
 def test_second_derivative_where_a_link_does_not_turn(vs):
-    """I0 in the rotation rate at w = 0: -l^3 (a^2 - 2 vn^2) / (12 r^5), by expanding the integrand; an even function."""
+    """I0 in the rotation rate at w = 0: -l^3 (a^2 - 2 vn^2) / (12 r^5), by expanding the integrand;
+    an even function."""
     from colloc.mechanics.link_friction import link_moments
 
     w = ca.SX.sym("w")

@@ -1,8 +1,10 @@
-"""Instants at stick, at folds, frozen, straight, with extreme coefficients and delta: the answer, or a clear refusal.
+"""Instants at stick, at folds, frozen, straight, with extreme coefficients and delta: the answer,
+or a clear refusal.
 
-The reference is a 40-digit Newton iteration on textbook antiderivatives (`benchmarks.reference`), which shares nothing
-with the solver. A residual of 1e-11 of the largest coefficient leaves the velocity of a body whose smallest coefficient
-is c times less uncertain by c times as much, so that is the accuracy asked for.
+The reference is a 40-digit Newton iteration on textbook antiderivatives (`benchmarks.reference`),
+which shares nothing with the solver. A residual of 1e-11 of the largest coefficient leaves the
+velocity of a body whose smallest coefficient is c times less uncertain by c times as much, so that
+is the accuracy asked for.
 """
 
 import itertools
@@ -28,12 +30,17 @@ SPEED = np.abs(RATES).max(axis=0)
 
 
 def errors(coefficients, delta, solved, chosen):
-    """Distance of the anchor's velocity from the reference, over the largest rate, for the chosen cases."""
+    """Distance of the anchor's velocity from the reference, over the largest rate, for the chosen
+    cases."""
     result = {}
     for k in chosen:
         anchor, velocity = int(solved.anchor[k]), solved.anchor_velocity[:, k]
-        exact = balanced_velocity(BODY.lengths, coefficients, ANGLES[:, k], RATES[:, k], delta, anchor, velocity)
-        result[NAMES[k]] = max(abs(float(e - mp.mpf(v))) for e, v in zip(exact, velocity, strict=True)) / SPEED[k]
+        exact = balanced_velocity(
+            BODY.lengths, coefficients, ANGLES[:, k], RATES[:, k], delta, anchor, velocity
+        )
+        result[NAMES[k]] = (
+            max(abs(float(e - mp.mpf(v))) for e, v in zip(exact, velocity, strict=True)) / SPEED[k]
+        )
     return result
 
 
@@ -53,7 +60,9 @@ def test_every_hard_instant_is_the_one_answer_of_isotropic_friction(delta):
     assert max(found.values()) < 1e-10, found
 
 
-@pytest.mark.parametrize("coefficients", [(1.7, 1.0, 1.3), (100.0, 0.01, 1.0), (0.01, 100.0, 1.0)], ids=str)
+@pytest.mark.parametrize(
+    "coefficients", [(1.7, 1.0, 1.3), (100.0, 0.01, 1.0), (0.01, 100.0, 1.0)], ids=str
+)
 def test_hard_instants_are_roots_for_unequal_coefficients(coefficients):
     for delta in (1e-4, 1e-12):
         solved = solve_balance(BODY, coulomb(*coefficients), ANGLES, RATES, delta)
@@ -72,7 +81,8 @@ def test_every_hard_instant_against_the_reference(coefficients, delta):
 
 def test_coefficients_equal_up_to_rounding_give_the_isotropic_answer():
     one, other = (
-        solve_balance(BODY, Friction(mu_t=1, mu_f=mu_f, mu_b=1), ANGLES, RATES, 1e-8).z for mu_f in (1.0, 1.0 + 1e-15)
+        solve_balance(BODY, Friction(mu_t=1, mu_f=mu_f, mu_b=1), ANGLES, RATES, 1e-8).z
+        for mu_f in (1.0, 1.0 + 1e-15)
     )
     np.testing.assert_allclose(one / SPEED, other / SPEED, atol=1e-10)
 
@@ -80,7 +90,10 @@ def test_coefficients_equal_up_to_rounding_give_the_isotropic_answer():
 @pytest.mark.parametrize("case", [*WORKED_CASES, *SYMMETRIC_CASES], ids=lambda c: f"{c.what[:20]}")
 def test_at_stick_the_velocity_tends_to_its_limit_linearly_in_delta(case):
     angles, rates = np.array(case.angles)[:, None], np.array(case.rates)[:, None]
-    z = [solve_balance(BODY, Friction(), angles, rates, delta).require().z for delta in (1e-4, 1e-5, 1e-6, 1e-13)]
+    z = [
+        solve_balance(BODY, Friction(), angles, rates, delta).require().z
+        for delta in (1e-4, 1e-5, 1e-6, 1e-13)
+    ]
     away = [np.abs(value - z[-1]).max() for value in z[:-1]]
     assert away[0] < 1e-2
     for coarse, fine in itertools.pairwise(away):
@@ -91,14 +104,24 @@ def test_at_stick_the_velocity_tends_to_its_limit_linearly_in_delta(case):
 def test_frozen_joints_leave_the_body_exactly_at_rest(coefficients):
     rest = np.zeros_like(RATES)
     for delta in (1.0, 1e-4, 1e-14):
-        assert np.array_equal(solve_balance(BODY, coulomb(*coefficients), ANGLES, rest, delta).z, np.zeros((3, len(NAMES))))
+        assert np.array_equal(
+            solve_balance(BODY, coulomb(*coefficients), ANGLES, rest, delta).z,
+            np.zeros((3, len(NAMES))),
+        )
 
 
 def test_frozen_joints_come_to_rest_from_any_start():
     rng = np.random.default_rng(3)
     for scale in (1.0, 1e6):
         start = scale * rng.normal(size=(3, len(NAMES)))
-        solved = solve_balance(BODY, Friction(mu_t=1.7, mu_f=1, mu_b=1.3), ANGLES, np.zeros_like(RATES), 1e-4, start=start)
+        solved = solve_balance(
+            BODY,
+            Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+            ANGLES,
+            np.zeros_like(RATES),
+            1e-4,
+            start=start,
+        )
         assert solved.converged.all()
         # at rest the force is viscous, about mu v / delta: the residual bounds the speed
         assert np.abs(solved.z).max() < 1e-11
@@ -111,7 +134,9 @@ def test_the_answer_does_not_depend_on_a_start_1e6_away(coefficients):
     angles, rates = ANGLES[:, chosen], RATES[:, chosen]
     for delta in (1e-2, 1e-8):
         near = solve_balance(BODY, friction, angles, rates, delta)
-        far = solve_balance(BODY, friction, angles, rates, delta, start=1e6 * rng.normal(size=(3, angles.shape[1])))
+        far = solve_balance(
+            BODY, friction, angles, rates, delta, start=1e6 * rng.normal(size=(3, angles.shape[1]))
+        )
         assert far.converged.all()
         ratio = friction.largest / friction.smallest
         np.testing.assert_allclose(far.z, near.z, atol=2e-10 * ratio)
@@ -119,16 +144,25 @@ def test_the_answer_does_not_depend_on_a_start_1e6_away(coefficients):
 
 def test_a_joint_at_1e9_of_the_other_moves_the_body_like_a_frozen_one():
     angles = ANGLES[:, :12]
-    for friction in (Friction(), Friction(mu_t=10, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=1, mu_b=5)):
-        z = [solve_balance(BODY, friction, angles, np.full_like(angles, 1.0) * [[1.0], [r]], 1e-6).z for r in (0, 1e-9, -1e-9)]
-        # at delta = 1e-6 a held link yields by about delta per unit force: 1e-9 of rate can do no more than that
+    for friction in (
+        Friction(),
+        Friction(mu_t=10, mu_f=1, mu_b=1),
+        Friction(mu_t=0.5, mu_f=1, mu_b=5),
+    ):
+        z = [
+            solve_balance(BODY, friction, angles, np.full_like(angles, 1.0) * [[1.0], [r]], 1e-6).z
+            for r in (0, 1e-9, -1e-9)
+        ]
+        # at delta = 1e-6 a held link yields by about delta per unit force: 1e-9 of rate can do no
+        # more than that
         np.testing.assert_allclose(z[1], z[0], atol=1e-8)
         np.testing.assert_allclose(z[2], z[0], atol=1e-8)
 
 
 @pytest.mark.parametrize("coefficients", COEFFICIENTS[:7], ids=str)
 def test_mirror_images_of_a_straight_body_cannot_move_it_along_itself(coefficients):
-    """Opposite bends of a straight body: the reflected motion is the same one, seen from the other side."""
+    """Opposite bends of a straight body: the reflected motion is the same one, seen from the other
+    side."""
     angles, rates = np.zeros((2, 1)), np.array([[1.0], [-1.0]])
     for delta in (1.0, 1e-4, 1e-12):
         solved = solve_balance(BODY, coulomb(*coefficients), angles, rates, delta).require()
@@ -144,17 +178,25 @@ def test_a_straight_body_sliding_along_itself_meets_coulomb_friction_exactly(len
         now = instant(body, friction, still, still, z, delta)
         expected = np.array([[-2.0, 5.0], [0.0, 0.0], [0.0, 0.0]]) * 3 / np.hypot(3, delta)
         np.testing.assert_allclose(net_force(now.posture, now.force), expected, atol=1e-14)
-        np.testing.assert_allclose(total_power(now.velocity, now.force)[0], 3 * np.abs(expected[0]), rtol=1e-14)
+        np.testing.assert_allclose(
+            total_power(now.velocity, now.force)[0], 3 * np.abs(expected[0]), rtol=1e-14
+        )
 
 
 def test_rates_below_delta_are_solved_to_their_own_scale():
-    """Viscous limit: the velocity is linear in the rates, whatever their size, and does not depend on delta."""
+    """Viscous limit: the velocity is linear in the rates, whatever their size, and does not depend
+    on delta."""
     angles, rates = ANGLES[:, 7:12], np.array([[1.0], [0.3]]) * np.ones((1, 5))
     for coefficients in COEFFICIENTS[:7]:
         friction = coulomb(*coefficients)
-        z = [solve_balance(BODY, friction, angles, k * rates, 1.0).require().z / k for k in (1e-6, 1e-12, 1e-100, 1e-300)]
+        z = [
+            solve_balance(BODY, friction, angles, k * rates, 1.0).require().z / k
+            for k in (1e-6, 1e-12, 1e-100, 1e-300)
+        ]
         for other in z[1:]:
-            np.testing.assert_allclose(other, z[0], atol=2e-10 * friction.largest / friction.smallest)
+            np.testing.assert_allclose(
+                other, z[0], atol=2e-10 * friction.largest / friction.smallest
+            )
 
 
 def test_rates_and_delta_over_600_decades_do_not_overflow():
@@ -170,10 +212,11 @@ def test_rates_and_delta_over_600_decades_do_not_overflow():
 
 @pytest.mark.parametrize("delta", [1e-2, 1e-6, 1e-10])
 def test_scissors_share_their_rate_equally(delta):
-    """Two equal links folded onto each other: without delta any split of the rate balances; delta picks the even one.
+    """Two equal links folded onto each other: without delta any split of the rate balances; delta
+    picks the even one.
 
-    The couple about the common end changes with the split by delta^2 only, so a residual of 1e-11 fixes it to 1e-11 / delta^2:
-    at tiny delta not at all. The power does not depend on it.
+    The couple about the common end changes with the split by delta^2 only, so a residual of 1e-11
+    fixes it to 1e-11 / delta^2: at tiny delta not at all. The power does not depend on it.
     """
     body, angles, rates = Chain((0.5, 0.5)), np.array([[np.pi]]), np.array([[1.0]])
     z = solve_balance(body, Friction(), angles, rates, delta).require().z
@@ -184,7 +227,8 @@ def test_scissors_share_their_rate_equally(delta):
 
 
 def test_two_links_that_nearly_rest_beside_one_that_turns_are_followed_from_smoother_friction():
-    """Every attempt at delta itself stopped at residuals of 7e-5 and above; at twice delta all is well."""
+    """Every attempt at delta itself stopped at residuals of 7e-5 and above; at twice delta all is
+    well."""
     angles = np.array([[2.41881], [-2.41881]])
     rates = np.array([[1.0], [-1.5312e-4]])
     solved = solve_balance(BODY, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.7), angles, rates, 1e-6)

@@ -1,4 +1,5 @@
-"""Gaits of vanishing amplitude, gaits that touch themselves, meshes too coarse for delta: certified, or refused in words."""
+"""Gaits of vanishing amplitude, gaits that touch themselves, meshes too coarse for delta:
+certified, or refused in words."""
 
 import numpy as np
 import pytest
@@ -20,10 +21,13 @@ def replayed(gait, delta, **settings):
 
 
 def test_small_gaits_scale_down_to_amplitude_1e_8():
-    """About a shape, distance falls with the square of the amplitude and work with the amplitude itself."""
+    """About a shape, distance falls with the square of the amplitude and work with the amplitude
+    itself."""
     sizes = np.array([1e-3, 1e-4, 1e-6, 1e-8])
     runs = [replayed(ellipse(1.0, a, 0.7 * a), 1e-4 * a) for a in sizes]
-    np.testing.assert_allclose([r.distance for r in runs] / sizes**2, runs[-1].distance / sizes[-1] ** 2, rtol=2e-3)
+    np.testing.assert_allclose(
+        [r.distance for r in runs] / sizes**2, runs[-1].distance / sizes[-1] ** 2, rtol=2e-3
+    )
     np.testing.assert_allclose([r.work for r in runs] / sizes, runs[-1].work / sizes[-1], rtol=2e-3)
     for run in runs:
         assert run.residual < 1e-11
@@ -31,11 +35,16 @@ def test_small_gaits_scale_down_to_amplitude_1e_8():
 
 
 def test_gaits_slower_than_delta_are_viscous_and_go_nowhere():
-    """Linear drag, equal in all directions: its sum is the velocity of the centre of mass, which therefore rests."""
-    runs = [replayed(ellipse(1.0, a, 0.7 * a), 1e-4, instants=200, most_instants=200) for a in (1e-6, 1e-7, 1e-8)]
+    """Linear drag, equal in all directions: its sum is the velocity of the centre of mass, which
+    therefore rests."""
+    runs = [
+        replayed(ellipse(1.0, a, 0.7 * a), 1e-4, instants=200, most_instants=200)
+        for a in (1e-6, 1e-7, 1e-8)
+    ]
     assert runs[1].work / runs[2].work == pytest.approx(100, rel=1e-4)
     dry = replayed(ellipse(1.0, 1e-6, 0.7e-6), 1e-10)
-    assert dry.distance == pytest.approx(3.503e-14, rel=1e-3)  # 0.035 amplitude^2, from amplitudes of 1e-2 and 1e-4 too
+    # 0.035 amplitude^2, from amplitudes of 1e-2 and 1e-4 too
+    assert dry.distance == pytest.approx(3.503e-14, rel=1e-3)
     for run, size in zip(runs, (1e-6, 1e-7, 1e-8), strict=True):
         assert run.distance < 1e-3 * dry.distance * (size / 1e-6) ** 2
 
@@ -47,7 +56,12 @@ def test_a_guess_that_hardly_moves_is_refused():
 
 def test_an_optimum_in_the_viscous_regime_is_not_called_solved():
     problem = Problem(
-        "small", ellipse(1.0, 1e-6, 0.7e-6), gait=BILATERAL, intervals=12, smallest_shape_speed=1e-9, delta_start=1e-4
+        "small",
+        ellipse(1.0, 1e-6, 0.7e-6),
+        gait=BILATERAL,
+        intervals=12,
+        smallest_shape_speed=1e-9,
+        delta_start=1e-4,
     )
     solution = solve(problem, 1)
     if solution.status == SOLVED:  # only if it left the viscous regime altogether
@@ -67,7 +81,14 @@ def test_touching_is_admissible_and_crossing_is_not():
 
 
 def test_from_a_gait_that_touches_itself_the_answer_does_not_cross_or_is_refused():
-    problem = Problem("touching", ellipse(0.0, 1.0, TOUCHING), gait=BILATERAL, intervals=12, delta_start=1e-2, delta=1e-3)
+    problem = Problem(
+        "touching",
+        ellipse(0.0, 1.0, TOUCHING),
+        gait=BILATERAL,
+        intervals=12,
+        delta_start=1e-2,
+        delta=1e-3,
+    )
     solution = solve(problem, 1)
     depth = crossing_depth(BODY, solution.gait.angles(FINE)).max()
     if solution.status == SOLVED:
@@ -78,11 +99,20 @@ def test_from_a_gait_that_touches_itself_the_answer_does_not_cross_or_is_refused
 
 @pytest.mark.parametrize(("intervals", "delta"), [(2, 1e-4), (3, 1e-6), (5, 1e-8), (10, 1e-10)])
 def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, delta):
-    """The replay knows better than the mesh: a wrong efficiency is never called solved, and the message says why."""
-    problem = Problem("coarse", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, intervals=intervals, delta=delta, mesh_tolerance=0)
+    """The replay knows better than the mesh: a wrong efficiency is never called solved, and the
+    message says why."""
+    problem = Problem(
+        "coarse",
+        ellipse(0.0, 2.8, 1.3),
+        gait=BILATERAL,
+        intervals=intervals,
+        delta=delta,
+        mesh_tolerance=0,
+    )
     solution = solve(problem, 1)
     if delta < 1e-9:
-        # gradients then carry rounding of 1e-16 / delta: first-order conditions may not be reached to 1e-6
+        # gradients then carry rounding of 1e-16 / delta: first-order conditions may not be reached
+        # to 1e-6
         assert solution.status != SOLVED
         assert solution.message
         return
@@ -96,7 +126,9 @@ def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, del
 
 
 def test_refinement_repairs_what_a_coarse_mesh_gets_wrong():
-    problem = Problem("refined", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, intervals=8, delta=1e-8, delta_start=1e-3)
+    problem = Problem(
+        "refined", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, intervals=8, delta=1e-8, delta_start=1e-3
+    )
     solution = solve(problem, 1)
     assert solution.status == SOLVED
     assert solution.efficiency == pytest.approx(solution.certificate.efficiency, rel=1e-4)
@@ -108,18 +140,34 @@ def test_refinement_repairs_what_a_coarse_mesh_gets_wrong():
         (100, 1, 1),
         (1, 1 + 1e-15, 1),
         (1, 100, 0.01),
-        *(pytest.param(law, marks=pytest.mark.slow) for law in ((0.01, 1, 1), (1, 0.01, 100), (0.01, 100, 1))),
+        *(
+            pytest.param(law, marks=pytest.mark.slow)
+            for law in ((0.01, 1, 1), (1, 0.01, 100), (0.01, 100, 1))
+        ),
     ],
     ids=str,
 )
 def test_extreme_coefficients_are_solved_or_refused(law):
     friction = coulomb(*law)
-    problem = Problem("extreme", ellipse(0.2, 1.0, 0.6), friction=friction, gait=BILATERAL, intervals=12, delta=1e-3)
+    problem = Problem(
+        "extreme",
+        ellipse(0.2, 1.0, 0.6),
+        friction=friction,
+        gait=BILATERAL,
+        intervals=12,
+        delta=1e-3,
+    )
     solution = solve(problem, 1)
     if solution.status == SOLVED:
         assert solution.certificate.efficiency <= 1 / friction.smallest
         delta = solution.answer.delta  # lowered where the gait is slow for it
-        again = replay(BODY, friction, lambda t: (solution.gait.angles(t), solution.gait.rates(t)), delta, tolerance=1e-7)
+        again = replay(
+            BODY,
+            friction,
+            lambda t: (solution.gait.angles(t), solution.gait.rates(t)),
+            delta,
+            tolerance=1e-7,
+        )
         assert again.efficiency == pytest.approx(solution.efficiency, rel=2e-4)
     else:
         assert len(solution.message) > 30

@@ -1,4 +1,5 @@
-"""NaN, infinity and nonsense, wherever numbers come in: one clear sentence, never a traceback or a silent answer."""
+"""NaN, infinity and nonsense, wherever numbers come in: one clear sentence, never a traceback or a
+silent answer."""
 
 import numpy as np
 import pytest
@@ -33,14 +34,25 @@ ENTRIES = {
     "sin": lambda v: Fourier([0, 0], [[1], [1]], [[v], [1]]),
     **{
         field: (lambda v, field=field: Problem("p", GAIT, **{field: v}))
-        for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance", "intervals")
+        for field in (
+            "delta",
+            "delta_start",
+            "joint_limit",
+            "smallest_shape_speed",
+            "mesh_tolerance",
+            "intervals",
+        )
     },
     "harmonics": lambda v: Harmonic(v),
     "angles": lambda v: solve_balance(BODY, LAW, with_one(v), np.ones((2, 4)), 1e-3),
     "rates": lambda v: solve_balance(BODY, LAW, np.ones((2, 4)), with_one(v), 1e-3),
-    "start": lambda v: solve_balance(BODY, LAW, np.ones((2, 4)), np.ones((2, 4)), 1e-3, start=np.full((3, 4), v)),
+    "start": lambda v: solve_balance(
+        BODY, LAW, np.ones((2, 4)), np.ones((2, 4)), 1e-3, start=np.full((3, 4), v)
+    ),
     "delta of a balance": lambda v: solve_balance(BODY, LAW, np.ones((2, 4)), np.ones((2, 4)), v),
-    "tolerance": lambda v: solve_balance(BODY, LAW, np.ones((2, 4)), np.ones((2, 4)), 1e-3, tolerance=v),
+    "tolerance": lambda v: solve_balance(
+        BODY, LAW, np.ones((2, 4)), np.ones((2, 4)), 1e-3, tolerance=v
+    ),
     "angles of a path": lambda v: replay(BODY, LAW, path_of(v, 1.0), 1e-3),
     "rates of a path": lambda v: replay(BODY, LAW, path_of(1.0, v), 1e-3),
     "delta of a replay": lambda v: replay(BODY, LAW, path_of(1.0, 1.0), v),

@@ -1,4 +1,5 @@
-"""The compiled kernel gives the answers of the NumPy formulas, the reference, at instants that are hard for both."""
+"""The compiled kernel gives the answers of the NumPy formulas, the reference, at instants that are
+hard for both."""
 
 import numpy as np
 import pytest
@@ -28,16 +29,25 @@ def by_both(*arguments, **named):
 @pytest.mark.parametrize("delta", DELTAS)
 @pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)
 def test_every_hard_instant_moves_as_numpy_says(coefficients, delta):
-    """A residual leaves the velocity uncertain by max(mu)/min(mu) times as much, so a small one is asked for."""
-    compiled, reference = by_both(Chain(), coulomb(*coefficients), ANGLES, RATES, delta, tolerance=1e-13)
+    """A residual leaves the velocity uncertain by max(mu)/min(mu) times as much, so a small one is
+    asked for."""
+    compiled, reference = by_both(
+        Chain(), coulomb(*coefficients), ANGLES, RATES, delta, tolerance=1e-13
+    )
     np.testing.assert_allclose(compiled.z / SPEED, reference.z / SPEED, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("lengths", [(0.4, 0.6), (0.3, 0.2, 0.15, 0.35), (0.05, 0.3, 0.1, 0.25, 0.2, 0.1)], ids=len)
+@pytest.mark.parametrize(
+    "lengths", [(0.4, 0.6), (0.3, 0.2, 0.15, 0.35), (0.05, 0.3, 0.1, 0.25, 0.2, 0.1)], ids=len
+)
 def test_chains_of_any_number_of_links_take_the_same_steps(lengths):
-    """At (1, 0.01, 100) many links have several balanced velocities, and rounding chooses: both are roots to 1e-16."""
+    """At (1, 0.01, 100) many links have several balanced velocities, and rounding chooses: both are
+    roots to 1e-16."""
     rng = np.random.default_rng(5)
-    angles, rates = rng.uniform(-3, 3, (len(lengths) - 1, 60)), rng.normal(size=(len(lengths) - 1, 60))
+    angles, rates = (
+        rng.uniform(-3, 3, (len(lengths) - 1, 60)),
+        rng.normal(size=(len(lengths) - 1, 60)),
+    )
     start = rng.normal(size=(3, 60))
     for coefficients in LAWS:
         for delta in (1e-2, 1e-6):
@@ -52,7 +62,9 @@ def test_chains_of_any_number_of_links_take_the_same_steps(lengths):
 
 @pytest.mark.parametrize("method", ["newton", "fixed_point"])
 def test_the_methods_for_comparison_are_the_same_as_well(method):
-    compiled, reference = by_both(Chain(), Friction(), ANGLES, RATES, 1e-2, method=method, max_iterations=60)
+    compiled, reference = by_both(
+        Chain(), Friction(), ANGLES, RATES, 1e-2, method=method, max_iterations=60
+    )
     np.testing.assert_array_equal(compiled.converged, reference.converged)
     np.testing.assert_allclose(compiled.z / SPEED, reference.z / SPEED, rtol=0, atol=1e-9)
 
@@ -60,7 +72,8 @@ def test_the_methods_for_comparison_are_the_same_as_well(method):
 @pytest.mark.parametrize("delta", [1e-3, 1e-7])
 @pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)
 def test_bodies_under_load_are_in_the_state_that_they_state(lengths, delta):
-    """Force, potential and power at the velocity found, by NumPy; in balance with every load that friction holds."""
+    """Force, potential and power at the velocity found, by NumPy; in balance with every load that
+    friction holds."""
     rng, body, n = np.random.default_rng(6), Chain(lengths), 400
     angles, rates = rng.uniform(-3, 3, (body.n_joint, n)), rng.uniform(-1, 1, (body.n_joint, n))
     load = rng.normal(size=(3, n)) * [[0.4], [0.4], [0.1]]
@@ -77,11 +90,17 @@ def test_bodies_under_load_are_in_the_state_that_they_state(lengths, delta):
     left = net_force(now.posture, now.force) + given
     # where nothing holds the load it runs away, and digits are lost
     scale = 1 + np.abs(z).max(axis=0)
-    np.testing.assert_allclose(found.residual, [np.hypot(*left[:2]), np.abs(left[2])], rtol=0, atol=1e-10)
-    np.testing.assert_allclose(found.leftover_power / scale, (left * z).sum(axis=0) / scale, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        found.residual, [np.hypot(*left[:2]), np.abs(left[2])], rtol=0, atol=1e-10
+    )
+    np.testing.assert_allclose(
+        found.leftover_power / scale, (left * z).sum(axis=0) / scale, rtol=0, atol=1e-10
+    )
     potential = dissipation_potential(body, law, now.velocity, np.full((1, n), delta))
     np.testing.assert_allclose(found.potential / scale, potential / scale, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(found.power / scale, total_power(now.velocity, now.force)[0] / scale, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        found.power / scale, total_power(now.velocity, now.force)[0] / scale, rtol=0, atol=1e-10
+    )
     np.testing.assert_allclose(found.forces, -np.stack(now.force, axis=1), rtol=0, atol=1e-10)
     held, push = found.residual.max(axis=0) < 1e-9, np.hypot(*load[:2])
     assert held[push + 8 * np.abs(load[2]) < 0.4].all()

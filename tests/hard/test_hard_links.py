@@ -1,4 +1,5 @@
-"""Link integrals where closed forms are known to fail: no rotation, nearly none, ends at rest, tiny and huge delta."""
+"""Link integrals where closed forms are known to fail: no rotation, nearly none, ends at rest, tiny
+and huge delta."""
 
 import itertools
 
@@ -23,13 +24,18 @@ def relative_error(vs, vn, w, delta):
     exact = reference.link_moments(vs, vn, w, LENGTH, delta)
     found = link_moments(*column(vs, vn, w), LENGTH, delta)
     scales = (exact[0], exact[0] * LENGTH / 2, exact[2])
-    return max(abs(float((mp.mpf(f.item()) - e) / s)) for f, e, s in zip(found, exact, scales, strict=True))
+    return max(
+        abs(float((mp.mpf(f.item()) - e) / s)) for f, e, s in zip(found, exact, scales, strict=True)
+    )
 
 
 def test_the_reference_agrees_with_quadrature():
     for arguments in ((1e-7, -0.01, 2.0, 1e-6), (2.0, 0.1, 0.0, 1e-2)):
         vs, vn, w, delta = arguments
-        one, other = (f(vs, vn, w, LENGTH, delta) for f in (reference.link_moments, reference.quadrature_moments))
+        one, other = (
+            f(vs, vn, w, LENGTH, delta)
+            for f in (reference.link_moments, reference.quadrature_moments)
+        )
         assert max(abs(a - b) for a, b in zip(one, other, strict=True)) < 1e-20 * one[0]
 
 
@@ -37,7 +43,9 @@ def test_the_reference_agrees_with_quadrature():
 def test_moments_over_every_combination_of_speeds(delta):
     worst = {}
     for vs, vn, w in itertools.product(SPEEDS, SPEEDS, SPEEDS):
-        if max(vs, vn, w) < 1e-20 or min(vs, vn, w) < 1e-20:  # the reference needs as many digits as there are decades
+        if (
+            max(vs, vn, w) < 1e-20 or min(vs, vn, w) < 1e-20
+        ):  # the reference needs as many digits as there are decades
             vs, vn, w = (0.0 if v < 1e-20 else v for v in (vs, vn, w))
         worst[vs, vn, w] = relative_error(vs, vn, w, delta)
     assert max(worst.values()) < 3e-14, max(worst, key=worst.get)
@@ -46,20 +54,27 @@ def test_moments_over_every_combination_of_speeds(delta):
 @pytest.mark.parametrize("w", [0.0, 5e-324, 1e-300, 1e-160, 1e-30, -1e-23])
 @pytest.mark.parametrize("delta", [1.0, 1e-6, 1e-14])
 def test_pure_translation_and_near_it(w, delta):
-    """Without rotation the integrals are those of a constant; a rotation below rounding changes nothing."""
+    """Without rotation the integrals are those of a constant; a rotation below rounding changes
+    nothing."""
     for vs, vn in ((0.0, 0.0), (3.0, 4.0), (0.0, 1e-9), (1e-13, 0.0)):
         root = np.sqrt(vs**2 + vn**2 + delta**2)
         moments = link_moments(*column(vs, vn, w), LENGTH, delta)
         np.testing.assert_allclose(moments.I0, LENGTH / root, rtol=1e-14)
         np.testing.assert_allclose(moments.I2, LENGTH**3 / (12 * root), rtol=1e-14)
-        assert abs(moments.I1.item()) <= abs(w * vn) * LENGTH**3 / (12 * root**3) * (1 + 1e-10) + 5e-324
-        force = link_force(*column(vs, vn, w), LENGTH, delta, Friction(mu_t=2.0, mu_f=1.0, mu_b=3.0))
+        assert (
+            abs(moments.I1.item())
+            <= abs(w * vn) * LENGTH**3 / (12 * root**3) * (1 + 1e-10) + 5e-324
+        )
+        force = link_force(
+            *column(vs, vn, w), LENGTH, delta, Friction(mu_t=2.0, mu_f=1.0, mu_b=3.0)
+        )
         np.testing.assert_allclose(force.tangential, -LENGTH * vs / root, rtol=1e-14, atol=0)
         np.testing.assert_allclose(force.normal, -2 * LENGTH * vn / root, rtol=1e-14, atol=0)
 
 
 def test_turning_about_an_end_or_the_midpoint():
-    """Exact values for a rigid link that pivots, in the dry limit: force mu, or none, and couples of l/2 and l/4."""
+    """Exact values for a rigid link that pivots, in the dry limit: force mu, or none, and couples
+    of l/2 and l/4."""
     w, delta = 2.0, 1e-13
     pivot_at_end = link_force(*column(0.0, w * LENGTH / 2, w), LENGTH, delta, Friction())
     np.testing.assert_allclose(pivot_at_end.normal, -LENGTH, rtol=1e-12)
@@ -71,7 +86,9 @@ def test_turning_about_an_end_or_the_midpoint():
 
 def test_forces_never_exceed_their_coefficients_nor_dissipation_its_speed():
     rng = np.random.default_rng(8)
-    vs, vn, w = (10 ** rng.uniform(-16, 8, (1, 4000)) * rng.choice([-1.0, 1.0], (1, 4000)) for _ in range(3))
+    vs, vn, w = (
+        10 ** rng.uniform(-16, 8, (1, 4000)) * rng.choice([-1.0, 1.0], (1, 4000)) for _ in range(3)
+    )
     friction = Friction(mu_t=2.0, mu_f=1.0, mu_b=5.0)
     for delta in (1.0, 1e-7, 1e-14):
         force = link_force(vs, vn, w, LENGTH, delta, friction)
@@ -80,4 +97,6 @@ def test_forces_never_exceed_their_coefficients_nor_dissipation_its_speed():
         assert np.all(np.abs(force.couple) <= 2 * LENGTH**2 / 4 * (1 + 1e-13))
         work = power(vs, vn, w, force)
         assert np.all(work >= 0)
-        assert np.all(work <= friction.largest * link_dissipation(vs, vn, w, LENGTH, delta) * (1 + 1e-12))
+        assert np.all(
+            work <= friction.largest * link_dissipation(vs, vn, w, LENGTH, delta) * (1 + 1e-12)
+        )

@@ -1,4 +1,5 @@
-"""Properties that hold for every body, friction, shape and rate, tried on cases that hypothesis looks for (derandomised)."""
+"""Properties that hold for every body, friction, shape and rate, tried on cases that hypothesis
+looks for (derandomised)."""
 
 import numpy as np
 from hypothesis import assume, given, settings
@@ -15,10 +16,14 @@ tried = settings(derandomize=True, max_examples=60, deadline=None, database=None
 PI = np.pi
 special = st.sampled_from([0.0, PI, -PI, PI / 2, -PI / 2, 2 * PI / 3, 1e-9, -1e-9])
 angle = st.one_of(st.floats(-PI, PI, allow_subnormal=False), special)
-rate = st.one_of(st.floats(-1.0, 1.0, allow_subnormal=False), st.sampled_from([0.0, 1.0, -1.0, 1e-9, -1e-12]))
+rate = st.one_of(
+    st.floats(-1.0, 1.0, allow_subnormal=False), st.sampled_from([0.0, 1.0, -1.0, 1e-9, -1e-12])
+)
 log_delta = st.floats(-12, 0)
 coefficient = st.floats(-1, 1).map(lambda e: 10.0**e)
-friction = st.one_of(st.just(Friction()), st.builds(Friction, mu_t=coefficient, mu_f=coefficient, mu_b=coefficient))
+friction = st.one_of(
+    st.just(Friction()), st.builds(Friction, mu_t=coefficient, mu_f=coefficient, mu_b=coefficient)
+)
 reversible = st.builds(lambda t, s: Friction(mu_t=t, mu_f=s, mu_b=s), coefficient, coefficient)
 
 
@@ -29,7 +34,9 @@ def instants(draw, n_joint=None):
     weights = np.array(draw(st.lists(st.floats(0.1, 1.0), min_size=n + 1, max_size=n + 1)))
     lengths = weights / weights.sum()
     lengths[-1] = 1 - lengths[:-1].sum()
-    angles, rates = (np.array(draw(st.lists(kind, min_size=n, max_size=n)))[:, None] for kind in (angle, rate))
+    angles, rates = (
+        np.array(draw(st.lists(kind, min_size=n, max_size=n)))[:, None] for kind in (angle, rate)
+    )
     largest = np.abs(rates).max()
     assume(largest > 1e-3)
     return Chain(tuple(lengths)), angles, rates / largest
@@ -40,10 +47,11 @@ def solved(body, law, angles, rates, delta):
 
 
 def allowed(body, law, angles, rates, delta):
-    """How far two solutions with residuals below 1e-11 may lie apart: the inverse of the balance's derivative tells.
+    """How far two solutions with residuals below 1e-11 may lie apart: the inverse of the balance's
+    derivative tells.
 
-    It can be far: two links that turn oppositely about a common end balance at every split of the rate between them, but
-    for delta.
+    It can be far: two links that turn oppositely about a common end balance at every split of the
+    rate between them, but for delta.
     """
     z = solved(body, law, angles, rates, delta)
     now = instant(body, law, angles, rates, z, delta)
@@ -65,7 +73,8 @@ def test_every_instant_converges(case, law, exponent):
     body, angles, rates = case
     result = solve_balance(body, law, angles, rates, 10.0**exponent)
     assert result.converged.all()
-    assert np.abs(result.z).max() < 10  # the body follows its joints: nothing outruns unit rates on a unit body by much
+    # the body follows its joints: nothing outruns unit rates on a unit body by much
+    assert np.abs(result.z).max() < 10
 
 
 @tried
@@ -73,7 +82,9 @@ def test_every_instant_converges(case, law, exponent):
 def test_mirror_image(case, law, exponent):
     body, angles, rates = case
     one, other = (solved(body, law, k * angles, k * rates, 10.0**exponent) for k in (1, -1))
-    np.testing.assert_allclose(other, one * [[1], [-1], [-1]], atol=allowed(body, law, angles, rates, 10.0**exponent))
+    np.testing.assert_allclose(
+        other, one * [[1], [-1], [-1]], atol=allowed(body, law, angles, rates, 10.0**exponent)
+    )
 
 
 @tried
@@ -81,13 +92,20 @@ def test_mirror_image(case, law, exponent):
 def test_scaling_rates_and_delta_scales_the_velocity(case, law, exponent, scale):
     body, angles, rates = case
     k, delta = 10.0**scale, 10.0**exponent
-    one, other = solved(body, law, angles, rates, delta), solved(body, law, angles, k * rates, k * delta)
-    np.testing.assert_allclose(other / k, one, atol=allowed(body, law, angles, rates, 10.0**exponent))
+    one, other = (
+        solved(body, law, angles, rates, delta),
+        solved(body, law, angles, k * rates, k * delta),
+    )
+    np.testing.assert_allclose(
+        other / k, one, atol=allowed(body, law, angles, rates, 10.0**exponent)
+    )
 
 
 @tried
 @given(instants(), reversible, log_delta)
-def test_reversing_the_rates_reverses_the_velocity_if_forward_and_backward_friction_agree(case, law, exponent):
+def test_reversing_the_rates_reverses_the_velocity_if_forward_and_backward_friction_agree(
+    case, law, exponent
+):
     body, angles, rates = case
     one, other = (solved(body, law, angles, k * rates, 10.0**exponent) for k in (1, -1))
     np.testing.assert_allclose(other, -one, atol=allowed(body, law, angles, rates, 10.0**exponent))
@@ -96,12 +114,15 @@ def test_reversing_the_rates_reverses_the_velocity_if_forward_and_backward_frict
 @tried
 @given(instants(), friction, log_delta)
 def test_seen_from_the_head_with_time_reversed_nothing_changes(case, law, exponent):
-    """For every friction: tangent and velocity both change sign, so each link keeps its sliding direction."""
+    """For every friction: tangent and velocity both change sign, so each link keeps its sliding
+    direction."""
     body, angles, rates = case
     turned = Chain(body.lengths[::-1])
     one = motion(body, law, angles, rates, 10.0**exponent)
     other = motion(turned, law, -angles[::-1], rates[::-1], 10.0**exponent)
-    np.testing.assert_allclose(other, one, atol=10 * allowed(body, law, angles, rates, 10.0**exponent))
+    np.testing.assert_allclose(
+        other, one, atol=10 * allowed(body, law, angles, rates, 10.0**exponent)
+    )
 
 
 @tried
@@ -112,14 +133,17 @@ def test_a_link_cut_by_a_frozen_joint_moves_as_before(case, law, exponent):
     cut = Chain((0.3 * first, first - 0.3 * first, *rest))
     still = np.zeros((1, 1))
     one = solved(body, law, angles, rates, 10.0**exponent)
-    other = solved(cut, law, np.concatenate([still, angles]), np.concatenate([still, rates]), 10.0**exponent)
+    other = solved(
+        cut, law, np.concatenate([still, angles]), np.concatenate([still, rates]), 10.0**exponent
+    )
     np.testing.assert_allclose(other, one, atol=allowed(body, law, angles, rates, 10.0**exponent))
 
 
 @tried
 @given(instants(), friction, log_delta)
 def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed(case, law, exponent):
-    """v^2/r >= |v| - delta at every point, and the mean of |v| is at least the speed of the centre of mass."""
+    """v^2/r >= |v| - delta at every point, and the mean of |v| is at least the speed of the centre
+    of mass."""
     body, angles, rates = case
     speed, power = motion(body, law, angles, rates, 10.0**exponent)
     assert power >= law.smallest * (speed - 10.0**exponent) - 1e-9 * law.largest
@@ -129,7 +153,8 @@ def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed(case, 
 @tried
 @given(instants(), log_delta)
 def test_isotropic_balance_minimises_the_dissipation(case, exponent):
-    """Doing better than any other rigid velocity is what the balance means there; the other is drawn close and far."""
+    """Doing better than any other rigid velocity is what the balance means there; the other is
+    drawn close and far."""
     from colloc.mechanics.link_friction import link_dissipation
 
     body, angles, rates = case
@@ -157,6 +182,13 @@ def test_no_gait_beats_the_bound_of_the_smallest_coefficient(numbers, law, expon
     assume(np.hypot(cos, sin).max() > 0.05)
     gait = Fourier(mean, cos[:, None], sin[:, None])
     delta = 10.0**exponent
-    result = replay(Chain(), law, lambda t: (gait.angles(t), gait.rates(t)), delta, instants=200, most_instants=200)
+    result = replay(
+        Chain(),
+        law,
+        lambda t: (gait.angles(t), gait.rates(t)),
+        delta,
+        instants=200,
+        most_instants=200,
+    )
     assert result.distance <= (result.work / law.smallest + delta) * (1 + 1e-6)
     np.testing.assert_allclose(result.actuator_work, result.work, rtol=1e-7)

@@ -1,10 +1,22 @@
-"""A law of friction that the library does not know, in this file alone: solved, certified, kept and read like any other."""
+"""A law of friction that the library does not know, in this file alone: solved, certified, kept and
+read like any other."""
 
 from dataclasses import dataclass, replace
 
 import pytest
 
-from colloc import Friction, Harmonic, OwnLaw, Problem, ProblemError, ellipse, load, replay, save, solve
+from colloc import (
+    Friction,
+    Harmonic,
+    OwnLaw,
+    Problem,
+    ProblemError,
+    ellipse,
+    load,
+    replay,
+    save,
+    solve,
+)
 from colloc.gaits import gait_fields
 from colloc.laws.formula_law import FormulaLaw
 
@@ -45,18 +57,29 @@ class Short(FormulaLaw):
 
 def test_what_a_law_does_not_say_is_named(monkeypatch):
     monkeypatch.setattr(gait_fields, "LAWS", [*gait_fields.LAWS, Short])
-    with pytest.raises(ProblemError, match="a Short does not say its describe, in_units_of, in_speeds_of"):
+    with pytest.raises(
+        ProblemError, match="a Short does not say its describe, in_units_of, in_speeds_of"
+    ):
         Problem("short", friction=Short())
 
 
 @pytest.mark.slow
 def test_it_is_solved_certified_kept_and_read(monkeypatch, tmp_path):
     monkeypatch.setattr(gait_fields, "LAWS", [*gait_fields.LAWS, Greased])
-    problem = Problem("greased", ellipse(0, 2.8, 1.3), friction=Greased(), gait=Harmonic(1, "bilateral"), delta=1e-2)
+    problem = Problem(
+        "greased",
+        ellipse(0, 2.8, 1.3),
+        friction=Greased(),
+        gait=Harmonic(1, "bilateral"),
+        delta=1e-2,
+    )
     found = solve(problem, starts=1)
     assert found.status == "solved", found.message
     read = load(save(found, tmp_path / "greased.h5"))
     assert (read.problem.law, read.certificate) == (Greased(), found.certificate)
-    same, dry = (replay(problem.body, law, found.gait, 1e-2) for law in (OwnLaw(*Greased().formulas), Friction(mu_t=2.0)))
+    same, dry = (
+        replay(problem.body, law, found.gait, 1e-2)
+        for law in (OwnLaw(*Greased().formulas), Friction(mu_t=2.0))
+    )
     assert found.efficiency == pytest.approx(same.efficiency, rel=1e-6)
     assert found.efficiency < dry.efficiency

@@ -1,4 +1,5 @@
-"""What every law of friction has to be: dissipative, the same in any frame, integrated along links as at points."""
+"""What every law of friction has to be: dissipative, the same in any frame, integrated along links
+as at points."""
 
 import casadi as ca
 import numpy as np
@@ -21,7 +22,9 @@ from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.smooth.modal_body import ModalBody
 
 LENGTHS = Chain().length_column()
-OWN = OwnLaw("-where(vs > 0, 1, 1.5)*vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))")
+OWN = OwnLaw(
+    "-where(vs > 0, 1, 1.5)*vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))"
+)
 EVERY = [
     Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5),
     Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.5),
@@ -29,7 +32,11 @@ EVERY = [
     PowerLaw(0.4, mu_t=2.0, mu_f=1.0, mu_b=1.5),
     OWN,
 ]
-ASSOCIATED = [Elliptic(mu_t=0.3, mu_f=1.0, mu_b=4.0), Viscous(normal=1.8, tangential=1.0), PowerLaw(0.4, 1.5, 1.5, 1.5)]
+ASSOCIATED = [
+    Elliptic(mu_t=0.3, mu_f=1.0, mu_b=4.0),
+    Viscous(normal=1.8, tangential=1.0),
+    PowerLaw(0.4, 1.5, 1.5, 1.5),
+]
 each = pytest.mark.parametrize("law", EVERY, ids=lambda law: type(law).__name__)
 each_associated = pytest.mark.parametrize("law", ASSOCIATED, ids=lambda law: type(law).__name__)
 
@@ -57,10 +64,14 @@ def test_friction_opposes_the_motion_and_does_not_tell_left_from_right(law):
 def test_a_law_in_other_units_is_the_same_law(law):
     vs, vn, _ = moving_links(2)
     force = np.array(law.density(vs, vn, 1e-2))
-    np.testing.assert_allclose(law.in_speeds_of(4.0).density(vs / 4, vn / 4, 1e-2 / 4), force, rtol=1e-13)
+    np.testing.assert_allclose(
+        law.in_speeds_of(4.0).density(vs / 4, vn / 4, 1e-2 / 4), force, rtol=1e-13
+    )
     np.testing.assert_allclose(law.in_units_of(3.0).density(vs, vn, 1e-2), force / 3, rtol=1e-13)
     if law.degree is not None:
-        np.testing.assert_allclose(law.density(2 * vs, 2 * vn, 2e-2), 2**law.degree * force, rtol=1e-13)
+        np.testing.assert_allclose(
+            law.density(2 * vs, 2 * vn, 2e-2), 2**law.degree * force, rtol=1e-13
+        )
     if law.reversible:
         np.testing.assert_allclose(law.density(-vs, -vn, 1e-2), -force, rtol=1e-13)
 
@@ -71,7 +82,9 @@ def test_the_secant_of_a_power_law_is_no_less_than_its_slope(power):
     law, (vs, vn, _) = PowerLaw(power, 1.5, 1.5, 1.5), moving_links(4)
     gap = np.array(law.density_secant(vs, vn, 1e-2)) - np.array(law.density_jacobian(vs, vn, 1e-2))
     size = np.abs(np.array(law.density_secant(vs, vn, 1e-2))).max(axis=(0, 1))
-    assert (np.linalg.eigvalsh(np.moveaxis(gap, (0, 1), (-2, -1))).min(axis=-1) > -1e-12 * size).all()
+    assert (
+        np.linalg.eigvalsh(np.moveaxis(gap, (0, 1), (-2, -1))).min(axis=-1) > -1e-12 * size
+    ).all()
 
 
 @each
@@ -88,8 +101,18 @@ def test_forces_on_links_are_integrals_of_the_force_on_points(law):
             return np.array([fs[0, 0], fn[0, 0], sigma * fn[0, 0]])
 
         for k, whole in enumerate(force):
-            scale, settings = max(abs(f[link, t]) for f in force), {"points": kinks or None, "limit": 400}
-            expected = quad(lambda s, k=k, at=at: at(s)[k], -half, half, epsabs=1e-12 * scale, full_output=1, **settings)[0]
+            scale, settings = (
+                max(abs(f[link, t]) for f in force),
+                {"points": kinks or None, "limit": 400},
+            )
+            expected = quad(
+                lambda s, k=k, at=at: at(s)[k],
+                -half,
+                half,
+                epsabs=1e-12 * scale,
+                full_output=1,
+                **settings,
+            )[0]
             assert abs(whole[link, t] - expected) < 1e-8 * scale
 
 
@@ -105,7 +128,9 @@ def test_jacobians_are_the_derivatives(law):
         ),
     ):
         for j, shift in enumerate(step * np.eye(len(v))[:, :, None, None] * np.abs(v).max(axis=0)):
-            numeric = (np.array(force(v - shift)) - np.array(force(v + shift))) / (2 * np.abs(shift[j]))
+            numeric = (np.array(force(v - shift)) - np.array(force(v + shift))) / (
+                2 * np.abs(shift[j])
+            )
             found = np.array([np.broadcast_to(row[j], v[0].shape) for row in matrix])
             np.testing.assert_allclose(found, numeric, atol=1e-6 * max(1.0, np.abs(found).max()))
 
@@ -115,16 +140,27 @@ def test_numpy_and_casadi_evaluate_one_statement(law):
     velocity = moving_links(5, 1)
     given = [ca.DM(v) for v in velocity]
     names = [ca.SX.sym(name, 3) for name in ("vs", "vn", "w")]
-    force = ca.Function("force", names, list(line_integrals(law).force(*names, LENGTHS, 1e-3)))(*given)
-    np.testing.assert_allclose(
-        [f.full() for f in force], line_integrals(law).force(*velocity, LENGTHS, 1e-3), rtol=1e-11, atol=1e-13
+    force = ca.Function("force", names, list(line_integrals(law).force(*names, LENGTHS, 1e-3)))(
+        *given
     )
-    held = line_integrals(law).scaled_laws(*names, LENGTHS, 1e-3, line_integrals(law).force(*names, LENGTHS, 1e-3))
-    assert np.abs(np.array([f.full() for f in ca.Function("held", names, held)(*given)])).max() < 1e-9
+    np.testing.assert_allclose(
+        [f.full() for f in force],
+        line_integrals(law).force(*velocity, LENGTHS, 1e-3),
+        rtol=1e-11,
+        atol=1e-13,
+    )
+    held = line_integrals(law).scaled_laws(
+        *names, LENGTHS, 1e-3, line_integrals(law).force(*names, LENGTHS, 1e-3)
+    )
+    assert (
+        np.abs(np.array([f.full() for f in ca.Function("held", names, held)(*given)])).max() < 1e-9
+    )
 
 
 @each
-def test_a_balanced_body_pays_with_its_joints_what_friction_takes_whatever_end_it_is_named_from(law):
+def test_a_balanced_body_pays_with_its_joints_what_friction_takes_whatever_end_it_is_named_from(
+    law,
+):
     body, (angles, rates) = Chain(), instants(6)
 
     def moved(angles, rates):
@@ -139,7 +175,9 @@ def test_a_balanced_body_pays_with_its_joints_what_friction_takes_whatever_end_i
     if law.reversible:
         swapped = moved(-angles[::-1], -rates[::-1])
         np.testing.assert_allclose(swapped.power, now.power, rtol=1e-7)
-        np.testing.assert_allclose(np.linalg.norm(swapped.centre, axis=0), np.linalg.norm(now.centre, axis=0), rtol=1e-7)
+        np.testing.assert_allclose(
+            np.linalg.norm(swapped.centre, axis=0), np.linalg.norm(now.centre, axis=0), rtol=1e-7
+        )
 
 
 @each
@@ -162,14 +200,24 @@ def test_slopes_of_the_motion_are_those_of_finite_differences(law):
 def test_an_associated_law_is_the_gradient_of_a_convex_function(law):
     velocity, h = moving_links(8), 1e-6
     jacobian = np.array(
-        [[np.broadcast_to(e, velocity[0].shape) for e in row] for row in line_integrals(law).jacobian(*velocity, LENGTHS, 0.1)]
+        [
+            [np.broadcast_to(e, velocity[0].shape) for e in row]
+            for row in line_integrals(law).jacobian(*velocity, LENGTHS, 0.1)
+        ]
     )
-    np.testing.assert_allclose(jacobian, jacobian.swapaxes(0, 1), atol=1e-12 * np.abs(jacobian).max())
+    np.testing.assert_allclose(
+        jacobian, jacobian.swapaxes(0, 1), atol=1e-12 * np.abs(jacobian).max()
+    )
     assert np.linalg.eigvalsh(np.moveaxis(jacobian, (0, 1), (-2, -1))).min() > 0
     force = line_integrals(law).force(*velocity, LENGTHS, 0.1)
     for j, shift in enumerate(h * np.eye(3)[:, :, None, None] * np.abs(velocity).max(axis=0)):
-        ahead, behind = (line_integrals(law).potential(*(velocity + sign * shift), LENGTHS, 0.1) for sign in (1, -1))
-        np.testing.assert_allclose((ahead - behind) / (2 * np.abs(shift[j])), -force[j], atol=1e-6 * np.abs(force[j]).max())
+        ahead, behind = (
+            line_integrals(law).potential(*(velocity + sign * shift), LENGTHS, 0.1)
+            for sign in (1, -1)
+        )
+        np.testing.assert_allclose(
+            (ahead - behind) / (2 * np.abs(shift[j])), -force[j], atol=1e-6 * np.abs(force[j]).max()
+        )
 
 
 def test_where_coulomb_friction_leaves_three_motions_the_elliptic_law_leaves_one():
@@ -181,7 +229,12 @@ def test_where_coulomb_friction_leaves_three_motions_the_elliptic_law_leaves_one
     for one in found:
         np.testing.assert_allclose(one.z, found[0].z, atol=1e-6)
     at = instant(body, law, angles, rates, found[0].z, 1e-4)
-    assert np.linalg.eigvalsh(balance_jacobian(body, law, at.posture, at.velocity, np.full((1, 1), 1e-4))).min() > 0
+    assert (
+        np.linalg.eigvalsh(
+            balance_jacobian(body, law, at.posture, at.velocity, np.full((1, 1), 1e-4))
+        ).min()
+        > 0
+    )
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.7])
@@ -190,7 +243,11 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
     for law_of in (Friction, Elliptic):
         law = law_of(mu, mu, mu)
         solved = body.solve(law, angles, rates, 1e-6).require()
-        found = [solved.z, body.motion(law, angles, rates, 1e-6, solved).power, body.slopes(law, angles, rates, 1e-6, solved)]
+        found = [
+            solved.z,
+            body.motion(law, angles, rates, 1e-6, solved).power,
+            body.slopes(law, angles, rates, 1e-6, solved),
+        ]
         if law_of is Friction:
             expected = found
     for a, b in zip(expected, found, strict=True):
@@ -209,7 +266,9 @@ def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
     for vs, vn in ((2.0, 0.0), (-2.0, 0.0), (0.0, 3.0)):
         at = np.array([[vs]]), np.array([[vn]]), 1e-12
         np.testing.assert_allclose(
-            Elliptic(mu_t=2, mu_f=1, mu_b=5).density(*at), Friction(mu_t=2, mu_f=1, mu_b=5).density(*at), rtol=1e-14
+            Elliptic(mu_t=2, mu_f=1, mu_b=5).density(*at),
+            Friction(mu_t=2, mu_f=1, mu_b=5).density(*at),
+            rtol=1e-14,
         )
 
 
@@ -229,10 +288,17 @@ def test_the_kernel_knows_the_elliptic_law():
             np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
 
 
-@pytest.mark.parametrize("law", [Viscous(), PowerLaw(0.5, mu_t=2.0), OWN], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize(
+    "law", [Viscous(), PowerLaw(0.5, mu_t=2.0), OWN], ids=lambda law: type(law).__name__
+)
 def test_smooth_bodies_obey_any_law_whatever_solver_they_are_asked_by(law):
     body, rng = ModalBody(), np.random.default_rng(14)
-    at = law, 0.3 * rng.normal(size=(body.n_joint, 2)), 5.0 * rng.normal(size=(body.n_joint, 2)), 0.1
+    at = (
+        law,
+        0.3 * rng.normal(size=(body.n_joint, 2)),
+        5.0 * rng.normal(size=(body.n_joint, 2)),
+        0.1,
+    )
     solved = body.motion(*at, body.solve(*at).require())
     replayed = body.replayed(*at, None)[0]
     # fixed panels resolve an instant like these to some 1e-3, whatever the law

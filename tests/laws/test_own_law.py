@@ -1,4 +1,5 @@
-"""A law stated as formulas: read, differentiated, checked for what the solvers rely on, and refused where that fails."""
+"""A law stated as formulas: read, differentiated, checked for what the solvers rely on, and refused
+where that fails."""
 
 import pickle
 
@@ -32,7 +33,10 @@ def test_traits_are_found_from_samples():
     [
         (COULOMB, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5)),
         (OwnLaw("-vs", "-2*vn"), Viscous(normal=2.0, tangential=1.0)),
-        (OwnLaw("-vs/sqrt(speed)", "-2*vn*speed**(-0.5)"), PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0)),
+        (
+            OwnLaw("-vs/sqrt(speed)", "-2*vn*speed**(-0.5)"),
+            PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0),
+        ),
     ],
     ids=["Coulomb", "viscous", "power"],
 )
@@ -57,7 +61,11 @@ def test_a_stated_law_moves_a_body_as_the_built_in_one_does(own, built_in):
         ("-vs/abs(vs + 1) - where(vs < 0, 0, 1e-9)", "-vn", "rest"),
         ("-vs/(speed - speed)", "-vn", "no finite value"),
         ("-vs/speed", "where(vs > 0, -2, -1.5)*vn/speed", "jumps where vs changes its sign"),
-        ("-vs", "-vn - where(vn > 0, 1, -1)*where(vn*vn > 0, 1, 0)", "jumps where vn changes its sign"),
+        (
+            "-vs",
+            "-vn - where(vn > 0, 1, -1)*where(vn*vn > 0, 1, 0)",
+            "jumps where vn changes its sign",
+        ),
         ("-vs/speeed", "-vn", "speaks of speeed"),
         ("-vs +", "-vn", "is no formula"),
         ("-vs.real", "-vn", "is no formula that can be differentiated"),
@@ -74,7 +82,13 @@ def test_what_is_no_law_of_friction_is_refused_with_its_reason(tangential, norma
 def test_a_stated_law_has_the_optimum_of_the_built_in_one():
     values = []
     for law in (Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), OwnLaw("-vs/speed", "-2*vn/speed")):
-        problem = Problem("own", friction=law, gait=Harmonic(1, "bilateral"), guess=ellipse(0, 2.5, 1.2), mesh_tolerance=1e-3)
+        problem = Problem(
+            "own",
+            friction=law,
+            gait=Harmonic(1, "bilateral"),
+            guess=ellipse(0, 2.5, 1.2),
+            mesh_tolerance=1e-3,
+        )
         solution = solve(problem, 1)
         assert solution.status == "solved"
         values.append(solution.efficiency)

@@ -1,4 +1,5 @@
-"""Purcell's swimmer, the body whose pace matters: strokes against an independent integration, and a certified optimum."""
+"""Purcell's swimmer, the body whose pace matters: strokes against an independent integration, and a
+certified optimum."""
 
 from pathlib import Path
 
@@ -56,13 +57,22 @@ def test_purcells_square_stroke_goes_as_far_as_an_independent_integration_says(a
 
     def centre(state, t):
         angles, theta = path(np.array([t]))[0][:, 0], state[2]
-        ends = [np.array([np.cos(a), np.sin(a)]) / 6 for a in (theta - angles[0], theta, theta + angles[1])]
+        ends = [
+            np.array([np.cos(a), np.sin(a)]) / 6
+            for a in (theta - angles[0], theta, theta + angles[1])
+        ]
         return state[:2] + (-(ends[1] + ends[0]) + (ends[1] + ends[2])) / 3
 
     state = np.zeros(4)
     begin = centre(state, 0.0)
     for a, b in zip((0.0, *CORNERS), (*CORNERS, 1.0), strict=True):
-        inside = solve_ivp(lambda t, y, a=a, b=b: rates(min(max(t, a), b - 1e-12), y), (a, b), state, rtol=1e-10, atol=1e-12)
+        inside = solve_ivp(
+            lambda t, y, a=a, b=b: rates(min(max(t, a), b - 1e-12), y),
+            (a, b),
+            state,
+            rtol=1e-10,
+            atol=1e-12,
+        )
         state = inside.y[:, -1]
     assert np.linalg.norm(centre(state, 0.0) - begin) == pytest.approx(measured.distance, rel=1e-7)
     assert state[3] == pytest.approx(measured.work, rel=1e-7)
@@ -85,8 +95,15 @@ def test_the_path_decides_how_far_a_viscous_body_goes_and_the_pace_what_it_costs
 
 
 def test_a_retraced_stroke_goes_nowhere():
-    measured = replay(Chain(), LAW, lambda t: (np.sin(2 * np.pi * t) * np.array([[1.0], [0.4]]),
-                                               2 * np.pi * np.cos(2 * np.pi * t) * np.array([[1.0], [0.4]])), 1e-4)  # fmt: skip
+    measured = replay(
+        Chain(),
+        LAW,
+        lambda t: (
+            np.sin(2 * np.pi * t) * np.array([[1.0], [0.4]]),
+            2 * np.pi * np.cos(2 * np.pi * t) * np.array([[1.0], [0.4]]),
+        ),
+        1e-4,
+    )
     assert measured.distance < 1e-14
 
 
@@ -97,7 +114,9 @@ def test_purcells_swimmer_is_solved_certified_kept_and_read(tmp_path):
     read = load(save(solution, tmp_path / "purcell.h5"))
     assert read.problem.hash == solution.problem.hash
     assert read.problem.friction == LAW
-    assert "as work depends on the pace under drag (2, 1)" in "\n".join(summary_lines(solution, None, verbose=True))
+    assert "as work depends on the pace under drag (2, 1)" in "\n".join(
+        summary_lines(solution, None, verbose=True)
+    )
     assert "the work depends on the pace" in report_page(solution)
     assert "no upper bound" in gap_line(solution.problem.with_(objective="efficiency"), 0.1, None)
 
@@ -117,7 +136,9 @@ def test_harmonics_settle_the_pace_and_more_of_them_come_closer_to_the_best_one_
 def test_classes_that_leave_the_pace_open_are_refused_where_it_matters():
     for law in (LAW, PowerLaw(0.5)):
         for gait in (FreePath(2.0), Polygon(6)):
-            with pytest.raises(ProblemError, match=r"work depends on the pace under .*; use Harmonic"):
+            with pytest.raises(
+                ProblemError, match=r"work depends on the pace under .*; use Harmonic"
+            ):
                 Problem("paced", friction=law, gait=gait)
     with pytest.raises(ProblemError, match="scallop theorem"):
         Problem("scallop", body=Chain((0.5, 0.5)), friction=LAW, gait=Harmonic(2))

@@ -1,4 +1,5 @@
-"""Motion in balance and its derivatives: against central differences, and compiled against NumPy."""
+"""Motion in balance and its derivatives: against central differences, and compiled against
+NumPy."""
 
 import numpy as np
 import pytest
@@ -26,7 +27,9 @@ def test_the_motion_is_that_of_the_tail_and_joints_do_the_work_of_friction(body,
     motion = chain_motion(body, law, angles, rates, 1e-4, solved)
     now = instant(body, law, angles, rates, solved.z, 1e-4)
     np.testing.assert_allclose(motion.z, solved.z, atol=1e-13)
-    np.testing.assert_allclose(motion.centre, np.vstack(body.centre_velocity(now.posture, now.velocity)), atol=1e-13)
+    np.testing.assert_allclose(
+        motion.centre, np.vstack(body.centre_velocity(now.posture, now.velocity)), atol=1e-13
+    )
     np.testing.assert_allclose(motion.power, total_power(now.velocity, now.force)[0], atol=1e-11)
     np.testing.assert_allclose(motion.actuator_power, motion.power, atol=1e-9)
 
@@ -49,10 +52,19 @@ def test_slopes_are_the_limit_of_differences(body, law):
             a, r = np.split(y + moved * np.eye(len(y))[:, k : k + 1], 2)
             ends.append(
                 rows(
-                    chain_motion(body, law, a, r, delta, solve_balance(body, law, a, r, delta, start=solved.z, tolerance=1e-13))
+                    chain_motion(
+                        body,
+                        law,
+                        a,
+                        r,
+                        delta,
+                        solve_balance(body, law, a, r, delta, start=solved.z, tolerance=1e-13),
+                    )
                 )
             )
-        np.testing.assert_allclose(slopes[:, k, smooth], ((ends[0] - ends[1]) / (2 * step))[:, smooth], atol=1e-6)
+        np.testing.assert_allclose(
+            slopes[:, k, smooth], ((ends[0] - ends[1]) / (2 * step))[:, smooth], atol=1e-6
+        )
 
 
 @pytest.mark.skipif(native_kernel() is None, reason="no C compiler")

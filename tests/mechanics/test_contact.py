@@ -24,11 +24,13 @@ from colloc.mechanics.contact import (
 )
 
 AROUND_THE_CORNER = Fourier(np.zeros(2), np.array([[2.877], [0.172]]), np.array([[0.0], [-2.872]]))
-"""A gait that rounds the shape (2 pi/3, 2 pi/3), where the first end passes the third link, within 2e-3 rad."""
+"""A gait that rounds the shape (2 pi/3, 2 pi/3), where the first end passes the third link, within
+2e-3 rad."""
 
 
 @pytest.mark.parametrize(
-    "lengths", [(1 / 3, 1 / 3, 1 / 3), (0.5, 0.3, 0.2), (0.2, 0.3, 0.5), (0.25, 0.5, 0.25), (0.3, 0.4, 0.3)]
+    "lengths",
+    [(1 / 3, 1 / 3, 1 / 3), (0.5, 0.3, 0.2), (0.2, 0.3, 0.5), (0.25, 0.5, 0.25), (0.3, 0.4, 0.3)],
 )
 def test_bounds_never_allow_a_crossing_and_forbid_little_else(lengths):
     body = Chain(lengths)
@@ -68,7 +70,8 @@ def test_the_gap_between_links_is_that_of_their_points():
     part = np.linspace(0.0, 1.0, 201)
     ends = np.stack(body.joints(angles))
     points = [ends[:, k, :, None] * (1 - part) + ends[:, k + 1, :, None] * part for k in range(4)]
-    tips = {(i, j): 200 if j > i else 0 for i in range(4) for j in range(4)}  # of link j, the end away from link i
+    # of link j, the end away from link i
+    tips = {(i, j): 200 if j > i else 0 for i in range(4) for j in range(4)}
 
     def distance(i, j):
         other = points[j] if abs(i - j) > 1 else points[j][:, :, [tips[i, j]]]
@@ -83,8 +86,12 @@ def test_the_gap_between_links_is_that_of_their_points():
 
 def test_folded_neighbours_and_a_zigzag_have_the_gap_of_their_ends():
     fold = np.array([[2.0, 2.9, np.pi]])
-    np.testing.assert_allclose(gap(Chain((0.5, 0.5)), fold), 0.5 * np.sin(np.pi - fold[0]), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(gap(Chain(), np.concatenate([fold, -fold])), np.sin(np.pi - fold[0]) / 3, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        gap(Chain((0.5, 0.5)), fold), 0.5 * np.sin(np.pi - fold[0]), rtol=0, atol=1e-14
+    )
+    np.testing.assert_allclose(
+        gap(Chain(), np.concatenate([fold, -fold])), np.sin(np.pi - fold[0]) / 3, rtol=0, atol=1e-14
+    )
 
 
 def test_two_links_cannot_cross():
@@ -96,15 +103,23 @@ def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
     rng = np.random.default_rng(2)
     first, second = rng.normal(size=(2, 500)) * 3 * SMOOTHING
     share = share_of_first(first, second)
-    assert tangent_of_minimum(first, second, share) == pytest.approx(smooth_minimum(first, second), abs=1e-15)
-    assert np.all(tangent_of_minimum(first, second, rng.permutation(share)) >= smooth_minimum(first, second) - 1e-15)
+    assert tangent_of_minimum(first, second, share) == pytest.approx(
+        smooth_minimum(first, second), abs=1e-15
+    )
+    assert np.all(
+        tangent_of_minimum(first, second, rng.permutation(share))
+        >= smooth_minimum(first, second) - 1e-15
+    )
     step = 1e-8
-    slope = (smooth_minimum(first + step, second) - smooth_minimum(first - step, second)) / (2 * step)
+    slope = (smooth_minimum(first + step, second) - smooth_minimum(first - step, second)) / (
+        2 * step
+    )
     assert share == pytest.approx(slope, abs=1e-6)
 
 
 def corner_peak(gait):
-    """The check at the corner, the instant of its peak, and the peak's height, on a mesh of 40 intervals."""
+    """The check at the corner, the instant of its peak, and the peak's height, on a mesh of 40
+    intervals."""
     problem = Problem(name="corner", guess=AROUND_THE_CORNER)
     check = next(c for c in shape_checks(problem.body) if c.name.endswith("(left)"))
     times = worst_instants(gait, control_problem(problem).mesh(), [check], np.pi)[0]
@@ -124,7 +139,11 @@ def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
     assert 0.1 < share[0] < 0.9
     errors, blind = [], []
     for size in (1e-2, 5e-3, 2.5e-3):
-        moved = Fourier(np.zeros(2), AROUND_THE_CORNER.cos + size * np.array([[0.3], [-0.8]]), AROUND_THE_CORNER.sin)
+        moved = Fourier(
+            np.zeros(2),
+            AROUND_THE_CORNER.cos + size * np.array([[0.3], [-0.8]]),
+            AROUND_THE_CORNER.sin,
+        )
         height = corner_peak(moved)[2]
         cut = float(np.array(check.cut(moved.angles(time), share)).ravel()[0])
         errors.append(abs(cut - height))
@@ -139,18 +158,26 @@ def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_and_after(order):
-    """The head of three equal links goes through the first one; it is (sin a + sin(a + b))/3 beside its line."""
+    """The head of three equal links goes through the first one; it is (sin a + sin(a + b))/3 beside
+    its line."""
     steps = np.array([-0.2, -0.1, -0.05, 0.02, 0.1, 0.2])[::order]
     angles = np.stack([np.full(6, 2.0), 2 * np.pi - 4.0 + steps])
     height = np.abs(np.sin(2.0) + np.sin(angles.sum(axis=0))) / 3
-    assert passing_depth(Chain(), angles) == pytest.approx(height[np.abs(steps) == 0.02].item(), rel=1e-12)
+    assert passing_depth(Chain(), angles) == pytest.approx(
+        height[np.abs(steps) == 0.02].item(), rel=1e-12
+    )
     assert passing_depth(Chain(), angles[:, :3]) == 0.0
 
 
 @pytest.mark.parametrize("width", [0.0, 0.02])
 def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
-    """By signs of areas, for one shape at a time, and all pairs that are three links apart at least."""
-    body, rng, found = Chain((0.05, 0.2, 0.1, 0.15, 0.2, 0.1, 0.2), width=width), np.random.default_rng(5), 0
+    """By signs of areas, for one shape at a time, and all pairs that are three links apart at
+    least."""
+    body, rng, found = (
+        Chain((0.05, 0.2, 0.1, 0.15, 0.2, 0.1, 0.2), width=width),
+        np.random.default_rng(5),
+        0,
+    )
     for angles in rng.uniform(-2.8, 2.8, (300, 6, 1)):
         at = (np.array([1, 1j]) @ np.stack(body.joints(angles))[..., 0]).ravel()
 
@@ -160,11 +187,15 @@ def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
         crossed = {
             (i, j)
             for i, j in far_pairs(body)
-            if side(i, i + 1, j) != side(i, i + 1, j + 1) and side(j, j + 1, i) != side(j, j + 1, i + 1)
+            if side(i, i + 1, j) != side(i, i + 1, j + 1)
+            and side(j, j + 1, i) != side(j, j + 1, i + 1)
         }
         pairs = overlapping_pairs(np.stack(body.joints(angles)), far_pairs(body), width, 0.0)
         assert crossed <= set(pairs) if width else crossed == set(pairs)
-        assert all(crossing_depth(body, angles, [pair])[0] > 0 or overlap(body, angles, [pair])[0] < width for pair in pairs)
+        assert all(
+            crossing_depth(body, angles, [pair])[0] > 0 or overlap(body, angles, [pair])[0] < width
+            for pair in pairs
+        )
         found += len(crossed)
     assert found > 50
 
@@ -172,10 +203,17 @@ def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
 @pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)
 def test_a_body_in_a_mirror_meets_itself_on_the_other_side_as_deep(lengths):
     """And a contact is positive where, and only where, the links two apart cross."""
-    body, angles = Chain(lengths), np.random.default_rng(8).uniform(-2.9, 2.9, (len(lengths) - 1, 400))
-    here, mirrored = ({near.name: near.pair(sign * angles) for near in body.contacts()} for sign in (1, -1))
+    body, angles = (
+        Chain(lengths),
+        np.random.default_rng(8).uniform(-2.9, 2.9, (len(lengths) - 1, 400)),
+    )
+    here, mirrored = (
+        {near.name: near.pair(sign * angles) for near in body.contacts()} for sign in (1, -1)
+    )
     for name, near in here.items():
-        other = mirrored[name.replace("left", "RIGHT").replace("right", "left").replace("RIGHT", "right")]
+        other = mirrored[
+            name.replace("left", "RIGHT").replace("right", "left").replace("RIGHT", "right")
+        ]
         np.testing.assert_allclose(near, other, rtol=0, atol=1e-13)
     pairs = [(i, i + 2) for i in range(len(lengths) - 2)]
     crossed = np.max([np.minimum(*near) for near in here.values()], axis=0)[0] > 0

@@ -1,4 +1,5 @@
-"""Chains with fewer motors than joints: against chains without those joints, and against the chain itself."""
+"""Chains with fewer motors than joints: against chains without those joints, and against the chain
+itself."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ BROKEN = Coupled(Chain((0.25,) * 4), stuck={1: 0.4})
 
 
 def solved(body, **changes):
-    return colloc.solve(Problem("c", body=body, friction=LAW, gait=Harmonic(1), delta=1e-3, **changes), starts=2)
+    return colloc.solve(
+        Problem("c", body=body, friction=LAW, gait=Harmonic(1), delta=1e-3, **changes), starts=2
+    )
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +26,10 @@ def broken():
 
 
 def test_a_stuck_joint_of_a_straight_body_makes_two_links_one():
-    stuck, whole = solved(Coupled(Chain((0.25,) * 4), stuck={1: 0.0})), solved(Chain((0.25, 0.5, 0.25)))
+    stuck, whole = (
+        solved(Coupled(Chain((0.25,) * 4), stuck={1: 0.0})),
+        solved(Chain((0.25, 0.5, 0.25))),
+    )
     assert stuck.status == whole.status == "solved"
     assert stuck.efficiency == pytest.approx(whole.efficiency, rel=1e-7)
 
@@ -33,7 +39,9 @@ def test_a_motor_for_every_joint_is_the_chain():
     own = Coupled(chain)
     a, b = (body.solve(LAW, y[:2], y[2:], 1e-3) for body in (own, chain))
     np.testing.assert_array_equal(a.z, b.z)
-    np.testing.assert_array_equal(own.slopes(LAW, y[:2], y[2:], 1e-3, a), chain.slopes(LAW, y[:2], y[2:], 1e-3, b))
+    np.testing.assert_array_equal(
+        own.slopes(LAW, y[:2], y[2:], 1e-3, a), chain.slopes(LAW, y[:2], y[2:], 1e-3, b)
+    )
     assert own.symmetries == chain.symmetries
 
 
@@ -46,14 +54,22 @@ def test_the_chain_plays_the_joint_angles_to_the_same_distance_and_work(broken):
 
 
 def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_backwards():
-    body, gait = Coupled(Chain((0.2,) * 5), gears=((1, 0), (-0.5, 0), (0.3, -1), (0, 1))), colloc.ellipse(0.1, 0.7, 0.6)
+    body, gait = (
+        Coupled(Chain((0.2,) * 5), gears=((1, 0), (-0.5, 0), (0.3, -1), (0, 1))),
+        colloc.ellipse(0.1, 0.7, 0.6),
+    )
     joints, t, h = body.joint_path(gait), np.linspace(0.0, 1.0, 20), 1e-5
-    np.testing.assert_allclose(joints(t)[1], (joints(t + h)[0] - joints(t - h)[0]) / (2 * h), atol=1e-7)
+    np.testing.assert_allclose(
+        joints(t)[1], (joints(t + h)[0] - joints(t - h)[0]) / (2 * h), atol=1e-7
+    )
     np.testing.assert_allclose(joints(t)[0][1], -0.5 * gait(t)[0][0], atol=1e-12)
 
 
 def test_slopes_are_those_of_differences():
-    body, h = Coupled(Chain((0.2,) * 5), gears=((1, 0), (0.5, 0), (0, 0), (0.3, 1)), stuck={2: -0.3}), 1e-6
+    body, h = (
+        Coupled(Chain((0.2,) * 5), gears=((1, 0), (0.5, 0), (0, 0), (0.3, 1)), stuck={2: -0.3}),
+        1e-6,
+    )
     y = np.array([0.7, -0.4, 1.0, 2.0])[:, None]
 
     def motion(y):
@@ -69,7 +85,9 @@ def test_slopes_are_those_of_differences():
 
 @pytest.mark.parametrize("symmetry", ["bilateral", "antipodal"])
 def test_what_is_the_same_from_both_ends_has_both_symmetries(symmetry):
-    found = colloc.solve(Problem("belts", body=BELTS, friction=LAW, gait=Harmonic(1, symmetry), delta=1e-3), starts=2)
+    found = colloc.solve(
+        Problem("belts", body=BELTS, friction=LAW, gait=Harmonic(1, symmetry), delta=1e-3), starts=2
+    )
     assert found.status == "solved"
     (motors,) = (found.gait.angles(np.linspace(0, 1, 9)),)
     image = -motors[::-1, ::-1] if symmetry == "bilateral" else -np.roll(motors[:, :-1], 4, axis=1)
@@ -96,7 +114,8 @@ def test_limits_are_those_of_the_joints_that_move():
 
 
 def test_torque_and_power_are_those_of_the_motors(broken):
-    """A motor that turns several joints does the work of all of them; with its share of each joint's torque."""
+    """A motor that turns several joints does the work of all of them; with its share of each
+    joint's torque."""
     from colloc.mechanics.actuators import joint_moments
 
     rng = np.random.default_rng(2)
@@ -162,5 +181,7 @@ def test_other_bodies_and_inertia_are_refused_in_a_sentence():
         Problem("fast", body=BROKEN, gait=Harmonic(1), froude=0.05)
     with pytest.raises(ProblemError, match="only a Chain"):
         Problem("up", body=BROKEN, gait=Harmonic(1), grade=0.05)
-    with pytest.raises(ProblemError, match=r"a body with one motor .* Give the body a second motor"):
+    with pytest.raises(
+        ProblemError, match=r"a body with one motor .* Give the body a second motor"
+    ):
         Problem("scallop", body=Coupled(Chain((0.2,) * 5), gears=((1,),) * 4))

@@ -1,4 +1,5 @@
-"""The balance solver: an independent oracle, its invariances, and extreme delta, starts and friction."""
+"""The balance solver: an independent oracle, its invariances, and extreme delta, starts and
+friction."""
 
 import numpy as np
 import pytest
@@ -82,7 +83,16 @@ def test_every_instant_converges_whatever_friction_and_delta(friction, delta):
 def test_fixed_point_and_newton_agree(delta):
     angles, rates = random_instants(13, 200)
     newton = solve_balance(Chain(), ISOTROPIC, angles, rates, delta, tolerance=1e-13)
-    fixed = solve_balance(Chain(), ISOTROPIC, angles, rates, delta, tolerance=1e-13, method="fixed_point", max_iterations=5000)
+    fixed = solve_balance(
+        Chain(),
+        ISOTROPIC,
+        angles,
+        rates,
+        delta,
+        tolerance=1e-13,
+        method="fixed_point",
+        max_iterations=5000,
+    )
     assert newton.converged.all()
     assert fixed.converged.all()
     np.testing.assert_allclose(newton.z, fixed.z, atol=1e-10)
@@ -95,18 +105,23 @@ def test_the_solution_does_not_depend_on_the_start():
     rng = np.random.default_rng(15)
     reference = solve_balance(Chain(), ISOTROPIC, angles, rates, 1e-4)
     for scale in (1.0, 1e3, 1e6):
-        other = solve_balance(Chain(), ISOTROPIC, angles, rates, 1e-4, start=scale * rng.normal(size=(3, 100)))
+        other = solve_balance(
+            Chain(), ISOTROPIC, angles, rates, 1e-4, start=scale * rng.normal(size=(3, 100))
+        )
         assert other.converged.all()
         np.testing.assert_allclose(other.z, reference.z, atol=1e-9)
 
 
 def test_a_start_next_to_the_answer_does_not_lose_it():
-    """One joint moves 4e-5 times as fast as the other. From here the anchor goes to a link from which nothing converges."""
+    """One joint moves 4e-5 times as fast as the other. From here the anchor goes to a link from
+    which nothing converges."""
     angles = np.array([[-2.450491783538704], [3.0288778624868327]])
     rates = np.array([[-11.194977583218439], [4.929179798711658e-04]])
     start = np.array([[6.882907034601281e-04], [-3.7304329219234784], [11.192336543699575]])
     law = Friction(mu_t=3, mu_f=1, mu_b=1)
-    from_rest, from_start = (solve_balance(Chain(), law, angles, rates, 1e-6, start=s).require() for s in (None, start))
+    from_rest, from_start = (
+        solve_balance(Chain(), law, angles, rates, 1e-6, start=s).require() for s in (None, start)
+    )
     assert np.abs(from_start.z - from_rest.z).max() < 1e-9
     assert np.abs(start - from_rest.z).max() < 1e-3
 
@@ -114,13 +129,18 @@ def test_a_start_next_to_the_answer_does_not_lose_it():
 @pytest.mark.parametrize("friction", FRICTIONS)
 def test_scaling_the_rates_and_delta_scales_the_solution(friction):
     angles, rates = random_instants(16, 60)
-    one, seven = (solve_balance(Chain(), friction, angles, k * rates, k * 1e-3).z for k in (1.0, 7.0))
+    one, seven = (
+        solve_balance(Chain(), friction, angles, k * rates, k * 1e-3).z for k in (1.0, 7.0)
+    )
     np.testing.assert_allclose(seven, 7 * one, atol=1e-8)
 
 
 def test_reversing_the_rates_reverses_the_solution_where_friction_is_reversible_and_only_there():
     angles, rates = random_instants(17, 60)
-    for friction, reverses in ((Friction(mu_t=3, mu_f=1, mu_b=1), True), (Friction(mu_t=1, mu_f=1, mu_b=3), False)):
+    for friction, reverses in (
+        (Friction(mu_t=3, mu_f=1, mu_b=1), True),
+        (Friction(mu_t=1, mu_f=1, mu_b=3), False),
+    ):
         there, back = (solve_balance(Chain(), friction, angles, k * rates, 1e-3).z for k in (1, -1))
         assert np.allclose(there, -back, atol=1e-9) == reverses
 
@@ -167,13 +187,17 @@ def test_the_balanced_velocity_minimises_dissipation_and_power_is_at_least_frict
 
 def test_frozen_joints_do_not_move_the_body():
     angles, _ = random_instants(22, 10)
-    solved = solve_balance(Chain(), Friction(mu_t=10, mu_f=1, mu_b=3), angles, np.zeros_like(angles), 1e-4)
+    solved = solve_balance(
+        Chain(), Friction(mu_t=10, mu_f=1, mu_b=3), angles, np.zeros_like(angles), 1e-4
+    )
     assert np.array_equal(solved.z, np.zeros((3, 10)))
 
 
 def test_what_does_not_converge_is_reported_and_required_loudly():
     angles, rates = random_instants(23, 50)
-    solved = solve_balance(Chain(), ISOTROPIC, angles, rates, 1e-6, max_iterations=2, method="newton")
+    solved = solve_balance(
+        Chain(), ISOTROPIC, angles, rates, 1e-6, max_iterations=2, method="newton"
+    )
     assert not solved.converged.all()
     assert np.array_equal(solved.converged, solved.residual <= 1e-11)
     with pytest.raises(NotConvergedError, match="of 50 instants"):
@@ -209,7 +233,8 @@ def test_a_link_at_stick_keeps_its_relative_accuracy_at_tiny_delta():
 
 BESIDE_A_FOLD = [
     (
-        Chain((0.2, 0.2, 0.2, 0.2, 0.2)), Friction(mu_t=0.3732971441138048, mu_f=1.0, mu_b=1.0), 1e-4,
+        Chain((0.2, 0.2, 0.2, 0.2, 0.2)), Friction(mu_t=0.3732971441138048, mu_f=1.0, mu_b=1.0),
+        1e-4,
         [0.2902139692001954, 0.41142221419266584, -0.24741914938788861, 0.5570036473833548],
         [1.5208964099572015, -0.442939356313379, -3.631156061252283, 2.5549055153555553],
     ),
@@ -220,7 +245,8 @@ BESIDE_A_FOLD = [
         [-0.030994899599743775, 0.0007943275201016675, -3.2631510952794907],
     ),
     (
-        Chain((0.18256804397346088, 0.19015637257632248, 0.2545511669004333, 0.19015637257632248, 0.18256804397346094)),
+        Chain((0.18256804397346088, 0.19015637257632248, 0.2545511669004333, 0.19015637257632248,
+        0.18256804397346094)),
         Friction(mu_t=0.4809270258518652, mu_f=1.0, mu_b=3.636603686191716), 1e-4,
         [2.597688063049994, -2.786161703726339, 3.0860764570646855, -2.866002211321948],
         [0.0026765635702248325, 2.586684889251715, -0.9621272363129159, -2.9613888780556366],
@@ -235,20 +261,27 @@ CASES = ["five links", "four links", "backward friction", "on three feet"]
 
 @pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=CASES)
 def test_beside_a_fold_of_the_balance_the_other_solution_is_found(case):
-    """Two solutions have just met and vanished: the residual has a minimum there, at which every step from rest used to end."""
+    """Two solutions have just met and vanished: the residual has a minimum there, at which every
+    step from rest used to end."""
     body, friction, delta, angles, rates = case
-    solution = solve_balance(body, friction, np.array(angles)[:, None], np.array(rates)[:, None], delta)
+    solution = solve_balance(
+        body, friction, np.array(angles)[:, None], np.array(rates)[:, None], delta
+    )
     assert solution.converged.all()
-    now = instant(body, friction, np.array(angles)[:, None], np.array(rates)[:, None], solution.z, delta)
+    now = instant(
+        body, friction, np.array(angles)[:, None], np.array(rates)[:, None], solution.z, delta
+    )
     assert np.abs(net_force(now.posture, now.force)).max() < 1e-9
 
 
 @pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=CASES)
 def test_another_start_is_tried_before_a_long_way_from_afar(case):
-    """Where the first attempt ends beside a fold, the way down from a large delta takes thousands of steps: it comes last."""
+    """Where the first attempt ends beside a fold, the way down from a large delta takes thousands
+    of steps: it comes last."""
     body, friction, delta, angles, rates = case
     at = body, friction, np.array(angles)[:, None], np.array(rates)[:, None], delta
     first, found = solve_balance(*at, method="direct"), solve_balance(*at)
     assert not first.converged.any()
     assert found.converged.all()
-    assert max(first.iterations.max(), found.iterations.max()) <= 40 * body.n_link  # forty with each link as the anchor
+    # forty with each link as the anchor
+    assert max(first.iterations.max(), found.iterations.max()) <= 40 * body.n_link

@@ -1,4 +1,5 @@
-"""Closed-form link integrals against quadrature that shares nothing with them, and against their own identities."""
+"""Closed-form link integrals against quadrature that shares nothing with them, and against their
+own identities."""
 
 import itertools
 
@@ -7,12 +8,19 @@ import pytest
 from scipy.integrate import quad
 
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import link_dissipation, link_force, link_force_jacobian, link_moments, power
+from colloc.mechanics.link_friction import (
+    link_dissipation,
+    link_force,
+    link_force_jacobian,
+    link_moments,
+    power,
+)
 from colloc.system.errors import ProblemError
 
 
 def graded_quadrature(vs, vn, w, length, delta, order, weight):
-    """Integral of sigma^order weight(r, y) over a link: Gauss panels graded geometrically towards the slowest point."""
+    """Integral of sigma^order weight(r, y) over a link: Gauss panels graded geometrically towards
+    the slowest point."""
     nodes, weights = np.polynomial.legendre.leggauss(20)
     half = 0.5 * length
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -47,7 +55,9 @@ def test_moments_agree_with_graded_quadrature_over_all_regimes():
     vs, vn, w, length, delta = random_links(1, 4000)
     moments = link_moments(vs, vn, w, length, delta)
     for order, closed in enumerate(moments):
-        reference, magnitude = graded_quadrature(vs, vn, w, length, delta, order, lambda r, y: 1 / r)
+        reference, magnitude = graded_quadrature(
+            vs, vn, w, length, delta, order, lambda r, y: 1 / r
+        )
         assert np.max(np.abs(closed - reference) / magnitude) < 1e-13
 
 
@@ -55,7 +65,9 @@ def test_normal_force_and_couple_agree_with_graded_quadrature():
     vs, vn, w, length, delta = random_links(2, 3000)
     force = link_force(vs, vn, w, length, delta, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0))
     for order, closed in ((0, force.normal), (1, force.couple)):
-        reference, magnitude = graded_quadrature(vs, vn, w, length, delta, order, lambda r, y: -2.0 * y / r)
+        reference, magnitude = graded_quadrature(
+            vs, vn, w, length, delta, order, lambda r, y: -2.0 * y / r
+        )
         assert np.max(np.abs(closed - reference) / np.maximum(magnitude, 1e-300)) < 1e-13
 
 
@@ -72,15 +84,32 @@ def test_moments_agree_with_adaptive_quadrature():
                 return s**k / np.sqrt(vs**2 + (vn + w * s) ** 2 + delta**2)
 
             reference = quad(
-                integrand, -length / 2, length / 2, points=points, epsabs=1e-14, epsrel=1e-12, limit=400, full_output=1
+                integrand,
+                -length / 2,
+                length / 2,
+                points=points,
+                epsabs=1e-14,
+                epsrel=1e-12,
+                limit=400,
+                full_output=1,
             )[0]
-            scale = quad(lambda s, f=integrand: abs(f(s)), -length / 2, length / 2, points=points, limit=400, full_output=1)[0]
+            scale = quad(
+                lambda s, f=integrand: abs(f(s)),
+                -length / 2,
+                length / 2,
+                points=points,
+                limit=400,
+                full_output=1,
+            )[0]
             assert abs(moments[order] - reference) < 2e-12 * scale
 
 
 def test_moments_are_even_and_odd_in_the_rotation():
     vs, vn, w, length, delta = random_links(4, 500)
-    forward, backward = link_moments(vs, vn, w, length, delta), link_moments(vs, vn, -w, length, delta)
+    forward, backward = (
+        link_moments(vs, vn, w, length, delta),
+        link_moments(vs, vn, -w, length, delta),
+    )
     np.testing.assert_allclose(forward.I0, backward.I0, rtol=1e-15)
     np.testing.assert_allclose(forward.I1, -backward.I1, rtol=1e-15)
     np.testing.assert_allclose(forward.I2, backward.I2, rtol=1e-15)
@@ -90,7 +119,10 @@ def test_couple_and_normal_force_are_combinations_of_the_moments():
     rng = np.random.default_rng(5)
     vs, vn, w = rng.normal(size=(3, 300))
     length, delta = np.full(300, 0.4), np.full(300, 1e-3)
-    moments, force = link_moments(vs, vn, w, length, delta), link_force(vs, vn, w, length, delta, Friction())
+    moments, force = (
+        link_moments(vs, vn, w, length, delta),
+        link_force(vs, vn, w, length, delta, Friction()),
+    )
     np.testing.assert_allclose(-force.normal, vn * moments.I0 + w * moments.I1, atol=1e-13)
     np.testing.assert_allclose(-force.couple, vn * moments.I1 + w * moments.I2, atol=1e-13)
 
@@ -107,7 +139,9 @@ def test_isotropic_force_is_minus_the_gradient_of_the_dissipation_and_its_jacobi
             return link_dissipation(*(np.array([[c]]) for c in x), length, d).item()
 
         def force(x, d=delta):
-            return np.array([c.item() for c in link_force(*(np.array([[c]]) for c in x), length, d, Friction())])
+            return np.array(
+                [c.item() for c in link_force(*(np.array([[c]]) for c in x), length, d, Friction())]
+            )
 
         shifts = step * np.eye(3)
         gradient = np.array([potential(v + h) - potential(v - h) for h in shifts]) / (2 * step)
@@ -120,7 +154,14 @@ def test_isotropic_force_is_minus_the_gradient_of_the_dissipation_and_its_jacobi
 
 
 def test_pure_translation_gives_coulomb_friction_in_the_limit():
-    force = link_force(np.array([3.0]), np.array([4.0]), np.array([0.0]), 0.5, 1e-9, Friction(mu_t=2.0, mu_f=1.5, mu_b=7.0))
+    force = link_force(
+        np.array([3.0]),
+        np.array([4.0]),
+        np.array([0.0]),
+        0.5,
+        1e-9,
+        Friction(mu_t=2.0, mu_f=1.5, mu_b=7.0),
+    )
     np.testing.assert_allclose(force.tangential, -1.5 * 0.5 * 0.6, rtol=1e-12)
     np.testing.assert_allclose(force.normal, -2.0 * 0.5 * 0.8, rtol=1e-12)
     np.testing.assert_allclose(force.couple, 0.0, atol=1e-15)
@@ -128,7 +169,14 @@ def test_pure_translation_gives_coulomb_friction_in_the_limit():
 
 def test_backward_motion_meets_the_backward_coefficient():
     forward, backward = (
-        link_force(np.array([v]), np.array([0.0]), np.array([0.0]), 1.0, 1e-9, Friction(mu_t=1, mu_f=2, mu_b=5)).tangential
+        link_force(
+            np.array([v]),
+            np.array([0.0]),
+            np.array([0.0]),
+            1.0,
+            1e-9,
+            Friction(mu_t=1, mu_f=2, mu_b=5),
+        ).tangential
         for v in (1.0, -1.0)
     )
     np.testing.assert_allclose([forward[0], backward[0]], [-2.0, 5.0], rtol=1e-12)
@@ -145,7 +193,10 @@ def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed():
     assert np.all(work >= 0)
 
 
-@pytest.mark.parametrize("bad", [{"mu_t": -1}, {"mu_f": 0}, {"mu_b": float("nan")}, {"mu_t": float("inf")}, {"mu_f": "1"}])
+@pytest.mark.parametrize(
+    "bad",
+    [{"mu_t": -1}, {"mu_f": 0}, {"mu_b": float("nan")}, {"mu_t": float("inf")}, {"mu_f": "1"}],
+)
 def test_unphysical_coefficients_are_refused_by_name(bad):
     with pytest.raises(ProblemError, match=next(iter(bad))):
         Friction(**bad)

@@ -1,4 +1,5 @@
-"""What joints have to do, and the limits of what they can: idling, braking, and torques of either sign."""
+"""What joints have to do, and the limits of what they can: idling, braking, and torques of either
+sign."""
 
 import numpy as np
 import pytest
@@ -15,9 +16,14 @@ ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
 
-@pytest.mark.parametrize("law", [LAW, PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), Viscous(normal=2, tangential=1)], ids=str)
+@pytest.mark.parametrize(
+    "law",
+    [LAW, PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), Viscous(normal=2, tangential=1)],
+    ids=str,
+)
 def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
-    """So the driven power is smooth there: half of it is gained with every bit of power, whichever way."""
+    """So the driven power is smooth there: half of it is gained with every bit of power, whichever
+    way."""
     (angles, rates), delta = random_instants(20), 1e-2
     idle = law.largest * delta ** (1 + law.degree)
     forces = BODY.forces(law, angles, rates, np.zeros((3, 20)), delta)
@@ -29,14 +35,21 @@ def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
     h = 1e-5 * idle
     slope = (driven(h) - driven(-h)) / (2 * h)
     np.testing.assert_allclose(
-        slope, 0.5 * Instants(BODY, law, angles, rates, delta, forces=forces).power.sum(axis=0), rtol=1e-6
+        slope,
+        0.5 * Instants(BODY, law, angles, rates, delta, forces=forces).power.sum(axis=0),
+        rtol=1e-6,
     )
 
 
 def test_torques_are_limited_both_ways_and_powers_one_way():
-    """In the program's bounds, and in what a replay tells: a gait in a mirror needs the same torques the other way round."""
+    """In the program's bounds, and in what a replay tells: a gait in a mirror needs the same
+    torques the other way round."""
     np.testing.assert_array_equal(ONE.least, [-1.0, -1.0, -np.inf, -np.inf])
-    program = transcribe(control_problem(Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6)))
+    program = transcribe(
+        control_problem(
+            Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6)
+        )
+    )
     rows = program.groups[ACTUATORS]
     assert set(program.constraint_upper[rows]) == {1.0}
     assert sorted(set(program.constraint_lower[rows])) == [-np.inf, -1.0]
@@ -46,7 +59,11 @@ def test_torques_are_limited_both_ways_and_powers_one_way():
     t = np.arange(400) / 400
     at = LAW, gait.angles(t), gait.rates(t)
     signed = joint_moments(BODY, LAW, at[1], BODY.forces(*at, BODY.solve(*at, 1e-2).z, 1e-2), 1e-2)
-    assert np.abs(signed.max(axis=1) + signed.min(axis=1)).max() > 0.01  # which is what makes a difference here
-    found, other = (replay(BODY, LAW, each, 1e-2, instants=400, limits=ONE, tolerance=1e-4).shares for each in (gait, mirrored))
+    # which is what makes a difference here
+    assert np.abs(signed.max(axis=1) + signed.min(axis=1)).max() > 0.01
+    found, other = (
+        replay(BODY, LAW, each, 1e-2, instants=400, limits=ONE, tolerance=1e-4).shares
+        for each in (gait, mirrored)
+    )
     np.testing.assert_allclose(found, other, rtol=1e-9)
     np.testing.assert_allclose(found[:2], np.abs(signed).max(axis=1), rtol=1e-2)

@@ -1,4 +1,5 @@
-"""The balance of a chain under an outside force at its centre of mass: against a quadrature of its own, and physics."""
+"""The balance of a chain under an outside force at its centre of mass: against a quadrature of its
+own, and physics."""
 
 import numpy as np
 import pytest
@@ -6,7 +7,18 @@ from scipy.optimize import least_squares
 from shared.instants import random_instants
 from shared.loaded_chain import left_over, lying, standing
 
-from colloc import Chain, Elliptic, Foot, Friction, OwnLaw, PowerLaw, ProblemError, Viscous, Wheel, solve_balance
+from colloc import (
+    Chain,
+    Elliptic,
+    Foot,
+    Friction,
+    OwnLaw,
+    PowerLaw,
+    ProblemError,
+    Viscous,
+    Wheel,
+    solve_balance,
+)
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
@@ -16,7 +28,8 @@ from tests.shared.laws import coulomb
 BODY = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 ON_FEET = Chain(
     (0.2, 0.5, 0.3), masses=(0.3, 0.3, 0.4),
-    feet=(Wheel(0, 0.2, rolling=0.5, weight=0.3), Foot(1, 0.6, 0.1, 0.05), Foot(1, 0.6, 0.1, -0.05), Foot(2, 0.9, 0.5)),
+    feet=(Wheel(0, 0.2, rolling=0.5, weight=0.3), Foot(1, 0.6, 0.1, 0.05), Foot(1, 0.6, 0.1,
+    -0.05), Foot(2, 0.9, 0.5)),
 )  # fmt: skip
 HELD = {BODY: 1.0, ON_FEET: 0.4}
 """What friction of coefficient 1 holds in every shape, about."""
@@ -47,20 +60,32 @@ def test_the_velocities_are_those_of_a_program_of_points(mu, body):
     points = standing(body.feet, mu) if body.feet else lying(body.weights, mu)
     solved = solve_balance(body, coulomb(*mu), angles, rates, delta, load=load).require()
     for t in range(12):
-        at = body.lengths, body.mass_column()[:, 0], points, angles[:, t], rates[:, t], load[:, t], delta
+        at = (
+            body.lengths,
+            body.mass_column()[:, 0],
+            points,
+            angles[:, t],
+            rates[:, t],
+            load[:, t],
+            delta,
+        )
         theirs = least_squares(left_over, np.zeros(3), args=at, xtol=1e-14, ftol=1e-14, gtol=1e-14)
         assert np.abs(theirs.fun).max() < 1e-9
         np.testing.assert_allclose(solved.z[:, t], theirs.x, atol=1e-6)
 
 
-@pytest.mark.parametrize("law", [*LAWS, Viscous(normal=2, tangential=1), PowerLaw(0.5)], ids=lambda law: law.label)
+@pytest.mark.parametrize(
+    "law", [*LAWS, Viscous(normal=2, tangential=1), PowerLaw(0.5)], ids=lambda law: law.label
+)
 @pytest.mark.parametrize("size", [0.3, 0.95])
 def test_joints_do_the_work_of_friction_less_that_of_the_load(law, size):
     angles, rates = random_instants(60)
     load = random_loads(60, size)
     solved = solve_balance(BODY, law, angles, rates, 1e-5, load=load).require()
     now = chain_motion(BODY, law, angles, rates, 1e-5, solved, load)
-    np.testing.assert_allclose(now.actuator_power, now.power - (load * now.centre).sum(axis=0), atol=1e-9)
+    np.testing.assert_allclose(
+        now.actuator_power, now.power - (load * now.centre).sum(axis=0), atol=1e-9
+    )
     own = Instants(BODY, law, angles, rates, 1e-5, z=now.z, load=load).power
     np.testing.assert_allclose(own.sum(axis=0), now.actuator_power, atol=1e-9)
     assert (now.power >= 0).all()
@@ -85,8 +110,12 @@ def test_slopes_along_shapes_rates_and_load_are_the_limit_of_differences(law, bo
     smooth = (body.slowness(law, angles, rates, delta, motion.z) > 1e-3).all(axis=0)
     assert smooth.mean() > 0.7
     for k in range(6):
-        there, back = (rows(moved(y + side * step * np.eye(6)[:, k : k + 1])[0]) for side in (1, -1))
-        np.testing.assert_allclose(slopes[:, k, smooth], ((there - back) / (2 * step))[:, smooth], atol=2e-6)
+        there, back = (
+            rows(moved(y + side * step * np.eye(6)[:, k : k + 1])[0]) for side in (1, -1)
+        )
+        np.testing.assert_allclose(
+            slopes[:, k, smooth], ((there - back) / (2 * step))[:, smooth], atol=2e-6
+        )
 
 
 @pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
@@ -110,7 +139,10 @@ def test_compiled_balances_and_slopes_are_those_of_numpy(body, law):
 
 def test_no_load_is_a_load_of_nothing():
     angles, rates = random_instants(50)
-    plain, loaded = (solve_balance(BODY, LAWS[1], angles, rates, 1e-4, load=load) for load in (None, np.zeros((2, 50))))
+    plain, loaded = (
+        solve_balance(BODY, LAWS[1], angles, rates, 1e-4, load=load)
+        for load in (None, np.zeros((2, 50)))
+    )
     np.testing.assert_array_equal(plain.z, loaded.z)
 
 
@@ -130,7 +162,9 @@ def test_a_load_beyond_friction_is_not_balanced():
     angles, rates = random_instants(6)
     for law in (Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)):
         load = random_loads(6, 1.01 * law.largest)
-        assert not solve_balance(BODY, law, angles, rates, 1e-3, load=load, max_iterations=50).converged.any()
+        assert not solve_balance(
+            BODY, law, angles, rates, 1e-3, load=load, max_iterations=50
+        ).converged.any()
 
 
 @pytest.mark.parametrize("load", [np.ones((3, 5)), np.full((2, 5), np.nan), "x"])
@@ -148,7 +182,9 @@ def test_all_motions_under_a_load_are_balanced_and_counted_by_their_signs():
     assert found.complete.all()
     for z, sign in zip(found.z, found.sign, strict=True):
         at = np.flatnonzero(sign)
-        stays = solve_balance(Chain(), law, angles[:, at], rates[:, at], 1e-4, load=load[:, at], start=z[:, at])
+        stays = solve_balance(
+            Chain(), law, angles[:, at], rates[:, at], 1e-4, load=load[:, at], start=z[:, at]
+        )
         np.testing.assert_allclose(stays.z, z[:, at], atol=1e-6)
 
 

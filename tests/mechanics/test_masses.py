@@ -1,4 +1,5 @@
-"""Masses that are not spread like the lengths: kinetic energy, and the joints' power that goes into it."""
+"""Masses that are not spread like the lengths: kinetic energy, and the joints' power that goes into
+it."""
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ BODY = Chain(LENGTHS, masses=MASSES, inertias=INERTIAS)
 
 
 def energy(angles, rates, z):
-    """Kinetic energy of rigid links with these masses, by complex numbers; all arguments of one instant."""
+    """Kinetic energy of rigid links with these masses, by complex numbers; all arguments of one
+    instant."""
     phi, spin = np.cumsum([0.0, *angles]), z[2] + np.cumsum([0.0, *rates])
     links = np.array(LENGTHS) * np.exp(1j * phi)
     starts = z[0] + 1j * z[1] + np.concatenate([[0.0], np.cumsum(1j * spin * links)[:-1]])
@@ -28,23 +30,38 @@ def test_kinetic_energy_weighs_every_link_by_its_mass(seed):
 
 
 def test_a_head_that_swings_alone_has_the_energy_of_its_own_mass():
-    swings = kinetic_energy(BODY, np.array([[0.4], [-0.3]]), np.array([[0.0], [2.0]]), np.zeros((3, 1)))
+    swings = kinetic_energy(
+        BODY, np.array([[0.4], [-0.3]]), np.array([[0.0], [2.0]]), np.zeros((3, 1))
+    )
     assert swings.item() == pytest.approx(0.5 * (0.1 * 0.125**2 + 0.0009) * 4, rel=1e-12)
 
 
 def test_what_joints_do_beyond_friction_is_the_growth_of_kinetic_energy():
-    """From the start of a period to any phase of it: work of the joints = work against friction + Fr times what E grows by."""
+    """From the start of a period to any phase of it: work of the joints = work against friction +
+    Fr times what E grows by."""
     froude = 0.3
     problem = Problem(
-        "heavy_tail", body=BODY, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), froude=froude, delta=1e-2
+        "heavy_tail",
+        body=BODY,
+        friction=Friction(mu_t=2, mu_f=1, mu_b=1),
+        gait=Harmonic(1),
+        froude=froude,
+        delta=1e-2,
     )
     solution = evaluate(problem.with_(mesh_tolerance=1e-4), ellipse(0.2, 0.9, 0.8))
     robot = solution.robot(length=1.0, mass=1.0, period=(1 / (9.81 * froude)) ** 0.5)
     t = np.linspace(0, 1, 2001)
     motion = solution.sample(t)
-    beyond = (robot.torques(t) / robot.torque_unit * motion.rates).sum(axis=0) - solution.power(motion)
+    beyond = (robot.torques(t) / robot.torque_unit * motion.rates).sum(axis=0) - solution.power(
+        motion
+    )
     gained = np.concatenate([[0.0], np.cumsum(0.5 * (beyond[1:] + beyond[:-1]) * np.diff(t))])
-    growth = np.array([energy(*instant) for instant in zip(motion.angles.T, motion.rates.T, motion.z.T, strict=True)])
+    growth = np.array(
+        [
+            energy(*instant)
+            for instant in zip(motion.angles.T, motion.rates.T, motion.z.T, strict=True)
+        ]
+    )
     growth = froude * (growth - growth[0])
     assert np.ptp(growth) > 0.03 * solution.work
     np.testing.assert_allclose(gained, growth, rtol=0, atol=1e-2 * np.ptp(growth))

@@ -1,4 +1,5 @@
-"""The compiled kernel: the same bits on any number of threads and in any batch; whatever is wrong with it costs speed only."""
+"""The compiled kernel: the same bits on any number of threads and in any batch; whatever is wrong
+with it costs speed only."""
 
 import shutil
 import subprocess
@@ -33,7 +34,15 @@ def fresh(monkeypatch):
 
 
 def fields(solution):
-    return np.vstack([solution.z, solution.residual, solution.iterations, solution.anchor, solution.anchor_velocity])
+    return np.vstack(
+        [
+            solution.z,
+            solution.residual,
+            solution.iterations,
+            solution.anchor,
+            solution.anchor_velocity,
+        ]
+    )
 
 
 @needs_kernel
@@ -46,7 +55,9 @@ def test_an_instant_has_the_same_bits_on_repetition_on_threads_and_in_any_batch(
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     np.testing.assert_array_equal(fields(solve_balance(Chain(), law, angles, rates, 1e-5)), once)
     few = slice(4321, 4371)
-    np.testing.assert_array_equal(fields(solve_balance(Chain(), law, angles[:, few], rates[:, few], 1e-5)), once[:, few])
+    np.testing.assert_array_equal(
+        fields(solve_balance(Chain(), law, angles[:, few], rates[:, few], 1e-5)), once[:, few]
+    )
 
 
 @needs_kernel
@@ -54,7 +65,12 @@ def test_views_with_any_strides_are_read_right():
     angles, rates = random_instants(40)
     whole = solve_balance(Chain(), Friction(), angles, rates, 1e-3)
     backwards = solve_balance(
-        Chain(), Friction(), angles[:, ::-1], np.asfortranarray(rates[:, ::-1]), 1e-3, start=whole.z[:, ::-1]
+        Chain(),
+        Friction(),
+        angles[:, ::-1],
+        np.asfortranarray(rates[:, ::-1]),
+        1e-3,
+        start=whole.z[:, ::-1],
     )
     np.testing.assert_allclose(backwards.z[:, ::-1], whole.z, rtol=0, atol=1e-9)
 
@@ -66,12 +82,19 @@ def test_threads_are_those_asked_for(monkeypatch):
     assert available_threads() >= 1
 
 
-@pytest.mark.skipif(native_kernel_module.built_kernel(Path(str(native_kernel_module.SOURCES))) is None, reason="not built")
+@pytest.mark.skipif(
+    native_kernel_module.built_kernel(Path(str(native_kernel_module.SOURCES))) is None,
+    reason="not built",
+)
 def test_a_clone_that_was_not_built_uses_the_kernel_that_was_installed(fresh):
     """As `python -m colloc.solve` does in a clone, after an installation from it."""
     built = Path(find_spec("colloc.mechanics._kernel").origin)
     fresh.setattr(native_kernel_module, "find_spec", lambda name: None)
-    fresh.setattr(metadata, "distributions", lambda name: [SimpleNamespace(locate_file=lambda folder: built.parent)])
+    fresh.setattr(
+        metadata,
+        "distributions",
+        lambda name: [SimpleNamespace(locate_file=lambda folder: built.parent)],
+    )
     assert native_kernel() is not None
 
 
@@ -85,7 +108,9 @@ def test_without_a_kernel_of_its_own_sources_numpy_gives_the_answer(fresh, tmp_p
     with pytest.warns(SlowWarning, match="by NumPy.*not built, or its sources changed since"):
         assert native_kernel() is None
     assert native_kernel() is None  # said once
-    np.testing.assert_allclose(solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z, known, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z, known, rtol=0, atol=1e-9
+    )
 
 
 def test_solving_a_balance_loads_neither_casadi_nor_matplotlib():

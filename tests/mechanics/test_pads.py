@@ -1,4 +1,5 @@
-"""Pads: even pressure between two places of a link, held against many points, the line that it generalises, and identities."""
+"""Pads: even pressure between two places of a link, held against many points, the line that it
+generalises, and identities."""
 
 import casadi as ca
 import numpy as np
@@ -6,18 +7,41 @@ import pytest
 from shared.instants import random_instants
 from shared.kernels import by_both
 
-from colloc import Chain, Elliptic, Foot, Friction, OwnLaw, Pad, PowerLaw, Problem, ProblemError, Viscous, Wheel, solve_balance
+from colloc import (
+    Chain,
+    Elliptic,
+    Foot,
+    Friction,
+    OwnLaw,
+    Pad,
+    PowerLaw,
+    Problem,
+    ProblemError,
+    Viscous,
+    Wheel,
+    solve_balance,
+)
 from colloc.mechanics.native_kernel import native_kernel
 
 LENGTHS = (0.3, 0.45, 0.25)
 WEIGHTS = (0.2, 0.5, 0.3)
-PADS = (Pad(0, 0.1, 0.6), Pad(1, 0.2, 0.5, offset=0.05), Pad(1, 0.2, 0.5, offset=-0.05), Pad(2, 0.0, 1.0))
+PADS = (
+    Pad(0, 0.1, 0.6),
+    Pad(1, 0.2, 0.5, offset=0.05),
+    Pad(1, 0.2, 0.5, offset=-0.05),
+    Pad(2, 0.0, 1.0),
+)
 OWN = (
     Pad(0, 0.1, 0.6, friction=Elliptic(mu_t=2, mu_f=1, mu_b=1.5)),
     Pad(1),
     Pad(2, 0.4, 0.5, friction=Friction(mu_t=0.5, mu_f=1, mu_b=2)),
 )
-MIXED = (Foot(0), Pad(1, 0.3, 0.9), Wheel(1, 0.1, rolling=0.2), Pad(2, 0.0, 0.2, friction=Friction(mu_t=0.5, mu_f=1, mu_b=2)))
+MIXED = (
+    Foot(0),
+    Pad(1, 0.3, 0.9),
+    Wheel(1, 0.1, rolling=0.2),
+    Pad(2, 0.0, 0.2, friction=Friction(mu_t=0.5, mu_f=1, mu_b=2)),
+)
 STANDS = {"pads": PADS, "own": OWN, "mixed": MIXED}
 LAWS = [
     Friction(),
@@ -31,7 +55,8 @@ names = {"ids": lambda law: type(law).__name__ + str(law.associated)}
 
 
 def dense_wrench(body, law, angles, rates, z, delta, count=4000):
-    """Net force and torque about the tail, and power: sums over points in the lab, by complex numbers."""
+    """Net force and torque about the tail, and power: sums over points in the lab, by complex
+    numbers."""
     phi, w = np.cumsum([0.0, *angles]), z[2] + np.cumsum([0.0, *rates])
     step = np.array(body.lengths) * np.exp(1j * phi)
     starts = np.concatenate([[0.0], np.cumsum(step)[:-1]])
@@ -41,11 +66,17 @@ def dense_wrench(body, law, angles, rates, z, delta, count=4000):
         many = count if part.extent else 1
         place = part.place + part.extent * ((np.arange(many) + 0.5) / many - 0.5)
         arm = step[part.link] * place + 1j * part.offset * np.exp(1j * phi[part.link])
-        velocity, turn = moves[part.link] + 1j * w[part.link] * arm, np.exp(1j * (phi[part.link] + part.angle))
+        velocity, turn = (
+            moves[part.link] + 1j * w[part.link] * arm,
+            np.exp(1j * (phi[part.link] + part.angle)),
+        )
         own = velocity / turn
         fs, fn = (part.friction or law).density(own.real[None], own.imag[None], np.array([[delta]]))
         force = part.weight / many * (fs[0] + 1j * fn[0]) * turn
-        net, torque = net + force.sum(), torque + ((starts[part.link] + arm).conj() * force).imag.sum()
+        net, torque = (
+            net + force.sum(),
+            torque + ((starts[part.link] + arm).conj() * force).imag.sum(),
+        )
         power -= (force * velocity.conj()).real.sum()
     return np.array([net.real, net.imag, torque]), power
 
@@ -64,7 +95,11 @@ def test_a_pad_is_many_points(law, feet):
 
 @pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
 def test_the_balance_on_pads_is_one_for_many_points(feet):
-    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), random_instants(8)
+    body, law, (angles, rates) = (
+        Chain(LENGTHS, feet=feet),
+        Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+        random_instants(8),
+    )
     z = solve_balance(body, law, angles, rates, 1e-2).require().z
     for k in range(8):
         net, _ = dense_wrench(body, law, angles[:, k], rates[:, k], z[:, k], 1e-2)
@@ -83,7 +118,10 @@ def test_pads_from_end_to_end_are_the_line(law, weights):
     np.testing.assert_allclose(pads.forces(*at, 0.1), line.forces(*at, 0.1), rtol=1e-14, atol=1e-15)
     np.testing.assert_allclose(pads.largest_forces(law), line.largest_forces(law), rtol=1e-14)
     np.testing.assert_allclose(
-        solve_balance(pads, law, angles, rates, 1e-3).z, solve_balance(line, law, angles, rates, 1e-3).z, rtol=1e-12, atol=1e-14
+        solve_balance(pads, law, angles, rates, 1e-3).z,
+        solve_balance(line, law, angles, rates, 1e-3).z,
+        rtol=1e-12,
+        atol=1e-14,
     )
 
 
@@ -93,10 +131,14 @@ def test_two_halves_of_a_pad_are_the_whole(law):
     (angles, rates), z = random_instants(20), np.random.default_rng(1).normal(size=(3, 20))
     whole = Chain(LENGTHS, feet=tuple(Pad(link, 0.1, 0.9) for link in range(3)))
     cut = tuple(
-        Pad(k, *ends, weight=LENGTHS[k] * (ends[1] - ends[0]) / 0.8) for k in range(3) for ends in ((0.1, 0.4), (0.4, 0.9))
+        Pad(k, *ends, weight=LENGTHS[k] * (ends[1] - ends[0]) / 0.8)
+        for k in range(3)
+        for ends in ((0.1, 0.4), (0.4, 0.9))
     )
     for own, known in zip(
-        Chain(LENGTHS, feet=cut).sliding(law, angles, rates, z, 0.1), whole.sliding(law, angles, rates, z, 0.1), strict=True
+        Chain(LENGTHS, feet=cut).sliding(law, angles, rates, z, 0.1),
+        whole.sliding(law, angles, rates, z, 0.1),
+        strict=True,
     ):
         np.testing.assert_allclose(own, known, rtol=1e-8, atol=1e-9)
 
@@ -104,7 +146,11 @@ def test_two_halves_of_a_pad_are_the_whole(law):
 @pytest.mark.parametrize("law", [law for law in LAWS if not isinstance(law, Viscous)], **names)
 def test_a_short_pad_tends_to_a_foot_like_its_length_squared(law):
     (angles, rates), z = random_instants(20), np.random.default_rng(1).normal(size=(3, 20))
-    foot = Chain(LENGTHS, feet=tuple(Foot(link, 0.4) for link in range(3))).sliding(law, angles, rates, z, 0.3).force
+    foot = (
+        Chain(LENGTHS, feet=tuple(Foot(link, 0.4) for link in range(3)))
+        .sliding(law, angles, rates, z, 0.3)
+        .force
+    )
     errors = []
     for half in (0.2, 0.1, 0.05, 0.025):
         pads = Chain(LENGTHS, feet=tuple(Pad(link, 0.4 - half, 0.4 + half) for link in range(3)))
@@ -117,13 +163,25 @@ def test_a_short_pad_tends_to_a_foot_like_its_length_squared(law):
 def test_casadi_says_the_same_of_pads(law, feet):
     body, (angles, rates) = Chain(LENGTHS, feet=feet), random_instants(1)
     rng = np.random.default_rng(3)
-    given = angles, rates, rng.normal(size=(3, 1)), rng.normal(size=(len(body.force_names), 1)), np.array([[0.01]])
+    given = (
+        angles,
+        rates,
+        rng.normal(size=(3, 1)),
+        rng.normal(size=(len(body.force_names), 1)),
+        np.array([[0.01]]),
+    )
     symbols = [ca.SX.sym("x", len(part)) for part in given]
 
     def said(q, r, z, f, delta):
-        return [*body.with_forces(law, q, r, z, f, delta), *body.sliding(law, q, r, z, delta), body.forces(law, q, r, z, delta)]
+        return [
+            *body.with_forces(law, q, r, z, f, delta),
+            *body.sliding(law, q, r, z, delta),
+            body.forces(law, q, r, z, delta),
+        ]
 
-    for own, theirs in zip(ca.Function("f", symbols, said(*symbols))(*given), said(*given), strict=True):
+    for own, theirs in zip(
+        ca.Function("f", symbols, said(*symbols))(*given), said(*given), strict=True
+    ):
         np.testing.assert_allclose(np.array(own), theirs, rtol=1e-11, atol=1e-13)
 
 

@@ -1,4 +1,5 @@
-"""All balanced velocities at an instant: one for equal coefficients, several for some instants of others."""
+"""All balanced velocities at an instant: one for equal coefficients, several for some instants of
+others."""
 
 import mpmath as mp
 import numpy as np
@@ -56,7 +57,9 @@ def test_each_of_them_is_a_root_of_the_reference_in_forty_digits():
         vs, vn, w = (float(part[1, 0]) for part in link)
         c, s = (float(part[1, 0]) for part in posture[:2])
         start = (vs * c - vn * s, vs * s + vn * c, w)
-        root = balanced_velocity(body.lengths, coefficients, PRINTED[0][:, 0], PRINTED[1][:, 0], 1e-4, 1, start)
+        root = balanced_velocity(
+            body.lengths, coefficients, PRINTED[0][:, 0], PRINTED[1][:, 0], 1e-4, 1, start
+        )
         assert max(abs(mp.mpf(a) - b) for a, b in zip(start, root, strict=True)) < 1e-8
 
 
@@ -109,9 +112,13 @@ def test_links_at_rest_find_at_least_what_hundreds_of_random_starts_find():
 
 def test_numpy_finds_the_same_as_the_compiled_solver():
     angles, rates = (np.tile(a, 2) for a in PRINTED)
-    compiled = all_balanced_velocities(Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4)
+    compiled = all_balanced_velocities(
+        Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4
+    )
     with numpy_instead():
-        found = all_balanced_velocities(Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4)
+        found = all_balanced_velocities(
+            Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4
+        )
     np.testing.assert_allclose(np.sort(found.z, axis=0), np.sort(compiled.z, axis=0), atol=1e-7)
 
 

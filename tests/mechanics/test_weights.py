@@ -6,7 +6,19 @@ from shared.instants import random_instants
 from shared.kernels import by_both
 
 from benchmarks.independent_replay import Crawler, played
-from colloc import Chain, Elliptic, Friction, OwnLaw, PowerLaw, Problem, ProblemError, load, replay, save, solve_balance
+from colloc import (
+    Chain,
+    Elliptic,
+    Friction,
+    OwnLaw,
+    PowerLaw,
+    Problem,
+    ProblemError,
+    load,
+    replay,
+    save,
+    solve_balance,
+)
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Fourier, Harmonic
@@ -34,7 +46,10 @@ def test_friction_on_a_link_is_in_proportion_to_its_weight():
     angles, rates = random_instants(20)
     z = np.random.default_rng(1).normal(size=(3, 20))
     for law in (*LAWS, PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")):
-        plain, heavy = (instant(Chain(LENGTHS, weights=w), law, angles, rates, z, 1e-3).force for w in ((), WEIGHTS))
+        plain, heavy = (
+            instant(Chain(LENGTHS, weights=w), law, angles, rates, z, 1e-3).force
+            for w in ((), WEIGHTS)
+        )
         for own, more in zip(plain, heavy, strict=True):
             np.testing.assert_allclose(more, own * np.divide(WEIGHTS, LENGTHS)[:, None], rtol=1e-14)
 
@@ -74,7 +89,11 @@ def test_compiled_balances_and_slopes_are_those_of_numpy(law):
 
 
 def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced():
-    body, law, (angles, rates) = Chain(LENGTHS, weights=WEIGHTS), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), random_instants(40)
+    body, law, (angles, rates) = (
+        Chain(LENGTHS, weights=WEIGHTS),
+        Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+        random_instants(40),
+    )
     solved = solve_balance(body, law, angles, rates, 1e-3)
     forces = body.forces(law, angles, rates, solved.z, 1e-3)
     lifted = body.with_forces(law, angles, rates, solved.z, forces, 1e-3)
@@ -86,9 +105,17 @@ def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced(
 
 
 @pytest.mark.parametrize("mu", [(1, 1, 3), (1, 3, 1), (3, 1, 2)], ids=str)
-def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_themselves_or_turn_about_an_end(mu):
-    """A straight body that slides as a whole, forwards, backwards and sideways; couples by a turn about a link's own end."""
-    body, law, straight, delta = Chain(LENGTHS, weights=WEIGHTS), coulomb(*mu), np.zeros((2, 3)), 1e-9
+def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_themselves_or_turn_about_an_end(
+    mu,
+):
+    """A straight body that slides as a whole, forwards, backwards and sideways; couples by a turn
+    about a link's own end."""
+    body, law, straight, delta = (
+        Chain(LENGTHS, weights=WEIGHTS),
+        coulomb(*mu),
+        np.zeros((2, 3)),
+        1e-9,
+    )
     most = body.largest_forces(law).ravel()
     along, across, couples = np.split(most, 3)
     ways = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
@@ -96,8 +123,17 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_them
     np.testing.assert_allclose(found[:3, :2].max(axis=1), along)
     np.testing.assert_allclose(found[3:6, 2], across)
     np.testing.assert_allclose(along, max(mu[1:]) * np.array(WEIGHTS))
-    # a link that turns about its middle pushes back alike on both halves: the couple is that of half its weight a quarter away
-    spinning = np.abs(body.forces(law, straight[:, :1], np.zeros((2, 1)), np.array([[0.0], [-LENGTHS[0] / 2], [1.0]]), delta))
+    # a link that turns about its middle pushes back alike on both halves: the couple is that of
+    # half its weight a quarter away
+    spinning = np.abs(
+        body.forces(
+            law,
+            straight[:, :1],
+            np.zeros((2, 1)),
+            np.array([[0.0], [-LENGTHS[0] / 2], [1.0]]),
+            delta,
+        )
+    )
     assert spinning[6, 0] == pytest.approx(couples[0])
     angles, rates = random_instants(200)
     z = np.random.default_rng(1).normal(size=(3, 200))
@@ -106,7 +142,12 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_them
 
 def test_the_replay_is_that_of_a_program_of_its_own():
     gait = Fourier([0.2, -0.1], [[1.2], [0.3]], [[0.2], [1.0]])
-    theirs = played(Crawler(LENGTHS, (1.7, 1.0, 1.3), WEIGHTS), lambda t: (gait.angles(t), gait.rates(t)), 1e-2, 1e-5)
+    theirs = played(
+        Crawler(LENGTHS, (1.7, 1.0, 1.3), WEIGHTS),
+        lambda t: (gait.angles(t), gait.rates(t)),
+        1e-2,
+        1e-5,
+    )
     ours = replay(Chain(LENGTHS, weights=WEIGHTS), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait, 1e-2)
     assert ours.work == pytest.approx(theirs.work, rel=1e-4)
     assert ours.distance == pytest.approx(theirs.distance, rel=1e-4)
@@ -122,7 +163,9 @@ def test_lengths_and_weights_are_parts_of_one_body(off):
 
 
 def test_a_problem_with_weights_is_solved_certified_and_kept(tmp_path):
-    problem = Problem("heavy_ends", body=Chain(weights=(0.4, 0.2, 0.4)), gait=Harmonic(1, "bilateral"))
+    problem = Problem(
+        "heavy_ends", body=Chain(weights=(0.4, 0.2, 0.4)), gait=Harmonic(1, "bilateral")
+    )
     found = solve(problem, 1)
     assert found.status == "solved"
     assert found.answer.program == "full"
@@ -135,14 +178,24 @@ def test_a_problem_with_weights_is_solved_certified_and_kept(tmp_path):
 
 
 def test_a_bound_knows_the_weights_or_refuses():
-    heavy, budget = Chain(weights=(0.4, 0.2, 0.4)), Budget(intervals=4, shapes=6, directions=12, rounds=2)
+    heavy, budget = (
+        Chain(weights=(0.4, 0.2, 0.4)),
+        Budget(intervals=4, shapes=6, directions=12, rounds=2),
+    )
     plain, other = (efficiency_bound(body, Friction(), budget=budget) for body in (Chain(), heavy))
     assert abs(plain.sampled - other.sampled) > 1e-3
     with pytest.raises(ProblemError, match="weights"):
-        certify(Domain(heavy, Friction(), np.pi), other.potential_space(heavy), np.array(other.coefficients), 0.6)
+        certify(
+            Domain(heavy, Friction(), np.pi),
+            other.potential_space(heavy),
+            np.array(other.coefficients),
+            0.6,
+        )
 
 
-@pytest.mark.parametrize("weights", [(1.0,), (0.5, 0.5, 0.5), (0.5, 0.5, 0.0), (0.5, 0.5, "x"), (np.nan, 0.5, 0.5), 3.0])
+@pytest.mark.parametrize(
+    "weights", [(1.0,), (0.5, 0.5, 0.5), (0.5, 0.5, 0.0), (0.5, 0.5, "x"), (np.nan, 0.5, 0.5), 3.0]
+)
 def test_unusable_weights_are_named(weights):
     with pytest.raises(ProblemError, match=r"body\.weights"):
         Chain(weights=weights)
@@ -163,7 +216,8 @@ def test_masses_that_are_the_weights_are_no_masses():
 
 @pytest.mark.parametrize("law", LAWS)
 def test_masses_move_the_centre_and_nothing_else_of_a_slow_body(law):
-    """The balance is that of the weights; the centre of mass is a mean with the masses, and so is its velocity."""
+    """The balance is that of the weights; the centre of mass is a mean with the masses, and so is
+    its velocity."""
     plain, heavy = Chain(LENGTHS, weights=WEIGHTS), Chain(LENGTHS, weights=WEIGHTS, masses=MASSES)
     angles, rates = random_instants(30)
     solved = solve_balance(plain, law, angles, rates, 1e-4)
@@ -191,7 +245,9 @@ def test_the_weight_of_a_mass_pulls_where_it_is():
     with numpy_instead():
         known, reference = chain_slopes(body, law, angles, rates, 1e-3, solved, load)
     np.testing.assert_allclose(motion.actuator_power, known.actuator_power, atol=1e-9)
-    np.testing.assert_allclose(slopes / np.abs(reference).max(), reference / np.abs(reference).max(), atol=1e-9)
+    np.testing.assert_allclose(
+        slopes / np.abs(reference).max(), reference / np.abs(reference).max(), atol=1e-9
+    )
 
 
 def test_a_body_with_masses_says_so_and_how_it_leans():

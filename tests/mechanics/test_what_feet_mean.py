@@ -1,4 +1,5 @@
-"""What the numbers of feet mean: shares of weight beside each other, turned feet, offsets from either end, laws backwards."""
+"""What the numbers of feet mean: shares of weight beside each other, turned feet, offsets from
+either end, laws backwards."""
 
 import numpy as np
 import pytest
@@ -17,7 +18,14 @@ def rows(feet):
 
 
 def test_a_foot_without_a_weight_bears_what_the_others_of_its_link_leave_in_equal_parts():
-    feet = (Foot(0, 0.1, weight=0.06), Foot(0, 0.5), Foot(0, 0.9), Foot(1), Foot(2, 0.2), Foot(2, 0.8, weight=0.05))
+    feet = (
+        Foot(0, 0.1, weight=0.06),
+        Foot(0, 0.5),
+        Foot(0, 0.9),
+        Foot(1),
+        Foot(2, 0.2),
+        Foot(2, 0.8, weight=0.05),
+    )
     body = Chain(LENGTHS, feet=feet)
     assert [foot.weight for foot in body.feet] == pytest.approx([0.06, 0.12, 0.12, 0.45, 0.2, 0.05])
 
@@ -32,17 +40,30 @@ def test_feet_may_bear_all_of_a_link_only_if_each_says_what():
 def one_instant(body, law, motion):
     """Force on a straight body of joints at rest that moves so, along it and to its left."""
     still = np.zeros((2, 1))
-    return body.sliding(law, still, still, np.array(motion, dtype=float)[:, None], 1e-9).force[:2, 0]
+    return body.sliding(law, still, still, np.array(motion, dtype=float)[:, None], 1e-9).force[
+        :2, 0
+    ]
 
 
 @pytest.mark.parametrize("angle", [0.4, -0.4, 1.2])
 def test_a_turned_wheel_rolls_along_its_own_direction(angle):
-    """Left and right ones together go straight on: across them acts the sum of what each has across itself."""
-    feet = rows(lambda link: [Wheel(link, angle=angle, rolling=0.1, sideways=1.0), Wheel(link, angle=-angle, rolling=0.1)])
-    # a velocity straight on is cos(angle) along the wheel and sin(angle) across it, and friction acts along these components
+    """Left and right ones together go straight on: across them acts the sum of what each has across
+    itself."""
+    feet = rows(
+        lambda link: [
+            Wheel(link, angle=angle, rolling=0.1, sideways=1.0),
+            Wheel(link, angle=-angle, rolling=0.1),
+        ]
+    )
+    # a velocity straight on is cos(angle) along the wheel and sin(angle) across it, and friction
+    # acts along these components
     c, s = np.cos(angle), np.sin(angle)
-    assert one_instant(Chain(LENGTHS, feet=feet), ISOTROPIC, [1, 0, 0]) == pytest.approx([-(0.1 * c**2 + s**2), 0.0])
-    assert one_instant(Chain(LENGTHS, feet=feet), ISOTROPIC, [0, 1, 0]) == pytest.approx([0.0, -(0.1 * s**2 + c**2)])
+    assert one_instant(Chain(LENGTHS, feet=feet), ISOTROPIC, [1, 0, 0]) == pytest.approx(
+        [-(0.1 * c**2 + s**2), 0.0]
+    )
+    assert one_instant(Chain(LENGTHS, feet=feet), ISOTROPIC, [0, 1, 0]) == pytest.approx(
+        [0.0, -(0.1 * s**2 + c**2)]
+    )
 
 
 def test_forwards_of_a_foot_is_towards_the_head():
@@ -55,7 +76,9 @@ def test_forwards_of_a_foot_is_towards_the_head():
 
 def test_a_foot_turned_round_has_its_law_backwards():
     angles, rates = random_instants(10)
-    turned = Chain(LENGTHS, feet=rows(lambda link: [Foot(link, 0.3, friction=EASY_AHEAD, angle=np.pi)]))
+    turned = Chain(
+        LENGTHS, feet=rows(lambda link: [Foot(link, 0.3, friction=EASY_AHEAD, angle=np.pi)])
+    )
     back = Chain(LENGTHS, feet=rows(lambda link: [Foot(link, 0.3, friction=EASY_BACK)]))
     z = np.random.default_rng(2).normal(size=(3, 10))
     forces = [body.sliding(ISOTROPIC, angles, rates, z, 0.1).force for body in (turned, back)]
@@ -64,11 +87,17 @@ def test_a_foot_turned_round_has_its_law_backwards():
 
 def reversed_feet(feet, law):
     """Of the body named from its other end: places and offsets from there, and laws backwards."""
-    return tuple(Foot(2 - f.link, 1 - f.place, weight=f.weight, offset=-f.offset, friction=law, angle=f.angle) for f in feet)
+    return tuple(
+        Foot(
+            2 - f.link, 1 - f.place, weight=f.weight, offset=-f.offset, friction=law, angle=f.angle
+        )
+        for f in feet
+    )
 
 
 def test_a_body_named_from_its_head_moves_alike_if_its_feet_have_their_laws_backwards():
-    """Offsets change sides, and forwards is backwards: then power is the same at every instant, else it is not."""
+    """Offsets change sides, and forwards is backwards: then power is the same at every instant,
+    else it is not."""
     angles, rates = random_instants(20)
     feet = (Foot(0, 0.2, friction=EASY_AHEAD), Foot(2, 0.9, friction=EASY_AHEAD))
     even = (*feet, *(Foot(1, 0.3, offset=side * 0.08, friction=EASY_AHEAD) for side in (1, -1)))
@@ -119,6 +148,7 @@ def test_feet_with_their_own_law_balance_like_a_body_whose_law_it_is():
     own = Chain(LENGTHS, feet=rows(lambda link: [Foot(link, friction=EASY_AHEAD)]))
     theirs = Chain(LENGTHS, feet=1)
     found = [
-        solve_balance(body, law, angles, rates, 1e-2).require().z for body, law in ((own, ISOTROPIC), (theirs, EASY_AHEAD))
+        solve_balance(body, law, angles, rates, 1e-2).require().z
+        for body, law in ((own, ISOTROPIC), (theirs, EASY_AHEAD))
     ]
     np.testing.assert_allclose(*found, rtol=0, atol=1e-8)

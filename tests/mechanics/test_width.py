@@ -1,17 +1,28 @@
-"""A body with a width: which shapes it may take, by walking points along its links, and what a search makes of it."""
+"""A body with a width: which shapes it may take, by walking points along its links, and what a
+search makes of it."""
 
 import numpy as np
 import pytest
 
 from colloc import Chain, Harmonic, Problem, ProblemError, ellipse, solve
 from colloc.bounds.coulomb_motion import admissible
-from colloc.mechanics.contact import crossing_depth, ends_and_links, excess, gap, overlap, square_distance
+from colloc.mechanics.contact import (
+    crossing_depth,
+    ends_and_links,
+    excess,
+    gap,
+    overlap,
+    square_distance,
+)
 
 
 def nearest(body, angles, first, second, points=301):
-    """Distance of two links [body lengths], from points along both; exact to half the distance of two points at an end."""
+    """Distance of two links [body lengths], from points along both; exact to half the distance of
+    two points at an end."""
     ends, part = np.stack(body.joints(angles)), np.linspace(0.0, 1.0, points)
-    a, b = (ends[:, k, :, None] * (1 - part) + ends[:, k + 1, :, None] * part for k in (first, second))
+    a, b = (
+        ends[:, k, :, None] * (1 - part) + ends[:, k + 1, :, None] * part for k in (first, second)
+    )
     return np.hypot(*(a[:, :, :, None] - b[:, :, None, :])).min(axis=(1, 2))
 
 
@@ -34,7 +45,9 @@ def test_the_distance_that_a_search_sees_is_that_of_the_points_of_a_link():
     for end, link in ends_and_links(body):
         points = ends[:, link, :, None] * (1 - part) + ends[:, link + 1, :, None] * part
         naive = np.hypot(*(points - ends[:, end, :, None])).min(axis=1)
-        assert np.sqrt(square_distance(body, angles, end, link)[0]) == pytest.approx(naive, abs=0.35 / 2000)
+        assert np.sqrt(square_distance(body, angles, end, link)[0]) == pytest.approx(
+            naive, abs=0.35 / 2000
+        )
 
 
 def test_what_a_search_bounds_is_to_first_order_the_width_that_is_lacking():
@@ -44,7 +57,9 @@ def test_what_a_search_bounds_is_to_first_order_the_width_that_is_lacking():
     for end, link in ends_and_links(body):
         lacks = body.width - np.sqrt(square_distance(body, angles, end, link)[0])
         near = np.abs(lacks) < 2e-3
-        np.testing.assert_allclose(excess(body, angles, end, link)[0, near], lacks[near], atol=2e-3**2 / 0.05)
+        np.testing.assert_allclose(
+            excess(body, angles, end, link)[0, near], lacks[near], atol=2e-3**2 / 0.05
+        )
         checked += near.sum()
     assert checked > 50
 
@@ -59,7 +74,11 @@ def test_a_joint_folds_until_the_free_end_lies_beside_its_neighbour(width):
     # of unequal neighbours the shorter decides
     uneven = Chain((0.5, 0.3, 0.2), width=width * 0.9)
     last = np.pi - np.arcsin(uneven.width / 0.3)
-    assert overlap(uneven, np.array([[last - 1e-6], [0.0]]))[0] == 0 < overlap(uneven, np.array([[last + 1e-6], [0.0]]))[0]
+    assert (
+        overlap(uneven, np.array([[last - 1e-6], [0.0]]))[0]
+        == 0
+        < overlap(uneven, np.array([[last + 1e-6], [0.0]]))[0]
+    )
 
 
 def test_without_a_width_nothing_is_different():
@@ -87,7 +106,14 @@ def test_a_guess_that_overlaps_is_refused():
 
 def test_the_best_folded_gait_keeps_its_width_and_pays_for_it():
     guess, width = ellipse(A0=2.4, A1=0.3, B1=0.5), 0.03
-    problem = Problem("folded", guess, Chain(width=width), gait=Harmonic(1, "bilateral"), delta_start=1e-3, intervals=12)
+    problem = Problem(
+        "folded",
+        guess,
+        Chain(width=width),
+        gait=Harmonic(1, "bilateral"),
+        delta_start=1e-3,
+        intervals=12,
+    )
     wide = solve(problem, 1)
     assert wide.status == "solved"
     # as lines the links lie on each other, at 0.1030 (problems/three_link_folded.py)

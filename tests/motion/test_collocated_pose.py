@@ -1,4 +1,5 @@
-"""Orientation and place along a collocation mesh: a circle, the order of the scheme, derivatives, and which way a gait goes."""
+"""Orientation and place along a collocation mesh: a circle, the order of the scheme, derivatives,
+and which way a gait goes."""
 
 import numpy as np
 import pytest
@@ -40,7 +41,9 @@ def forward(t):
 @pytest.mark.parametrize(("name", "order"), [("gauss-2", 4), ("radau-2", 3), ("trapezoid", 2)])
 def test_the_place_converges_with_the_order_of_the_scheme(name, order):
     exact = pose("gauss-5", np.linspace(0, 1, 200), rate, forward).place[-1]
-    coarse, fine = (abs(pose(name, np.linspace(0, 1, n + 1), rate, forward).place[-1] - exact) for n in (8, 16))
+    coarse, fine = (
+        abs(pose(name, np.linspace(0, 1, n + 1), rate, forward).place[-1] - exact) for n in (8, 16)
+    )
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.3)
 
 
@@ -62,7 +65,10 @@ def test_the_displacement_has_the_slopes_of_differences(name):
 
     def ahead(*rates):
         turn, forwards, left = rates
-        return (CollocatedPose(mesh.scheme, mesh.h, turn, forwards + 1j * left).place[-1] * np.conj(axis)).real
+        return (
+            CollocatedPose(mesh.scheme, mesh.h, turn, forwards + 1j * left).place[-1]
+            * np.conj(axis)
+        ).real
 
     found = CollocatedPose(mesh.scheme, mesh.h, omega, x + 1j * y)
     on_theta, (on_centre,) = found.on_pose(np.array([axis]))
@@ -82,19 +88,23 @@ def test_weights_of_shared_points_add_up():
 
 
 def test_a_gait_goes_where_its_whole_period_leads():
-    """The second half of an antipodal gait is the mirror image of the first, from where that left the body."""
+    """The second half of an antipodal gait is the mirror image of the first, from where that left
+    the body."""
     displacement, rotation = 0.3 * np.exp(0.9j), 0.5
     whole = displacement + np.exp(1j * rotation) * np.conj(displacement)
     for end in (displacement, -displacement):
         sign = 1 if end == displacement else -1
-        assert np.exp(1j * heading(ANTIPODAL, end, rotation)) == pytest.approx(sign * whole / abs(whole))
+        assert np.exp(1j * heading(ANTIPODAL, end, rotation)) == pytest.approx(
+            sign * whole / abs(whole)
+        )
     for symmetry in (NONE, BILATERAL):
         assert heading(symmetry, displacement, rotation) == pytest.approx(0.9)
 
 
 @pytest.mark.parametrize("backwards", [0.0, np.pi])
 def test_orientations_along_the_travel_close_an_antipodal_gait(backwards):
-    """Seen along the travel the second half begins as the mirror image of the first, which ends there."""
+    """Seen along the travel the second half begins as the mirror image of the first, which ends
+    there."""
     rotation = 0.5
     displacement = 0.3 * np.exp(1j * (0.5 * rotation + backwards))
     first = -heading(ANTIPODAL, displacement, rotation)

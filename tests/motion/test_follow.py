@@ -1,4 +1,5 @@
-"""States followed through a period: a closed form, a jump in the rates, and what the tolerance promises."""
+"""States followed through a period: a closed form, a jump in the rates, and what the tolerance
+promises."""
 
 import threading
 import warnings
@@ -32,7 +33,8 @@ def test_three_states_are_those_of_the_closed_form_within_the_tolerance(toleranc
 
 
 def test_a_jump_of_the_rates_is_met_from_both_sides():
-    """s' = -1, then 3: asked for at 0.3 itself the later rate never counts for the earlier piece."""
+    """s' = -1, then 3: asked for at 0.3 itself the later rate never counts for the earlier
+    piece."""
     seen = []
 
     def rates(t, state, _):
@@ -41,7 +43,9 @@ def test_a_jump_of_the_rates_is_met_from_both_sides():
 
     ran = followed(rates, np.zeros(1), 1e-6, breaks=(0.3,))
     assert 0.3 not in seen
-    np.testing.assert_allclose(ran.at(np.array([0.15, 0.3, 0.65])), [[-0.15, -0.3, 0.75]], atol=1e-9)
+    np.testing.assert_allclose(
+        ran.at(np.array([0.15, 0.3, 0.65])), [[-0.15, -0.3, 0.75]], atol=1e-9
+    )
     assert ran.states[0, -1] == pytest.approx(1.8, abs=1e-9)
 
 
@@ -51,7 +55,8 @@ def test_steps_are_no_longer_than_asked():
 
 @pytest.mark.parametrize(("others", "asks"), [(True, False), (True, True), (False, False)])
 def test_where_one_method_gives_up_or_asks_without_end_another_goes_on(monkeypatch, others, asks):
-    """As where friction is far stiffer than the body is slow to move; where none goes on, a sentence says how far."""
+    """As where friction is far stiffer than the body is slow to move; where none goes on, a
+    sentence says how far."""
 
     def gives_up(*given, method, **how):
         while asks and method == "LSODA":
@@ -76,7 +81,8 @@ def test_two_threads_follow_what_one_follows_and_leave_warnings_as_they_were():
     def thread(k):
         def rates(t, state, asked):
             begun[k].set()
-            (ended if k else begun[1]).wait(0 if asked else 0.3)  # for the other one, to begin or to end
+            # for the other one, to begin or to end
+            (ended if k else begun[1]).wait(0 if asked else 0.3)
             return turning(t, state, asked)
 
         if k:

@@ -1,4 +1,5 @@
-"""Replay where the law leaves the motion open: branches followed in time, and an error that covers every choice."""
+"""Replay where the law leaves the motion open: branches followed in time, and an error that covers
+every choice."""
 
 import numpy as np
 import pytest
@@ -21,12 +22,15 @@ BODY = Chain()
 
 def random_path(seed):
     rng = np.random.default_rng(seed)
-    gait = Fourier(rng.uniform(-0.8, 0.8, 2), rng.normal(0, 0.8, (2, 2)), rng.normal(0, 0.8, (2, 2)))
+    gait = Fourier(
+        rng.uniform(-0.8, 0.8, 2), rng.normal(0, 0.8, (2, 2)), rng.normal(0, 0.8, (2, 2))
+    )
     return lambda t: (gait.angles(t), gait.rates(t))
 
 
 def step_by_step(friction, path, sense, n=2500):
-    """Efficiency of a body that goes through the period in small steps, each solved from the one before."""
+    """Efficiency of a body that goes through the period in small steps, each solved from the one
+    before."""
     t = (np.arange(n) + 0.5) / n
     angles, rates = path(t)
     z = solve_balance(BODY, friction, angles[:, :1], rates[:, :1], 1e-4).z
@@ -43,14 +47,21 @@ def step_by_step(friction, path, sense, n=2500):
 
 
 def test_equal_coefficients_leave_nothing_open():
-    forwards, backwards = (replay(BODY, Friction(), random_path(1), 1e-4, sense=s) for s in (FORWARDS, BACKWARDS))
+    forwards, backwards = (
+        replay(BODY, Friction(), random_path(1), 1e-4, sense=s) for s in (FORWARDS, BACKWARDS)
+    )
     assert forwards == backwards
     assert forwards.several == forwards.ambiguity == 0
 
 
 def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
-    """Panels count as at the worse of their ends, so a little more; and never more than all of it."""
-    friction, path, t = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(3), (np.arange(2000) + 0.5) / 2000
+    """Panels count as at the worse of their ends, so a little more; and never more than all of
+    it."""
+    friction, path, t = (
+        Friction(mu_t=100, mu_f=1, mu_b=1),
+        random_path(3),
+        (np.arange(2000) + 0.5) / 2000,
+    )
     several = (all_balanced_velocities(BODY, friction, *path(t), 1e-4).number > 1).mean()
     found = replay(BODY, friction, path, 1e-4, instants=1600, most_instants=1600)
     assert 0.02 < several <= found.several + 1e-3
@@ -71,7 +82,10 @@ def test_the_replay_follows_the_branch_in_time(sense):
 
 
 def test_velocities_solved_one_by_one_are_put_on_the_branch_that_steps_in_time_stay_on():
-    friction, (angles, rates) = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(3)(np.arange(1500) / 1500)
+    friction, (angles, rates) = (
+        Friction(mu_t=100, mu_f=1, mu_b=1),
+        random_path(3)(np.arange(1500) / 1500),
+    )
     alone = solve_balance(BODY, friction, angles, rates, 1e-4).z
     found, z = on_one_branch(BODY, friction, angles, rates, 1e-4, alone), alone[:, :1]
     walked = np.empty_like(found)
@@ -106,7 +120,8 @@ def test_where_one_motion_is_balanced_nothing_is_changed():
 
 @pytest.mark.parametrize("seed", [3, 5])
 def test_the_adaptive_motion_follows_the_branch_that_the_replay_follows(seed):
-    """Solved for one by one, instants fall on either branch, and these lie 6 % and 0.03 % apart in the efficiency."""
+    """Solved for one by one, instants fall on either branch, and these lie 6 % and 0.03 % apart in
+    the efficiency."""
     friction, path = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(seed)
     fine = fine_motion(BODY, friction, path, 1e-4, np.linspace(0, 1, 61), 1e-6)
     expected = replay(BODY, friction, path, 1e-4).efficiency
@@ -114,13 +129,16 @@ def test_the_adaptive_motion_follows_the_branch_that_the_replay_follows(seed):
 
 
 @pytest.mark.parametrize(
-    ("law", "seeds"), [((100, 1, 1), (0, 2, 3, 4)), ((10, 1, 1), (2, 3, 4)), ((1, 0.01, 100), (2, 7, 8, 12))]
+    ("law", "seeds"),
+    [((100, 1, 1), (0, 2, 3, 4)), ((10, 1, 1), (2, 3, 4)), ((1, 0.01, 100), (2, 7, 8, 12))],
 )
 def test_the_stated_error_covers_both_directions(law, seeds):
     """All of these but seeds 4 and 8 run through shapes with several motions."""
     for seed in seeds:
         forwards, backwards = (
-            replay(BODY, coulomb(*law), random_path(seed), 1e-4, instants=800, tolerance=1e-4, sense=s)
+            replay(
+                BODY, coulomb(*law), random_path(seed), 1e-4, instants=800, tolerance=1e-4, sense=s
+            )
             for s in (FORWARDS, BACKWARDS)
         )
         for known, other in ((forwards, backwards), (backwards, forwards)):

@@ -1,4 +1,5 @@
-"""Gaits with inertia on a slope: against differences, the limits slow and level, a body that sets out from rest, and files."""
+"""Gaits with inertia on a slope: against differences, the limits slow and level, a body that sets
+out from rest, and files."""
 
 import numpy as np
 import pytest
@@ -15,11 +16,21 @@ from colloc.search.spaces import space_near
 from colloc.verification.inertial_motion import inertial_motion
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[1.17], [0.12]], sin=[[0.0], [-0.91]], theta=0.7)
-BODY, FRICTION, DELTA = colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), 1e-2
+BODY, FRICTION, DELTA = (
+    colloc.Chain((0.3, 0.45, 0.25)),
+    colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3),
+    1e-2,
+)
 
 
 def problem(**fields):
-    usual = {"gait": colloc.Harmonic(1), "guess": LEANING, "grade": 0.2, "froude": 0.1, "delta": DELTA}
+    usual = {
+        "gait": colloc.Harmonic(1),
+        "guess": LEANING,
+        "grade": 0.2,
+        "froude": 0.1,
+        "delta": DELTA,
+    }
     return colloc.Problem("gliding", **({"body": BODY, "friction": FRICTION} | usual | fields))
 
 
@@ -29,7 +40,9 @@ def motion_of(stated):
 
 
 def played(grade, froude, towards=None):
-    return inertial_motion(BODY, FRICTION, LEANING, DELTA, froude, tolerance=1e-6, regime=Slope(grade, towards))
+    return inertial_motion(
+        BODY, FRICTION, LEANING, DELTA, froude, tolerance=1e-6, regime=Slope(grade, towards)
+    )
 
 
 def test_a_collocated_period_is_the_one_that_is_followed_from_instant_to_instant():
@@ -39,13 +52,17 @@ def test_a_collocated_period_is_the_one_that_is_followed_from_instant_to_instant
         assert collocated[name] == pytest.approx(followed.values[name], abs=2e-5)
 
 
-@pytest.mark.parametrize("pace", [{}, {"froude": (0.01, 0.4), "objective": "distance / (work + 0.1 * period)"}])
+@pytest.mark.parametrize(
+    "pace", [{}, {"froude": (0.01, 0.4), "objective": "distance / (work + 0.1 * period)"}]
+)
 def test_gradients_are_those_of_differences(pace):
     motion, v = motion_of(problem(towards=0.4, **pace))
     gradients, step = motion.gradients(v, DELTA), 1e-5 * np.linspace(-1.0, 1.0, v.size)
     after, before = (motion.values(v + sign * step, DELTA) for sign in (1, -1))
     for name in gradients:
-        assert gradients[name] @ step == pytest.approx(0.5 * (after[name] - before[name]), rel=1e-6, abs=1e-12)
+        assert gradients[name] @ step == pytest.approx(
+            0.5 * (after[name] - before[name]), rel=1e-6, abs=1e-12
+        )
 
 
 def test_slower_and_slower_it_is_the_slow_motion_on_a_slope_to_first_order():
@@ -74,7 +91,10 @@ def test_a_gait_is_found_and_certified_and_kept(found, tmp_path):
     assert found.status == "solved", found.message
     assert {check.name for check in found.certificate.checks} >= {"stability", "net rotation"}
     read = colloc.load(colloc.save(found, tmp_path / "gliding.h5"))
-    assert (read.problem.regime, read.certificate) == (PacedOnSlope(grade=0.05, froude=0.03), found.certificate)
+    assert (read.problem.regime, read.certificate) == (
+        PacedOnSlope(grade=0.05, froude=0.03),
+        found.certificate,
+    )
     assert read.gait.theta == found.gait.theta
 
 
@@ -89,7 +109,9 @@ def test_from_rest_a_body_comes_to_the_same_periods(found):
 @pytest.fixture(scope="module")
 def slow():
     gait = colloc.Harmonic(1, "bilateral")
-    return colloc.solve(colloc.Problem("uphill", gait=gait, delta=DELTA, grade=0.1, mesh_tolerance=3e-4), starts=1)
+    return colloc.solve(
+        colloc.Problem("uphill", gait=gait, delta=DELTA, grade=0.1, mesh_tolerance=3e-4), starts=1
+    )
 
 
 @pytest.mark.parametrize("which", ["found", pytest.param("slow", marks=pytest.mark.slow)])
@@ -100,7 +122,9 @@ def test_torques_of_a_robot_lift_its_weight_too(which, request):
     grade, cosine = solution.problem.grade, np.cos(np.arctan(solution.problem.grade))
     pace = solution.froude or 1e-6  # so slow that inertia takes nothing
     robot = solution.robot(length=1.0, mass=2.0, period=(1.0 / (9.81 * cosine * pace)) ** 0.5)
-    assert robot.facts["work_per_period_J"] == pytest.approx(2.0 * 9.81 * cosine * solution.work, rel=1e-4)
+    assert robot.facts["work_per_period_J"] == pytest.approx(
+        2.0 * 9.81 * cosine * solution.work, rel=1e-4
+    )
     x, y, z = (float(part) for part in mjcf(robot).split('gravity="')[1].split('"')[0].split())
     assert np.hypot(x, y) / abs(z) == pytest.approx(grade)
     assert np.hypot(np.hypot(x, y), z) == pytest.approx(9.81)
@@ -108,8 +132,14 @@ def test_torques_of_a_robot_lift_its_weight_too(which, request):
 
 @pytest.mark.slow
 def test_the_best_pace_uphill_is_found_and_the_gait_tells_pace_and_heading():
-    pace = {"froude": colloc.Free(0.005, 1.0), "objective": "distance / (work + 0.05 * period)", "grade": 0.1}
-    stated = colloc.Problem("paced", gait=colloc.Harmonic(1), delta=1e-3, mesh_tolerance=1e-4, **pace)
+    pace = {
+        "froude": colloc.Free(0.005, 1.0),
+        "objective": "distance / (work + 0.05 * period)",
+        "grade": 0.1,
+    }
+    stated = colloc.Problem(
+        "paced", gait=colloc.Harmonic(1), delta=1e-3, mesh_tolerance=1e-4, **pace
+    )
     found = colloc.solve(stated, starts=2)
     assert found.status == "solved", found.message
     assert 0.005 < found.froude < 1.0

@@ -1,6 +1,8 @@
-"""A kind of motion that the library does not know, in this file alone: solved, certified, kept and read like any other.
+"""A kind of motion that the library does not know, in this file alone: solved, certified, kept and
+read like any other.
 
-A body is pushed along its tail link by a constant force, as by a propeller; it crawls slowly, on the level.
+A body is pushed along its tail link by a constant force, as by a propeller; it crawls slowly, on
+the level.
 """
 
 from dataclasses import dataclass
@@ -61,11 +63,21 @@ class PushedMotion(SlowOnLevel):
         return Pushed(self._push).pull(np.zeros((1, shapes.angles.shape[1])))
 
     def along(self, mesh, shapes, begin, near=(None, None), tolerance=1e-12):
-        at, pushed = (self.body, self.friction, shapes.angles, shapes.rates, shapes.delta), self._load(shapes)
+        at, pushed = (
+            (self.body, self.friction, shapes.angles, shapes.rates, shapes.delta),
+            self._load(shapes),
+        )
         solved = solve_balance(*at, load=pushed, start=near[1], tolerance=tolerance)
         now = chain_motion(*at, solved, pushed)
         held = solved.residual < 1e3 * tolerance
-        return Along(begin, np.empty((0, held.size)), solved.z, now._replace(power=now.actuator_power), held, solved=solved)
+        return Along(
+            begin,
+            np.empty((0, held.size)),
+            solved.z,
+            now._replace(power=now.actuator_power),
+            held,
+            solved=solved,
+        )
 
     def slopes(self, shapes, along):
         at = self.body, self.friction, shapes.angles, shapes.rates, shapes.delta
@@ -85,7 +97,8 @@ def _(regime: Pushed, of):
 
 
 class Gait:
-    """Its differential equation: orientation, place, work of the joints, and friction's less the push's."""
+    """Its differential equation: orientation, place, work of the joints, and friction's less the
+    push's."""
 
     def __init__(self, body, friction, path, delta, push):
         self.at, self.path, self.delta, self.push = (body, friction), path, delta, push
@@ -99,7 +112,9 @@ class Gait:
         solved, now = self.balanced(np.array([t]), near)
         moved = np.exp(1j * state[0]) * complex(*now.centre[:, 0])
         spent = now.power[0] - self.push * now.centre[0, 0]
-        return np.array([now.z[2, 0], moved.real, moved.imag, now.actuator_power[0], spent]), solved.z
+        return np.array(
+            [now.z[2, 0], moved.real, moved.imag, now.actuator_power[0], spent]
+        ), solved.z
 
     def run(self, error):
         return followed(self.rates, np.zeros(5), error, longest=4e-3)
@@ -113,13 +128,22 @@ def _(regime: Pushed, control, gait, delta, mesh, error):
 
 @replayer.register
 def _(regime: Pushed):
-    def run(body, friction, path, delta, *, tolerance=1e-6, objective=EFFICIENCY, quantities=(), **_):
-        gait, totals = Gait(body, friction, path, delta, regime.push), whole_totals([LENGTH, *quantities], path)
+    def run(
+        body, friction, path, delta, *, tolerance=1e-6, objective=EFFICIENCY, quantities=(), **_
+    ):
+        gait, totals = (
+            Gait(body, friction, path, delta, regime.push),
+            whole_totals([LENGTH, *quantities], path),
+        )
 
         def followed_to(error):
             ran = gait.run(error)
             theta, x, y, work, _ = ran.states[:, -1]
-            return ran, {"distance": float(np.hypot(x, y)), "work": float(work), "rotation": float(theta)}
+            return ran, {
+                "distance": float(np.hypot(x, y)),
+                "work": float(work),
+                "rotation": float(theta),
+            }
 
         ran, values, errors = to_tolerance(followed_to, tolerance, objective, tolerance, totals)
         t = ran.phases % 1.0
@@ -141,7 +165,9 @@ def _(regime: Pushed):
     return run
 
 
-PROBLEM = Problem("pushed", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "antipodal"), delta=1e-2, motion=Pushed(0.1))
+PROBLEM = Problem(
+    "pushed", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "antipodal"), delta=1e-2, motion=Pushed(0.1)
+)
 
 
 @pytest.fixture

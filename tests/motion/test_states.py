@@ -1,4 +1,5 @@
-"""States on a mesh whose rates depend on them, one to three: the differential equation, the order, adjoints, symmetry."""
+"""States on a mesh whose rates depend on them, one to three: the differential equation, the order,
+adjoints, symmetry."""
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ SIZES = (1, 2, 3)
 
 
 def spring(k, push=1.0):
-    """States that are pulled to 0, unevenly and by each other, and pushed to and fro once a period."""
+    """States that are pulled to 0, unevenly and by each other, and pushed to and fro once a
+    period."""
     rng = np.random.default_rng(k)
     matrix = 2.0 * np.eye(k) + 0.5 * rng.normal(size=(k, k))
 
@@ -33,7 +35,14 @@ def on_mesh(mesh, ode):
 
 
 def followed(rates, start, t):
-    run = solve_ivp(lambda t, s: rates(np.array([t]), s[:, None])[:, 0], (0, t[-1]), start, t_eval=t, rtol=1e-11, atol=1e-12)
+    run = solve_ivp(
+        lambda t, s: rates(np.array([t]), s[:, None])[:, 0],
+        (0, t[-1]),
+        start,
+        t_eval=t,
+        rtol=1e-11,
+        atol=1e-12,
+    )
     return run.y
 
 
@@ -68,7 +77,11 @@ def test_the_adjoint_has_the_slopes_of_differences(k, free):
     mask[:1] = free and k != 2  # one told, the other free
     image = -np.eye(k) if k == 3 else None
     equations, (rates, on_states) = CollocatedStates(mesh, mask, image), spring(k)
-    weight, more, start = rng.normal(size=(k, mesh.n_point)), rng.normal(size=(k, mesh.n_point)), np.full(k, 0.2)
+    weight, more, start = (
+        rng.normal(size=(k, mesh.n_point)),
+        rng.normal(size=(k, mesh.n_point)),
+        np.full(k, 0.2),
+    )
     moved = np.where(mask, 0.0, rng.normal(size=k))
 
     def number(size):
@@ -91,11 +104,15 @@ def test_interval_by_interval_it_is_the_one_large_system(name):
     mesh, rng, k = Mesh(scheme(name), EDGES), np.random.default_rng(0), 2
     equations, n = CollocatedStates(mesh, unit=2.0), mesh.n_point
     matrix, push = rng.normal(size=(k, k, n)), rng.normal(size=(k, n))
-    integral = np.stack([equations.integrals(row.reshape(k, n))[0].ravel() for row in np.eye(k * n)], axis=1)
+    integral = np.stack(
+        [equations.integrals(row.reshape(k, n))[0].ravel() for row in np.eye(k * n)], axis=1
+    )
     jacobian = np.zeros((k, n, k, n))
     jacobian[:, range(n), :, range(n)] = np.moveaxis(matrix, -1, 0)
     whole = np.eye(k * n) - integral @ jacobian.reshape(k * n, k * n)
-    states, _, held = equations.solved(lambda s: Rates(np.einsum("abn,bn->an", matrix, s) + push, matrix), np.ones(k))
+    states, _, held = equations.solved(
+        lambda s: Rates(np.einsum("abn,bn->an", matrix, s) + push, matrix), np.ones(k)
+    )
     assert held
     np.testing.assert_allclose(whole @ states.ravel(), 1 + integral @ push.ravel(), atol=1e-10)
     of_states = rng.normal(size=(3, k, n))
@@ -108,9 +125,15 @@ def test_interval_by_interval_it_is_the_one_large_system(name):
 def test_half_a_period_and_its_image_are_the_whole():
     """Pushed the other way half a period later, odd springs do the opposite."""
     ode, image = spring(2), -np.eye(2)
-    half, whole = (Mesh(scheme("gauss-4"), np.linspace(0.0, end, n + 1)) for end, n in ((0.5, 20), (1.0, 40)))
-    first, start, held = CollocatedStates(half, np.full(2, True), image).solved(on_mesh(half, ode), np.zeros(2))
-    both, again, _ = CollocatedStates(whole, np.full(2, True)).solved(on_mesh(whole, ode), np.zeros(2))
+    half, whole = (
+        Mesh(scheme("gauss-4"), np.linspace(0.0, end, n + 1)) for end, n in ((0.5, 20), (1.0, 40))
+    )
+    first, start, held = CollocatedStates(half, np.full(2, True), image).solved(
+        on_mesh(half, ode), np.zeros(2)
+    )
+    both, again, _ = CollocatedStates(whole, np.full(2, True)).solved(
+        on_mesh(whole, ode), np.zeros(2)
+    )
     assert held
     np.testing.assert_allclose(start, again, atol=1e-11)
     np.testing.assert_allclose(np.concatenate([first, -first], axis=1), both, atol=1e-11)

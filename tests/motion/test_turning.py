@@ -1,4 +1,5 @@
-"""The distance of a gait that is asked to turn is the chord of an arc: what that means, and that every way to it agrees."""
+"""The distance of a gait that is asked to turn is the chord of an arc: what that means, and that
+every way to it agrees."""
 
 import numpy as np
 import pytest
@@ -29,11 +30,15 @@ def replayed(path=GAIT, turn=0.0):
 
 
 def on_a_dense_grid(path, n=4000):
-    """Rotation of a period and its places, by the trapezoidal rule on a uniform grid: of smooth periodic motion it is exact."""
+    """Rotation of a period and its places, by the trapezoidal rule on a uniform grid: of smooth
+    periodic motion it is exact."""
     t = np.arange(n) / n
     angles, rates = path(t)
     solved = BODY.solve(FRICTION, angles, rates, DELTA)
-    omega, centre = solved.z[2], np.array([1, 1j]) @ np.array(BODY.motion(FRICTION, angles, rates, DELTA, solved).centre)
+    omega, centre = (
+        solved.z[2],
+        np.array([1, 1j]) @ np.array(BODY.motion(FRICTION, angles, rates, DELTA, solved).centre),
+    )
 
     def integral(rate):
         """From 0 up to every t and 1, by the spectrum; the mean grows."""
@@ -45,7 +50,8 @@ def on_a_dense_grid(path, n=4000):
 
     theta = integral(omega).real
     alpha, later = theta[-1], np.append(t, 1.0)
-    # periodic: what is seen from axes that turn evenly; its primitive times e^(i alpha t) is the place
+    # periodic: what is seen from axes that turn evenly; its primitive times e^(i alpha t) is the
+    # place
     seen = np.exp(1j * (theta[:-1] - alpha * t)) * centre
     k = np.fft.fftfreq(n, 1 / n)
     loop = np.fft.ifft(np.fft.fft(seen) / (1j * (2 * np.pi * k + alpha)))
@@ -57,7 +63,9 @@ def test_a_period_turns_about_a_point_and_the_chord_is_that_of_the_mean_circle()
     assert abs(alpha) > 0.05
     # the point that a period leaves where it is: place(1) - c = e^(i alpha) (place(0) - c)
     centre = (place[-1] - np.exp(1j * alpha) * place[0]) / (1 - np.exp(1j * alpha))
-    evenly = (place - centre)[:-1] * np.exp(-1j * alpha * np.arange(place.size - 1) / (place.size - 1))
+    evenly = (place - centre)[:-1] * np.exp(
+        -1j * alpha * np.arange(place.size - 1) / (place.size - 1)
+    )
     radius = abs(evenly.mean())
     assert np.ptp(abs(place - centre)) > 0.01 * radius  # it does wriggle
     found = replayed(turn=alpha)
@@ -68,15 +76,20 @@ def test_a_period_turns_about_a_point_and_the_chord_is_that_of_the_mean_circle()
 
 def test_the_chord_does_not_depend_on_the_phase_that_a_period_is_begun_at():
     turn = replayed().rotation
-    chords, displacements = ([replayed(begun_at(p), at).distance for p in (0, 0.13, 0.37, 0.71)] for at in (turn, 0.0))
+    chords, displacements = (
+        [replayed(begun_at(p), at).distance for p in (0, 0.13, 0.37, 0.71)] for at in (turn, 0.0)
+    )
     assert np.ptp(displacements) > 0.01 * max(displacements)
     np.testing.assert_allclose(chords, chords[0], rtol=1e-9)
 
 
 def test_the_error_of_a_chord_falls_with_the_instants_as_that_of_a_displacement_does():
-    # what lies before a period and after it is seen from the same axes, turned on: no seam is left between two periods
+    # what lies before a period and after it is seen from the same axes, turned on: no seam is left
+    # between two periods
     turn = replayed().rotation
-    straight, chord = (replay(BODY, FRICTION, GAIT, DELTA, instants=8000, turn=at).errors for at in (0.0, turn))
+    straight, chord = (
+        replay(BODY, FRICTION, GAIT, DELTA, instants=8000, turn=at).errors for at in (0.0, turn)
+    )
     assert chord["distance"] < 3 * straight["distance"]
 
 
@@ -105,12 +118,22 @@ CASES = {
     "series": {"gait": Harmonic(1)},
     "with inertia": {"gait": Harmonic(1), "froude": 0.05},
     "free path": {"gait": FreePath(4.0, "none")},
-    "polygon of unequal friction": {"gait": Polygon(4, "none"), "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)},
+    "polygon of unequal friction": {
+        "gait": Polygon(4, "none"),
+        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    },
 }
 
 
 def stated(case, turn, intervals=24):
-    given = {"friction": FRICTION, "guess": GAIT, "intervals": intervals, "delta": DELTA, "delta_start": DELTA, **CASES[case]}
+    given = {
+        "friction": FRICTION,
+        "guess": GAIT,
+        "intervals": intervals,
+        "delta": DELTA,
+        "delta_start": DELTA,
+        **CASES[case],
+    }
     return Problem(case.replace(" ", "_"), rotation=turn, **given)
 
 
@@ -128,19 +151,29 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     full = transcribed(problem, space.member(v), space.mesh.edges)
     x = feasible_point(full, space.full_parameters(v), delta)
     found = oracles(full.assembly)
-    p = found.parameter_vector(delta / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]]))
+    p = found.parameter_vector(
+        delta / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]])
+    )
     g = np.array(found.options["jac_g"](x, p)[0]).ravel()
-    assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(-values["distance"] / values["work"], rel=1e-9)
+    assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(
+        -values["distance"] / values["work"], rel=1e-9
+    )
     for group in ("orientation", "rotation", "distance", "work", "balance"):
-        np.testing.assert_allclose(g[full.groups[group]], full.constraint_lower[full.groups[group]], atol=1e-10)
+        np.testing.assert_allclose(
+            g[full.groups[group]], full.constraint_lower[full.groups[group]], atol=1e-10
+        )
 
     gait = space.member(v)
     per_period = delta * gait.delta_unit
     run, law = (inertial_replay, problem.law) if problem.froude else (replay, problem.law)
     more = {"regime": problem.regime} if problem.froude else {}
-    fine = run(BODY, law, gait, per_period, breaks=gait.corner_phases, tolerance=1e-6, turn=turn, **more)
+    fine = run(
+        BODY, law, gait, per_period, breaks=gait.corner_phases, tolerance=1e-6, turn=turn, **more
+    )
     error = mesh_error(control_problem(problem), full.phase_mesh(gait), gait, per_period, 1e-7)
-    assert values["distance"] / values["work"] / fine.efficiency - 1 == pytest.approx(error.total, abs=3e-6)
+    assert values["distance"] / values["work"] / fine.efficiency - 1 == pytest.approx(
+        error.total, abs=3e-6
+    )
     assert abs(error.total) < error.estimate + 1e-7
 
 
@@ -151,5 +184,8 @@ def test_gradients_of_the_chord_are_those_of_differences(case):
     motion = ReducedProgram(space, DELTA).motion
     found = motion.gradients(v, DELTA)
     for name in ("distance", "rotation"):
-        both = [[motion.values(v + sign * e, DELTA)[name] for sign in (1, -1)] for e in h * np.eye(v.size)]
+        both = [
+            [motion.values(v + sign * e, DELTA)[name] for sign in (1, -1)]
+            for e in h * np.eye(v.size)
+        ]
         np.testing.assert_allclose(found[name], np.diff(both)[:, 0] / (-2 * h), atol=2e-6)

@@ -1,4 +1,5 @@
-"""Gaits with inertia as a search sees them: against shooting, differences, the slow motion, and what cannot be."""
+"""Gaits with inertia as a search sees them: against shooting, differences, the slow motion, and
+what cannot be."""
 
 import numpy as np
 import pytest
@@ -39,7 +40,12 @@ def problem(**fields):
         "friction": colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3),
         "rotation": None,
     }
-    return colloc.Problem("paced", **({"body": colloc.Chain((0.3, 0.45, 0.25)), "froude": 0.1, "delta": 1e-2} | usual | fields))
+    return colloc.Problem(
+        "paced",
+        **(
+            {"body": colloc.Chain((0.3, 0.45, 0.25)), "froude": 0.1, "delta": 1e-2} | usual | fields
+        ),
+    )
 
 
 def program(stated):
@@ -51,7 +57,10 @@ def program(stated):
     ("body", "friction"),
     [
         (colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)),
-        (colloc.Chain((0.2, 0.3, 0.5), masses=(0.5, 0.1, 0.4), inertias=(0.01, 0.02, 0.03)), colloc.Friction(mu_t=0.4)),
+        (
+            colloc.Chain((0.2, 0.3, 0.5), masses=(0.5, 0.1, 0.4), inertias=(0.01, 0.02, 0.03)),
+            colloc.Friction(mu_t=0.4),
+        ),
         (STANDING, colloc.Friction(mu_t=3.0, mu_f=0.5, mu_b=1.0)),
         (colloc.Chain((0.5, 0.5)), colloc.Viscous(normal=2.0)),
     ],
@@ -59,7 +68,11 @@ def program(stated):
 def test_the_kernel_and_the_symbolic_statement_have_the_derivatives_of_differences(body, friction):
     """Of fourth order, at random shapes, rates and momenta."""
     rng, law, step = np.random.default_rng(4), body.law(friction), 1e-4
-    given, n_joint, at = rng.normal(size=(2 * body.n_joint + 3, 50)), body.n_joint, {"delta": 0.3, "froude": 0.1}
+    given, n_joint, at = (
+        rng.normal(size=(2 * body.n_joint + 3, 50)),
+        body.n_joint,
+        {"delta": 0.3, "froude": 0.1},
+    )
 
     def stated(given):
         angles, rates, states = np.split(given, [n_joint, 2 * n_joint])
@@ -77,7 +90,10 @@ def test_the_kernel_and_the_symbolic_statement_have_the_derivatives_of_differenc
     np.testing.assert_allclose(symbolic[0], value, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(symbolic[1], found, rtol=1e-9, atol=1e-9)
     for k, unit in enumerate(np.eye(len(given))[:, :, None]):
-        near, far = ((stated(given + n * step * unit) - stated(given - n * step * unit)) / (2 * n) for n in (1, 2))
+        near, far = (
+            (stated(given + n * step * unit) - stated(given - n * step * unit)) / (2 * n)
+            for n in (1, 2)
+        )
         np.testing.assert_allclose(found[:, k], (4 * near - far) / (3 * step), rtol=1e-7, atol=1e-7)
 
 
@@ -96,12 +112,16 @@ def test_shooting_and_collocation_find_the_same_motion(froude):
     along = kind.along(mesh, Shapes(*gait(mesh.times), 1e-2), begin_of(kind, gait))
     largest = np.abs(shot.states[:3]).max()
     for momentum, edges in zip(shot.states[:3], along.edges, strict=True):
-        np.testing.assert_allclose(edges, np.interp(mesh.edges, shot.phases, momentum), atol=1e-3 * largest)
+        np.testing.assert_allclose(
+            edges, np.interp(mesh.edges, shot.phases, momentum), atol=1e-3 * largest
+        )
 
 
 def test_half_of_an_antipodal_gait_says_what_all_of_it_does():
     """The mirror image of the momenta closes the half."""
-    half, v = program(problem(gait=colloc.Harmonic(1, "antipodal"), guess=ROUND, rotation=0.0, intervals=60))
+    half, v = program(
+        problem(gait=colloc.Harmonic(1, "antipodal"), guess=ROUND, rotation=0.0, intervals=60)
+    )
     whole, w = program(problem(guess=ROUND, intervals=120))
     for name in ("distance", "work"):
         assert half.period(v)[name] == pytest.approx(whole.period(w)[name], rel=1e-5)
@@ -121,21 +141,37 @@ def test_half_of_an_antipodal_gait_says_what_all_of_it_does():
 def test_gradients_are_those_of_differences(fields):
     reduced, v = program(problem(intervals=30, **fields))
     step = 1e-5
-    sides = [(reduced.objective(v + step * unit), reduced.objective(v - step * unit)) for unit in np.eye(v.size)]
+    sides = [
+        (reduced.objective(v + step * unit), reduced.objective(v - step * unit))
+        for unit in np.eye(v.size)
+    ]
     differences = np.array([(high - low) / (2 * step) for high, low in sides])
-    np.testing.assert_allclose(reduced.gradient(v), differences, atol=2e-6 * np.abs(differences).max())
+    np.testing.assert_allclose(
+        reduced.gradient(v), differences, atol=2e-6 * np.abs(differences).max()
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypatch):
-    """Momenta as large as a body has that crosses its length in a period lead to those that the slow motion leads to. The
-    kernel goes NumPy's way."""
+    """Momenta as large as a body has that crosses its length in a period lead to those that the
+    slow motion leads to. The kernel goes NumPy's way."""
     stated = problem(body=STANDING, delta=1e-4, froude=0.02, intervals=60)
     space, _ = space_near(stated, LEANING)
     angles, rates = LEANING(space.mesh.times)
-    kind, at = kind_of_motion(control_problem(stated).dynamics), (space.mesh, Shapes(angles, rates, 1e-4), np.empty(0))
-    expected, far, asked = kind.along(*at), np.random.default_rng(seed).normal(size=(3, space.mesh.n_point)), []
-    monkeypatch.setattr(kinds, "momenta_along_states", lambda *given: asked.append(1) or momenta_along_states(*given))
+    kind, at = (
+        kind_of_motion(control_problem(stated).dynamics),
+        (space.mesh, Shapes(angles, rates, 1e-4), np.empty(0)),
+    )
+    expected, far, asked = (
+        kind.along(*at),
+        np.random.default_rng(seed).normal(size=(3, space.mesh.n_point)),
+        [],
+    )
+    monkeypatch.setattr(
+        kinds,
+        "momenta_along_states",
+        lambda *given: asked.append(1) or momenta_along_states(*given),
+    )
     compiled = kind.along(*at, near=(far, None))
     with numpy_instead():
         found = kind.along(*at, near=(far, None))
@@ -147,7 +183,9 @@ def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypa
 
 
 @pytest.mark.parametrize(
-    "fields", [{}, {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "rotation": 0.0}], ids=["whole", "half"]
+    "fields",
+    [{}, {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "rotation": 0.0}],
+    ids=["whole", "half"],
 )
 @pytest.mark.parametrize("size", [0.1, 30.0])
 def test_the_kernel_and_numpy_come_to_the_same_momenta_or_to_none(fields, size):
@@ -180,14 +218,18 @@ def test_the_slow_motion_is_the_limit():
 
 
 def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_fast():
-    stated = colloc.Problem("paced", gait=colloc.Harmonic(1, "antipodal"), froude=0.1, delta=1e-2, guess=ROUND)
+    stated = colloc.Problem(
+        "paced", gait=colloc.Harmonic(1, "antipodal"), froude=0.1, delta=1e-2, guess=ROUND
+    )
     found = colloc.solve(stated, starts=1)
     assert found.status == "solved", found.message
     assert found.answer.program == stated.formulation, "IPOPT confirms it on the full program"
     slow = colloc.solve(stated.with_(froude=0.0), starts=1)
     played = colloc.inertial_motion(stated.body, stated.law, slow.gait, 1e-2, 0.1)
     assert found.efficiency > 1.2 * played.efficiency
-    assert 0 < max(check.value for check in found.certificate.checks if check.name == "stability") < 1
+    assert (
+        0 < max(check.value for check in found.certificate.checks if check.name == "stability") < 1
+    )
 
 
 @pytest.mark.parametrize(
@@ -195,7 +237,15 @@ def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_f
     [
         ({"froude": -1.0}, "not negative"),
         ({"froude": "fast"}, "not negative"),
-        ({"gait": colloc.Harmonic(1, "bilateral"), "body": colloc.Chain(), "guess": None, "rotation": 0.0}, "run backwards"),
+        (
+            {
+                "gait": colloc.Harmonic(1, "bilateral"),
+                "body": colloc.Chain(),
+                "guess": None,
+                "rotation": 0.0,
+            },
+            "run backwards",
+        ),
         ({"gait": colloc.FreePath(2.0)}, "leaves the pace open"),
         ({"body": colloc.ModalBody(), "guess": None}, "of a ModalBody"),
         ({"grade": 0.1, "rotation": 1.0}, "on a slope a body that a period turns"),
@@ -214,8 +264,18 @@ def test_what_cannot_be_asked_is_refused_in_a_sentence(fields, said):
 @pytest.mark.parametrize(
     "fields",
     [
-        {"body": colloc.Chain((0.5, 0.5)), "gait": colloc.Harmonic(2), "friction": colloc.Friction(), "froude": 0.2},
-        {"body": colloc.Chain(feet=1), "gait": colloc.Harmonic(1, "antipodal"), "friction": colloc.Friction(), "froude": 0.05},
+        {
+            "body": colloc.Chain((0.5, 0.5)),
+            "gait": colloc.Harmonic(2),
+            "friction": colloc.Friction(),
+            "froude": 0.2,
+        },
+        {
+            "body": colloc.Chain(feet=1),
+            "gait": colloc.Harmonic(1, "antipodal"),
+            "friction": colloc.Friction(),
+            "froude": 0.05,
+        },
     ],
     ids=["two links, which crawl with inertia alone", "feet"],
 )
@@ -227,7 +287,9 @@ def test_bodies_of_other_kinds_find_a_certified_gait(fields):
 
 def test_objectives_of_the_length_of_the_path_are_replayed():
     path = program(problem())[0].space.member(program(problem())[1])
-    played = colloc.inertial_motion(colloc.Chain(), colloc.Friction(), path, 1e-2, 0.1, tolerance=1e-4)
+    played = colloc.inertial_motion(
+        colloc.Chain(), colloc.Friction(), path, 1e-2, 0.1, tolerance=1e-4
+    )
     t = np.arange(4000) / 4000
     assert played.length == pytest.approx(np.linalg.norm(path.rates(t), axis=0).mean(), rel=1e-6)
     assert 0 < played.error_of(objective_from("speed")) < 1e-3
@@ -248,7 +310,8 @@ def test_a_gait_that_is_given_is_evaluated_at_its_pace():
 
 
 def test_a_body_that_begins_at_rest_comes_to_move_as_certified():
-    """Its centre of mass is at rest at first, and after some periods goes as far in each as in the motion of equal periods."""
+    """Its centre of mass is at rest at first, and after some periods goes as far in each as in the
+    motion of equal periods."""
     found = colloc.evaluate(colloc.Problem("paced", froude=0.1, delta=1e-2), ROUND)
     moved = found.from_rest(np.arange(0.0, 6.001, 0.01))
     ways = np.hypot(*np.diff(moved.centre[:, ::100], axis=1))
@@ -279,16 +342,25 @@ def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
 
 @pytest.mark.parametrize("size", [1.0, 0.15])
 def test_errors_are_told_apart_however_short_the_way(size):
-    """Two links go nowhere slowly, and not far fast: the differential equation is solved to a part of that."""
+    """Two links go nowhere slowly, and not far fast: the differential equation is solved to a part
+    of that."""
     gait = colloc.Fourier(mean=[0.6], cos=[[size, 0.2 * size]], sin=[[0.0, 0.3 * size]])
-    stated = problem(body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2), guess=gait, froude=0.02)
+    stated = problem(
+        body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2), guess=gait, froude=0.02
+    )
     error = mesh_error(control_problem(stated), control_problem(stated).mesh(), gait, 1e-2, 3e-5)
     assert error.unresolved == pytest.approx(0.05 * 3e-5, rel=0.1)
 
 
 def test_a_mesh_is_fine_where_errors_are_made_not_where_they_are_felt():
     """Momenta that stick and slip leave wrong are carried through the rest of the period."""
-    stated = problem(gait=colloc.Harmonic(1, "antipodal"), guess=ROUND, rotation=0.0, delta=1e-3, friction=colloc.Friction())
+    stated = problem(
+        gait=colloc.Harmonic(1, "antipodal"),
+        guess=ROUND,
+        rotation=0.0,
+        delta=1e-3,
+        friction=colloc.Friction(),
+    )
     control, mesh = control_problem(stated), Mesh(scheme("gauss-3"), np.linspace(0.0, 0.5, 81))
     shares = np.sort(np.abs(mesh_error(control, mesh, ROUND, 1e-3, 3e-5).value))
     assert shares[-8:].sum() > 0.9 * shares.sum()
@@ -300,7 +372,11 @@ def test_a_mesh_is_fine_where_errors_are_made_not_where_they_are_felt():
 def test_a_motion_that_does_not_follow_from_rest_is_another_one(monkeypatch):
     def other_from_rest(self, near):
         found = closed(self, near)
-        return found if near.any() else found._replace(momenta=found.momenta + np.array([0.5, 0.0, 0.0]))
+        return (
+            found
+            if near.any()
+            else found._replace(momenta=found.momenta + np.array([0.5, 0.0, 0.0]))
+        )
 
     closed = GaitWithInertia.closed
     at = colloc.Chain(), colloc.Friction(), ROUND, 1e-2
@@ -315,7 +391,10 @@ def test_a_motion_that_does_not_follow_from_rest_is_another_one(monkeypatch):
 def test_kinetic_energy_is_that_of_dense_points():
     body, points = colloc.Chain((0.3, 0.45, 0.25)), (np.arange(400) + 0.5) / 400
     (angles, rates), z = LEANING(np.array([0.2])), np.array([[0.3], [-0.2], [0.7]])
-    heading, spin = np.concatenate([[0.0], np.cumsum(angles)]), z[2, 0] + np.concatenate([[0.0], np.cumsum(rates)])
+    heading, spin = (
+        np.concatenate([[0.0], np.cumsum(angles)]),
+        z[2, 0] + np.concatenate([[0.0], np.cumsum(rates)]),
+    )
     links = np.array(body.lengths) * np.exp(1j * heading)
     starts = z[0, 0] + 1j * z[1, 0] + np.concatenate([[0.0], np.cumsum(1j * spin * links)[:-1]])
     velocity = starts[:, None] + 1j * (spin * links)[:, None] * points
@@ -324,33 +403,53 @@ def test_kinetic_energy_is_that_of_dense_points():
 
 
 def test_two_equal_links_go_nowhere_by_an_antipodal_gait_and_such_a_problem_is_refused():
-    """They move along their axis of symmetry, and as far back while bent to the other side; links that differ do not."""
+    """They move along their axis of symmetry, and as far back while bent to the other side; links
+    that differ do not."""
     gait = colloc.Fourier(mean=[0.0], cos=[[1.1, 0.0, 0.3]], sin=[[0.0, 0.0, 0.4]])
 
     def distance(body):
         whole = objective_from("distance + work")  # no error is small beside no distance
-        return colloc.replay(body, colloc.Friction(mu_t=2.0), gait, 1e-2, froude=0.1, tolerance=1e-4, objective=whole).distance
+        return colloc.replay(
+            body, colloc.Friction(mu_t=2.0), gait, 1e-2, froude=0.1, tolerance=1e-4, objective=whole
+        ).distance
 
     assert distance(colloc.Chain((0.5, 0.5))) < 1e-6 < 1e-4 < distance(colloc.Chain((0.4, 0.6)))
-    stated = {"friction": colloc.Friction(mu_t=2.0), "gait": colloc.Harmonic(3, "antipodal"), "guess": None, "rotation": 0.0}
+    stated = {
+        "friction": colloc.Friction(mu_t=2.0),
+        "gait": colloc.Harmonic(3, "antipodal"),
+        "guess": None,
+        "rotation": 0.0,
+    }
     with pytest.raises(colloc.ProblemError, match="own axis of symmetry"):
         problem(body=colloc.Chain((0.5, 0.5)), **stated)
     assert problem(body=colloc.Chain((0.4, 0.6)), **stated).froude == 0.1
 
 
 def test_two_equal_links_never_turn_so_that_nothing_has_to_keep_them_from_it():
-    """In every shape they are their own mirror image; that a mesh errs is no reason to look for gaits that make up for it."""
-    gait, friction = colloc.Fourier(mean=[0.7], cos=[[0.4, 0.5]], sin=[[0.9, -0.2]]), colloc.Friction(mu_t=0.4)
+    """In every shape they are their own mirror image; that a mesh errs is no reason to look for
+    gaits that make up for it."""
+    gait, friction = (
+        colloc.Fourier(mean=[0.7], cos=[[0.4, 0.5]], sin=[[0.9, -0.2]]),
+        colloc.Friction(mu_t=0.4),
+    )
     turned = [
-        colloc.replay(colloc.Chain(lengths), friction, gait, 1e-2, froude=0.05, tolerance=1e-5).rotation
+        colloc.replay(
+            colloc.Chain(lengths), friction, gait, 1e-2, froude=0.05, tolerance=1e-5
+        ).rotation
         for lengths in ((0.5, 0.5), (0.4, 0.6))
     ]
     assert abs(turned[0]) < 1e-6 < 1e-3 < abs(turned[1])
     stated = {"friction": friction, "gait": colloc.Harmonic(2), "guess": gait, "rotation": 0.0}
-    rows = [program(problem(body=colloc.Chain(lengths), **stated)) for lengths in ((0.5, 0.5), (0.4, 0.6))]
+    rows = [
+        program(problem(body=colloc.Chain(lengths), **stated))
+        for lengths in ((0.5, 0.5), (0.4, 0.6))
+    ]
     for reduced, v in rows:
         reduced.place_rows(v)
-    assert [reduced.rows(v).size - reduced.constraints.values(v).size for reduced, v in rows] == [0, 1]
+    assert [reduced.rows(v).size - reduced.constraints.values(v).size for reduced, v in rows] == [
+        0,
+        1,
+    ]
     with pytest.raises(colloc.ProblemError, match="never turn"):
         problem(body=colloc.Chain((0.5, 0.5)), **stated | {"rotation": 1.0})
 
@@ -364,8 +463,14 @@ def test_where_no_motion_is_found_the_search_says_so(monkeypatch):
 
 
 def test_what_holds_slowly_alone_is_not_asked_of_a_fast_body():
-    """One joint goes somewhere with inertia, and loops too small for the pace to matter do not exist."""
-    assert colloc.Problem("burst", body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2), froude=0.1).froude == 0.1
+    """One joint goes somewhere with inertia, and loops too small for the pace to matter do not
+    exist."""
+    assert (
+        colloc.Problem(
+            "burst", body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2), froude=0.1
+        ).froude
+        == 0.1
+    )
     with pytest.raises(colloc.ProblemError, match="scallop"):
         colloc.Problem("slow", body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2))
     assert small_loops(problem()) == []

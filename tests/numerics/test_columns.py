@@ -1,4 +1,5 @@
-"""Rows of a program evaluated from NumPy's memory, against CasADi's own values and Jacobian of the same program."""
+"""Rows of a program evaluated from NumPy's memory, against CasADi's own values and Jacobian of the
+same program."""
 
 import casadi as ca
 import numpy as np
@@ -22,21 +23,32 @@ def test_a_function_of_columns_takes_any_number_of_them():
 
 @pytest.mark.parametrize(
     ("body", "gait"),
-    [(Chain((0.3, 0.2, 0.2, 0.3)), FreePath(2.0, "antipodal")), (Chain(), FreePath(2.0)), (Chain(), Polygon(6))],
+    [
+        (Chain((0.3, 0.2, 0.2, 0.3)), FreePath(2.0, "antipodal")),
+        (Chain(), FreePath(2.0)),
+        (Chain(), Polygon(6)),
+    ],
     ids=["three joints", "two joints", "polygon"],
 )
 @pytest.mark.parametrize("seed", [1, 2])
 def test_chosen_rows_are_those_of_the_program(body, gait, seed):
     """Every other row, at a point that keeps none of them."""
-    problem, rng = Problem("rows", body=body, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=gait), np.random.default_rng(seed)
+    problem, rng = (
+        Problem("rows", body=body, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=gait),
+        np.random.default_rng(seed),
+    )
     rows = path_geometry(control_problem(problem), problem.guess).rows
     x = rng.uniform(0.5, 1.5, rows.linear.shape[1])
     given = [block.parameters for block in rows.blocks]
     local = ca.SX.sym("x")
     square = local_function("square", local, ca.SX(0, 1), ca.SX.sym("delta"), local**2)
-    objective = Block(square, np.zeros((1, 1), dtype=int), sparse.eye(1, format="csr"), np.empty((0, 1)))
+    objective = Block(
+        square, np.zeros((1, 1), dtype=int), sparse.eye(1, format="csr"), np.empty((0, 1))
+    )
     program = oracles(Assembly(x.size, objective, rows.blocks, rows.linear))
-    values, jacobian = program.options["jac_g"](x, program.parameter_vector(0.0, [objective.parameters, *given]))
+    values, jacobian = program.options["jac_g"](
+        x, program.parameter_vector(0.0, [objective.parameters, *given])
+    )
     kept = np.arange(seed % 2, rows.lower.size, 2)
     chosen = ChosenRows(rows.linear, rows.blocks, kept, given)
     np.testing.assert_allclose(chosen.values(x), values.full().ravel()[kept], rtol=0, atol=1e-13)

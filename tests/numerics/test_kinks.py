@@ -10,10 +10,15 @@ ZERO = np.zeros(2)
 
 
 class Pieces:
-    """The largest (or the smallest, with sign -1) of linear pieces and a bowl, with x + y = total as a row."""
+    """The largest (or the smallest, with sign -1) of linear pieces and a bowl, with x + y = total
+    as a row."""
 
     def __init__(self, slopes, sign=1.0, total=None):
-        self._slopes, self._sign, rows = np.array(slopes, dtype=float), sign, 0 if total is None else 1
+        self._slopes, self._sign, rows = (
+            np.array(slopes, dtype=float),
+            sign,
+            0 if total is None else 1,
+        )
         self.lower, self.upper = np.full(2, -1.0), np.full(2, 1.0)
         self.row_lower = self.row_upper = np.full(rows, total, dtype=float)
 
@@ -37,7 +42,9 @@ def around(program, v, radius=1e-6, **given):
     return stationarity_around(program, v, stationarity(program, v), radius, enough=1e-9, **given)
 
 
-@pytest.mark.parametrize("slopes", [[(1, 0), (-2, 0)], [(1, 1), (-1, 0), (0, -1)], [(3, 1), (-1, 2), (-1, -1), (1, -2)]])
+@pytest.mark.parametrize(
+    "slopes", [[(1, 0), (-2, 0)], [(1, 1), (-1, 0), (0, -1)], [(3, 1), (-1, 2), (-1, -1), (1, -2)]]
+)
 def test_gradients_of_all_sides_cancel_at_the_bottom_of_a_valley(slopes):
     program = Pieces(slopes)
     assert stationarity(program, ZERO).kkt_error >= 1
@@ -45,10 +52,13 @@ def test_gradients_of_all_sides_cancel_at_the_bottom_of_a_valley(slopes):
 
 
 def test_a_narrow_side_is_found_that_chance_misses():
-    """Of the plane the third piece has a fiftieth, right below; the others' gradients leave (0, 0.05)."""
+    """Of the plane the third piece has a fiftieth, right below; the others' gradients leave (0,
+    0.05)."""
     narrow = Pieces([(1, 0.05), (-1, 0.05), (0, -0.01)])
     assert around(narrow, ZERO, points=2).kkt_error < 2e-6
-    assert around(Pieces([(1, 0.05), (-1, 0.05)]), ZERO, points=2).kkt_error == pytest.approx(0.05, rel=1e-3)
+    assert around(Pieces([(1, 0.05), (-1, 0.05)]), ZERO, points=2).kkt_error == pytest.approx(
+        0.05, rel=1e-3
+    )
 
 
 def test_they_do_not_cancel_on_a_slope_with_a_kink():
@@ -56,9 +66,13 @@ def test_they_do_not_cancel_on_a_slope_with_a_kink():
 
 
 def test_a_row_that_binds_carries_what_is_left_along_it():
-    assert stationarity(valley := Pieces([(2, 0), (-1, 1)], total=0.0), ZERO).kkt_error == pytest.approx(1)
+    assert stationarity(
+        valley := Pieces([(2, 0), (-1, 1)], total=0.0), ZERO
+    ).kkt_error == pytest.approx(1)
     assert around(valley, ZERO, points=16).kkt_error < 2e-6
-    assert around(Pieces([(1, 0), (2, -1)], total=0.0), ZERO).kkt_error == pytest.approx(0.5, abs=1e-5)
+    assert around(Pieces([(1, 0), (2, -1)], total=0.0), ZERO).kkt_error == pytest.approx(
+        0.5, abs=1e-5
+    )
 
 
 def test_a_ridge_has_the_same_gradients_and_is_no_minimum():

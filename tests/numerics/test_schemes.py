@@ -7,7 +7,12 @@ from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
 from colloc.system.errors import ProblemError
 
-NAMES = ["trapezoid", "hermite-simpson", *(f"gauss-{s}" for s in range(1, 7)), *(f"radau-{s}" for s in range(1, 7))]
+NAMES = [
+    "trapezoid",
+    "hermite-simpson",
+    *(f"gauss-{s}" for s in range(1, 7)),
+    *(f"radau-{s}" for s in range(1, 7)),
+]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -57,4 +62,6 @@ def test_site_equations_have_one_row_per_unknown_and_integrate_polynomials_exact
     sites[mesh.edge_sites] = mesh.edges
     sites[mesh.sites] = mesh.times[mesh.points]
     degree = s.s
-    np.testing.assert_allclose(state @ sites**degree - rate @ (degree * mesh.times ** (degree - 1)), 0, atol=1e-13)
+    np.testing.assert_allclose(
+        state @ sites**degree - rate @ (degree * mesh.times ** (degree - 1)), 0, atol=1e-13
+    )

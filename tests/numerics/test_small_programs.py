@@ -1,4 +1,5 @@
-"""Small programs that are solved without SciPy's optimize: least squares with signs, and linear programs."""
+"""Small programs that are solved without SciPy's optimize: least squares with signs, and linear
+programs."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -12,7 +13,8 @@ from colloc.system.errors import NotConvergedError
 
 @pytest.mark.parametrize("seed", range(40))
 def test_nonnegative_least_squares_meet_the_conditions_of_a_minimum(seed):
-    """Which are sufficient, as the program is convex; up to what rounding leaves of the sums that slopes are."""
+    """Which are sufficient, as the program is convex; up to what rounding leaves of the sums that
+    slopes are."""
     rng = np.random.default_rng(seed)
     matrix, right = rng.standard_normal(rng.integers(1, 9, 2)), rng.standard_normal(9)
     if seed % 2:  # an equation is a column and its reverse

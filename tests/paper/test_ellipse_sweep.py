@@ -1,4 +1,5 @@
-"""Sweeps over ellipse gaits: the paper's features, agreement of the routes, and with the independent replay."""
+"""Sweeps over ellipse gaits: the paper's features, agreement of the routes, and with the
+independent replay."""
 
 import numpy as np
 import pytest
@@ -39,8 +40,11 @@ def test_half_a_period_gives_what_a_replay_of_the_whole_period_gives(direct):
     found = performance(direct, gaits, instants=1600)
     for i, gait in enumerate(gaits.T):
         path = ellipse(*gait)
-        exact = replay(BODY, ISOTROPIC, lambda t, p=path: (p.angles(t), p.rates(t)), DELTA, tolerance=1e-5)
-        assert abs(exact.rotation) < 1e-7  # the balance's residual, 1e-11, over its stiffness, of order delta
+        exact = replay(
+            BODY, ISOTROPIC, lambda t, p=path: (p.angles(t), p.rates(t)), DELTA, tolerance=1e-5
+        )
+        # the balance's residual, 1e-11, over its stiffness, of order delta
+        assert abs(exact.rotation) < 1e-7
         assert found.distance[i] == pytest.approx(exact.distance, abs=5e-6)
         assert found.work[i] == pytest.approx(exact.work, rel=1e-5)
 
@@ -48,7 +52,10 @@ def test_half_a_period_gives_what_a_replay_of_the_whole_period_gives(direct):
 def test_time_error_is_of_second_order(direct):
     gaits = _random_gaits(40, 22)
     exact = performance(direct, gaits, instants=1600).efficiency
-    errors = [np.sqrt(np.mean((performance(direct, gaits, instants=n).efficiency - exact) ** 2)) for n in (50, 100, 200)]
+    errors = [
+        np.sqrt(np.mean((performance(direct, gaits, instants=n).efficiency - exact) ** 2))
+        for n in (50, 100, 200)
+    ]
     assert errors[1] < 6e-4
     assert np.log2(errors[0] / errors[2]) / 2 > 1.5
 
@@ -99,9 +106,12 @@ def test_no_motion_on_the_axes_and_little_on_the_diagonal(direct):
 
 
 def test_work_grows_with_amplitude_and_hardly_with_offset(direct):
-    """At fixed direction W grows with the amplitude; at fixed ellipse it varies by less than half with A0."""
+    """At fixed direction W grows with the amplitude; at fixed ellipse it varies by less than half
+    with A0."""
     amplitude = np.linspace(0.3, 1.2, 6)
-    rays = performance(direct, np.stack([0 * amplitude + 0.5, amplitude * 0.8, amplitude * 0.6])).work
+    rays = performance(
+        direct, np.stack([0 * amplitude + 0.5, amplitude * 0.8, amplitude * 0.6])
+    ).work
     assert (np.diff(rays) > 0).all()
     A0 = np.linspace(0, 2.2, 8)
     work = performance(direct, np.stack([A0, 0 * A0 + 0.5, 0 * A0 + 0.5])).work
@@ -139,7 +149,9 @@ def test_three_printed_maxima_come_out_of_the_sweep(known, direct):
     found = [(m.replay.efficiency, abs(m.A0)) for m in maxima]
     for efficiency, A0 in ((0.2600, 0.0), (0.2076, 1.11), (0.1030, 2.59)):
         assert any(abs(e - efficiency) < 5e-4 and abs(a - A0) < 0.03 for e, a in found)
-    first, second = (next(m for m in maxima if abs(m.replay.efficiency - e) < 5e-4) for e in (0.2600, 0.2076))
+    first, second = (
+        next(m for m in maxima if abs(m.replay.efficiency - e) < 5e-4) for e in (0.2600, 0.2076)
+    )
     assert second.replay.distance / first.replay.distance == pytest.approx(0.37, abs=0.012)
     assert second.replay.work / first.replay.work == pytest.approx(0.47, abs=0.012)
 

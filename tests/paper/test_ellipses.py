@@ -5,7 +5,13 @@ import numpy as np
 from colloc.gaits.harmonic import ellipse
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
-from scripts.models.ellipses import admissible, contact_reach, ellipse_angles, gait_grid, largest_amplitude
+from scripts.models.ellipses import (
+    admissible,
+    contact_reach,
+    ellipse_angles,
+    gait_grid,
+    largest_amplitude,
+)
 
 T = np.linspace(0, 1, 4001)
 
@@ -54,7 +60,9 @@ def test_largest_amplitude_is_on_the_boundary():
     A0, angle = np.meshgrid([0.0, 0.6, 1.8, 2.9], np.linspace(0.01, 1.55, 9), indexing="ij")
     r = largest_amplitude(body, A0, angle)
     for factor, expected in ((0.999, True), (1.001, False)):
-        gaits = np.stack([A0, factor * r * np.cos(angle), factor * r * np.sin(angle)]).reshape(3, -1)
+        gaits = np.stack([A0, factor * r * np.cos(angle), factor * r * np.sin(angle)]).reshape(
+            3, -1
+        )
         assert (admissible(body, gaits) == expected).all()
 
 

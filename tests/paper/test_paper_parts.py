@@ -23,7 +23,10 @@ def _sum(context: Context) -> dict:
 
 
 def _study(folder, x=(1.0, 2.0), quick=False) -> PaperStudy:
-    parts = [Part("square", _square, settings={"x": list(x)}, quick={"x": [1.0]}), Part("sum", _sum, needs=("square",))]
+    parts = [
+        Part("square", _square, settings={"x": list(x)}, quick={"x": [1.0]}),
+        Part("sum", _sum, needs=("square",)),
+    ]
     return PaperStudy(parts, folder, quick=quick)
 
 
@@ -51,7 +54,10 @@ def test_source_closure_follows_imports():
         "colloc.mechanics.friction",
         "scripts.models.velocity_map",
     } <= found.keys()
-    assert not {"scripts.paper.figures", "scripts.paper.parallel", "scripts.paper.study"} & found.keys()
+    assert (
+        not {"scripts.paper.figures", "scripts.paper.parallel", "scripts.paper.study"}
+        & found.keys()
+    )
 
 
 def test_files_are_replaced_whole_or_not_at_all(tmp_path):
@@ -90,8 +96,18 @@ def test_dips_of_the_third_slowest_end():
 
 
 def test_command_line_computes_resumes_and_draws(tmp_path, capsys):
-    """Two small parts: computed, then skipped; table and figures written; the rest named as missing."""
-    arguments = ["--quick", "--only", "instant", "flap", "--output", str(tmp_path), "--processes", "1"]
+    """Two small parts: computed, then skipped; table and figures written; the rest named as
+    missing."""
+    arguments = [
+        "--quick",
+        "--only",
+        "instant",
+        "flap",
+        "--output",
+        str(tmp_path),
+        "--processes",
+        "1",
+    ]
     assert reproduce_paper.main(arguments) == 0
     assert "flap: computing" in capsys.readouterr().out
     assert reproduce_paper.main(arguments) == 0
@@ -102,7 +118,10 @@ def test_command_line_computes_resumes_and_draws(tmp_path, capsys):
     assert "does not hold" not in text
     assert "`sweep`" in text.split("Not computed yet")[1]
     drawn = sorted(p.name for p in (tmp_path / "paper-quick").glob("*.p*"))
-    assert [n for n in drawn if n.endswith(".png")] == ["figure-03-velocity-and-force.png", "figure-04-flap-body.png"]
+    assert [n for n in drawn if n.endswith(".png")] == [
+        "figure-03-velocity-and-force.png",
+        "figure-04-flap-body.png",
+    ]
     assert len(drawn) == 4
     assert reproduce_paper.main(["--only", "nothing", "--output", str(tmp_path)]) == 1
     assert "there is no part 'nothing'" in capsys.readouterr().err

@@ -41,7 +41,8 @@ def test_held_links_creep_at_order_delta_and_bear_part_of_the_friction(case):
 
 @pytest.mark.parametrize("case", SYMMETRIC_CASES, ids=lambda c: c.name)
 def test_symmetric_cases_have_no_kinetic_solution(case):
-    """The unbalanced force falls with the one velocity that symmetry leaves free, and jumps over zero at rest."""
+    """The unbalanced force falls with the one velocity that symmetry leaves free, and jumps over
+    zero at rest."""
     gap = kinetic_gap(BODY, ISOTROPIC, case)
     assert gap.no_solution
     V = np.concatenate([-np.geomspace(1, 1e-8, 60), np.geomspace(1e-8, 1, 60)])
@@ -84,7 +85,11 @@ class TestFlapBody:
     body = FlapBody()
 
     def test_geometry_against_plain_trigonometry(self):
-        angles, rates, z = np.array([[0.4], [-0.9]]), np.array([[1.3], [0.2]]), np.array([[0.3], [-0.2], [0.7]])
+        angles, rates, z = (
+            np.array([[0.4], [-0.9]]),
+            np.array([[1.3], [0.2]]),
+            np.array([[0.3], [-0.2], [0.7]]),
+        )
         velocity = self.body.velocity(self.body.posture(angles), rates, z)
         for flap in (0, 1):
             a, w = angles[flap, 0], rates[flap, 0] + 0.7
@@ -105,7 +110,8 @@ class TestFlapBody:
         np.testing.assert_allclose(np.array(one), np.array(other), atol=1e-13)
 
     def test_kinetic_friction_has_no_solution(self):
-        """The force falls strictly with the velocity (the dissipation is convex) and leaps over zero at rest."""
+        """The force falls strictly with the velocity (the dissipation is convex) and leaps over
+        zero at rest."""
         V = np.concatenate([-np.geomspace(3, 1e-8, 100), [0.0], np.geomspace(1e-8, 3, 100)])
         for opening in (0.1, 0.7, 1.4):
             assert flap_gap(self.body, ISOTROPIC, opening, 1.0).no_solution
@@ -128,6 +134,9 @@ class TestFlapBody:
         assert errors[0] / errors[1] > 5
 
     def test_closing_flaps_push_the_other_way(self):
-        opened, closed = (axial_force(self.body, ISOTROPIC, 0.7, rate, np.zeros(1), 1e-9)[0] for rate in (1.0, -1.0))
+        opened, closed = (
+            axial_force(self.body, ISOTROPIC, 0.7, rate, np.zeros(1), 1e-9)[0]
+            for rate in (1.0, -1.0)
+        )
         assert opened == pytest.approx(-closed)
         assert opened > 0

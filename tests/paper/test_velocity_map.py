@@ -19,7 +19,13 @@ def isotropic() -> VelocityMap:
 
 @pytest.fixture(scope="module")
 def directional() -> VelocityMap:
-    return velocity_map(Chain((0.25, 0.45, 0.3)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), DELTA, n_angle=12, n_ratio=13)
+    return velocity_map(
+        Chain((0.25, 0.45, 0.3)),
+        Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3),
+        DELTA,
+        n_angle=12,
+        n_ratio=13,
+    )
 
 
 @pytest.mark.parametrize("method", STENCILS)
@@ -36,14 +42,18 @@ def test_nodes_are_reproduced_on_every_face(which, method, request):
         rates[leading], rates[1 - leading] = sign, sign * ratio
         direct = solve_balance(made.body, made.friction, angles, rates, DELTA).z
         # at |ratio| = 1 either face may serve; both hold the same solution
-        np.testing.assert_allclose(made.tail_velocity(angles, rates, method=method), direct, atol=1e-7)
+        np.testing.assert_allclose(
+            made.tail_velocity(angles, rates, method=method), direct, atol=1e-7
+        )
 
 
 def test_map_is_homogeneous_and_periodic(isotropic):
     rng = np.random.default_rng(4)
     angles, rates = rng.uniform(-np.pi, np.pi, (2, 200)), rng.normal(size=(2, 200))
     z = isotropic.tail_velocity(angles, rates)
-    np.testing.assert_allclose(isotropic.tail_velocity(angles, 7.3 * rates), 7.3 * z, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(
+        isotropic.tail_velocity(angles, 7.3 * rates), 7.3 * z, rtol=1e-12, atol=1e-13
+    )
     np.testing.assert_allclose(isotropic.tail_velocity(angles, -rates), -z, rtol=0, atol=1e-14)
     np.testing.assert_allclose(isotropic.tail_velocity(angles + 2 * np.pi, rates), z, atol=1e-11)
 
@@ -57,7 +67,8 @@ def test_mirror_image(isotropic):
 
 
 def test_reading_the_body_from_its_head_swaps_the_faces(isotropic):
-    """The velocity of the head, from the second face, is that of the tail of the reversed body, from the first."""
+    """The velocity of the head, from the second face, is that of the tail of the reversed body,
+    from the first."""
     rng = np.random.default_rng(6)
     angles = rng.uniform(-np.pi, np.pi, (2, 200))
     rates = np.stack([np.ones(200), rng.uniform(-1, 1, 200)])
@@ -72,7 +83,9 @@ def test_reading_the_body_from_its_head_swaps_the_faces(isotropic):
     exact = solve_balance(body, Friction(), -angles[::-1], -rates[::-1], DELTA).z
     direct = solve_balance(body, Friction(), angles, rates, DELTA).z
     link = body.velocity(posture, rates, direct)
-    np.testing.assert_allclose(exact, [-link.vs[2], -(link.vn[2] + link.w[2] / 6), link.w[2]], atol=1e-8)
+    np.testing.assert_allclose(
+        exact, [-link.vs[2], -(link.vn[2] + link.w[2] / 6), link.w[2]], atol=1e-8
+    )
 
 
 def test_both_joints_at_rest_give_rest(isotropic):
@@ -93,13 +106,17 @@ def test_four_faces_if_backward_friction_differs(directional):
     assert directional.values.shape[0] == 4
     angles = np.array([[0.7], [-0.9]])
     rates = np.array([[1.0], [0.4]])
-    forth, back = directional.tail_velocity(angles, rates), directional.tail_velocity(angles, -rates)
+    forth, back = (
+        directional.tail_velocity(angles, rates),
+        directional.tail_velocity(angles, -rates),
+    )
     assert np.abs(forth + back).max() > 1e-3  # not simply reversed
     assert map_error(directional, samples=2000).rms < 5e-3
 
 
 def test_kink_where_a_joint_rests():
-    """A joint at rest, the other bent sharply: two links rest, and the velocity has a kink on ratio = 0, kept on nodes."""
+    """A joint at rest, the other bent sharply: two links rest, and the velocity has a kink on ratio
+    = 0, kept on nodes."""
     angles = np.array([[0.75 * np.pi], [0.0]])
 
     def omega(ratio: float) -> float:

@@ -1,4 +1,5 @@
-"""Animations: pictures that move with the body, files others can play, and a clear word where ffmpeg is missing."""
+"""Animations: pictures that move with the body, files others can play, and a clear word where
+ffmpeg is missing."""
 
 import shutil
 import subprocess
@@ -21,9 +22,16 @@ from colloc.results.store import save
 
 def crawler(n_link):
     j = np.arange(n_link - 1)
-    guess = Fourier(np.zeros(n_link - 1), 0.6 * np.cos(0.9 * j)[:, None], 0.6 * np.sin(0.9 * j)[:, None] + 0.1)
+    guess = Fourier(
+        np.zeros(n_link - 1), 0.6 * np.cos(0.9 * j)[:, None], 0.6 * np.sin(0.9 * j)[:, None] + 0.1
+    )
     return Problem(
-        "crawler", guess, Chain((1 / n_link,) * n_link), Friction(mu_t=1.0, mu_f=1.0, mu_b=2.0), delta=1e-2, intervals=8
+        "crawler",
+        guess,
+        Chain((1 / n_link,) * n_link),
+        Friction(mu_t=1.0, mu_f=1.0, mu_b=2.0),
+        delta=1e-2,
+        intervals=8,
     )
 
 
@@ -39,13 +47,18 @@ def test_every_picture_shows_the_body_where_it_is_then(three_link):
     drawn, (low, high) = list(pictures(three_link, 2, 3)), frames(three_link, 3).window
     assert len(drawn) == 6
     tall, wide, _ = drawn[0].shape
-    assert (wide, tall % 2, {picture.shape for picture in drawn}) == (900, 0, {drawn[0].shape})  # video wants even numbers
+    # video wants even numbers
+    assert (wide, tall % 2, {picture.shape for picture in drawn}) == (900, 0, {drawn[0].shape})
     scale = 0.68 * wide / (high - low)[0]
     motion = three_link.sample(np.arange(6) / 2)
     x, y = lab_outline(three_link.problem.body, motion.angles, motion.theta, motion.tail)
     room = tall - 0.13 * wide  # the lower part, of this height
     columns = 0.015 * wide + scale * (0.5 * (x.min(axis=0) + x.max(axis=0)) - low[0])
-    rows = 0.97 * tall - 0.5 * room - scale * (0.5 * (y.min(axis=0) + y.max(axis=0)) - 0.5 * (low + high)[1])
+    rows = (
+        0.97 * tall
+        - 0.5 * room
+        - scale * (0.5 * (y.min(axis=0) + y.max(axis=0)) - 0.5 * (low + high)[1])
+    )
     middle_x, middle_y, across, upwards = np.transpose([dark(picture) for picture in drawn])
     np.testing.assert_allclose(middle_x, columns, atol=1.0)
     np.testing.assert_allclose(middle_y, rows, atol=3.0)  # the head is a disc
@@ -70,12 +83,16 @@ def test_links_are_drawn_of_their_width(unsolved):
 
     thin, thick = dark_pixels(0.08), dark_pixels(0.16)
     # a strip of length 1 and two round ends; joints, head and centre are drawn over it
-    assert thick / thin == pytest.approx((0.16 + np.pi * 0.08**2) / (0.08 + np.pi * 0.04**2), rel=0.15)
+    assert thick / thin == pytest.approx(
+        (0.16 + np.pi * 0.08**2) / (0.08 + np.pi * 0.04**2), rel=0.15
+    )
 
 
 def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")
-    assert main([str(file), "--periods", "1", "--seconds", "1", "--fps", "10", "--width", "300"]) == 0
+    assert (
+        main([str(file), "--periods", "1", "--seconds", "1", "--fps", "10", "--width", "300"]) == 0
+    )
     assert "saved" in capsys.readouterr().out
     with Image.open(tmp_path / "x.gif") as image:
         assert image.n_frames == 10
@@ -87,11 +104,25 @@ def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsy
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_mp4_plays(three_link, tmp_path):
     path = write_movie(three_link, tmp_path / "x.mp4", periods=1, seconds=1.0, fps=10.0, width=301)
-    probe = ["ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames,width", "-of", "csv=p=0", path]
-    assert subprocess.run(probe, capture_output=True, text=True, check=True).stdout.strip() == "300,10"
+    probe = [
+        "ffprobe",
+        "-v",
+        "error",
+        "-count_frames",
+        "-show_entries",
+        "stream=nb_read_frames,width",
+        "-of",
+        "csv=p=0",
+        path,
+    ]
+    assert (
+        subprocess.run(probe, capture_output=True, text=True, check=True).stdout.strip() == "300,10"
+    )
 
 
-def test_without_ffmpeg_an_mp4_is_refused_before_anything_is_drawn(three_link, tmp_path, monkeypatch, capsys):
+def test_without_ffmpeg_an_mp4_is_refused_before_anything_is_drawn(
+    three_link, tmp_path, monkeypatch, capsys
+):
     file = save(three_link, tmp_path / "x.h5")
     monkeypatch.setenv("PATH", str(tmp_path))
     assert main([str(file), "--format", "mp4"]) == 2
@@ -102,7 +133,8 @@ def test_without_ffmpeg_an_mp4_is_refused_before_anything_is_drawn(three_link, t
 
 
 @pytest.mark.parametrize(
-    "options", [["--fps", "0"], ["--periods", "0"], ["--seconds", "nan"], ["--width", "5"], ["--fps", "1e9"]]
+    "options",
+    [["--fps", "0"], ["--periods", "0"], ["--seconds", "nan"], ["--width", "5"], ["--fps", "1e9"]],
 )
 def test_impossible_wishes_are_refused(options, three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")

@@ -1,4 +1,5 @@
-"""The figure of a solution can be read: no words over words, nothing cut off, snapshots apart, and PDF only on demand."""
+"""The figure of a solution can be read: no words over words, nothing cut off, snapshots apart, and
+PDF only on demand."""
 
 import subprocess
 import sys
@@ -18,7 +19,15 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.feet import Foot, Pad, Wheel
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import draw_allowed, draw_filmstrip, draw_lab, draw_shape_path, draw_speeds, forbidden, strips
+from colloc.pictures.figure import (
+    draw_allowed,
+    draw_filmstrip,
+    draw_lab,
+    draw_shape_path,
+    draw_speeds,
+    forbidden,
+    strips,
+)
 from colloc.pictures.motion_frames import foot_kinds
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
@@ -29,10 +38,18 @@ from scripts.gallery import picture
 
 def crawler(n_link, size=0.6):
     j = np.arange(n_link - 1)
-    guess = Fourier(np.zeros(n_link - 1), size * np.cos(0.9 * j)[:, None], size * np.sin(0.9 * j)[:, None] + 0.1)
+    guess = Fourier(
+        np.zeros(n_link - 1), size * np.cos(0.9 * j)[:, None], size * np.sin(0.9 * j)[:, None] + 0.1
+    )
     lengths = (1 / n_link,) * n_link
     return Problem(
-        "crawler", guess, Chain(lengths), Friction(mu_t=1.5, mu_f=1.0, mu_b=1.2), gait=Harmonic(1), delta=1e-2, intervals=8
+        "crawler",
+        guess,
+        Chain(lengths),
+        Friction(mu_t=1.5, mu_f=1.0, mu_b=1.2),
+        gait=Harmonic(1),
+        delta=1e-2,
+        intervals=8,
     )
 
 
@@ -40,7 +57,9 @@ def crawler(n_link, size=0.6):
 def test_strips_have_the_width_of_the_links_and_round_ends(turned):
     ends = np.array([[0.0, 0.4, 0.4], [0.0, 0.0, 0.6]])
     axes = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
-    for strip, length, own in zip(strips(axes @ ends, 0.1), (0.4, 0.6), (axes, axes[:, ::-1]), strict=True):
+    for strip, length, own in zip(
+        strips(axes @ ends, 0.1), (0.4, 0.6), (axes, axes[:, ::-1]), strict=True
+    ):
         x, y = strip.T
         area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
         assert area == pytest.approx(0.1 * length + np.pi * 0.05**2, rel=0.01)
@@ -48,12 +67,21 @@ def test_strips_have_the_width_of_the_links_and_round_ends(turned):
 
 
 def snake(size):
-    """A wave down five links that hardly slide sideways; a large one is two fifths of a body length a period."""
+    """A wave down five links that hardly slide sideways; a large one is two fifths of a body length
+    a period."""
     wave = Fourier(
-        np.zeros(4), size * np.cos(0.4 * np.pi * np.arange(4.0))[:, None], size * np.sin(0.4 * np.pi * np.arange(4.0))[:, None]
+        np.zeros(4),
+        size * np.cos(0.4 * np.pi * np.arange(4.0))[:, None],
+        size * np.sin(0.4 * np.pi * np.arange(4.0))[:, None],
     )
     return Problem(
-        "snake", wave, Chain((0.2,) * 5), Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), gait=Harmonic(1), delta=1e-2, intervals=8
+        "snake",
+        wave,
+        Chain((0.2,) * 5),
+        Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0),
+        gait=Harmonic(1),
+        delta=1e-2,
+        intervals=8,
     )
 
 
@@ -72,9 +100,13 @@ def test_paths_in_the_lab_go_on_until_the_body_has_left_its_place_if_it_soon_doe
     links = motion.theta + np.cumsum(np.insert(motion.angles, 0, 0.0, axis=0), axis=0)
     np.testing.assert_allclose(tail, motion.tail, atol=1e-12)
     np.testing.assert_allclose(centre, motion.centre, atol=1e-12)
-    np.testing.assert_allclose(head, tail + np.mean([np.cos(links), np.sin(links)], axis=1), atol=1e-12)
+    np.testing.assert_allclose(
+        head, tail + np.mean([np.cos(links), np.sin(links)], axis=1), atol=1e-12
+    )
     drawn = bodies(axes)
-    np.testing.assert_allclose(drawn[-1][:, [0, -1]], np.stack([tail[:, -1], head[:, -1]], axis=1), atol=1e-12)
+    np.testing.assert_allclose(
+        drawn[-1][:, [0, -1]], np.stack([tail[:, -1], head[:, -1]], axis=1), atol=1e-12
+    )
     if size < 1:
         assert (periods, len(drawn)) == (1, 1)
     else:
@@ -84,29 +116,42 @@ def test_paths_in_the_lab_go_on_until_the_body_has_left_its_place_if_it_soon_doe
 
 
 @pytest.mark.parametrize(("size", "half"), [(0.01, 0.03), (0.5, 0.6), (1.2, 1.02 * np.pi)])
-def test_a_path_of_shapes_is_drawn_whole_with_its_sense_and_from_close_by_if_it_is_small(size, half, unsolved):
+def test_a_path_of_shapes_is_drawn_whole_with_its_sense_and_from_close_by_if_it_is_small(
+    size, half, unsolved
+):
     problem, axes = snake(1.2), Figure().add_subplot()
     angle = np.linspace(0, 2 * np.pi, 500)
     q = np.array([[0.3], [-0.2]]) + size * np.array([np.cos(angle), 0.5 * np.sin(angle)])
     draw_shape_path(axes, problem, q)
     pieces = axes.collections[-1].get_segments()
     assert all((one[-1] == other[0]).all() for one, other in pairwise(pieces))
-    np.testing.assert_array_equal(np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)]), q.T)
+    np.testing.assert_array_equal(
+        np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)]), q.T
+    )
     (arrow,) = axes.texts
     x, y = np.subtract([arrow.xyann, arrow.xy], [0.3, -0.2]).T
     sense = np.unwrap(np.arctan2(2 * y, x))
     np.testing.assert_allclose(np.hypot(x, 2 * y), size, rtol=1e-3)
     assert 0 < sense[1] - sense[0] < 0.1
     middle = (0.3, -0.2) if half < 3 else (0.0, 0.0)
-    np.testing.assert_allclose([axes.get_xlim(), axes.get_ylim()], np.add.outer(middle, [-half, half]), atol=1e-3 * half)
+    np.testing.assert_allclose(
+        [axes.get_xlim(), axes.get_ylim()], np.add.outer(middle, [-half, half]), atol=1e-3 * half
+    )
 
 
-@pytest.mark.parametrize(("n_link", "size"), [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (6, 0.5), (9, 0.3), (13, 0.2)])
+@pytest.mark.parametrize(
+    ("n_link", "size"),
+    [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (6, 0.5), (9, 0.3), (13, 0.2)],
+)
 def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
     solution = unsolved(crawler(n_link, size))
     texts = assert_readable(solution_figure(solution))
     named = range(2, n_link) if n_link <= 9 else (4, 7, 9, 12)
-    assert "joint angle 2  [rad]" in texts if n_link == 3 else {"joint 1", *map(str, named)} <= set(texts)
+    assert (
+        "joint angle 2  [rad]" in texts
+        if n_link == 3
+        else {"joint 1", *map(str, named)} <= set(texts)
+    )
 
 
 @pytest.mark.parametrize("n_link", [6, 13])
@@ -119,7 +164,12 @@ def test_joints_of_a_robot_are_named_above_the_panels_in_colours_that_differ(n_l
         assert len({to_hex(line.get_color()) for line in axes.lines}) == n_link - 1
 
 
-STANDS = (Foot(0), *(Wheel(1, 0.3, offset=side * 0.05, angle=side * 0.6) for side in (1, -1)), Pad(2, 0.2, 0.8), Wheel(3))
+STANDS = (
+    Foot(0),
+    *(Wheel(1, 0.3, offset=side * 0.05, angle=side * 0.6) for side in (1, -1)),
+    Pad(2, 0.2, 0.8),
+    Wheel(3),
+)
 KINDS = ["foot", "wheel", "wheel", "pad", "wheel"]
 
 
@@ -140,7 +190,9 @@ def test_feet_wheels_and_pads_differ_and_the_key_says_which_is_which(unsolved):
     for line, wanted in ((wheels, [(1, -0.6), (1, 0.6), (3, 0.0)]), (pad, [(2, 0.0)])):
         first, last = (np.array(line.get_data())[:, end::3] for end in (0, 1))
         direction = np.arctan2(*(last - first)[::-1])
-        np.testing.assert_allclose(np.sin(direction - [links[link] + angle for link, angle in wanted]), 0, atol=1e-9)
+        np.testing.assert_allclose(
+            np.sin(direction - [links[link] + angle for link, angle in wanted]), 0, atol=1e-9
+        )
 
 
 def test_a_figure_in_the_lab_says_of_how_many_periods_it_is(unsolved):
@@ -152,9 +204,17 @@ def test_a_figure_in_the_lab_says_of_how_many_periods_it_is(unsolved):
 @pytest.mark.parametrize("size", [0.3, 1.5])
 def test_planes_of_shapes_of_one_gait_share_one_scale(size, unsolved):
     problem = crawler(4, size)
-    wide = Fourier(problem.guess.mean, problem.guess.cos * [[1.0], [0.2], [0.1]], problem.guess.sin * [[1.0], [0.2], [0.1]])
+    wide = Fourier(
+        problem.guess.mean,
+        problem.guess.cos * [[1.0], [0.2], [0.1]],
+        problem.guess.sin * [[1.0], [0.2], [0.1]],
+    )
     solution = unsolved(problem.with_(guess=wide))
-    axes = [panel.figure().axes[0] for name, panel in panels(solution).items() if name.startswith("shape")]
+    axes = [
+        panel.figure().axes[0]
+        for name, panel in panels(solution).items()
+        if name.startswith("shape")
+    ]
     assert len(axes) == 2
     assert np.ptp([[np.ptp(panel.get_xlim()), np.ptp(panel.get_ylim())] for panel in axes]) < 1e-12
 
@@ -164,19 +224,27 @@ def test_the_solved_problem_can_be_read(three_link):
     assert any("efficiency d/W = 0.26003" in text for text in texts)
 
 
-@pytest.mark.parametrize("name", ["lab", "angles", "speeds", "power", "convergence", "mesh", "shape-1-2", "filmstrip"])
+@pytest.mark.parametrize(
+    "name", ["lab", "angles", "speeds", "power", "convergence", "mesh", "shape-1-2", "filmstrip"]
+)
 def test_panels_alone_can_be_read_and_hold_all_that_is_drawn(name, three_link):
     figure = panels(three_link)[name].figure()
     assert_readable(figure)
     (axes,) = figure.axes
-    for seen, drawn in ((axes.viewLim.intervalx, axes.dataLim.intervalx), (axes.viewLim.intervaly, axes.dataLim.intervaly)):
+    for seen, drawn in (
+        (axes.viewLim.intervalx, axes.dataLim.intervalx),
+        (axes.viewLim.intervaly, axes.dataLim.intervaly),
+    ):
         rounding = 1e-6 * np.ptp(seen)  # of older ones of matplotlib
         assert min(seen) - rounding <= min(drawn) <= max(drawn) <= max(seen) + rounding
 
 
 def test_speeds_are_drawn_down_to_rest(unsolved):
     """All joints of a standing wave rest at once, and so does the body."""
-    wave, axes = Fourier(np.zeros(4), np.array([[0.6], [0.3], [0.5], [0.2]]), np.zeros((4, 1))), Figure().add_subplot()
+    wave, axes = (
+        Fourier(np.zeros(4), np.array([[0.6], [0.3], [0.5], [0.2]]), np.zeros((4, 1))),
+        Figure().add_subplot(),
+    )
     solution = unsolved(snake(1.2).with_(guess=wave))
     draw_speeds(axes, solution, np.linspace(0.0, 1.0, 101))
     low, high = axes.get_ylim()
@@ -195,7 +263,9 @@ def test_a_reader_of_words_sees_an_overlap():
 
 
 @pytest.mark.parametrize("n_link", [2, 3, 5])
-def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved_to_their_places(n_link, unsolved):
+def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved_to_their_places(
+    n_link, unsolved
+):
     solution, axes = unsolved(crawler(n_link, 1.5)), Figure().add_subplot()
     draw_filmstrip(axes, solution)
     drawn, motion = bodies(axes), solution.sample(np.linspace(0.0, 1.0, 11))
@@ -203,7 +273,9 @@ def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved
     for left, right in pairwise(drawn):
         assert 0.1 < right[0].min() - left[0].max() < 0.6
     tails = np.stack([body[:, 0] for body in drawn], axis=1)
-    centres = np.concatenate([line.get_data() for line in axes.lines if line.get_marker() == "+"], axis=1)
+    centres = np.concatenate(
+        [line.get_data() for line in axes.lines if line.get_marker() == "+"], axis=1
+    )
     np.testing.assert_allclose(tails[1], motion.tail[1], atol=1e-12)
     np.testing.assert_allclose(centres - tails, motion.centre - motion.tail, atol=1e-12)
     said = [float(text.get_text().replace("−", "-")) for text in axes.texts]
@@ -212,7 +284,8 @@ def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved
 
 
 def test_forbidden_shapes_are_the_exact_set_of_the_three_link_body():
-    """Design: crossing iff both angles positive and min(2 a + b, a + 2 b) > 2 pi, or the mirror image."""
+    """Design: crossing iff both angles positive and min(2 a + b, a + 2 b) > 2 pi, or the mirror
+    image."""
 
     def area(limit):
         return float((forbidden(Chain(), limit)[1][:-1, :-1] > 0).mean()) * (2 * np.pi) ** 2
@@ -242,10 +315,13 @@ def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     shapes = np.random.default_rng(7).uniform(-np.pi, np.pi, (body.n_joint, 20000))
     shapes = np.concatenate([shapes, 0.4 * shapes], axis=1)
     stretched, most = under_one_limit(shapes, limit)
-    allowed = shapes[:, (body.largest_angles(stretched) <= most) & (body.crossing_depth(shapes) == 0)]
+    allowed = shapes[
+        :, (body.largest_angles(stretched) <= most) & (body.crossing_depth(shapes) == 0)
+    ]
     assert allowed.shape[1] > 100
     column, row = (np.abs(grid[:, None] - allowed[j]).argmin(axis=0) for j in plane)
-    assert excess[row, column].max() < 2.5 * (grid[1] - grid[0])  # no deeper than the nearest point of the grid may be
+    # no deeper than the nearest point of the grid may be
+    assert excess[row, column].max() < 2.5 * (grid[1] - grid[0])
 
 
 def test_only_the_kinds_asked_for_are_written_and_nobodys_settings_change(tmp_path):
@@ -258,14 +334,21 @@ def test_only_the_kinds_asked_for_are_written_and_nobodys_settings_change(tmp_pa
 
 def test_solving_and_drawing_load_nothing_that_is_not_used():
     program = (
-        "import sys, colloc.commands.solve; assert 'matplotlib' not in sys.modules; import colloc.studies.saved, "
+        "import sys, colloc.commands.solve; assert 'matplotlib' not in sys.modules; import "
+        "colloc.studies.saved, "
         "colloc.pictures.solution_figure;"
         "print(*sys.modules)"
     )
-    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert "matplotlib.figure" in loaded
-    parts = {f"scipy.{part}" for part in ("integrate", "interpolate", "optimize", "special", "stats")}
-    assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "jinja2", *parts} & set(loaded)
+    parts = {
+        f"scipy.{part}" for part in ("integrate", "interpolate", "optimize", "special", "stats")
+    }
+    assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "jinja2", *parts} & set(
+        loaded
+    )
 
 
 @pytest.mark.parametrize(("n_link", "size"), [(2, 1.5), (3, 0.3), (5, 0.6)])
@@ -280,13 +363,20 @@ def test_a_flat_motion_is_drawn_higher_with_its_feet_and_says_so(size, times, un
         Fourier(np.zeros(3), size * np.ones((3, 1)), size * np.array([[1.0], [0.0], [-1.0]])),
     )
     axes = Figure().add_subplot()
-    problem = Problem("flat", gait, body, gait=Harmonic(1), delta=1e-2, intervals=8, smallest_shape_speed=1e-3)
+    problem = Problem(
+        "flat", gait, body, gait=Harmonic(1), delta=1e-2, intervals=8, smallest_shape_speed=1e-3
+    )
     draw_filmstrip(axes, unsolved(problem))
     said = [text.get_text() for text in axes.texts if "heights" in text.get_text()]
     drawn = bodies(axes)
     assert np.ptp(np.concatenate(drawn, axis=1)[1]) > 0.2
     assert said == ([] if times == 1 else [f"heights drawn {times} times as large"])
-    squares = [np.array(line.get_data()) for line in axes.lines if line.get_marker() == "s" and line.get_color() != "white"]
-    feet = np.concatenate([square[:, ::3] for square in squares], axis=1)  # each is there twice, and then a gap
+    squares = [
+        np.array(line.get_data())
+        for line in axes.lines
+        if line.get_marker() == "s" and line.get_color() != "white"
+    ]
+    # each is there twice, and then a gap
+    feet = np.concatenate([square[:, ::3] for square in squares], axis=1)
     middles = np.concatenate([0.5 * (body[:, 1:] + body[:, :-1]) for body in drawn], axis=1)
     np.testing.assert_allclose(sorted(feet.T.tolist()), sorted(middles.T.tolist()), atol=1e-12)

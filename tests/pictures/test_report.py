@@ -1,4 +1,5 @@
-"""The report is one self-contained, well-formed page that trusts nothing in the file, and a browser runs it without a word."""
+"""The report is one self-contained, well-formed page that trusts nothing in the file, and a browser
+runs it without a word."""
 
 import dataclasses
 import json
@@ -31,10 +32,15 @@ from colloc.search import certify as certificate
 from colloc.search.certify import certify
 from colloc.smooth.modal_body import ModalBody
 
-BROWSER = next((path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path), None)
+BROWSER = next(
+    (path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path),
+    None,
+)
 VOID = {"meta", "br", "hr", "input", "img", "link"}
 """Elements without an end tag."""
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium or google-chrome on this machine")
+needs_browser = pytest.mark.skipif(
+    BROWSER is None, reason="no chromium or google-chrome on this machine"
+)
 
 
 class Outline(HTMLParser):
@@ -76,7 +82,11 @@ def crawler(n_link, **changes):
         "body": Chain((1 / n_link,) * n_link),
         "friction": Friction(mu_t=1.5, mu_f=1.0, mu_b=1.2),
         "gait": Harmonic(1),
-        "guess": Fourier(np.zeros(n_link - 1), 0.6 * np.cos(0.9 * j)[:, None], 0.6 * np.sin(0.9 * j)[:, None] + 0.1),
+        "guess": Fourier(
+            np.zeros(n_link - 1),
+            0.6 * np.cos(0.9 * j)[:, None],
+            0.6 * np.sin(0.9 * j)[:, None] + 0.1,
+        ),
         "delta": 1e-2,
         "intervals": 8,
     }
@@ -91,10 +101,14 @@ def page(three_link):
 def test_the_page_holds_what_it_should(page, three_link):
     text = " ".join(outline(page).text)
     for words in (
-        "three_link", "✓ certified", "0.26003", "agrees with 0.259", "upper bound 0.473", "Motion in the lab frame",
-        "moves 0.27 body lengths a cycle; 0.26 body lengths per unit of work", "1 harmonic, symmetry bilateral",
-        "μt = 1 sideways", "0.3333, 0.3333, 0.3333", "replay gap", "finds the same value", "joints 1 and 2",
-        "speeds along the body", "power against friction", "efficiency at each level", "mesh: error of",
+        "three_link", "✓ certified", "0.26003", "agrees with 0.259", "upper bound 0.473",
+        "Motion in the lab frame",
+        "moves 0.27 body lengths a cycle; 0.26 body lengths per unit of work",
+        "1 harmonic, symmetry bilateral",
+        "μt = 1 sideways", "0.3333, 0.3333, 0.3333", "replay gap", "finds the same value",
+        "joints 1 and 2",
+        "speeds along the body", "power against friction", "efficiency at each level",
+        "mesh: error of",
         "How to reproduce", "colloc solve three_link.py", "casadi", three_link.problem.hash,
     ):  # fmt: skip
         assert words in text, words
@@ -105,16 +119,33 @@ def test_the_page_holds_what_it_should(page, three_link):
 def test_the_page_needs_no_network_and_no_other_file(page):
     seen = outline(page)
     for tag, name, value in seen.attributes:
-        assert name not in ("src", "srcset", "href", "action", "background", "poster"), (tag, name, value)
-        assert name != "xlink:href" or (tag == "use" and value.startswith("#")), (tag, name, value)  # a mark drawn again
+        assert name not in ("src", "srcset", "href", "action", "background", "poster"), (
+            tag,
+            name,
+            value,
+        )
+        # a mark drawn again
+        assert name != "xlink:href" or (tag == "use" and value.startswith("#")), (tag, name, value)
         assert "://" not in (value or ""), (tag, name, value)
         assert not name.startswith("on"), (tag, name)
     assert "://" not in page
     assert "@import" not in page
     assert not re.findall(r"url\((?!#)", page)
-    for call in ("fetch(", "XMLHttpRequest", "WebSocket", "import(", "eval(", "innerHTML", "document.write"):
+    for call in (
+        "fetch(",
+        "XMLHttpRequest",
+        "WebSocket",
+        "import(",
+        "eval(",
+        "innerHTML",
+        "document.write",
+    ):
         assert call not in page
-    policy = [value for tag, name, value in seen.attributes if tag == "meta" and name == "content" and "default-src" in value]
+    policy = [
+        value
+        for tag, name, value in seen.attributes
+        if tag == "meta" and name == "content" and "default-src" in value
+    ]
     assert policy[0].startswith("default-src 'none'")
     assert not {tag for tag, _, _ in seen.attributes} & {"link", "iframe", "object", "embed", "img"}
 
@@ -126,7 +157,9 @@ def test_a_reader_who_hears_the_page_is_told_what_is_drawn_and_can_scroll_with_t
     drawn = re.findall(r"<(?:svg|canvas)[^>]*>", page)
     assert len(drawn) > 6
     assert all('role="img"' in tag and re.search(r'aria-label="[^"]+"', tag) for tag in drawn)
-    assert re.findall(r"<figcaption>(.*?)</figcaption>", page) == re.findall(r'<svg[^>]*aria-label="([^"]*)"', page)
+    assert re.findall(r"<figcaption>(.*?)</figcaption>", page) == re.findall(
+        r'<svg[^>]*aria-label="([^"]*)"', page
+    )
     scrolling = re.findall(r'<(?:pre|div class="scroll")[^>]*>', page)
     assert scrolling
     assert all('tabindex="0"' in tag for tag in scrolling)
@@ -134,10 +167,16 @@ def test_a_reader_who_hears_the_page_is_told_what_is_drawn_and_can_scroll_with_t
 
 
 def test_the_film_comes_first_and_the_certificate_is_folded_away_unless_it_fails(page, three_link):
-    places = [page.index(words) for words in ("Motion in the lab frame", "What was solved", "<h2>Gait", "<h2>Certificate")]
+    places = [
+        page.index(words)
+        for words in ("Motion in the lab frame", "What was solved", "<h2>Gait", "<h2>Certificate")
+    ]
     assert places == sorted(places)
     assert "<details><summary><h2>Certificate: 15 of 15 checks hold" in page
-    bad = replace(three_link.certificate, checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks))
+    bad = replace(
+        three_link.certificate,
+        checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks),
+    )
     failed = report_page(Solution(three_link.problem, three_link.answer, bad))
     assert "<details open><summary><h2>Certificate: 15 of 16 checks hold" in failed
 
@@ -147,7 +186,15 @@ def test_everything_from_the_file_is_escaped(three_link):
     history = (*three_link.history, replace(three_link.history[0], status=EVIL, optimal=False))
     answer = replace(three_link.answer, history=history)
     versions = {EVIL: EVIL, "colloc": EVIL}
-    evil = Solution(three_link.problem, answer, replace(three_link.certificate, checks=checks), 1.0, EVIL, EVIL, versions)
+    evil = Solution(
+        three_link.problem,
+        answer,
+        replace(three_link.certificate, checks=checks),
+        1.0,
+        EVIL,
+        EVIL,
+        versions,
+    )
     page = report_page(evil, Reference(0.2, 0.1, EVIL), EVIL)
     seen = outline(page)
     assert "<img" not in page
@@ -162,7 +209,9 @@ def test_everything_from_the_file_is_escaped(three_link):
 
 def test_json_in_the_page_cannot_end_its_block():
     made = (
-        environment().from_string('<script id="x" type="application/json">{{ data|tojson }}</script>').render(data={"a": EVIL})
+        environment()
+        .from_string('<script id="x" type="application/json">{{ data|tojson }}</script>')
+        .render(data={"a": EVIL})
     )
     assert made.count("<") == 2
     assert json.loads(outline(made).scripts[0])["a"] == EVIL
@@ -185,7 +234,10 @@ def test_every_check_of_a_certificate_is_put_in_plain_words(page, three_link):
 
 def test_the_page_says_how_slow_is_slow_enough(page, three_link):
     """On a floor with a part of the friction at that part of the Froude number, L/(gT²)."""
-    words = r"up to a Froude number L/\(gT²\) of (\S+): a robot of 1 m on a\s+floor with (\S+) of this friction, from (\S+) s"
+    words = (
+        r"up to a Froude number L/\(gT²\) of (\S+): a robot of 1 m on a\s+floor with (\S+) of "
+        r"this friction, from (\S+) s"
+    )
     froude, part, period = map(float, re.search(words, unescape(page)).groups())
     assert froude == pytest.approx(three_link.slow_enough(0.01), rel=0.05)
     assert 1 / (9.81 * period**2) == pytest.approx(part * froude, rel=0.15)  # of two digits
@@ -204,11 +256,16 @@ def test_pictures_take_colour_and_font_from_the_page_and_do_not_style_it(page):
 
 
 def test_failures_show_in_red_and_an_interrupted_solve_has_a_page_too(three_link):
-    bad = replace(three_link.certificate, checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks))
+    bad = replace(
+        three_link.certificate,
+        checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks),
+    )
     text = " ".join(outline(report_page(Solution(three_link.problem, three_link.answer, bad))).text)
     assert "✗ fails" in text
     assert "✗ certificate failed" in text
-    ended = Solution(three_link.problem, three_link.answer, message="ended early.", interrupted=True)
+    ended = Solution(
+        three_link.problem, three_link.answer, message="ended early.", interrupted=True
+    )
     text = " ".join(outline(report_page(ended)).text)
     assert "✗ interrupted" in text
     assert "ended early." in text
@@ -232,23 +289,34 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     shown = frames(solution := unsolved(problem), count=241, arrows=300)
     lengths = np.hypot(*np.diff(shown.ends, axis=1))
     np.testing.assert_allclose(lengths, np.full_like(lengths, 1 / n_link), atol=1e-12)
-    # the arrows are friction per length: their sum is the net force, which vanishes up to the midpoint rule; at collocation
-    # points only, between them z is interpolated: hence the loose bound on a mesh of eight intervals
+    # the arrows are friction per length: their sum is the net force, which vanishes up to the
+    # midpoint rule; at collocation points only, between them z is interpolated: hence the loose
+    # bound on a mesh of eight intervals
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
     spent = -(shown.arrow * np.gradient(shown.arrow_base, shown.t, axis=2)).sum(axis=0).mean(axis=0)
     assert np.trapezoid(spent, shown.t) == pytest.approx(solution.measured.work, rel=5e-3)
     drawn, (low, high) = shown.arrow_scale * shown.arrow, shown.window
     assert np.hypot(*drawn).max() == pytest.approx(0.12)
-    tips = np.concatenate([before.of((shown.arrow_base + drawn).reshape(2, -1)) for before in shown.before], axis=1)
-    assert np.all((low < tips.min(axis=1)) & (tips.max(axis=1) < high) & (high - low < np.ptp(tips, axis=1) + 0.48))
+    tips = np.concatenate(
+        [before.of((shown.arrow_base + drawn).reshape(2, -1)) for before in shown.before], axis=1
+    )
+    assert np.all(
+        (low < tips.min(axis=1))
+        & (tips.max(axis=1) < high)
+        & (high - low < np.ptp(tips, axis=1) + 0.48)
+    )
 
 
 def test_what_the_page_draws_is_what_the_frames_hold(unsolved):
     problem = crawler(3)
     shown = frames(unsolved(problem), count=7, arrows=12)
     data = motion_data(shown, problem.body)
-    drawn = {("x", "y"): shown.ends, ("arrowX", "arrowY"): shown.arrow_base, ("forceX", "forceY"): shown.arrow}
+    drawn = {
+        ("x", "y"): shown.ends,
+        ("arrowX", "arrowY"): shown.arrow_base,
+        ("forceX", "forceY"): shown.arrow,
+    }
     for names, rows in drawn.items():
         np.testing.assert_allclose([data[name] for name in names], rows, atol=1e-3)
     (left, low), (right, high) = shown.window
@@ -304,28 +372,45 @@ def test_the_browser_draws_every_period_where_the_body_is_then(turning, tmp_path
     result = browsed(report_page(turning).replace("</body>", tell), tmp_path)
     seen = np.array(json.loads(unescape(re.search('data-seen="([^"]*)"', result.stdout).group(1))))
     motion = turning.sample(np.array([0.3, 1.5, 2.7]))
-    joints = lab_outline(turning.problem.body, motion.angles, motion.theta, motion.tail)[:, 1:]  # hinges, then the head
-    x, y = np.concatenate([joints, motion.centre[:, None]], axis=1).transpose(0, 2, 1).reshape(2, -1)
+    # hinges, then the head
+    joints = lab_outline(turning.problem.body, motion.angles, motion.theta, motion.tail)[:, 1:]
+    x, y = (
+        np.concatenate([joints, motion.centre[:, None]], axis=1).transpose(0, 2, 1).reshape(2, -1)
+    )
     one, none = np.ones_like(x), np.zeros_like(x)
     rows = np.concatenate([np.stack([x, one, none]), np.stack([-y, none, one])], axis=1).T
     pixels = seen.T.ravel()
-    fitted = rows @ np.linalg.lstsq(rows, pixels, rcond=None)[0]  # a scale and a shift of the canvas, the same for all
+    # a scale and a shift of the canvas, the same for all
+    fitted = rows @ np.linalg.lstsq(rows, pixels, rcond=None)[0]
     np.testing.assert_allclose(pixels, fitted, atol=1.0)
 
 
 def test_the_dot_of_a_plane_is_placed_in_the_coordinates_of_its_picture(unsolved):
-    small = crawler(3, guess=Fourier(np.array([2.3, -2.3]), np.array([[0.2], [-0.2]]), np.array([[0.15], [0.15]])))
+    small = crawler(
+        3,
+        guess=Fourier(np.array([2.3, -2.3]), np.array([[0.2], [-0.2]]), np.array([[0.15], [0.15]])),
+    )
     page = report_page(unsolved(small.with_(smallest_shape_speed=0.01)))
     plane = page[: page.index("data-sides")].rindex("<svg")
-    _, _, width, _ = (float(v) for v in re.search('viewBox="([^"]*)"', page[plane:]).group(1).split())
-    left, right, top, bottom = (float(v) for v in re.search('data-sides="([^"]*)"', page).group(1).split(","))
-    x0, x1, y0, y1 = (float(v) for v in re.search('data-limits="([^"]*)"', page).group(1).split(","))
+    _, _, width, _ = (
+        float(v) for v in re.search('viewBox="([^"]*)"', page[plane:]).group(1).split()
+    )
+    left, right, top, bottom = (
+        float(v) for v in re.search('data-sides="([^"]*)"', page).group(1).split(",")
+    )
+    x0, x1, y0, y1 = (
+        float(v) for v in re.search('data-limits="([^"]*)"', page).group(1).split(",")
+    )
     assert 0 < left < right < 100
     assert 0 < top < bottom < 100
     angles = small.guess.angles(np.linspace(0, 1, 200))
-    assert x0 < angles[0].min() < angles[0].max() < x1 < x0 + 1.0  # a small loop is shown from close by
+    # a small loop is shown from close by
+    assert x0 < angles[0].min() < angles[0].max() < x1 < x0 + 1.0
     assert y0 < angles[1].min() < angles[1].max() < y1
-    drawn = np.array(re.findall(r"[ML] ([0-9.]+) ([0-9.]+) \n", page[plane : page.index("data-sides")]), dtype=float)[:, 0]
+    drawn = np.array(
+        re.findall(r"[ML] ([0-9.]+) ([0-9.]+) \n", page[plane : page.index("data-sides")]),
+        dtype=float,
+    )[:, 0]
     expected = (left + (angles[0].max() - x0) / (x1 - x0) * (right - left)) / 100 * width
     assert np.abs(drawn - expected).min() < 0.3
 
@@ -339,10 +424,14 @@ def test_the_command_writes_the_page_beside_the_result(three_link, tmp_path, cap
 
 
 def browsed(page, folder):
-    """What a browser makes of a page: its document as standard output, its complaints as standard error."""
+    """What a browser makes of a page: its document as standard output, its complaints as standard
+    error."""
     file = folder / "page.html"
     file.write_text(page, encoding="utf-8")
-    options = "headless no-sandbox disable-gpu disable-quic no-first-run disable-background-networking disable-component-update"
+    options = (
+        "headless no-sandbox disable-gpu disable-quic no-first-run "
+        "disable-background-networking disable-component-update"
+    )
     command = [
         BROWSER,
         *(f"--{option}" for option in options.split()),
@@ -359,13 +448,20 @@ def browsed(page, folder):
 @needs_browser
 def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
     # frames by the clock: a browser without a screen may draw none before it is done
-    clock = "<script>window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 16);</script></head>"
+    clock = (
+        "<script>window.requestAnimationFrame = draw => setTimeout(() => "
+        "draw(performance.now()), 16);</script></head>"
+    )
     result = browsed(report_page(three_link).replace("</head>", clock), tmp_path)
-    assert "CONSOLE" not in result.stderr, [line for line in result.stderr.splitlines() if "CONSOLE" in line]
+    assert "CONSOLE" not in result.stderr, [
+        line for line in result.stderr.splitlines() if "CONSOLE" in line
+    ]
     assert 'data-ready="yes"' in result.stdout
     phase = float(re.search(r"t = ([0-9.]+)</output>", result.stdout).group(1))
     assert phase > 0.1  # it plays
-    cursor = r'class="cursor" data-low="([0-9.]+)" data-high="([0-9.]+)" style="[^"]*left: ([0-9.]+)%'
+    cursor = (
+        r'class="cursor" data-low="([0-9.]+)" data-high="([0-9.]+)" style="[^"]*left: ([0-9.]+)%'
+    )
     cursors = re.findall(cursor, result.stdout)
     assert len(cursors) == 3
     for low, high, left in cursors:
@@ -379,18 +475,32 @@ def test_a_notebook_shows_a_card(three_link):
     text = " ".join(card.text)
     for words in ("three_link", "solved", "0.26003", "checks, all hold", "distance d"):
         assert words in text
-    film = [frame.split() for frame in re.search(r'points" values="([^"]+)"', three_link._repr_html_())[1].split(";")]
-    drawn = np.array([[[float(x) for x in point.split(",")] for point in frame] for frame in film])  # (time, point, 2) [pixels]
+    film = [
+        frame.split()
+        for frame in re.search(r'points" values="([^"]+)"', three_link._repr_html_())[1].split(";")
+    ]
+    # (time, point, 2) [pixels]
+    drawn = np.array([[[float(x) for x in point.split(",")] for point in frame] for frame in film])
     half, scale = len(film) // 2, 3 * np.hypot(*(drawn[0, 1] - drawn[0, 0]))
-    np.testing.assert_allclose(np.hypot(*np.diff(drawn, axis=1).transpose(2, 0, 1)), scale / 3, atol=0.15)
-    steps = drawn[half:] - drawn[:half]  # the second period repeats the first one, a distance further on
-    np.testing.assert_allclose(np.hypot(*steps.transpose(2, 0, 1)), scale * three_link.measured.distance, atol=0.3)
-    size = [float(x) for x in re.search(r'<svg width="(\d+)" height="(\d+)"', three_link._repr_html_()).groups()]
+    np.testing.assert_allclose(
+        np.hypot(*np.diff(drawn, axis=1).transpose(2, 0, 1)), scale / 3, atol=0.15
+    )
+    # the second period repeats the first one, a distance further on
+    steps = drawn[half:] - drawn[:half]
+    np.testing.assert_allclose(
+        np.hypot(*steps.transpose(2, 0, 1)), scale * three_link.measured.distance, atol=0.3
+    )
+    size = [
+        float(x)
+        for x in re.search(r'<svg width="(\d+)" height="(\d+)"', three_link._repr_html_()).groups()
+    ]
     assert np.all((drawn > 0) & (drawn < size))
     assert max(size[0] / 320, size[1] / 200) == 1
     start = three_link.sample(0.0)
     upwards = lab_outline(three_link.problem.body, start.angles, start.theta, start.tail)[1, :, 0]
-    np.testing.assert_allclose(drawn[0, :, 1] - drawn[0, 0, 1], -scale * (upwards - upwards[0]), atol=0.3)
+    np.testing.assert_allclose(
+        drawn[0, :, 1] - drawn[0, 0, 1], -scale * (upwards - upwards[0]), atol=0.3
+    )
     failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     assert "not converged" in " ".join(outline(failed._repr_html_()).text)
 
@@ -398,7 +508,11 @@ def test_a_notebook_shows_a_card(three_link):
 def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three_link, tmp_path):
     solution = replace(three_link, source="")
     text = unescape(report_page(solution))
-    stated = text[text.index("from colloc import Problem") : text.index("</code>", text.index("from colloc import Problem"))]
+    stated = text[
+        text.index("from colloc import Problem") : text.index(
+            "</code>", text.index("from colloc import Problem")
+        )
+    ]
     (tmp_path / "stated.py").write_text(stated, encoding="utf-8")
     assert load_problem(tmp_path / "stated.py").hash == three_link.problem.hash
     assert "save the problem source above" in text
@@ -406,11 +520,15 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
 
 def test_levels_on_the_way_do_not_alarm_and_the_last_one_does(three_link):
     rough = replace(three_link.history[0], optimal=False, status="not stationary")
-    good = replace(three_link, answer=replace(three_link.answer, history=(rough, *three_link.history[1:])))
+    good = replace(
+        three_link, answer=replace(three_link.answer, history=(rough, *three_link.history[1:]))
+    )
     text = " ".join(outline(report_page(good)).text)
     assert "on the way" in text
     assert "✗" not in text
-    bad = replace(three_link, answer=replace(three_link.answer, history=(*three_link.history[:-1], rough)))
+    bad = replace(
+        three_link, answer=replace(three_link.answer, history=(*three_link.history[:-1], rough))
+    )
     assert "✗ not stationary" in " ".join(outline(report_page(bad)).text)
 
 

@@ -17,13 +17,21 @@ COMMANDS = (
 
 
 def python(*words, folder=None, **environment):
-    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, env=os.environ | environment, cwd=folder)
+    done = subprocess.run(
+        [sys.executable, *words],
+        capture_output=True,
+        text=True,
+        env=os.environ | environment,
+        cwd=folder,
+    )
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_commands_draw_where_the_environment_names_a_backend_that_there_is_not(command, three_link, tmp_path):
+def test_commands_draw_where_the_environment_names_a_backend_that_there_is_not(
+    command, three_link, tmp_path
+):
     """A notebook's terminal does: module://matplotlib_inline.backend_inline."""
     save(three_link, tmp_path / "one.h5")
     python("-m", "colloc", *command.split(), folder=tmp_path, MPLBACKEND="no_such_name")
@@ -31,11 +39,17 @@ def test_commands_draw_where_the_environment_names_a_backend_that_there_is_not(c
 
 
 @pytest.mark.parametrize(
-    ("before", "backend"), [("", "no_such_name"), ("", "module://no.such_name"), ("", "svg"), ("matplotlib, ", "svg")]
+    ("before", "backend"),
+    [("", "no_such_name"), ("", "module://no.such_name"), ("", "svg"), ("matplotlib, ", "svg")],
 )
-def test_a_script_draws_whatever_backend_is_named_and_one_that_there_is_stays(before, backend, three_link, tmp_path):
+def test_a_script_draws_whatever_backend_is_named_and_one_that_there_is_stays(
+    before, backend, three_link, tmp_path
+):
     save(three_link, tmp_path / "one.h5")
-    drawn = f"import os, {before}colloc; colloc.load('one.h5').plot().savefig('one.png'); import matplotlib"
+    drawn = (
+        f"import os, {before}colloc; colloc.load('one.h5').plot().savefig('one.png'); import "
+        f"matplotlib"
+    )
     said = python(
         "-c",
         f"{drawn}; print(matplotlib.rcParams['backend'] == 'svg', os.environ['MPLBACKEND'])",
@@ -47,7 +61,9 @@ def test_a_script_draws_whatever_backend_is_named_and_one_that_there_is_stays(be
 
 
 def test_a_style_that_cannot_be_drawn_with_is_of_no_account_and_stays(three_link, tmp_path):
-    with matplotlib.rc_context({"text.usetex": True, "figure.figsize": (1.0, 1.0), "font.family": "no such font"}):
+    with matplotlib.rc_context(
+        {"text.usetex": True, "figure.figsize": (1.0, 1.0), "font.family": "no such font"}
+    ):
         mine = dict(matplotlib.rcParams)
         drawn = save_figure(three_link.plot(), tmp_path / "styled", ("png",))
         assert dict(matplotlib.rcParams) == mine

@@ -8,22 +8,42 @@ from colloc.mechanics.bodies import formulations
 def shapes(body, count, seed, size):
     """Angles, rates and tail velocities."""
     rng = np.random.default_rng(seed)
-    return rng.uniform(-size, size, (body.n_joint, count)), rng.normal(size=(body.n_joint, count)), rng.normal(size=(3, count))
+    return (
+        rng.uniform(-size, size, (body.n_joint, count)),
+        rng.normal(size=(body.n_joint, count)),
+        rng.normal(size=(3, count)),
+    )
 
 
 def form(body, size, seed=3, count=7):
     """What it says of its shapes."""
     angles, rates, z = shapes(body, count, seed, size)
-    names = ("symmetries", "usual", "schedule", "panels", "looks_for_all_velocities", "limited", "limit_names", "drawn_width")
+    names = (
+        "symmetries",
+        "usual",
+        "schedule",
+        "panels",
+        "looks_for_all_velocities",
+        "limited",
+        "limit_names",
+        "drawn_width",
+    )
     found = {name: getattr(body, name) for name in ("n_joint", "coordinate", "quantity")}
     found |= {"formulations": formulations(body), "n_force": len(body.force_names)}
     found |= {name: getattr(body, name) for name in (*names, "bending")}
-    found |= {"describe": body.describe(), "hinges": [body.hinges.start, body.hinges.stop], "pairs": np.array(body.far_pairs)}
+    found |= {
+        "describe": body.describe(),
+        "hinges": [body.hinges.start, body.hinges.stop],
+        "pairs": np.array(body.far_pairs),
+    }
     found |= {
         "largest": body.largest_angles(angles),
         "contacts": [(c.name, *c.pair(angles), c.width) for c in body.contacts(body.far_pairs)],
     }
-    found |= {"crossing": body.crossing_depth(angles), "passing": body.passing_depth(np.repeat(angles, 2, axis=1))}
+    found |= {
+        "crossing": body.crossing_depth(angles),
+        "passing": body.passing_depth(np.repeat(angles, 2, axis=1)),
+    }
     return found | {
         "outline": body.outline(angles),
         "centre": body.centre(angles),

@@ -10,7 +10,8 @@ import numpy as np
 
 _TURN = 0.5 * (np.sqrt(5.0) - 1.0)
 _FEW_INSTANTS = 1.6
-"""Relative change of a mean of logarithms, times their number, where two instants take four times as many steps."""
+"""Relative change of a mean of logarithms, times their number, where two instants take four times
+as many steps."""
 
 
 def leaves(value: Any, name: str = "") -> Iterator[tuple[str, np.ndarray | str]]:
@@ -35,8 +36,8 @@ def leaves(value: Any, name: str = "") -> Iterator[tuple[str, np.ndarray | str]]
 
 
 def digest(value: Any) -> dict[str, Any]:
-    """Texts as they are; of an array its shape, number of finite parts, root mean square, and a sum in which each part counts
-    differently."""
+    """Texts as they are; of an array its shape, number of finite parts, root mean square, and a sum
+    in which each part counts differently."""
     found: dict[str, Any] = {}
     for name, leaf in leaves(value):
         if isinstance(leaf, str):
@@ -48,15 +49,23 @@ def digest(value: Any) -> dict[str, Any]:
         finite = np.where(np.isfinite(parts), parts, 0.0)
         weights = np.cos(1.0 + 2 * np.pi * _TURN * np.arange(parts.size))
         size = float(np.sqrt(np.mean(finite**2))) if parts.size else 0.0
-        found[name] = [list(leaf.shape), int(np.isfinite(parts).sum()), size, float(weights @ finite)]
+        found[name] = [
+            list(leaf.shape),
+            int(np.isfinite(parts).sum()),
+            size,
+            float(weights @ finite),
+        ]
     return found
 
 
-def assert_same(found: dict[str, Any], known: dict[str, Any], precision: float, floor: float) -> None:
+def assert_same(
+    found: dict[str, Any], known: dict[str, Any], precision: float, floor: float
+) -> None:
     """Texts, shapes and numbers; these to a relative precision, and not below a floor.
 
-    Rounding, and so the processor, decides here and there on a fourfold of a method's steps: of iterations the mean is compared
-    alone, and two instants may have such a change, however many there are.
+    Rounding, and so the processor, decides here and there on a fourfold of a method's steps: of
+    iterations the mean is compared alone, and two instants may have such a change, however many
+    there are.
     """
     assert list(found) == list(known), "other parts"
     for name, (mine, theirs) in {name: (found[name], known[name]) for name in known}.items():
@@ -69,4 +78,6 @@ def assert_same(found: dict[str, Any], known: dict[str, Any], precision: float, 
             assert abs(mine[2] - theirs[2]) <= _FEW_INSTANTS / theirs[1] * theirs[2], says
             continue
         assert abs(mine[2] - theirs[2]) <= precision * theirs[2] + floor, says
-        assert abs(mine[3] - theirs[3]) <= precision * theirs[2] * np.sqrt(max(1, theirs[1])) + floor, says
+        assert (
+            abs(mine[3] - theirs[3]) <= precision * theirs[2] * np.sqrt(max(1, theirs[1])) + floor
+        ), says

@@ -1,4 +1,5 @@
-"""Chains: form, contact, mechanics under several laws and loads, by the compiled kernel and by NumPy."""
+"""Chains: form, contact, mechanics under several laws and loads, by the compiled kernel and by
+NumPy."""
 
 import numpy as np
 
@@ -40,7 +41,11 @@ def other_ends():
     found = []
     for body in (THREE, WIDE, FIVE):
         angles, rates, z = shapes(body, 4, 6, 1.0)
-        found += [body.seen_from_head(angles, rates, z), body.swapped(angles), body.laid(np.array([0.5, 0.2, 0.3]))]
+        found += [
+            body.seen_from_head(angles, rates, z),
+            body.swapped(angles),
+            body.laid(np.array([0.5, 0.2, 0.3])),
+        ]
     return found
 
 
@@ -51,15 +56,24 @@ def contact():
         found += [clearance(WIDE, angles, i, j), intrusions(WIDE, angles, i, j)]
     first, second = rng.normal(size=(2, 9)) * 1e-3
     share = share_of_first(first, second)
-    found += [gap(WIDE, angles), overlap(WIDE, angles), share, tangent_of_minimum(second, first, share)]
-    path = np.stack([np.linspace(0, 3.0, 50), np.linspace(0.2, 3.1, 50), np.linspace(-2.0, 2.5, 50)])
+    found += [
+        gap(WIDE, angles),
+        overlap(WIDE, angles),
+        share,
+        tangent_of_minimum(second, first, share),
+    ]
+    path = np.stack(
+        [np.linspace(0, 3.0, 50), np.linspace(0.2, 3.1, 50), np.linspace(-2.0, 2.5, 50)]
+    )
     lacking = [excess(WIDE, angles, *pair) for pair in ends_and_links(WIDE)]
     return found, lacking, WIDE.passing_depth(path), WIDE.crossing_depth(path)
 
 
 def mechanics_of_chains():
     laws = Friction(), UNEQUAL, Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0)
-    return [mechanics(body, law, 1e-3, 2.0) for body, law in zip((THREE, ODD, FIVE), laws, strict=True)]
+    return [
+        mechanics(body, law, 1e-3, 2.0) for body, law in zip((THREE, ODD, FIVE), laws, strict=True)
+    ]
 
 
 def laws_of_friction():
@@ -72,13 +86,35 @@ def laws_of_friction():
         PowerLaw(0.5, mu_t=2.0, mu_f=1.0),
         Viscous(normal=1.7, tangential=1.0),
     ):
-        found += [getattr(law, name)(vs, vn, 0.1) for name in ("density", "density_secant", "density_jacobian")]
+        found += [
+            getattr(law, name)(vs, vn, 0.1)
+            for name in ("density", "density_secant", "density_jacobian")
+        ]
         on_links = line_integrals(law)
-        found += [integral(vs, vn, w, length, 0.1) for integral in (on_links.force, on_links.jacobian, on_links.secant)]
+        found += [
+            integral(vs, vn, w, length, 0.1)
+            for integral in (on_links.force, on_links.jacobian, on_links.secant)
+        ]
         if law.associated:
-            found += [law.density_potential(vs, vn, 0.1), on_links.potential(vs, vn, w, length, 0.1)]
-        found += [law.smallest, law.largest, law.degree, law.regularised, law.reversible, law.label, law.describe()]
-        found += [on_links.largest_forces(length), law.kernel_numbers, law.in_units_of(2.0), law.in_speeds_of(2.0)]
+            found += [
+                law.density_potential(vs, vn, 0.1),
+                on_links.potential(vs, vn, w, length, 0.1),
+            ]
+        found += [
+            law.smallest,
+            law.largest,
+            law.degree,
+            law.regularised,
+            law.reversible,
+            law.label,
+            law.describe(),
+        ]
+        found += [
+            on_links.largest_forces(length),
+            law.kernel_numbers,
+            law.in_units_of(2.0),
+            law.in_speeds_of(2.0),
+        ]
     return found
 
 
@@ -93,12 +129,20 @@ def _loaded(body, law, delta):
     angles, rates, _ = shapes(body, 8, 9, 2.5)
     load = 0.1 * np.random.default_rng(10).normal(size=(2, 8))
     solved = solve_balance(body, law, angles, rates, delta, load=load)
-    return solved.z, solved.iterations, solved.anchor, chain_slopes(body, law, angles, rates, delta, solved, load)
+    return (
+        solved.z,
+        solved.iterations,
+        solved.anchor,
+        chain_slopes(body, law, angles, rates, delta, solved, load),
+    )
 
 
 def _at_rest():
     angles, _, start = shapes(THREE, 4, 15, 2.0)
-    found = [solve_balance(THREE, law, angles, 0 * angles, 1e-3, start=start).z for law in (UNEQUAL, PowerLaw(0.5, mu_t=2.0))]
+    found = [
+        solve_balance(THREE, law, angles, 0 * angles, 1e-3, start=start).z
+        for law in (UNEQUAL, PowerLaw(0.5, mu_t=2.0))
+    ]
     load = np.array([[0.05, 0.0, 0.1, 0.0], [0.1, 0.2, 0.0, 0.0]])
     return found, solve_balance(THREE, UNEQUAL, angles, 0 * angles, 1e-3, load=load).z
 
@@ -112,7 +156,11 @@ def bodies_whose_joints_rest():
 def under_loads():
     return [
         _loaded(body, law, 1e-4)
-        for body, law in ((THREE, Friction()), (ODD, UNEQUAL), (FIVE, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)))
+        for body, law in (
+            (THREE, Friction()),
+            (ODD, UNEQUAL),
+            (FIVE, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)),
+        )
     ]
 
 
@@ -120,7 +168,10 @@ def _steps(count, methods=("auto",)):
     """Iterations and velocities at hard instants and random ones, from good starts and bad ones."""
     angles, rates, start = shapes(THREE, count, 14, np.pi)
     hard = np.array(list(HARD.values())).transpose(1, 2, 0)
-    angles, rates = np.concatenate([angles, hard[0]], axis=1), np.concatenate([rates, hard[1]], axis=1)
+    angles, rates = (
+        np.concatenate([angles, hard[0]], axis=1),
+        np.concatenate([rates, hard[1]], axis=1),
+    )
     start, found = np.concatenate([start, np.zeros((3, hard.shape[2]))], axis=1), []
     for law, delta in (
         (Friction(), 1e-10),
@@ -130,8 +181,15 @@ def _steps(count, methods=("auto",)):
     ):
         for near in (None, start):
             for method in methods:
-                solved = solve_balance(THREE, law, angles, rates, delta, start=near, method=method, max_iterations=300)
-                found.append({"iterations": np.log1p(solved.iterations), "anchor": solved.anchor[:count].mean()})
+                solved = solve_balance(
+                    THREE, law, angles, rates, delta, start=near, method=method, max_iterations=300
+                )
+                found.append(
+                    {
+                        "iterations": np.log1p(solved.iterations),
+                        "anchor": solved.anchor[:count].mean(),
+                    }
+                )
     return found
 
 
@@ -146,13 +204,20 @@ def steps_of_numpy():
 
 def by_numpy():
     with numpy_instead():
-        return _loaded(ODD, UNEQUAL, 1e-4), _loaded(THREE, Friction(), 1e-6), mechanics(FIVE, UNEQUAL, 1e-3, 2.0, count=3)
+        return (
+            _loaded(ODD, UNEQUAL, 1e-4),
+            _loaded(THREE, Friction(), 1e-6),
+            mechanics(FIVE, UNEQUAL, 1e-3, 2.0, count=3),
+        )
 
 
 def every_motion():
     angles, rates, _ = shapes(THREE, 30, 12, 2.5)
     return [
-        all_balanced_velocities(THREE, Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), angles, rates, delta) for delta in (1e-3, 1e-5)
+        all_balanced_velocities(
+            THREE, Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), angles, rates, delta
+        )
+        for delta in (1e-3, 1e-5)
     ]
 
 

@@ -21,7 +21,9 @@ def main() -> None:
             print(f"changed: {name}: {str(error).splitlines()[0][:200]}")
         else:
             found[name] = before[name]
-    lines = (f"{json.dumps(name)}: {json.dumps(digests)}" for name, digests in sorted(found.items()))
+    lines = (
+        f"{json.dumps(name)}: {json.dumps(digests)}" for name, digests in sorted(found.items())
+    )
     KNOWN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 

@@ -1,7 +1,8 @@
-"""What the library found when its results had been checked by other means, for inputs of many kinds: it finds that still.
+"""What the library found when its results had been checked by other means, for inputs of many
+kinds: it finds that still.
 
-Not a proof of anything, but whatever changes a digit of these results is noticed: a fault, or a change that was meant and has
-to be looked at. Those that changed are listed, and recorded anew, by
+Not a proof of anything, but whatever changes a digit of these results is noticed: a fault, or a
+change that was meant and has to be looked at. Those that changed are listed, and recorded anew, by
 
     python -m tests.recorded.record
 """
@@ -16,10 +17,16 @@ from tests.recorded import bounds_cases, mechanics_cases, smooth_cases, verifica
 from tests.recorded.digest import assert_same, digest
 
 CASES = {
-    f"{part.__name__.rpartition('.')[2].removesuffix('_cases')}: {name}": (case, part.PRECISION, part.FLOOR)
+    f"{part.__name__.rpartition('.')[2].removesuffix('_cases')}: {name}": (
+        case,
+        part.PRECISION,
+        part.FLOOR,
+    )
     for part in (mechanics_cases, smooth_cases, bounds_cases, verification_cases)
     for name, case in vars(part).items()
-    if callable(case) and getattr(case, "__module__", "") == part.__name__ and not name.startswith("_")
+    if callable(case)
+    and getattr(case, "__module__", "") == part.__name__
+    and not name.startswith("_")
 }
 KNOWN = Path(__file__).with_name("known.json")
 

@@ -1,4 +1,5 @@
-"""The reduced space: exact gradients, the same numbers as the full program, and answers that solve the full program."""
+"""The reduced space: exact gradients, the same numbers as the full program, and answers that solve
+the full program."""
 
 from itertools import pairwise
 
@@ -6,7 +7,20 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from colloc import Chain, Fourier, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse, load, replay, save
+from colloc import (
+    Chain,
+    Fourier,
+    FreePath,
+    Friction,
+    Harmonic,
+    ModalBody,
+    Polygon,
+    Problem,
+    ellipse,
+    load,
+    replay,
+    save,
+)
 from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
@@ -16,7 +30,10 @@ from colloc.search.effort import FINE
 from colloc.search.spaces import remeshed, space_near, transcribed
 from tests.shared.stages import answer_near
 
-FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
+FOUR = {
+    "body": Chain((0.25,) * 4),
+    "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]]),
+}
 WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0.9], [-0.2]])}
 CASES = {
     "harmonics": {"gait": Harmonic(2, "none"), "friction": Friction(mu_t=0.5, mu_f=1, mu_b=5)},
@@ -28,13 +45,20 @@ CASES = {
     },
     "shared nodes": {"gait": Harmonic(1, "none"), "scheme": "hermite-simpson"},
     "free path": {"gait": FreePath(4.0, "none")},
-    "bilateral path": {"gait": FreePath(4.0, "bilateral"), "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)},
+    "bilateral path": {
+        "gait": FreePath(4.0, "bilateral"),
+        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    },
     "antipodal path": {"gait": FreePath(4.0, "antipodal")},
     "bilateral path of three joints": {"gait": FreePath(6.0, "bilateral"), **FOUR},
     "path of three joints": {"gait": FreePath(6.0, "none"), **WAVE},
     "antipodal path of three joints": {"gait": FreePath(6.0, "antipodal"), **WAVE},
     "path with two intervals an arc": {"gait": FreePath(4.0, "none"), "halved": True},
-    "path of three joints with two intervals an arc": {"gait": FreePath(6.0, "bilateral"), "halved": True, **FOUR},
+    "path of three joints with two intervals an arc": {
+        "gait": FreePath(6.0, "bilateral"),
+        "halved": True,
+        **FOUR,
+    },
     "polygon": {"gait": Polygon(4, "none"), "friction": Friction(mu_t=3, mu_f=1, mu_b=2)},
     "bilateral polygon": {"gait": Polygon(5, "bilateral")},
 }
@@ -48,7 +72,9 @@ def near_start(case, shake=1e-2):
     space, v = space_near(problem, problem.guess)
     if halved:
         edges = space.mesh.edges
-        space, v = space_near(problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))]))
+        space, v = space_near(
+            problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))])
+        )
     v = v + shake * np.random.default_rng(0).normal(size=v.size)
     program = ReducedProgram(space, DELTA)
     program.place_rows(v)
@@ -56,7 +82,13 @@ def near_start(case, shake=1e-2):
 
 
 def test_least_values_and_the_rotation_are_asked_for_as_they_are_stated():
-    stated = Problem("p", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.3, at_least={"distance": 0.21, "-work": -0.4})
+    stated = Problem(
+        "p",
+        ellipse(0.1, 1.6, 1.1),
+        gait=Harmonic(1),
+        rotation=0.3,
+        at_least={"distance": 0.21, "-work": -0.4},
+    )
     space, v = space_near(stated, stated.guess)
     program = ReducedProgram(space, DELTA)
     program.place_rows(v)
@@ -76,10 +108,15 @@ def test_gradients_are_those_of_differences(case):
 
 
 @pytest.mark.parametrize("case", [case for case in CASES if "path" in case])
-def test_the_metric_of_paths_is_the_mean_square_that_a_step_moves_the_shapes_and_a_little_of_every_parameter(case):
+def test_the_metric_of_paths_is_the_mean_square_that_a_step_moves_the_shapes_and_a_little_of_every_parameter(
+    case,
+):
     space, v, _ = near_start(case)
     metric, h = space.metric(v), 1e-6
-    slopes = [(space.member(v + e).shapes - space.member(v - e).shapes).ravel() / (2 * h) for e in h * np.eye(space.n)]
+    slopes = [
+        (space.member(v + e).shapes - space.member(v - e).shapes).ravel() / (2 * h)
+        for e in h * np.eye(space.n)
+    ]
     moved = np.inner(slopes, slopes) / space.member(v).edges.size
     added = metric - moved
     np.testing.assert_allclose(added, added[0, 0] * np.eye(space.n), atol=1e-8 * moved.max())
@@ -99,8 +136,11 @@ def test_the_full_program_measures_the_same_efficiency_and_rotation(case):
     space, v, program = near_start(case, shake=0.0)
     full = transcribed(space.control.problem, space.member(v), space.mesh.edges)
     x, layout = feasible_point(full, space.full_parameters(v), DELTA), full.layout
-    sign = np.sign(x[layout.distance[0, -1]])  # an antipodal gait may travel either way along its axis
-    assert -sign * x[layout.distance[0, -1]] / x[layout.work[0, -1]] == pytest.approx(program.objective(v), rel=1e-9)
+    # an antipodal gait may travel either way along its axis
+    sign = np.sign(x[layout.distance[0, -1]])
+    assert -sign * x[layout.distance[0, -1]] / x[layout.work[0, -1]] == pytest.approx(
+        program.objective(v), rel=1e-9
+    )
     if "rotation" in full.groups and space.control.admissible.gait.symmetry == "none":
         turned = x[layout.theta[0, -1]] - x[layout.theta[0, 0]]
         assert turned == pytest.approx(program.rows(v)[0], abs=1e-9)
@@ -111,15 +151,26 @@ def test_a_finer_mesh_on_the_same_arcs_has_the_same_parameters_and_a_smaller_err
     fine, w, finer = near_start("path with two intervals an arc", shake=0.0)
     np.testing.assert_allclose(w, v, atol=1e-12)
     assert (fine.mesh.n, fine.n) == (2 * coarse.mesh.n, coarse.n)
-    exact = replay(*coarse.control.dynamics[:2], coarse.member(v), DELTA * coarse.member(v).delta_unit).efficiency
+    exact = replay(
+        *coarse.control.dynamics[:2], coarse.member(v), DELTA * coarse.member(v).delta_unit
+    ).efficiency
     assert abs(-finer.objective(w) - exact) < 0.2 * abs(-program.objective(v) - exact)
 
 
 def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
-    problem = Problem("p", ellipse(1.0, 0.7, 1.1), gait=FreePath(2.0, "bilateral"), intervals=16, delta=1e-2, mesh_tolerance=0)
+    problem = Problem(
+        "p",
+        ellipse(1.0, 0.7, 1.1),
+        gait=FreePath(2.0, "bilateral"),
+        intervals=16,
+        delta=1e-2,
+        mesh_tolerance=0,
+    )
     space, v = space_near(problem, problem.guess)
     edges = space.mesh.edges
-    space, v = space_near(problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))]))
+    space, v = space_near(
+        problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))])
+    )
     solution = Solution(problem, unconfirmed(as_it_is(space, v, problem.delta)))
     again = load(save(solution, tmp_path / "path.h5"))
     np.testing.assert_array_equal(again.answer.knots, edges)
@@ -127,12 +178,24 @@ def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "gait", [Harmonic(1, "none"), Harmonic(2, "bilateral"), Polygon(4, "bilateral"), FreePath(2.0, "bilateral")]
+    "gait",
+    [
+        Harmonic(1, "none"),
+        Harmonic(2, "bilateral"),
+        Polygon(4, "bilateral"),
+        FreePath(2.0, "bilateral"),
+    ],
 )
 def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
-    """Tail velocities and link forces among the variables, the balance among the constraints; two programs, one solution."""
+    """Tail velocities and link forces among the variables, the balance among the constraints; two
+    programs, one solution."""
     problem = Problem(
-        "p", ellipse(1.0, 0.7, 1.1), friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait=gait, intervals=24, delta=3e-3
+        "p",
+        ellipse(1.0, 0.7, 1.1),
+        friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+        gait=gait,
+        intervals=24,
+        delta=3e-3,
     )
     answer = answer_near(problem.with_(mesh_tolerance=0.0))
     found = answer.history[-2]
@@ -145,10 +208,19 @@ def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
 
 
 def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since():
-    problem = Problem("p", ellipse(1.0, 0.7, 1.1), gait=Polygon(4, "bilateral"), delta=3e-2, delta_start=3e-2, intervals=24)
+    problem = Problem(
+        "p",
+        ellipse(1.0, 0.7, 1.1),
+        gait=Polygon(4, "bilateral"),
+        delta=3e-2,
+        delta_start=3e-2,
+        intervals=24,
+    )
     space, v = space_near(problem, problem.guess)
     ends = space.member(v).phases
-    graded = np.concatenate([a + (b - a) * np.linspace(0, 1, 9)[:-1] ** 2 for a, b in pairwise(ends)] + [ends[-1:]])
+    graded = np.concatenate(
+        [a + (b - a) * np.linspace(0, 1, 9)[:-1] ** 2 for a, b in pairwise(ends)] + [ends[-1:]]
+    )
     space = remeshed(space, space.member(v), graded, "gauss-3")
     found = converged(space, space.parameters(space.member(v)), 3e-2, FINE)
     answer = confirm(found)
@@ -158,10 +230,14 @@ def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since()
 
 
 def test_amplitudes_of_modes_may_exceed_the_bound_on_the_tangent():
-    """Steep sides are large coefficients: within 1.5 rad everywhere, a Legendre mode may have an amplitude of 2.5."""
+    """Steep sides are large coefficients: within 1.5 rad everywhere, a Legendre mode may have an
+    amplitude of 2.5."""
     body = ModalBody(4)
     rows = np.vstack([body.limited, -body.limited])
-    largest = [-linprog(-e, rows, np.full(len(rows), 1.5), bounds=[(None, None)] * 4).fun for e in np.eye(4)]
+    largest = [
+        -linprog(-e, rows, np.full(len(rows), 1.5), bounds=[(None, None)] * 4).fun
+        for e in np.eye(4)
+    ]
     problem = Problem("p", body=body, gait=Harmonic(1, "antipodal"))
     space, _ = space_near(problem, problem.guess)
     assert 2.5 < max(largest) < space.upper.min()

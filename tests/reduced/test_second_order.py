@@ -1,4 +1,5 @@
-"""Second-order conditions: optima have positive curvature on what is free, and a known saddle has not."""
+"""Second-order conditions: optima have positive curvature on what is free, and a known saddle has
+not."""
 
 import numpy as np
 import pytest
@@ -26,8 +27,14 @@ class Quadratic:
 
     def __init__(self, hessian, normal=None, upper=np.inf):
         n = len(hessian)
-        self.hessian, self.lower, self.upper = np.array(hessian, dtype=float), np.full(n, -9.0), np.full(n, 9.0)
-        self.normal = np.zeros((0, n)) if normal is None else np.atleast_2d(np.array(normal, dtype=float))
+        self.hessian, self.lower, self.upper = (
+            np.array(hessian, dtype=float),
+            np.full(n, -9.0),
+            np.full(n, 9.0),
+        )
+        self.normal = (
+            np.zeros((0, n)) if normal is None else np.atleast_2d(np.array(normal, dtype=float))
+        )
         self.row_lower = self.row_upper = np.zeros(len(self.normal))
 
     def objective(self, v):
@@ -54,10 +61,11 @@ class Quadratic:
 
 
 class Touching(Quadratic):
-    """Minimise x^2 + b y^2 - p x with x cos t + y sin t <= 1 at all t: rows at the worst t, which turns with y.
+    """Minimise x^2 + b y^2 - p x with x cos t + y sin t <= 1 at all t: rows at the worst t, which
+    turns with y.
 
-    On the circle x = 1 - y^2/2, so the objective has the curvature 2 b + p - 2 along it; the row held at its instant, x <= 1,
-    gives 2 b.
+    On the circle x = 1 - y^2/2, so the objective has the curvature 2 b + p - 2 along it; the row
+    held at its instant, x <= 1, gives 2 b.
     """
 
     def __init__(self, b, p):
@@ -77,7 +85,9 @@ class Touching(Quadratic):
 
 def test_curvature_is_that_on_the_free_directions_alone():
     hessian = np.diag([3.0, -2.0, 0.5])
-    free, fixed = (curvature(Quadratic(hessian, normal), np.zeros(3)) for normal in (None, [0, 1, 0]))
+    free, fixed = (
+        curvature(Quadratic(hessian, normal), np.zeros(3)) for normal in (None, [0, 1, 0])
+    )
     assert free.smallest == pytest.approx(-2.0)
     assert np.abs(free.direction) == pytest.approx([0, 1, 0])
     assert fixed.smallest == pytest.approx(0.5)
@@ -92,13 +102,28 @@ def test_the_worst_instant_moves_with_the_gait(b):
 
 
 def test_the_peak_of_a_moment_moves_with_the_gait():
-    """The second derivative of the largest moment over time is that at its instant and what the move of the instant adds."""
-    problem = Problem("weak", body=Chain((0.25,) * 4), gait=Harmonic(1, "bilateral"), torque_limit=0.06, delta=1e-2)
+    """The second derivative of the largest moment over time is that at its instant and what the
+    move of the instant adds."""
+    problem = Problem(
+        "weak",
+        body=Chain((0.25,) * 4),
+        gait=Harmonic(1, "bilateral"),
+        torque_limit=0.06,
+        delta=1e-2,
+    )
     space, v = space_near(problem, problem.guess)
     program = ReducedProgram(space, problem.delta)
     program.place_rows(v)
     (shares, points), names = program.actuators.placed, problem.path_limits.names
-    row = int(np.argmax(np.where(shares == names.index("torque of joint 2"), program.actuators.values(v, problem.delta), -1)))
+    row = int(
+        np.argmax(
+            np.where(
+                shares == names.index("torque of joint 2"),
+                program.actuators.values(v, problem.delta),
+                -1,
+            )
+        )
+    )
     cell = points[row] // space.mesh.scheme.s
     left, right = space.mesh.edges[cell : cell + 2]
 
@@ -106,10 +131,16 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
         gait, body, t = space.member(at), problem.body, np.atleast_1d(t)
         angles, rates = gait(t)
         z = body.solve(problem.friction, angles, rates, problem.delta).z
-        return problem.path_limits.at(Instants(body, problem.friction, angles, rates, problem.delta, z=z))[1, 0]
+        return problem.path_limits.at(
+            Instants(body, problem.friction, angles, rates, problem.delta, z=z)
+        )[1, 0]
 
     def peak(at):
-        reach = {"bounds": (2 * left - right, 2 * right - left), "method": "bounded", "options": {"xatol": 1e-12}}
+        reach = {
+            "bounds": (2 * left - right, 2 * right - left),
+            "method": "bounded",
+            "options": {"xatol": 1e-12},
+        }
         return minimize_scalar(lambda t: -moment(at, t), **reach).x
 
     here, on_rows = peak(v), np.zeros(program.row_lower.size)
@@ -120,13 +151,16 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
         step = 1e-3 * z / np.linalg.norm(z)
         largest = [moment(at, peak(at)) for at in (v - step, v, v + step)]
         there = [moment(at, here) for at in (v - step, v, v + step)]
-        moved = (largest[0] - 2 * largest[1] + largest[2] - there[0] + 2 * there[1] - there[2]) / 1e-6
+        moved = (
+            largest[0] - 2 * largest[1] + largest[2] - there[0] + 2 * there[1] - there[2]
+        ) / 1e-6
         assert moved > 1e-3
         assert step @ added @ step / 1e-6 == pytest.approx(moved, rel=1e-2)
 
 
 class Kinked(Quadratic):
-    """(x - 1)^2 with a gradient that falls by 1e-3 beside x = 1, as where a link begins to stick at a mesh point."""
+    """(x - 1)^2 with a gradient that falls by 1e-3 beside x = 1, as where a link begins to stick at
+    a mesh point."""
 
     def __init__(self):
         super().__init__(np.diag([2.0]))
@@ -181,7 +215,9 @@ def test_the_gait_between_two_ways_of_bending_is_a_saddle():
     step = 1e-3 * found.direction
     objective = [program.objective(v + k * step) for k in (-1, 0, 1)]
     assert objective[0] < objective[1] > objective[2]
-    assert (objective[0] - 2 * objective[1] + objective[2]) / 1e-6 == pytest.approx(found.smallest, rel=1e-2)
+    assert (objective[0] - 2 * objective[1] + objective[2]) / 1e-6 == pytest.approx(
+        found.smallest, rel=1e-2
+    )
 
 
 def test_an_optimum_is_better_than_its_neighbours():

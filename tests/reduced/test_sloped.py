@@ -1,11 +1,26 @@
-"""The collocated motion on a slope: against the differential equation, differences, and the full program."""
+"""The collocated motion on a slope: against the differential equation, differences, and the full
+program."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from colloc import Basis, BSpline, Chain, Foot, FreePath, Friction, Harmonic, Pad, Polygon, Problem, Serpenoid, Wheel, ellipse
+from colloc import (
+    Basis,
+    BSpline,
+    Chain,
+    Foot,
+    FreePath,
+    Friction,
+    Harmonic,
+    Pad,
+    Polygon,
+    Problem,
+    Serpenoid,
+    Wheel,
+    ellipse,
+)
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.gait_fields import fields, gait_from
 from colloc.reduced.program import ReducedProgram
@@ -26,13 +41,20 @@ SKEW = Problem(
 )  # fmt: skip
 FEET = SKEW.with_(
     name="feet",
-    body=Chain((0.2, 0.5, 0.3), masses=(0.4, 0.3, 0.3), feet=(Foot(0), Pad(1, 0.1, 0.6), Wheel(2, rolling=0.5))),
+    body=Chain((0.2, 0.5, 0.3), masses=(0.4, 0.3, 0.3), feet=(Foot(0), Pad(1, 0.1, 0.6), Wheel(2,
+    rolling=0.5))),
     grade=0.2,
 )  # fmt: skip
 
 SNAKE = SKEW.with_(name="snake", gait=Serpenoid(2), guess=None)
 SPLINE = SKEW.with_(name="spline", gait=BSpline(7, degree=3), guess=None)
-ARCS = Problem("arcs", friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait=FreePath(5.0), grade=0.4, intervals=12)
+ARCS = Problem(
+    "arcs",
+    friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    gait=FreePath(5.0),
+    grade=0.4,
+    intervals=12,
+)
 ARCS_OF_THREE = ARCS.with_(name="arcs-3", body=Chain((0.25,) * 4), guess=None, grade=0.2)
 SIDES = SKEW.with_(name="sides", gait=Polygon(5), guess=None)
 NOTHING_MORE = (None, "driven efficiency", {"torque_limit": 0.06})
@@ -42,7 +64,9 @@ PACED = (2.0, "distance / (work + 0.01 * length)", {"power_limit": 0.3, "torque_
 
 def program_at(problem, delta):
     """A program, and a point of it with nothing special; of paths one that is closed."""
-    space, v = space_near(problem, ellipse(0, 2.6, 1.3) if problem.body.n_joint == 2 else problem.guess)
+    space, v = space_near(
+        problem, ellipse(0, 2.6, 1.3) if problem.body.n_joint == 2 else problem.guess
+    )
     size = 0.0 if problem.gait.unit_speed else 0.1
     v = np.append(v[:-1] + size * np.random.default_rng(0).normal(size=v.size - 1), 0.7)
     program = ReducedProgram(space, delta)
@@ -50,29 +74,48 @@ def program_at(problem, delta):
     return program, v
 
 
-@pytest.mark.parametrize("problem", [LEVEL, SKEW, FEET, SPLINE, ARCS, ARCS_OF_THREE, SIDES], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "problem", [LEVEL, SKEW, FEET, SPLINE, ARCS, ARCS_OF_THREE, SIDES], ids=lambda p: p.name
+)
 def test_the_mesh_has_the_motion_of_the_differential_equation(problem):
     program, v = program_at(problem.with_(intervals=120), 0.1)
     gait = program.space.member(v)
     at = problem.body, problem.friction, gait, 0.1 * gait.delta_unit, problem.grade
     ran = slope_motion(*at, breaks=gait.corner_phases)
     found = program.motion.values(v, 0.1)
-    for name, exact in (("distance", ran.climb), ("work", ran.joint_work), ("rotation", ran.turn), ("across", ran.aside)):
+    for name, exact in (
+        ("distance", ran.climb),
+        ("work", ran.joint_work),
+        ("rotation", ran.turn),
+        ("across", ran.aside),
+    ):
         assert found[name] == pytest.approx(float(np.squeeze(exact)), abs=1e-5), name
 
 
 @pytest.mark.parametrize(
     ("problem", "asked"),
     [
-        *((problem, asked) for problem in (LEVEL, FEET, SPLINE, SNAKE) for asked in (NOTHING_MORE, PACED)),
-        *((problem, asked) for problem in (ARCS, ARCS_OF_THREE, SIDES) for asked in (NOTHING_MORE, ACROSS)),
+        *(
+            (problem, asked)
+            for problem in (LEVEL, FEET, SPLINE, SNAKE)
+            for asked in (NOTHING_MORE, PACED)
+        ),
+        *(
+            (problem, asked)
+            for problem in (ARCS, ARCS_OF_THREE, SIDES)
+            for asked in (NOTHING_MORE, ACROSS)
+        ),
     ],
 )
 def test_gradients_are_the_limit_of_differences(problem, asked):
     towards, objective, limits = asked
     program, v = program_at(problem.with_(towards=towards, objective=objective, **limits), 0.05)
     assert program.actuators.placed.shape[1] > 10
-    slopes, gradient, rows = program.motion.gradients(v, 0.05), program.gradient(v), program.row_slopes(v)
+    slopes, gradient, rows = (
+        program.motion.gradients(v, 0.05),
+        program.gradient(v),
+        program.row_slopes(v),
+    )
     for k in range(v.size):
         step = 1e-5 * np.eye(v.size)[k]
         there, back = (program.motion.values(v + side * step, 0.05) for side in (1, -1))
@@ -80,7 +123,9 @@ def test_gradients_are_the_limit_of_differences(problem, asked):
             assert slope[k] == pytest.approx((there[name] - back[name]) / 2e-5, abs=3e-6), name
         change = program.objective(v + step) - program.objective(v - step)
         assert gradient[k] == pytest.approx(change / 2e-5, abs=3e-5)
-        np.testing.assert_allclose(rows[:, k], (program.rows(v + step) - program.rows(v - step)) / 2e-5, atol=3e-5)
+        np.testing.assert_allclose(
+            rows[:, k], (program.rows(v + step) - program.rows(v - step)) / 2e-5, atol=3e-5
+        )
 
 
 @pytest.mark.parametrize(
@@ -104,18 +149,27 @@ def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towa
     off = {name for name, rows in full.groups.items() if found.excess[rows].max(initial=0.0) > 1e-7}
     assert off == ({"rotation"} if towards is None else {"rotation", "across"})
     assert found.objective == pytest.approx(program.objective(v), abs=1e-12)
-    assert found.excess[full.groups["rotation"]][0] == pytest.approx(abs(program.motion.values(v, 0.05)["rotation"]), abs=1e-9)
+    assert found.excess[full.groups["rotation"]][0] == pytest.approx(
+        abs(program.motion.values(v, 0.05)["rotation"]), abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("problem", [SKEW, SPLINE, ARCS, SIDES], ids=lambda p: p.name)
 def test_where_the_ground_is_nearly_level_a_gait_goes_up_as_far_as_on_the_level(problem):
-    (up, v), (level, w) = (space_near(problem.with_(grade=grade), problem.guess) for grade in (1e-9, 0.0))
-    found, known = (ReducedProgram(space, 0.01).motion.values(at, 0.01) for space, at in ((up, v), (level, w)))
+    (up, v), (level, w) = (
+        space_near(problem.with_(grade=grade), problem.guess) for grade in (1e-9, 0.0)
+    )
+    found, known = (
+        ReducedProgram(space, 0.01).motion.values(at, 0.01) for space, at in ((up, v), (level, w))
+    )
     turned = up.member(np.append(v[:-1], v[-1] + 0.3))
     assert up.parameters(turned)[-1] == pytest.approx(v[-1] + 0.3)
     assert found["work"] == pytest.approx(known["work"], abs=1e-7)
-    assert np.hypot(found["distance"], found["across"]) == pytest.approx(known["distance"], abs=1e-7)
-    assert found["distance"] > 0.98 * known["distance"]  # where it points is found at a larger delta
+    assert np.hypot(found["distance"], found["across"]) == pytest.approx(
+        known["distance"], abs=1e-7
+    )
+    # where it points is found at a larger delta
+    assert found["distance"] > 0.98 * known["distance"]
 
 
 @pytest.mark.parametrize("problem", [ARCS, SIDES], ids=lambda p: p.name)
@@ -128,22 +182,30 @@ def test_a_path_laid_through_a_gait_points_where_that_does(problem):
 def test_a_serpenoid_gait_on_a_slope_is_known_by_its_few_parameters():
     program, v = program_at(SNAKE, 0.05)
     assert v.size == SNAKE.gait.n_own + 1
-    np.testing.assert_allclose(program.space.parameters(gait_from(fields(program.space.member(v)))), v, atol=1e-12)
+    np.testing.assert_allclose(
+        program.space.parameters(gait_from(fields(program.space.member(v)))), v, atol=1e-12
+    )
 
 
 def test_what_friction_does_not_hold_has_no_value():
-    program, v = program_at(LEVEL.with_(friction=Friction(mu_t=10, mu_f=0.1, mu_b=0.1), grade=5.0, intervals=12), 1e-3)
+    program, v = program_at(
+        LEVEL.with_(friction=Friction(mu_t=10, mu_f=0.1, mu_b=0.1), grade=5.0, intervals=12), 1e-3
+    )
     assert np.isnan(program.objective(v))
 
 
-@pytest.mark.parametrize("gait", [Harmonic(2), BSpline(8, symmetry="bilateral"), Basis([bump, lambda t: bump(t - 0.3)])])
+@pytest.mark.parametrize(
+    "gait", [Harmonic(2), BSpline(8, symmetry="bilateral"), Basis([bump, lambda t: bump(t - 0.3)])]
+)
 def test_a_member_that_points_somewhere_is_known_by_its_parameters_and_kept_in_files(gait):
     problem = LEVEL.with_(gait=gait, guess=None)
     v = np.append(np.random.default_rng(1).normal(size=problem.gait.size(2) - 1), 0.7)
     member = problem.gait.member(v, 2)
     assert member.theta == 0.7
     assert "points +40.11°" in str(member)
-    np.testing.assert_allclose(problem.gait.parameters(problem.gait.through(gait_from(fields(member)))), v, atol=1e-12)
+    np.testing.assert_allclose(
+        problem.gait.parameters(problem.gait.through(gait_from(fields(member)))), v, atol=1e-12
+    )
     free = problem.gait.parameters(gait.member(v[:-1], 2))
     np.testing.assert_allclose(free[:-1], v[:-1], atol=1e-12)
     assert np.isnan(free[-1])

@@ -14,7 +14,12 @@ def knows_cpp():
     if compiler is None:
         return False
     command = [compiler, "-x", "c++", "-fsyntax-only", "-"]
-    return subprocess.run(command, input=b"#include <cmath>\n", capture_output=True, check=False).returncode == 0
+    return (
+        subprocess.run(
+            command, input=b"#include <cmath>\n", capture_output=True, check=False
+        ).returncode
+        == 0
+    )
 
 
 @pytest.fixture(autouse=True)

@@ -1,6 +1,8 @@
-"""The allowance of strong convexity for one cell, written out with more digits (mpmath): research/guarantee/README.md.
+"""The allowance of strong convexity for one cell, written out with more digits (mpmath):
+research/guarantee/README.md.
 
-A second implementation of research/guarantee/native/enclosure.hpp, for a dissipation sqrt((sigma vs)^2 + vn^2).
+A second implementation of research/guarantee/native/enclosure.hpp, for a dissipation sqrt((sigma
+vs)^2 + vn^2).
 """
 
 import numpy as np
@@ -32,15 +34,25 @@ class Link:
 
         def turned(at, p):
             angle = -self.side * at
-            return mp.cos(angle) * p[0] - mp.sin(angle) * p[1], mp.sin(angle) * p[0] + mp.cos(angle) * p[1]
+            return mp.cos(angle) * p[0] - mp.sin(angle) * p[1], mp.sin(angle) * p[0] + mp.cos(
+                angle
+            ) * p[1]
 
         corner = [[low[a] + size[a] * (k >> (2 - a) & 1) for a in range(3)] for k in CORNERS]
-        self.hinge = [p if axis is None else turned(corner[k][axis], p) for k, p in enumerate(joint)]
-        rate = {0: lambda k: 1 - z[k][2], 1: lambda k: z[k][2], 2: lambda k: z[k][2] + corner[k][2]}[i]
+        self.hinge = [
+            p if axis is None else turned(corner[k][axis], p) for k, p in enumerate(joint)
+        ]
+        rate = {
+            0: lambda k: 1 - z[k][2],
+            1: lambda k: z[k][2],
+            2: lambda k: z[k][2] + corner[k][2],
+        }[i]
         self.spin = [rate(k) for k in CORNERS]
         self.off = mp.mpf(0)
         if axis is not None:
-            change = max([norm(joint[b][0] - joint[a][0], joint[b][1] - joint[a][1]) for a, b in edges(axis)])
+            change = max(
+                [norm(joint[b][0] - joint[a][0], joint[b][1] - joint[a][1]) for a, b in edges(axis)]
+            )
             self.off = self.h**2 / 8 * max([norm(*p) for p in joint]) + self.h / 4 * change
         self.stretch([mp.mpf(x) for x in sigma])
         self.v = [sum(p[c] for p in self.hinge) / 8 for c in (0, 1)]
@@ -54,7 +66,8 @@ class Link:
         self.find_errors()
 
     def stretch(self, sigma):
-        """Tangential velocities count sigma times: that of the sense in which the whole link slides all over the cell."""
+        """Tangential velocities count sigma times: that of the sense in which the whole link slides
+        all over the cell."""
         self.directed, along = sigma[0] != sigma[1], [p[0] for p in self.hinge]
         self.sigma, self.ratio = max(sigma), mp.mpf(1)
         if all(x > self.off for x in along):
@@ -72,21 +85,37 @@ class Link:
         return self.hinge[k][0], self.hinge[k][1] + s * self.spin[k]
 
     def spread(self, s):
-        return max([norm(self.at(k, s)[0] - self.v[0], self.at(k, s)[1] - self.v[1] - s * self.w) for k in CORNERS]) + self.off
+        return (
+            max(
+                [
+                    norm(self.at(k, s)[0] - self.v[0], self.at(k, s)[1] - self.v[1] - s * self.w)
+                    for k in CORNERS
+                ]
+            )
+            + self.off
+        )
 
     def rows(self, s):
         return [self.row[0], [self.row[1][0], self.row[1][1], self.row[1][2] + self.sign * s]]
 
     def nodes(self):
-        """Shorter where the mean velocity turns; where some corners are slow, where the mean of their directions does."""
+        """Shorter where the mean velocity turns; where some corners are slow, where the mean of
+        their directions does."""
         l, vs, vn, w = (float(x) for x in (self.l, *self.v, self.w))
         speeds = [max(float(norm(*self.at(k, s))) for s in (0, self.l)) for k in CORNERS]
         self.patterned = min(speeds) < 0.3 * max(speeds)
         if self.patterned:
-            ways = [[float(x) / v for x in (*p, w)] for p, w, v in zip(self.hinge, self.spin, speeds, strict=True)]
+            ways = [
+                [float(x) / v for x in (*p, w)]
+                for p, w, v in zip(self.hinge, self.spin, speeds, strict=True)
+            ]
             vs, vn, w = np.mean(ways, axis=0)
             s0 = min(max(-vn / w, 0.0), l)
-            width = max(abs(vs), 1e-3, *(np.hypot(x - vs, y + s0 * turn - vn - s0 * w) for x, y, turn in ways))
+            width = max(
+                abs(vs),
+                1e-3,
+                *(np.hypot(x - vs, y + s0 * turn - vn - s0 * w) for x, y, turn in ways),
+            )
         else:
             width = max(abs(vs), float(self.spread(min(max(-vn / w, 0.0), l))), 1e-9)
         if abs(w) * l > 1e-3 * width:
@@ -148,7 +177,12 @@ class Link:
             else:
                 narrow += (1 - held) * fastest
             if narrow < gap:
-                return "slow", narrow, min([power, fastest * (1 - cosine) + self.off]), (u, sine, fastest + self.off)
+                return (
+                    "slow",
+                    narrow,
+                    min([power, fastest * (1 - cosine) + self.off]),
+                    (u, sine, fastest + self.off),
+                )
         return "loose", gap, power, None
 
     def sliding(self, sa, sb, ya, yb, spread, r):
@@ -171,14 +205,20 @@ class Link:
             side = max([abs(d[1] * u[0] - d[0] * u[1]) for d in jumps])
             along = max([abs(d[0] * u[0] + d[1] * u[1]) for d in jumps])
             c = min([side + along * lean + 4 * self.off, D])
-            bend = 2 / mp.sqrt(3) * D**2 if 3 * c**2 > 2 * D**2 else c * mp.sqrt(4 * D**2 - 3 * c**2)
+            bend = (
+                2 / mp.sqrt(3) * D**2 if 3 * c**2 > 2 * D**2 else c * mp.sqrt(4 * D**2 - 3 * c**2)
+            )
             error += bend / (8 * m**2)
             power += c**2 / (8 * m)
         return min([error, 2 * sine + 1 - mp.sqrt(1 - sine**2)]), power
 
     def growth(self, H, A):
         vs, vn, w, l, h = *self.v, self.w, self.l, self.h
-        hinge = [[self.norm * x for x in row] for row in self.plain] if self.moving else [[mp.mpf(0)] * 3] * 2
+        hinge = (
+            [[self.norm * x for x in row] for row in self.plain]
+            if self.moving
+            else [[mp.mpf(0)] * 3] * 2
+        )
         along = max([abs(p[0] - vs) for p in self.hinge]) + self.off
         if self.mixed or (self.directed and abs(vs) <= (along + A)):
             return
@@ -196,7 +236,10 @@ class Link:
             moved = (max([abs(self.at(k, s0)[1]) for k in CORNERS]) + self.off + A) / spin
             tilted = along / spin + abs(vs) / abs(w) * change / spin
             wide = 2 / (abs(w) + change)
-            for stiff, row, lost, per in ((wide * (T - mp.tanh(T)), b, tilted, 3), (wide * mp.tanh(T), c, moved, 5)):
+            for stiff, row, lost, per in (
+                (wide * (T - mp.tanh(T)), b, tilted, 3),
+                (wide * mp.tanh(T), c, moved, 5),
+            ):
                 tau = mp.mpf(min(max(per * lost + 0.7 * h, 0.3), 0.6))
                 add(H, stiff * (1 - tau), row)
                 H[2][2] -= 2 * stiff * (1 / tau - 1) * lost**2
@@ -275,13 +318,16 @@ def fourth_power_norm(forward, G):
 
 
 def allowance(lengths, sigma, low, size, motions, forces, left, point, delta):
-    """Gain and power; forces (8, 2, 2) on the outer links, left (force, torque), point (x, y, beside)."""
+    """Gain and power; forces (8, 2, 2) on the outer links, left (force, torque), point (x, y,
+    beside)."""
     low, size = [mp.mpf(float(x)) for x in low], [mp.mpf(float(x)) for x in size]
     links = [Link(i, lengths, sigma, low, size, motions, delta) for i in range(3)]
     turning = [mp.mpf(0)] * 3
     for i, which in ((0, 0), (2, 1)):
         f = [[mp.mpf(float(x)) for x in forces[k][which]] for k in CORNERS]
-        change = max([norm(f[b][0] - f[a][0], f[b][1] - f[a][1]) for a, b in edges(0 if i == 0 else 1)])
+        change = max(
+            [norm(f[b][0] - f[a][0], f[b][1] - f[a][1]) for a, b in edges(0 if i == 0 else 1)]
+        )
         turning[i] = links[i].h ** 2 / 8 * max([norm(*x) for x in f]) + links[i].h / 4 * change
     G, total = [[mp.mpf(0)] * 3 for _ in range(3)], mp.mpf(0)
     for k in links:
@@ -323,20 +369,23 @@ def allowance(lengths, sigma, low, size, motions, forces, left, point, delta):
             return radius * (at_point + beside * turn), power + gap + pull * radius
         # any larger ones will do: these are those of the compiled code
         allowed = [
-            max([1.5 * m, A]) if all(fit[: i + 1]) else 1.5 * m for i, (m, A) in enumerate(zip(moved, allowed, strict=True))
+            max([1.5 * m, A]) if all(fit[: i + 1]) else 1.5 * m
+            for i, (m, A) in enumerate(zip(moved, allowed, strict=True))
         ]
     raise AssertionError("nothing is known of this cell")
 
 
 def resting(links, sigma, i, turning, left, point, delta):
-    """Where link i rests at all corners: beta int |a| <= g + |rho.d| with beta = 1 - |f|, |a| on it as large as at one end."""
+    """Where link i rests at all corners: beta int |a| <= g + |rho.d| with beta = 1 - |f|, |a| on it
+    as large as at one end."""
     k, (forth, back) = links[i], [mp.mpf(x) for x in sigma]
     speed = max([norm(*k.at(corner, s)) for corner in CORNERS for s in (0, k.l)])
     fastest = (speed + k.off) * max([forth / back, back / forth])
     beta = 1 - fastest / norm(fastest, delta)
     if speed > 100 * delta or beta < 1e-6:
         return None
-    # a changes by at most 2/l along a body that turns as a whole: at the ends of the others, of a on link i
+    # a changes by at most 2/l along a body that turns as a whole: at the ends of the others, of a
+    # on link i
     far, hinge = {i: mp.mpf(1)}, {i: mp.mpf(1)}
     for step in (-1, 1):
         j, before = i + step, mp.mpf(1)
@@ -351,7 +400,10 @@ def resting(links, sigma, i, turning, left, point, delta):
         rho += (
             links[j].norm
             * far[j]
-            * sum(e * (b - a) for e, a, b in zip(links[j].error, links[j].node, links[j].node[1:], strict=False))
+            * sum(
+                e * (b - a)
+                for e, a, b in zip(links[j].error, links[j].node, links[j].node[1:], strict=False)
+            )
         )
     room = beta * min([forth, back, 1]) * (mp.sqrt(2) - 1) * k.l - rho
     if room <= 0:

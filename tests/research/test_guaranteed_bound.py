@@ -1,4 +1,5 @@
-"""The guaranteed bound: its certificates hold at every motion inside a cell, and its inequalities are what they claim."""
+"""The guaranteed bound: its certificates hold at every motion inside a cell, and its inequalities
+are what they claim."""
 
 import numpy as np
 import pytest
@@ -39,10 +40,15 @@ def potential(bound) -> PotentialRange:
 
 
 def boxes(potential, size, count, seed, thin=False):
-    """Random cells that no knot cuts; near the plane s = 0, where one joint turns alone, if thin."""
+    """Random cells that no knot cuts; near the plane s = 0, where one joint turns alone, if
+    thin."""
     rng, knots = np.random.default_rng(seed), potential.spline.knots
     low = np.stack(
-        [rng.uniform(0, np.pi - size, count), rng.uniform(-np.pi, np.pi - size, count), rng.uniform(-1, 1 - size, count)]
+        [
+            rng.uniform(0, np.pi - size, count),
+            rng.uniform(-np.pi, np.pi - size, count),
+            rng.uniform(-1, 1 - size, count),
+        ]
     )
     sizes = np.full((3, count), size)
     if thin:
@@ -53,9 +59,12 @@ def boxes(potential, size, count, seed, thin=False):
 
 
 def motions_inside(cells, count, seed, body=BODY, friction=UNIT):
-    """Share of the corners ``(n, count, 8)`` at random points of the cells, and the balanced motions there."""
+    """Share of the corners ``(n, count, 8)`` at random points of the cells, and the balanced
+    motions there."""
     shares = np.random.default_rng(seed).uniform(0, 1, (3, cells.low.shape[1], count))
-    weights = np.prod(np.where(CORNERS.T[:, None, None, :] == 1, shares[..., None], 1 - shares[..., None]), axis=0)
+    weights = np.prod(
+        np.where(CORNERS.T[:, None, None, :] == 1, shares[..., None], 1 - shares[..., None]), axis=0
+    )
     q1, q2, s = (cells.low[:, :, None] + cells.size[:, :, None] * shares).reshape(3, -1)
     rest, r = np.zeros((3, s.size)), np.stack([np.ones_like(s), s])
     rest[2] = (1 - s) / 3
@@ -78,12 +87,15 @@ def test_loaded_balance_without_load_is_the_balance_of_the_body():
 
 def proved_at(q, r, state, load):
     """The dissipation, what the forces prove, and force and torque left over, ``(4, n)``."""
-    return enclosure.states(BODY, UNIT, np.stack([*q, r[1]]), state.velocity, load)[:, [0, 20, 22, 24]].T
+    return enclosure.states(BODY, UNIT, np.stack([*q, r[1]]), state.velocity, load)[
+        :, [0, 20, 22, 24]
+    ].T
 
 
 @needs_kernel
 def test_loaded_forces_bound_the_power_from_below():
-    """Weak duality: admissible forces in balance with a load prove J(z) >= beta.r + load.z for every motion z."""
+    """Weak duality: admissible forces in balance with a load prove J(z) >= beta.r + load.z for
+    every motion z."""
     rng = np.random.default_rng(32)
     n = 100
     q, r = rng.uniform(-3, 3, (2, n)), np.stack([np.ones(n), rng.uniform(-1, 1, n)])
@@ -91,14 +103,17 @@ def test_loaded_forces_bound_the_power_from_below():
     state = loaded_balance(BODY, UNIT, q, r, load, np.zeros((3, n)), DELTA)
     beta_r = proved_at(q, r, state, load)[1]
     for _ in range(20):
-        other = loaded_balance(BODY, UNIT, q, r, np.zeros((3, n)), rng.uniform(-1, 1, (3, n)) * 0.3, 1e-12, steps=0)
+        other = loaded_balance(
+            BODY, UNIT, q, r, np.zeros((3, n)), rng.uniform(-1, 1, (3, n)) * 0.3, 1e-12, steps=0
+        )
         assert np.all(other.potential >= beta_r + (load * other.velocity).sum(axis=0) - 1e-7)
 
 
 @needs_kernel
 @pytest.mark.parametrize("steps", [0, 2, 40])
 def test_what_is_left_unbalanced_is_counted_however_early_the_solver_stops(steps):
-    """By NumPy: dissipation, power of the forces with the middle link held, and what the load leaves over."""
+    """By NumPy: dissipation, power of the forces with the middle link held, and what the load
+    leaves over."""
     rng = np.random.default_rng(36)
     n = 50
     q, r = rng.uniform(-3, 3, (2, n)), np.stack([np.ones(n), rng.uniform(-1, 1, n)])
@@ -110,7 +125,8 @@ def test_what_is_left_unbalanced_is_counted_however_early_the_solver_stops(steps
     now = instant(BODY, UNIT, q, r, z, np.full((1, n), DELTA), 1)
     left = net_force(now.posture, now.force) + pushed
     held = -sum(
-        (np.stack(now.force, axis=1)[:, k] * part).sum(axis=0) for k, part in enumerate(BODY.velocity(now.posture, r, 0 * z, 1))
+        (np.stack(now.force, axis=1)[:, k] * part).sum(axis=0)
+        for k, part in enumerate(BODY.velocity(now.posture, r, 0 * z, 1))
     )
     dissipation = dissipation_potential(BODY, UNIT, now.velocity, np.full((1, n), DELTA))
     expected = dissipation, held, np.hypot(*left[:2]), np.abs(left[2])
@@ -132,7 +148,12 @@ ODD_LENGTHS = Chain((0.3, 0.45, 0.25))
 DIRECTED = Elliptic(mu_t=1.0, mu_f=0.6, mu_b=1.4)
 CASES = pytest.mark.parametrize(
     ("body", "friction"),
-    [(BODY, UNIT), (ODD_LENGTHS, UNIT), (BODY, Elliptic(mu_t=1.0, mu_f=0.5, mu_b=0.5)), (ODD_LENGTHS, DIRECTED)],
+    [
+        (BODY, UNIT),
+        (ODD_LENGTHS, UNIT),
+        (BODY, Elliptic(mu_t=1.0, mu_f=0.5, mu_b=0.5)),
+        (ODD_LENGTHS, DIRECTED),
+    ],
     ids=["equal", "unlike lengths", "elliptic", "unlike and directed"],
 )
 
@@ -196,9 +217,11 @@ def test_balanced_motions_stay_within_what_is_allowed(potential, body, friction,
         "both senses, thin",
     ],
 )
-def test_allowances_by_convexity_are_the_inequalities_written_out_and_never_less(body, friction, size, thin, seed):
-    """Motions do not come near the margins: what is allowed is held against the inequalities of research/guarantee/README.md,
-    written out again, with more digits; it is never less."""
+def test_allowances_by_convexity_are_the_inequalities_written_out_and_never_less(
+    body, friction, size, thin, seed
+):
+    """Motions do not come near the margins: what is allowed is held against the inequalities of
+    research/guarantee/README.md, written out again, with more digits; it is never less."""
     cells, corners, reference = random_cells(body, friction, size, seed, thin)
     found = by_convexity(body, friction, cells, corners, reference)
     known = np.flatnonzero(np.isfinite(found.gain))
@@ -207,9 +230,20 @@ def test_allowances_by_convexity_are_the_inequalities_written_out_and_never_less
     for n in known[np.argsort(found.gain[known])[[0, -1]]]:
         at = cells.at[n]
         point = (reference.centre[n].real, reference.centre[n].imag, reference.beside[n])
-        forces, left = corners.forces[::2, :2][:, :, at].transpose(2, 0, 1), corners.residual[:, at].max(axis=1)
+        forces, left = (
+            corners.forces[::2, :2][:, :, at].transpose(2, 0, 1),
+            corners.residual[:, at].max(axis=1),
+        )
         exact = allowance(
-            body.lengths, sigma, cells.low[:, n], cells.size[:, n], corners.velocity[:, at].T, forces, left, point, DELTA
+            body.lengths,
+            sigma,
+            cells.low[:, n],
+            cells.size[:, n],
+            corners.velocity[:, at].T,
+            forces,
+            left,
+            point,
+            DELTA,
         )
         for value, least in zip((found.gain[n], found.power[n]), exact, strict=True):
             assert least <= value <= (1 + 1e-5) * least + 1e-12
@@ -218,17 +252,28 @@ def test_allowances_by_convexity_are_the_inequalities_written_out_and_never_less
 @needs_kernel
 @pytest.mark.parametrize(
     ("friction", "size", "thin", "steps"),
-    [(UNIT, 0.05, False, 40), (UNIT, 0.003, True, 40), (DIRECTED, 0.01, False, 40), (UNIT, 0.05, False, 3)],
+    [
+        (UNIT, 0.05, False, 40),
+        (UNIT, 0.003, True, 40),
+        (DIRECTED, 0.01, False, 40),
+        (UNIT, 0.05, False, 3),
+    ],
 )
-def test_allowances_by_loads_are_the_inequalities_written_out_cell_by_cell(friction, size, thin, steps):
+def test_allowances_by_loads_are_the_inequalities_written_out_cell_by_cell(
+    friction, size, thin, steps
+):
     """Where the solver stopped early too."""
     cells, _, reference = random_cells(ODD_LENGTHS, friction, size, 52, thin)
     rest = np.zeros((3, cells.points.shape[1]))
-    corners = loaded_balance(ODD_LENGTHS, friction, cells.points[:2], cells.rates, rest, rest, DELTA, steps)
+    corners = loaded_balance(
+        ODD_LENGTHS, friction, cells.points[:2], cells.rates, rest, rest, DELTA, steps
+    )
     multiplier = 2.0 ** np.round(np.log2(4 / np.sqrt(size)))
     found = by_loads(ODD_LENGTHS, friction, cells, corners, reference, multiplier)
     for n in range(cells.low.shape[1]):
-        gain, power = allowance_by_loads(ODD_LENGTHS, friction, cells, corners, reference, multiplier, n)
+        gain, power = allowance_by_loads(
+            ODD_LENGTHS, friction, cells, corners, reference, multiplier, n
+        )
         assert found.gain[n] == pytest.approx(gain, rel=1e-8, abs=1e-8)
         assert found.power[n] == pytest.approx(power, rel=1e-8, abs=1e-8)
 
@@ -249,12 +294,16 @@ def test_cell_bounds_hold_at_random_motions_inside(potential, body, friction, si
 
 @needs_kernel
 @pytest.mark.parametrize("way", ["by_convexity", "by_loads"])
-def test_what_a_motion_inside_may_gain_more_and_pay_less_than_at_the_corners_raises_the_bound(potential, monkeypatch, way):
+def test_what_a_motion_inside_may_gain_more_and_pay_less_than_at_the_corners_raises_the_bound(
+    potential, monkeypatch, way
+):
     """By just as much, whichever way it is known; a motion that may cost nothing has no bound."""
     cells, other = boxes(potential, 0.01, 100, 41), ({"by_convexity", "by_loads"} - {way}).pop()
 
     def bound_with(gain, power):
-        allowed = enclosure.Allowance(*(np.full(cells.low.shape[1], 0.0) + value for value in (gain, power)))
+        allowed = enclosure.Allowance(
+            *(np.full(cells.low.shape[1], 0.0) + value for value in (gain, power))
+        )
         unknown = enclosure.Allowance(*(np.full(cells.low.shape[1], np.inf) for _ in range(2)))
         monkeypatch.setattr(guaranteed, way, lambda *_: allowed)
         monkeypatch.setattr(guaranteed, other, lambda *_: unknown)
@@ -262,9 +311,19 @@ def test_what_a_motion_inside_may_gain_more_and_pay_less_than_at_the_corners_rai
 
     motions = corner_motions(BODY, UNIT, cells)
     power = (motions.potential - DELTA)[cells.at]
-    gain = potential.corner_gain(cells, motions)[cells.at] + potential.trial_error(cells, motions)[:, None]
-    for more, less in ((0.0, 0.0), (0.02, 0.0), (0.0, 0.1 * power.min()), (0.02, 0.9 * power.min())):
-        np.testing.assert_allclose(bound_with(more, less), ((gain + more) / (power - less)).max(axis=1), rtol=2e-9)
+    gain = (
+        potential.corner_gain(cells, motions)[cells.at]
+        + potential.trial_error(cells, motions)[:, None]
+    )
+    for more, less in (
+        (0.0, 0.0),
+        (0.02, 0.0),
+        (0.0, 0.1 * power.min()),
+        (0.02, 0.9 * power.min()),
+    ):
+        np.testing.assert_allclose(
+            bound_with(more, less), ((gain + more) / (power - less)).max(axis=1), rtol=2e-9
+        )
     assert (bound_with(0.0, 0.5 * (power.min(axis=1) + power.max(axis=1))) == np.inf).all()
 
 
@@ -276,7 +335,9 @@ def test_cell_bounds_hold_for_whatever_the_solver_returns(potential, monkeypatch
     _, rates, angles, true = motions_inside(cells, 10, 39)
     motion = CoulombMotion(angles, rates, true.velocity[:2], true.velocity[2], true.potential)
     ratio = Samples(potential.space, motion).ratio(potential.free)[0].reshape(-1, 10).max(axis=1)
-    monkeypatch.setattr(enclosure, "loaded_balance", lambda *given: loaded_balance(*given, steps=steps))
+    monkeypatch.setattr(
+        enclosure, "loaded_balance", lambda *given: loaded_balance(*given, steps=steps)
+    )
     assert np.all(ratio <= cell_bounds(BODY, UNIT, potential, cells, 0.0))
 
 
@@ -286,11 +347,15 @@ def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, potential, monkeyp
 
     def broken(*given):
         state = loaded_balance(*given)
-        return state._replace(velocity=np.full_like(state.velocity, np.nan), power=np.full_like(state.power, np.nan))
+        return state._replace(
+            velocity=np.full_like(state.velocity, np.nan), power=np.full_like(state.power, np.nan)
+        )
 
     monkeypatch.setattr(enclosure, "loaded_balance", broken)
     assert np.all(cell_bounds(BODY, UNIT, potential, cells, 0.0) == np.inf)
-    monkeypatch.setattr(guaranteed, "cell_bounds", lambda *given: np.full(given[3].low.shape[1], np.nan))
+    monkeypatch.setattr(
+        guaranteed, "cell_bounds", lambda *given: np.full(given[3].low.shape[1], np.nan)
+    )
     certificate = certify(*stated(bound), 0.95, deepest=0, part=(1, 500))
     assert certificate.open_cells == certificate.cells > 0
     assert certificate.guaranteed == np.inf
@@ -298,31 +363,45 @@ def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, potential, monkeyp
 
 def stated(bound, body=BODY, friction=None):
     """Domain and potential of a bound, as `certify` takes them."""
-    return Domain(body, friction or Friction(), bound.joint_limit), bound.potential_space(body), np.array(bound.coefficients)
+    return (
+        Domain(body, friction or Friction(), bound.joint_limit),
+        bound.potential_space(body),
+        np.array(bound.coefficients),
+    )
 
 
 def test_the_gain_over_all_headings_is_bounded_from_above_and_closely():
     rng = np.random.default_rng(41)
     amplitudes = {k: rng.normal(size=40) + 1j * rng.normal(size=40) for k in (1, 3, 5)}
     theta = np.linspace(0, 2 * np.pi, 20001)
-    fine = sum(np.real(a[:, None] * np.exp(1j * k * theta)) for k, a in amplitudes.items()).max(axis=1)
+    fine = sum(np.real(a[:, None] * np.exp(1j * k * theta)) for k, a in amplitudes.items()).max(
+        axis=1
+    )
     assert np.all(gain_bound(amplitudes) >= fine)
     assert np.all(gain_bound(amplitudes) <= fine * 1.005)
 
 
 @pytest.mark.parametrize("order", [(2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
-def test_derivatives_of_the_potential_stay_below_their_bound_which_is_met_where_they_are_constant(potential, order):
+def test_derivatives_of_the_potential_stay_below_their_bound_which_is_met_where_they_are_constant(
+    potential, order
+):
     rng, spline = np.random.default_rng(39), potential.spline
     centres = rng.uniform(-3, 3, (2, 30))
     i, j = spline.cell(centres[0]), spline.cell(centres[1])
     largest = np.stack([potential.largest[k, order][i, j] for k in potential.c])
     cell = spline.cell(centres)
-    knots = [spline.extended[DEGREE + cell[a]] for a in (0, 1)], [spline.extended[DEGREE + 1 + cell[a]] for a in (0, 1)]
-    inside = np.array(knots[0])[:, :, None] + (np.array(knots[1]) - np.array(knots[0]))[:, :, None] * rng.uniform(
-        0.001, 0.999, (2, 30, 200)
+    knots = (
+        [spline.extended[DEGREE + cell[a]] for a in (0, 1)],
+        [spline.extended[DEGREE + 1 + cell[a]] for a in (0, 1)],
     )
+    inside = np.array(knots[0])[:, :, None] + (np.array(knots[1]) - np.array(knots[0]))[
+        :, :, None
+    ] * rng.uniform(0.001, 0.999, (2, 30, 200))
     found = np.stack(
-        [np.abs(spline.matrix(inside.reshape(2, -1), order) @ c).reshape(30, 200).max(axis=1) for c in potential.c.values()]
+        [
+            np.abs(spline.matrix(inside.reshape(2, -1), order) @ c).reshape(30, 200).max(axis=1)
+            for c in potential.c.values()
+        ]
     )
     assert np.all(found <= largest * (1 + 1e-9) + 1e-12)
     assert np.median(largest / found) < 3
@@ -337,16 +416,23 @@ def test_no_gait_of_the_isotropic_body_reaches_nine_tenths(bound):
 
 
 @pytest.mark.parametrize(("target", "closed"), [(0.46, True), (0.44, False)])
-def test_a_body_on_twice_the_friction_goes_half_as_far_for_its_work(bound, monkeypatch, target, closed):
+def test_a_body_on_twice_the_friction_goes_half_as_far_for_its_work(
+    bound, monkeypatch, target, closed
+):
     """Cells are bounded for coefficients of 1: by 0.9 here."""
-    monkeypatch.setattr(guaranteed, "cell_bounds", lambda *given: np.full(given[3].low.shape[1], 0.9))
-    certificate = certify(*stated(bound, friction=Friction(2.0, 2.0, 2.0)), target, deepest=0, part=(1, 50))
+    monkeypatch.setattr(
+        guaranteed, "cell_bounds", lambda *given: np.full(given[3].low.shape[1], 0.9)
+    )
+    certificate = certify(
+        *stated(bound, friction=Friction(2.0, 2.0, 2.0)), target, deepest=0, part=(1, 50)
+    )
     assert (certificate.open_cells == 0) == closed
     assert certificate.guaranteed == pytest.approx(target if closed else 0.45)
 
 
 def test_parts_share_the_cells_and_these_fill_the_domain(bound, monkeypatch):
-    """Between them: half of the plane of angles, less the corner where links cross, and all rates; each once."""
+    """Between them: half of the plane of angles, less the corner where links cross, and all rates;
+    each once."""
     seen = []
 
     def recorded(body, friction, potential, cells, goal):
@@ -355,14 +441,20 @@ def test_parts_share_the_cells_and_these_fill_the_domain(bound, monkeypatch):
 
     monkeypatch.setattr(guaranteed, "cell_bounds", recorded)
     counts = [certify(*stated(bound), 0.9, part=(k, 3)).cells for k in (1, 2, 3)]
-    low, size = (np.concatenate([getattr(cells, name) for cells in seen], axis=1) for name in ("low", "size"))
+    low, size = (
+        np.concatenate([getattr(cells, name) for cells in seen], axis=1) for name in ("low", "size")
+    )
     assert sum(counts) == low.shape[1] == np.unique(low.round(12), axis=1).shape[1]
     rng = np.random.default_rng(42)
-    for q1, q2, s in np.stack([rng.uniform(0, 1.4, 50), rng.uniform(-np.pi, 1.4, 50), rng.uniform(-1, 1, 50)], axis=1):
+    for q1, q2, s in np.stack(
+        [rng.uniform(0, 1.4, 50), rng.uniform(-np.pi, 1.4, 50), rng.uniform(-1, 1, 50)], axis=1
+    ):
         point = np.array([q1, q2, s])[:, None]
         assert ((low <= point) & (point <= low + size)).all(axis=0).any()
     for s in (-1e-10, 1e-10, 1e-7, -1e-5):
-        assert ((low <= [[1.0], [0.5], [s]]) & ([[1.0], [0.5], [s]] <= low + size)).all(axis=0).any()
+        assert (
+            ((low <= [[1.0], [0.5], [s]]) & ([[1.0], [0.5], [s]] <= low + size)).all(axis=0).any()
+        )
 
 
 @needs_kernel
@@ -383,24 +475,37 @@ def test_a_potential_says_the_same_of_a_body_turned_end_for_end(friction):
     np.testing.assert_allclose(ratios[0], ratios[1], rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.parametrize("body", [BODY, Chain((0.4, 0.25, 0.35)), Chain((0.25, 0.3, 0.45))], ids=["equal", "long", "one long"])
+@pytest.mark.parametrize(
+    "body",
+    [BODY, Chain((0.4, 0.25, 0.35)), Chain((0.25, 0.3, 0.45))],
+    ids=["equal", "long", "one long"],
+)
 def test_no_box_is_left_out_that_holds_a_shape_without_crossing(body):
-    """By plain intersection of segments at random shapes inside; and boxes well inside the crossing are left out."""
+    """By plain intersection of segments at random shapes inside; and boxes well inside the crossing
+    are left out."""
     rng = np.random.default_rng(47)
     edges = np.linspace(0, np.pi, 24)
-    index = np.stack([a.ravel() for a in np.meshgrid(np.arange(23), np.arange(-23, 23), indexing="ij")])
+    index = np.stack(
+        [a.ravel() for a in np.meshgrid(np.arange(23), np.arange(-23, 23), indexing="ij")]
+    )
     low, high = (np.sign(k) * edges[np.abs(k)] for k in (index, index + 1))
     for sign in (1, -1):
         one, other = (low, high) if sign > 0 else (-high, -low)
         kept = guaranteed._uncrossed(body, one, other)
-        inside = one[:, :, None] + (other - one)[:, :, None] * rng.uniform(0, 1, (2, one.shape[1], 40))
+        inside = one[:, :, None] + (other - one)[:, :, None] * rng.uniform(
+            0, 1, (2, one.shape[1], 40)
+        )
         depth = crossing_depth(body, inside.reshape(2, -1)).reshape(-1, 40)
         assert np.all(kept[(depth == 0).any(axis=1)])
         assert (~kept).sum() > 0.6 * (depth > 0).all(axis=1).sum() > 0
 
 
 def test_cells_know_the_places_of_their_corners_and_share_each():
-    edges = np.array([0.0, 0.3, 1.0]), np.array([-1.0, -0.2, 0.5, 2.0]), np.array([-1.0, 0.0, 0.1, 0.4, 1.0])
+    edges = (
+        np.array([0.0, 0.3, 1.0]),
+        np.array([-1.0, -0.2, 0.5, 2.0]),
+        np.array([-1.0, 0.0, 0.1, 0.4, 1.0]),
+    )
     for levels in ((0, 0, 0), (2, 2, 2), (2, 2, 1)):
         counts = [(each.size - 1) << level for each, level in zip(edges, levels, strict=True)]
         index = np.stack([a.ravel() for a in np.meshgrid(*map(np.arange, counts), indexing="ij")])
@@ -414,14 +519,18 @@ def test_cells_know_the_places_of_their_corners_and_share_each():
 def test_halves_of_cells_fill_them_and_thin_ones_keep_their_rates():
     edges = np.linspace(0, 1, 4), np.linspace(-1, 1, 5), np.array([0.0, 1e-6, 1e-3, 0.2, 1.0])
     lattice = guaranteed._Lattice(edges, (1, 1, 0))
-    index = np.stack([a.ravel() for a in np.meshgrid(np.arange(6), np.arange(8), np.arange(4), indexing="ij")])
+    index = np.stack(
+        [a.ravel() for a in np.meshgrid(np.arange(6), np.arange(8), np.arange(4), indexing="ij")]
+    )
     parents = np.arange(index.shape[1], dtype=float)
     low, size = lattice.box(index)
     volume = np.zeros(parents.size)
     for finer, parts, of in lattice.halved(index, parents):
         inside, extent = finer.box(parts)
         k = of.astype(int)
-        assert np.all((inside >= low[:, k] - 1e-15) & (inside + extent <= low[:, k] + size[:, k] + 1e-15))
+        assert np.all(
+            (inside >= low[:, k] - 1e-15) & (inside + extent <= low[:, k] + size[:, k] + 1e-15)
+        )
         np.add.at(volume, k, extent.prod(axis=0))
         thin = finer.levels[2] == 0
         assert np.all((size[2, k] < 0.5 * size[:2, k].min(axis=0)) == thin)
@@ -449,7 +558,14 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
         (BODY, Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0), (0, 1)),
         (BODY, Friction(), (3,)),
     ],
-    ids=["no convex potential", "four links", "weights", "even harmonics", "those of a reversible law", "no displacement"],
+    ids=[
+        "no convex potential",
+        "four links",
+        "weights",
+        "even harmonics",
+        "those of a reversible law",
+        "no displacement",
+    ],
 )
 def test_what_the_proof_does_not_cover_is_refused(body, friction, harmonics):
     spline = TensorSpline(body.n_joint, np.pi, 3)
@@ -467,7 +583,8 @@ def test_without_a_compiler_it_says_what_is_wanting(potential):
 @needs_kernel
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
 def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
-    """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their power at most delta below.
+    """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their
+    power at most delta below.
 
     These are all that the allowance for finite delta uses (research/guarantee/README.md).
     """

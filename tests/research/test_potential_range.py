@@ -26,7 +26,12 @@ def cells():
     """Oblong ones, none of which a knot cuts, with s of both signs."""
     rng = np.random.default_rng(4)
     size = np.array([[0.05], [0.02], [0.3]]) * rng.uniform(0.5, 1, (3, N))
-    low = np.stack([*(rng.integers(-2, 2, (2, N)) * np.pi / 2 + rng.uniform(0.1, 1.4, (2, N))), rng.uniform(-1, 0.7, N)])
+    low = np.stack(
+        [
+            *(rng.integers(-2, 2, (2, N)) * np.pi / 2 + rng.uniform(0.1, 1.4, (2, N))),
+            rng.uniform(-1, 0.7, N),
+        ]
+    )
     points = (low[:, :, None] + size[:, :, None] * CORNERS.T[:, None, :]).reshape(3, -1)
     return Cells(low, size, points, np.arange(8 * N).reshape(N, 8))
 
@@ -49,26 +54,38 @@ def cubic(t, i, x, degree=DEGREE):
         return Fraction(t[i] <= x < t[i + 1]), Fraction(0)
     one, other = cubic(t, i, x, degree - 1)[0], cubic(t, i + 1, x, degree - 1)[0]
     up, down = 1 / (t[i + degree] - t[i]), 1 / (t[i + degree + 1] - t[i + 1])
-    return (x - t[i]) * up * one + (t[i + degree + 1] - x) * down * other, degree * (up * one - down * other)
+    return (x - t[i]) * up * one + (t[i + degree + 1] - x) * down * other, degree * (
+        up * one - down * other
+    )
 
 
-def test_what_is_stated_of_a_harmonic_and_of_its_gain_holds_what_they_are_in_fractions(potential, cells):
+def test_what_is_stated_of_a_harmonic_and_of_its_gain_holds_what_they_are_in_fractions(
+    potential, cells
+):
     points, z = cells.points[:, ::5], motions_at(cells.points[:, ::5]).velocity
     knots = [Fraction(x) for x in potential.spline.extended]
     for k, c in potential.c.items():
         table = c.reshape(potential.spline.per_joint, -1)
         stated = potential._harmonic(k, points, z)
         for n, (q1, q2, s) in enumerate(points.T):
-            first, second = ([cubic(knots, i, Fraction(q)) for i in range(len(table))] for q in (q1, q2))
+            first, second = (
+                [cubic(knots, i, Fraction(q)) for i in range(len(table))] for q in (q1, q2)
+            )
             x, y, spin = (Fraction(v) for v in z[:, n])
             for part in (0, 1):
                 real, value, rate = (np.real, np.imag)[part], [0, 0], 0
-                for (i, (a, da)), (j, (b, db)) in itertools.product(enumerate(first), enumerate(second)):
+                for (i, (a, da)), (j, (b, db)) in itertools.product(
+                    enumerate(first), enumerate(second)
+                ):
                     if a * b:
                         both = Fraction(table[i, j].real), Fraction(table[i, j].imag)
                         value = [v + a * b * each for v, each in zip(value, both, strict=True)]
                         rate += (da * b + Fraction(s) * a * db) * both[part]
-                gain = rate + (k * spin * value[0] if part else -k * spin * value[1]) + ((x, y)[part] if k == 1 else 0)
+                gain = (
+                    rate
+                    + (k * spin * value[0] if part else -k * spin * value[1])
+                    + ((x, y)[part] if k == 1 else 0)
+                )
                 for exact, (near, off) in zip((value[part], gain), stated, strict=True):
                     assert abs(exact - Fraction(float(real(near[n])))) <= Fraction(off[n])
         assert max(off.max() for _, off in stated) < 1e-13
@@ -83,8 +100,8 @@ def test_half_way_between_headings_the_bound_of_the_gain_is_met_to_fourth_order(
 
 
 def test_the_error_of_a_trial_motion_is_that_of_interpolating_slopes_and_products(potential, cells):
-    """h^2/8 of second derivatives of the rate, and of spin times potential; (h/4) of the change of one times the slope of the
-    other."""
+    """h^2/8 of second derivatives of the rate, and of spin times potential; (h/4) of the change of
+    one times the slope of the other."""
     motions = motions_at(cells.points)
     found = potential.trial_error(cells, motions)
     for n in range(N):
@@ -93,12 +110,18 @@ def test_the_error_of_a_trial_motion_is_that_of_interpolating_slopes_and_product
         i, j = (int(np.searchsorted(potential.spline.knots, q, side="right")) - 1 for q in place)
         total = 0.0
         for k in (1, 3):
-            largest = {order: table[i, j] for (harmonic, order), table in potential.largest.items() if harmonic == k}
+            largest = {
+                order: table[i, j]
+                for (harmonic, order), table in potential.largest.items()
+                if harmonic == k
+            }
             for axis in (0, 1):
                 h, change = cells.size[axis, n], np.abs(np.diff(spin, axis=axis)).max()
                 twice, once = ((2, 0), (1, 0)) if axis == 0 else ((0, 2), (0, 1))
                 rate = largest[twice[0] + 1, twice[1]] + s * largest[twice[0], twice[1] + 1]
-                product = h**2 / 8 * np.abs(spin).max() * largest[twice] + h / 4 * change * largest[once]
+                product = (
+                    h**2 / 8 * np.abs(spin).max() * largest[twice] + h / 4 * change * largest[once]
+                )
                 total += h**2 / 8 * rate + k * product
         assert found[n] == pytest.approx(total, rel=1e-8)
 
@@ -108,26 +131,37 @@ def test_a_reference_point_is_the_first_harmonic_and_all_else_is_beside_it(poten
     for n in range(N):
         centre = cells.low[:2, n] + 0.5 * cells.size[:2, n]
         i, j = (int(np.searchsorted(potential.spline.knots, q, side="right")) - 1 for q in centre)
-        slopes = {k: [potential.largest[k, order][i, j] for order in ((1, 0), (0, 1))] for k in (1, 3)}
+        slopes = {
+            k: [potential.largest[k, order][i, j] for order in ((1, 0), (0, 1))] for k in (1, 3)
+        }
         across = {k: cells.size[0, n] * a + cells.size[1, n] * b for k, (a, b) in slopes.items()}
         bent = [potential.largest[1, order][i, j] for order in ((2, 0), (0, 2))]
         assert found.centre[n] == pytest.approx(value(potential, 1, centre), rel=1e-8)
         for corner in cells.at[n]:
-            assert found.at[corner] == pytest.approx(value(potential, 1, cells.points[:2, corner]), rel=1e-8)
+            assert found.at[corner] == pytest.approx(
+                value(potential, 1, cells.points[:2, corner]), rel=1e-8
+            )
         third = abs(value(potential, 3, centre))
-        assert found.beside[n] == pytest.approx(0.5 * across[1] + 3 * (0.5 * across[3] + third), rel=1e-8)
+        assert found.beside[n] == pytest.approx(
+            0.5 * across[1] + 3 * (0.5 * across[3] + third), rel=1e-8
+        )
         assert found.change[n] == pytest.approx(across[1], rel=1e-8)
-        assert found.curvature[n] == pytest.approx((cells.size[:2, n] ** 2 / 8 * bent).sum(), rel=1e-8)
+        assert found.curvature[n] == pytest.approx(
+            (cells.size[:2, n] ** 2 / 8 * bent).sum(), rel=1e-8
+        )
 
 
 @pytest.mark.parametrize("order", [(1, 0), (0, 1), (2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
 def test_bounds_of_derivatives_are_the_hull_of_their_coefficients(potential, order):
-    """A cubic that is the same everywhere has the same derivatives everywhere: the bound is met by a polynomial."""
+    """A cubic that is the same everywhere has the same derivatives everywhere: the bound is met by
+    a polynomial."""
     a, b = order
     spline, space = potential.spline, potential.space
     whole = PotentialRange(space, np.zeros(space.size))
     at = np.stack([axis.ravel() for axis in np.meshgrid(*[np.linspace(-np.pi, np.pi, 29)] * 2)])
     monomial = at[0] ** a * at[1] ** b
-    whole.c = {1: np.linalg.lstsq(spline.matrix(at).toarray(), monomial.astype(complex), rcond=None)[0]}
+    whole.c = {
+        1: np.linalg.lstsq(spline.matrix(at).toarray(), monomial.astype(complex), rcond=None)[0]
+    }
     factorial = np.prod(np.arange(1, a + 1)) * np.prod(np.arange(1, b + 1))
     np.testing.assert_allclose(whole.largest[1, order], factorial, rtol=1e-7)

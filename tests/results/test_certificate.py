@@ -1,4 +1,5 @@
-"""Every check of the certificate refuses what lies just above its limit, and nothing else does; the limits are these."""
+"""Every check of the certificate refuses what lies just above its limit, and nothing else does; the
+limits are these."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -43,11 +44,14 @@ def replays(three_link):
 
 @pytest.fixture
 def failures(three_link, replays, monkeypatch):
-    """A function from a changed solution and changes of its replays to the names of the checks that fail."""
+    """A function from a changed solution and changes of its replays to the names of the checks that
+    fail."""
 
     def names(solution=three_link, change=lambda part, replayed: replayed):
         largest = max(replays)
-        monkeypatch.setattr(replayer, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
+        monkeypatch.setattr(
+            replayer, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]])
+        )
         return {check.name for check in certify(solution.answer).failures}
 
     return names
@@ -64,7 +68,8 @@ def changed(replayed, **numbers):
 
 
 def judged(name, run):
-    """`run` of a factor makes a violation of so many times the limit: only `name` fails, and only above it."""
+    """`run` of a factor makes a violation of so many times the limit: only `name` fails, and only
+    above it."""
     assert run(JUST_BELOW) == set()
     assert run(JUST_ABOVE) == {name}
 
@@ -115,7 +120,10 @@ def test_what_the_replay_measures(failures, name, changes):
 @pytest.mark.parametrize("sign", [1, -1])
 def test_collocated_against_replayed_efficiency(failures, three_link, replays, sign):
     true = replays[max(replays)].efficiency
-    judged("replay gap", lambda f: failures(with_answer(three_link, value=true * (1 + sign * f * 1e-4))))
+    judged(
+        "replay gap",
+        lambda f: failures(with_answer(three_link, value=true * (1 + sign * f * 1e-4))),
+    )
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -139,13 +147,20 @@ def test_joint_limits_are_those_of_the_problem(failures, three_link):
     largest = np.abs(three_link.gait.angles(np.linspace(0, 1, 20001))).max()
 
     def run(f):
-        return failures(with_answer(three_link, problem=three_link.problem.with_(joint_limit=largest - f * 1e-6)))
+        return failures(
+            with_answer(
+                three_link, problem=three_link.problem.with_(joint_limit=largest - f * 1e-6)
+            )
+        )
 
     judged("joint limits", run)
 
 
-def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(failures, three_link, replays):
-    """The replay's distance counts: a problem that asks for as much has it, and one that asks for more does not."""
+def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(
+    failures, three_link, replays
+):
+    """The replay's distance counts: a problem that asks for as much has it, and one that asks for
+    more does not."""
     there = replays[max(replays)].distance
 
     def run(f):
@@ -163,7 +178,9 @@ def test_a_way_on_a_slope_may_lead_off_by_a_thousandth_of_a_radian(part, passes)
     ran = slope_motion(Chain(), Friction(), gait, 1e-2, 0.1, tolerance=1e-3)
     goes = np.arctan2(ran.aside[0], ran.climb[0])
     asked = {"delta": 1e-2, "grade": 0.1, "towards": goes + part * 1e-3}
-    found = gait_certificate(Problem("aside", gait=Harmonic(1), **asked), gait, 1e-2, np.empty(0), tolerance=1e-3)
+    found = gait_certificate(
+        Problem("aside", gait=Harmonic(1), **asked), gait, 1e-2, np.empty(0), tolerance=1e-3
+    )
     (check,) = (check for check in found.checks if check.name == "direction")
     assert check.passed == passes
     assert check.value == pytest.approx(-part * 1e-3, abs=1e-4)
@@ -182,7 +199,11 @@ def test_self_contact(failures, monkeypatch, depth):
 
 def test_mesh_error(failures, three_link, monkeypatch):
     def run(f):
-        monkeypatch.setattr(verify, "mesh_error", lambda *a: SimpleNamespace(estimate=f * three_link.problem.mesh_tolerance))
+        monkeypatch.setattr(
+            verify,
+            "mesh_error",
+            lambda *a: SimpleNamespace(estimate=f * three_link.problem.mesh_tolerance),
+        )
         return failures()
 
     judged("mesh error", run)
@@ -194,7 +215,9 @@ def test_influence_of_delta(failures, replays, sign):
 
     def run(f):
         limit = largest * (1 + sign * f * 1e-2)
-        return failures(change=lambda part, r: r if part == 1 else changed(r, distance=limit * r.work))
+        return failures(
+            change=lambda part, r: r if part == 1 else changed(r, distance=limit * r.work)
+        )
 
     judged("delta influence", run)
 
@@ -236,14 +259,23 @@ SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    "name", ["two_link", "three_link", "small_gaits", *(pytest.param(n, marks=SLOW) for n in ("four_link", "five_link"))]
+    "name",
+    [
+        "two_link",
+        "three_link",
+        "small_gaits",
+        *(pytest.param(n, marks=SLOW) for n in ("four_link", "five_link")),
+    ],
 )
 def test_errors_of_a_certificate_hold(solved, name):
-    """Efficiency at delta, and for delta -> 0, against replays to 1e-9 at delta and at a ten-thousandth of it."""
+    """Efficiency at delta, and for delta -> 0, against replays to 1e-9 at delta and at a
+    ten-thousandth of it."""
     solution = solved(name)[0]
     problem, path, known = solution.problem, solution.gait, solution.certificate
     here, limit = (
-        replay(problem.body, problem.friction, path, part * solution.delta_per_period, tolerance=1e-9).efficiency
+        replay(
+            problem.body, problem.friction, path, part * solution.delta_per_period, tolerance=1e-9
+        ).efficiency
         for part in (1.0, 1e-4)
     )
     assert abs(known.efficiency - here) <= known.efficiency_error < 2e-6 * here
@@ -255,22 +287,36 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
     found = extrapolated_limit(linear, [0.0, 0.0, 0.0])
     assert found.value == pytest.approx(0.25, abs=1e-15)
     assert found.error == pytest.approx(3e-4, rel=1e-9)
-    # other parts may hide the linear one in the last change, never by chance in both: what it leaves there is allowed for
-    hidden = extrapolated_limit([0.25 + 3.0 * 1e-2, 0.25 + 3.0 * 1e-3, 0.25 + 3.0 * 1e-3], [0.0, 0.0, 0.0])
+    # other parts may hide the linear one in the last change, never by chance in both: what it
+    # leaves there is allowed for
+    hidden = extrapolated_limit(
+        [0.25 + 3.0 * 1e-2, 0.25 + 3.0 * 1e-3, 0.25 + 3.0 * 1e-3], [0.0, 0.0, 0.0]
+    )
     assert hidden.error == pytest.approx(3.0 * 1e-4, rel=1e-9)
     # the last value is moved by a ninth of the last change: so is what it may be wrong by
     errors = [7e-3, 9e-4, 2e-4]
-    assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12)
+    assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(
+        2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12
+    )
 
 
-def test_a_certificate_knows_the_limit_of_a_distance_that_falls_in_proportion_to_delta(three_link, replays, monkeypatch):
+def test_a_certificate_knows_the_limit_of_a_distance_that_falls_in_proportion_to_delta(
+    three_link, replays, monkeypatch
+):
     fine = replays[max(replays)]
-    monkeypatch.setattr(replayer, "replay", lambda *a, **k: changed(fine, distance=fine.distance * (1 + 3 * a[3])))
-    assert certify(three_link.answer).efficiency_at_zero_delta == pytest.approx(fine.efficiency, rel=1e-12)
+    monkeypatch.setattr(
+        replayer, "replay", lambda *a, **k: changed(fine, distance=fine.distance * (1 + 3 * a[3]))
+    )
+    assert certify(three_link.answer).efficiency_at_zero_delta == pytest.approx(
+        fine.efficiency, rel=1e-12
+    )
 
 
 def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(three_link, replays):
-    unequal, fine = three_link.problem.with_(friction=Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)), replays[max(replays)]
+    unequal, fine = (
+        three_link.problem.with_(friction=Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)),
+        replays[max(replays)],
+    )
     for problem, several, said in (
         (three_link.problem, 0.0, "leaves one balanced motion"),
         (unequal, 0.0, "no other balanced motion was found"),
@@ -285,11 +331,16 @@ def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch
     assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
     assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
     # a point at the end of the longest lever goes by so much less or more
-    assert known.errors["distance"] == pytest.approx(fine.errors["distance"] + 3e-5 * fine.lever, rel=1e-9)
+    assert known.errors["distance"] == pytest.approx(
+        fine.errors["distance"] + 3e-5 * fine.lever, rel=1e-9
+    )
 
 
-def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, three_link, replays, monkeypatch):
-    """1 % of the efficiency that the law leaves open may pass; it is no fault of the mesh, and stated in every error."""
+def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(
+    failures, three_link, replays, monkeypatch
+):
+    """1 % of the efficiency that the law leaves open may pass; it is no fault of the mesh, and
+    stated in every error."""
     fine = replays[max(replays)]
 
     def open_by(part):
@@ -301,12 +352,16 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, t
     assert failures(gapped, open_by(2.5e-4)) == set()
     monkeypatch.setattr(replayer, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
     known = certify(three_link.answer)
-    assert min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency) >= 5e-3
+    assert (
+        min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency)
+        >= 5e-3
+    )
     assert known.errors["work"] >= 5e-3 * known.work
 
 
 def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):
-    """Curvature in units of the objective, less its error, as the mesh may be wrong by what a tenth of a radian gains."""
+    """Curvature in units of the objective, less its error, as the mesh may be wrong by what a tenth
+    of a radian gains."""
 
     def curved(smallest, error, n_free=2):
         return with_answer(three_link, second_order=SecondOrder(smallest, error, n_free))
@@ -315,11 +370,17 @@ def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):
     judged("second order", lambda f: failures(curved(-f * 1e-2 - 0.5, 0.5)))
 
     def meaning(solution):
-        return next(check.meaning for check in certify(solution.answer).checks if check.name == "second order")
+        return next(
+            check.meaning
+            for check in certify(solution.answer).checks
+            if check.name == "second order"
+        )
 
     assert "a saddle" in meaning(curved(-0.02, 0.0))
     assert "flat" in meaning(curved(1e-6, 1e-5))
     assert "flat" in meaning(curved(0.02, 0.03))
     assert "an optimum" in meaning(curved(0.5, 0.01))
     assert "a vertex" in meaning(curved(np.inf, 0.0, 0))
-    assert "not measured" in meaning(with_answer(three_link, second_order=SecondOrder(np.nan, np.nan, 0, "not measured")))
+    assert "not measured" in meaning(
+        with_answer(three_link, second_order=SecondOrder(np.nan, np.nan, 0, "not measured"))
+    )

@@ -1,4 +1,5 @@
-"""A result takes its place without loss: what another problem, or a better answer, left there is kept and named."""
+"""A result takes its place without loss: what another problem, or a better answer, left there is
+kept and named."""
 
 import os
 import re
@@ -35,7 +36,10 @@ def values(folder):
     return {path.name: load(path).certificate.value for path in folder.glob("*.h5")}
 
 
-@pytest.mark.parametrize("changes", [{"delta": 2e-4}, {"name": "other"}, {"joint_limit": 3.0}, {"at_least": {"distance": 0.1}}])
+@pytest.mark.parametrize(
+    "changes",
+    [{"delta": 2e-4}, {"name": "other"}, {"joint_limit": 3.0}, {"at_least": {"distance": 0.1}}],
+)
 def test_the_result_of_another_problem_is_kept_under_another_name(changes, three_link, tmp_path):
     path = tmp_path / "x.h5"
     save_result(valued(three_link, 0.2), path)
@@ -45,9 +49,18 @@ def test_the_result_of_another_problem_is_kept_under_another_name(changes, three
     assert values(tmp_path) == {"x.h5": 0.9, "x.former-1.h5": 0.2}
 
 
-def test_a_better_answer_to_the_same_question_is_kept_and_a_worse_or_equal_one_replaced(three_link, tmp_path):
+def test_a_better_answer_to_the_same_question_is_kept_and_a_worse_or_equal_one_replaced(
+    three_link, tmp_path
+):
     path = tmp_path / "x.h5"
-    for value, former in ((0.2, None), (0.3, None), (0.3 - 1e-9, None), (0.25, 1), (0.3, None), (0.1, 1)):
+    for value, former in (
+        (0.2, None),
+        (0.3, None),
+        (0.3 - 1e-9, None),
+        (0.25, 1),
+        (0.3, None),
+        (0.1, 1),
+    ):
         (saved,) = save_result(valued(three_link, value, intervals=30 + int(100 * value)), path)
         assert saved.former == (former and tmp_path / "x.former-1.h5")
         assert load(path).certificate.value == value
@@ -56,12 +69,15 @@ def test_a_better_answer_to_the_same_question_is_kept_and_a_worse_or_equal_one_r
 
 
 @pytest.mark.skipif(
-    sys.platform != "linux" or shutil.which("cc") is None, reason="a library that is preloaded stands for the system"
+    sys.platform != "linux" or shutil.which("cc") is None,
+    reason="a library that is preloaded stands for the system",
 )
 def test_on_a_file_system_without_locks_a_result_is_read_and_replaced(three_link, tmp_path):
     """As the system says it there: to HDF5, which locks what it opens, as to Python."""
     path, source, library = (tmp_path / name for name in ("x.h5", "flock.c", "flock.so"))
-    source.write_text("#include <errno.h>\nint flock(int file, int how) { errno = ENOLCK; return -1; }\n")
+    source.write_text(
+        "#include <errno.h>\nint flock(int file, int how) { errno = ENOLCK; return -1; }\n"
+    )
     subprocess.run(["cc", "-shared", "-fPIC", source, "-o", library], check=True)
     save_result(three_link, path)
     code = f"""if True:
@@ -71,7 +87,9 @@ def test_on_a_file_system_without_locks_a_result_is_read_and_replaced(three_link
         path = Path({str(path)!r})
         print(save_result(load(path), path)[0].former)"""
     environment = {**os.environ, "LD_PRELOAD": str(library)}
-    ran = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    ran = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True
+    )
     assert (ran.stdout, ran.stderr) == ("None\n", "")
 
 
@@ -101,7 +119,9 @@ def test_what_cannot_be_read_is_kept(three_link, tmp_path):
 
 
 @pytest.mark.parametrize("linked", [True, False])
-def test_where_the_new_result_cannot_be_written_all_stays_as_it_was(linked, three_link, tmp_path, monkeypatch):
+def test_where_the_new_result_cannot_be_written_all_stays_as_it_was(
+    linked, three_link, tmp_path, monkeypatch
+):
     path = tmp_path / "x.h5"
     save_result(replace(valued(three_link, 0.2), shrunk=valued(three_link, 0.1)), path)
     (tmp_path / "x.png").write_bytes(b"its figure")
@@ -156,7 +176,9 @@ def test_names_of_files_that_colloc_makes_beside_results_are_refused(name):
         Problem(name)
 
 
-@pytest.mark.parametrize("name", ["tiny.failed.2", "partial", "finite", "x.start", "x.former", "_", "3.5", "a--help"])
+@pytest.mark.parametrize(
+    "name", ["tiny.failed.2", "partial", "finite", "x.start", "x.former", "_", "3.5", "a--help"]
+)
 def test_other_names_are_taken(name):
     assert Problem(name).name == name
 
@@ -172,9 +194,13 @@ def test_an_output_must_not_be_called_like_such_a_file_either(tmp_path, capsys):
 def test_solve_says_where_the_result_of_another_problem_of_this_name_went(tmp_path, capsys):
     for delta in ("2e-2", "1e-2"):
         (tmp_path / "p.py").write_text(FILE.replace("DELTA", delta))
-        assert colloc(["solve", str(tmp_path / "p.py"), "--starts", "1", "--output", f"{tmp_path}/"]) in (0, 4)
+        assert colloc(
+            ["solve", str(tmp_path / "p.py"), "--starts", "1", "--output", f"{tmp_path}/"]
+        ) in (0, 4)
     said = capsys.readouterr().out
     former = next(tmp_path.glob("mine*.former-1.h5"))
-    assert re.search(rf"the former result, of another problem called mine, is kept as {former}\n$", said)
+    assert re.search(
+        rf"the former result, of another problem called mine, is kept as {former}\n$", said
+    )
     assert load(former).problem.delta == 2e-2
     assert former.with_suffix(".png").exists()

@@ -1,4 +1,5 @@
-"""On a robot: metres, kilograms and seconds, held against the forces of dense points that know of no other units."""
+"""On a robot: metres, kilograms and seconds, held against the forces of dense points that know of
+no other units."""
 
 import json
 
@@ -25,7 +26,8 @@ def robot(three_link):
 
 
 def in_metres(solution, seconds):
-    """Points ``(n_link, POINTS)`` of the body [m], complex, with its tail link at rest on the x axis, and the ends of links."""
+    """Points ``(n_link, POINTS)`` of the body [m], complex, with its tail link at rest on the x
+    axis, and the ends of links."""
     angles = solution.gait.angles(np.array([seconds / SLOW["period"]]))[:, 0]
     heading = np.concatenate([[0.0], np.cumsum(angles)])
     links = SIZE["length"] * np.array(solution.problem.body.lengths) * np.exp(1j * heading)
@@ -36,7 +38,9 @@ def in_metres(solution, seconds):
 def friction_of_points(solution, seconds, gravity=9.81):
     """Force [N] and velocity [m/s] of every point where all of them balance, and the points."""
     step = 1e-5 * SLOW["period"]
-    bending = (in_metres(solution, seconds + step)[0] - in_metres(solution, seconds - step)[0]) / (2 * step)
+    bending = (in_metres(solution, seconds + step)[0] - in_metres(solution, seconds - step)[0]) / (
+        2 * step
+    )
     points = in_metres(solution, seconds)[0]
     slow = solution.answer.delta * SIZE["length"] / SLOW["period"]
     weight = SIZE["mass"] * gravity * np.array(solution.problem.body.lengths)[:, None] / POINTS
@@ -46,12 +50,21 @@ def friction_of_points(solution, seconds, gravity=9.81):
         return -weight * velocity / np.sqrt(abs(velocity) ** 2 + slow**2), velocity
 
     def dissipated(z):
-        """Whose least value is the balance; its slopes are the forces and the moment that are left over."""
+        """Whose least value is the balance; its slopes are the forces and the moment that are left
+        over."""
         force, velocity = moved(z)
-        left_over = -np.array([force.sum().real, force.sum().imag, (points.conj() * force).imag.sum()])
+        left_over = -np.array(
+            [force.sum().real, force.sum().imag, (points.conj() * force).imag.sum()]
+        )
         return (weight * np.sqrt(abs(velocity) ** 2 + slow**2)).sum(), left_over
 
-    found = minimize(dissipated, np.zeros(3), jac=True, method="BFGS", options={"gtol": 1e-4 * SIZE["mass"] * gravity})
+    found = minimize(
+        dissipated,
+        np.zeros(3),
+        jac=True,
+        method="BFGS",
+        options={"gtol": 1e-4 * SIZE["mass"] * gravity},
+    )
     assert found.success
     return *moved(found.x), points
 
@@ -77,17 +90,23 @@ def test_work_over_a_period_is_the_mean_power_and_moves_the_body_its_way(three_l
     assert facts["mean_power_W"] == pytest.approx(facts["work_per_period_J"] / 5)
     way = np.linalg.norm(columns["centre"].values[:, -1] - columns["centre"].values[:, 0])
     assert facts["speed_m_per_s"] * 5 == pytest.approx(way, rel=1e-4)
-    assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (3 * 9.81 * way), rel=1e-4)
+    assert facts["cost_of_transport"] == pytest.approx(
+        facts["work_per_period_J"] / (3 * 9.81 * way), rel=1e-4
+    )
     speeds = np.diff(columns["joint_angles"].values) / np.diff(seconds)
     assert facts["peak_speed_rad_per_s"] == pytest.approx(np.abs(speeds).max(axis=1), rel=1e-4)
 
 
 def test_no_end_joint_carries_more_than_its_link_swung_broadside(three_link):
     """mu m g / 3 at a sixth of the length."""
-    assert max(three_link.robot(**SLOW).facts["peak_torque_N_m"]) <= 3 * 9.81 / 3 * 1.2 / 6 * (1 + 1e-4)
+    assert max(three_link.robot(**SLOW).facts["peak_torque_N_m"]) <= 3 * 9.81 / 3 * 1.2 / 6 * (
+        1 + 1e-4
+    )
 
 
-def test_every_side_of_a_polygon_is_sampled_eight_times_however_many_there_are(three_link, monkeypatch):
+def test_every_side_of_a_polygon_is_sampled_eight_times_however_many_there_are(
+    three_link, monkeypatch
+):
     corners = np.arange(1, 400) / 400
     monkeypatch.setattr(colloc.Fourier, "corner_phases", corners)
     seconds = three_link.robot(**SIZE).columns["t"].values
@@ -96,14 +115,23 @@ def test_every_side_of_a_polygon_is_sampled_eight_times_however_many_there_are(t
 
 
 def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
-    """Friction is proportional to the weight, torques to the length too; at one Froude number the pace is in speeds and powers
-    alone."""
+    """Friction is proportional to the weight, torques to the length too; at one Froude number the
+    pace is in speeds and powers alone."""
     other = three_link.robot(length=2.4, mass=6, period=10, gravity=9.81 / 2).facts
-    for name, factor in (("work_per_period_J", 2), ("mean_power_W", 1), ("speed_m_per_s", 1), ("froude_number", 1)):
+    for name, factor in (
+        ("work_per_period_J", 2),
+        ("mean_power_W", 1),
+        ("speed_m_per_s", 1),
+        ("froude_number", 1),
+    ):
         assert other[name] == pytest.approx(factor * robot.facts[name]), name
     assert other["peak_torque_N_m"] == pytest.approx(2 * np.array(robot.facts["peak_torque_N_m"]))
-    assert other["rms_speed_rad_per_s"] == pytest.approx(np.array(robot.facts["rms_speed_rad_per_s"]) / 2)
-    assert three_link.robot(**SLOW).facts["cost_of_transport"] == pytest.approx(1 / three_link.efficiency, rel=1e-4)
+    assert other["rms_speed_rad_per_s"] == pytest.approx(
+        np.array(robot.facts["rms_speed_rad_per_s"]) / 2
+    )
+    assert three_link.robot(**SLOW).facts["cost_of_transport"] == pytest.approx(
+        1 / three_link.efficiency, rel=1e-4
+    )
 
 
 def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(three_link, tmp_path):
@@ -111,39 +139,60 @@ def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(thr
     at_it = three_link.robot(1.2, 3, facts["shortest_period_s"]).facts
     assert max(np.array(at_it["peak_speed_rad_per_s"]) / [2, 3]) == pytest.approx(1, rel=1e-4)
     exported = three_link.export(tmp_path / "x.csv", max_speed=[2, 3], rate=1000)
-    assert facts["shortest_period_paced_by_speed_s"] == pytest.approx(exported["period_s"], abs=2e-3)
+    assert facts["shortest_period_paced_by_speed_s"] == pytest.approx(
+        exported["period_s"], abs=2e-3
+    )
     assert facts["shortest_period_paced_by_speed_s"] < facts["shortest_period_s"]
 
 
 def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
-    """As of the same gait in a problem for that pace, whose motion is collocated, and of one followed through time."""
+    """As of the same gait in a problem for that pace, whose motion is collocated, and of one
+    followed through time."""
     size = {"length": 1.0, "mass": 2.0, "period": 1.5}
     robot = three_link.robot(**size)
-    problem = three_link.problem.with_(froude=robot.froude, gait=colloc.Harmonic(1), delta=1e-3, name="paced")
+    problem = three_link.problem.with_(
+        froude=robot.froude, gait=colloc.Harmonic(1), delta=1e-3, name="paced"
+    )
     paced = colloc.evaluate(problem, three_link.gait).robot(**size).facts
-    names = ("speed_m_per_s", "work_per_period_J", "mean_power_W", "cost_of_transport", "peak_torque_N_m", "peak_power_W")
+    names = (
+        "speed_m_per_s",
+        "work_per_period_J",
+        "mean_power_W",
+        "cost_of_transport",
+        "peak_torque_N_m",
+        "peak_power_W",
+    )
     for name in names:
         assert robot.facts[name] == pytest.approx(paced[name], rel=0.01), name
-    played = colloc.inertial_motion(problem.body, problem.friction, three_link.gait, 1e-4, robot.froude, tolerance=1e-4)
+    played = colloc.inertial_motion(
+        problem.body, problem.friction, three_link.gait, 1e-4, robot.froude, tolerance=1e-4
+    )
     assert robot.facts["body_lengths_per_period"] == pytest.approx(played.distance, rel=1e-3)
     assert played.distance < 0.7 * three_link.distance
     assert f"slow motion would be {three_link.distance / 1.5:.4g} m/s" in str(robot)
-    np.testing.assert_allclose(robot.columns["centre"].values[:, -1], [played.distance, 0.0], atol=2e-3)
+    np.testing.assert_allclose(
+        robot.columns["centre"].values[:, -1], [played.distance, 0.0], atol=2e-3
+    )
 
 
 def test_motors_share_what_inertia_asks_of_coupled_joints():
     """Power is that of the joints: over a period the work against friction."""
     body = colloc.Coupled(colloc.Chain((0.25,) * 4), gears=((1, 0), (0.5, 0.5), (0, 1)))
     gait = colloc.ellipse(0.1, 0.7, 0.6)
-    robot = colloc.evaluate(colloc.Problem("belts", body=body, gait=colloc.Harmonic(1), delta=1e-2), gait).robot(1.0, 1.0, 1.0)
+    robot = colloc.evaluate(
+        colloc.Problem("belts", body=body, gait=colloc.Harmonic(1), delta=1e-2), gait
+    ).robot(1.0, 1.0, 1.0)
     powers = robot.columns["joint_powers"].values.sum(axis=0)
     assert abs(robot.facts["inertia_takes"]) > 0.05
-    assert abs(robot.facts["rotation_by_inertia_rad"]) > 0.005  # and every sentence of the sheet ends, that one's too
+    # and every sentence of the sheet ends, that one's too
+    assert abs(robot.facts["rotation_by_inertia_rad"]) > 0.005
     assert all(sentence.endswith(".") for sentence in robot.sentences())
     assert powers[:-1].mean() == pytest.approx(robot.facts["work_per_period_J"], rel=1e-3)
 
 
-def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_at_the_period_that_they_allow(three_link):
+def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_at_the_period_that_they_allow(
+    three_link,
+):
     """No limit to solve with is advised: such a gait may be slower."""
     sheet = str(three_link.robot(1.2, 3, 5, max_speed=[2, 3]))
     facts = three_link.robot(1.2, 3, 5, max_speed=[2, 3]).facts
@@ -160,25 +209,41 @@ def test_weak_motors_are_told_whether_a_longer_period_helps(three_link):
     assert "The torques suffice at this pace" in str(three_link.robot(**SIZE, max_torque=4))
     assert "take a longer period" in str(three_link.robot(**SIZE, max_torque=2.2))
     weak = three_link.robot(**SIZE, max_torque=[4, 1.5])
-    assert "Joint 2 needs 2.36 N m and has 1.5. Played slowly motors are too weak as well" in str(weak)
+    assert "Joint 2 needs 2.36 N m and has 1.5. Played slowly motors are too weak as well" in str(
+        weak
+    )
     assert f"torque_limit=({4 / weak.torque_unit:.4g}, {1.5 / weak.torque_unit:.4g})" in str(weak)
 
 
 def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
     friction = colloc.Viscous(normal=2, tangential=1)
     problem = colloc.Problem(
-        "paced", colloc.ellipse(0.0, 1.2, 0.8), gait=colloc.Harmonic(1), delta=1e-2, friction=friction, objective="towing"
+        "paced",
+        colloc.ellipse(0.0, 1.2, 0.8),
+        gait=colloc.Harmonic(1),
+        delta=1e-2,
+        friction=friction,
+        objective="towing",
     )
     swimmer = unsolved(problem)
-    assert "coefficients are taken to be those in units of this period" in str(swimmer.robot(**SIZE))
+    assert "coefficients are taken to be those in units of this period" in str(
+        swimmer.robot(**SIZE)
+    )
     for name in ("max_speed", "max_torque"):
-        with pytest.raises(colloc.ProblemError, match=f"{name} asks for another pace, and torques depend on it"):
+        with pytest.raises(
+            colloc.ProblemError, match=f"{name} asks for another pace, and torques depend on it"
+        ):
             swimmer.robot(**SIZE, **{name: 1.0})
 
 
-@pytest.mark.parametrize("wrong", [{"length": 0}, {"period": -5}, {"mass": float("nan")}, {"max_speed": [1, 2, 3]}])
+@pytest.mark.parametrize(
+    "wrong", [{"length": 0}, {"period": -5}, {"mass": float("nan")}, {"max_speed": [1, 2, 3]}]
+)
 def test_unusable_numbers_are_refused_by_name(three_link, wrong):
-    with pytest.raises(colloc.ProblemError, match=r"must be a positive finite number|3 joint speed limits for 2 joints"):
+    with pytest.raises(
+        colloc.ProblemError,
+        match=r"must be a positive finite number|3 joint speed limits for 2 joints",
+    ):
         three_link.robot(**(SIZE | wrong))
 
 
@@ -186,7 +251,9 @@ def test_a_smooth_body_has_no_torques_to_tell(unsolved):
     guess = colloc.Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
     soft = colloc.ModalBody(2, panels=4)
     gait = colloc.Harmonic(1, "antipodal")
-    solution = unsolved(colloc.Problem("soft", guess, soft, colloc.Friction(mu_t=3), gait, intervals=6))
+    solution = unsolved(
+        colloc.Problem("soft", guess, soft, colloc.Friction(mu_t=3), gait, intervals=6)
+    )
     with pytest.raises(colloc.ProblemError, match="smooth body: it has no joints"):
         _ = solution.robot(**SIZE).facts
 
@@ -197,13 +264,17 @@ def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, 
     assert main(["robot", str(file), *words, "--json", "--figure"]) == 0
     told = json.loads(capsys.readouterr().out)
     for name, value in robot.facts.items():
-        assert told[name] == (value if isinstance(value, str) else pytest.approx(value, rel=1e-9)), name
+        assert told[name] == (
+            value if isinstance(value, str) else pytest.approx(value, rel=1e-9)
+        ), name
     assert (tmp_path / "x.robot.png").stat().st_size > 10_000
     assert main(["export", str(file), *words, "--rate", "100"]) == 0
     columns = pandas.read_csv(tmp_path / "x.csv", comment="#").query("time_s >= 0")
     torques = np.stack([columns["joint_1_N_m"], columns["joint_2_N_m"]])
     np.testing.assert_allclose(torques, robot.torques(np.arange(500) / 500), rtol=1e-4, atol=2e-3)
-    np.testing.assert_allclose(columns["joint_2_W"], torques[1] * columns["joint_2_rad_per_s"], atol=1e-6)
+    np.testing.assert_allclose(
+        columns["joint_2_W"], torques[1] * columns["joint_2_rad_per_s"], atol=1e-6
+    )
     assert "cost of transport  3.942" in report_page(three_link, robot=robot)
     assert "cost of transport" not in report_page(three_link)
 
@@ -211,12 +282,18 @@ def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, 
 def test_the_mean_square_of_a_sine_is_half_of_its_amplitude_s(three_link, robot):
     gait = three_link.gait
     amplitudes = 2 * np.pi / SIZE["period"] * np.hypot(gait.cos[:, 0], gait.sin[:, 0])
-    np.testing.assert_allclose(robot.facts["rms_speed_rad_per_s"], amplitudes / np.sqrt(2), rtol=1e-9)
+    np.testing.assert_allclose(
+        robot.facts["rms_speed_rad_per_s"], amplitudes / np.sqrt(2), rtol=1e-9
+    )
 
 
 def test_the_motion_has_units(robot):
     dataset = robot.to_xarray()
-    assert [dataset[f"joint_{name}"].units for name in ("torques", "speeds", "powers")] == ["N m", "rad/s", "W"]
+    assert [dataset[f"joint_{name}"].units for name in ("torques", "speeds", "powers")] == [
+        "N m",
+        "rad/s",
+        "W",
+    ]
     assert dataset.sel(joint=2).joint_torques.shape == dataset.t.shape
     assert float(dataset.t[-1]) == SIZE["period"]
 
@@ -232,7 +309,9 @@ def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, r
 def test_what_inertia_takes_is_that_of_the_motion_followed_through_time(three_link, robot):
     at = three_link.problem.body, three_link.problem.law, three_link.gait, three_link.problem.delta
     played = colloc.inertial_motion(*at, robot.froude, tolerance=1e-4)
-    assert robot.facts["inertia_takes"] == pytest.approx(1 - played.efficiency / three_link.efficiency, abs=1e-3)
+    assert robot.facts["inertia_takes"] == pytest.approx(
+        1 - played.efficiency / three_link.efficiency, abs=1e-3
+    )
 
 
 def test_what_inertia_takes_is_told_although_no_pace_is_slow_enough(three_link, robot, monkeypatch):
@@ -248,13 +327,17 @@ def test_what_inertia_takes_is_told_although_no_pace_is_slow_enough(three_link, 
 @pytest.fixture(scope="module")
 def fast():
     stated = colloc.Problem(
-        "fast", gait=colloc.Harmonic(1, "antipodal"), guess=colloc.ellipse(A0=0, A1=2.3, B1=1.3), froude=0.05
+        "fast",
+        gait=colloc.Harmonic(1, "antipodal"),
+        guess=colloc.ellipse(A0=0, A1=2.3, B1=1.3),
+        froude=0.05,
     )
     return colloc.solve(stated.with_(delta=1e-2, mesh_tolerance=1e-6), starts=1)
 
 
 def test_torques_with_inertia_do_the_work_of_friction_and_swing_the_masses(fast):
-    """Over a period the first; at every instant of their power what is left goes into kinetic energy, here of dense points."""
+    """Over a period the first; at every instant of their power what is left goes into kinetic
+    energy, here of dense points."""
     step, t = 1e-4, np.linspace(0.0, 1.0, 401)[:-1]
     power = (joint_torques(fast, t) * fast.gait(t)[1]).sum(axis=0)
     assert power.mean() == pytest.approx(fast.work, rel=1e-4)

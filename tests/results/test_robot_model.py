@@ -1,4 +1,5 @@
-"""Models of robots for simulators: what they say of links, joints and masses, and that MuJoCo moves as colloc does."""
+"""Models of robots for simulators: what they say of links, joints and masses, and that MuJoCo moves
+as colloc does."""
 
 from xml.etree import ElementTree
 
@@ -17,17 +18,25 @@ MASSES, INERTIAS = (0.3, 0.2, 0.5), (0.002, 0.006, 0.001)
 
 @pytest.fixture(scope="module")
 def uneven():
-    """Links of their own lengths, weights, masses and moments of inertia, ranges to one side, and feet."""
+    """Links of their own lengths, weights, masses and moments of inertia, ranges to one side, and
+    feet."""
     feet = (
         Foot(0, 0.2, weight=0.2),
         Foot(1, weight=0.5),
         Foot(2, 0.7, offset=0.02, weight=0.15),
         Foot(2, 0.7, offset=-0.02, weight=0.15),
     )
-    body = Chain((0.2, 0.5, 0.3), weights=(0.2, 0.5, 0.3), feet=feet, masses=MASSES, inertias=INERTIAS)
+    body = Chain(
+        (0.2, 0.5, 0.3), weights=(0.2, 0.5, 0.3), feet=feet, masses=MASSES, inertias=INERTIAS
+    )
     limits = ((-1.0, 2.0), 1.5)
     problem = Problem(
-        "uneven", body=body, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), joint_limit=limits, delta=1e-2
+        "uneven",
+        body=body,
+        friction=Friction(mu_t=2, mu_f=1, mu_b=1),
+        gait=Harmonic(1),
+        joint_limit=limits,
+        delta=1e-2,
     )
     return colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
 
@@ -48,32 +57,56 @@ def test_an_mjcf_has_the_links_masses_ranges_and_feet_of_the_robot(uneven):
     ranges = [numbers(joint.get("range")) for joint in root.iter("joint") if joint.get("range")]
     assert ranges == [[-1.0, 2.0], [-1.5, 1.5]]
     feet = [numbers(body.get("pos")) for body in bodies if body.get("name").startswith("foot")]
-    np.testing.assert_allclose(feet, np.array([[0.048, 0, 0], [0.3, 0, 0], [0.252, -0.024, 0], [0.252, 0.024, 0]]), atol=1e-12)
+    np.testing.assert_allclose(
+        feet,
+        np.array([[0.048, 0, 0], [0.3, 0, 0], [0.252, -0.024, 0], [0.252, 0.024, 0]]),
+        atol=1e-12,
+    )
     springs = [joint for joint in root.iter("joint") if joint.get("name").startswith("press")]
     borne = [-float(spring.get("stiffness")) * float(spring.get("springref")) for spring in springs]
     assert borne == pytest.approx(np.multiply(3.0 * 9.81, (0.2, 0.5, 0.15, 0.15)))
-    start, joints = numbers(root.find("keyframe/key").get("qpos")), [joint.get("name") for joint in root.iter("joint")]
+    start, joints = (
+        numbers(root.find("keyframe/key").get("qpos")),
+        [joint.get("name") for joint in root.iter("joint")],
+    )
     angles = [angle for name, angle in zip(joints, start, strict=True) if name.startswith("joint")]
     assert angles == pytest.approx(uneven.gait.angles(np.zeros(1))[:, 0])
 
 
 def test_every_contact_has_the_coefficients_of_its_own_foot_along_and_across(uneven, tmp_path):
-    feet = (Foot(0), Foot(1, friction=Friction(mu_t=3, mu_f=4, mu_b=1)), Wheel(2, rolling=0.04, sideways=1.0))
-    problem = uneven.problem.with_(body=Chain(feet=feet), friction=Friction(9, 9, 9), joint_limit=3.0)
+    feet = (
+        Foot(0),
+        Foot(1, friction=Friction(mu_t=3, mu_f=4, mu_b=1)),
+        Wheel(2, rolling=0.04, sideways=1.0),
+    )
+    problem = uneven.problem.with_(
+        body=Chain(feet=feet), friction=Friction(9, 9, 9), joint_limit=3.0
+    )
     solution = colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
     root = ElementTree.fromstring(mjcf(solution.robot(**SIZE)))
     assert [pair.get("geom2") for pair in root.iter("pair")] == ["foot_1", "foot_2", "foot_3"]
-    assert [numbers(pair.get("friction"))[:2] for pair in root.iter("pair")] == [[9, 9], [2, 3], [0.04, 1]]
+    assert [numbers(pair.get("friction"))[:2] for pair in root.iter("pair")] == [
+        [9, 9],
+        [2, 3],
+        [0.04, 1],
+    ]
     said = solution.export(tmp_path / "x.xml", **SIZE)["note"]
-    assert "is elliptic, and alike forwards and backwards: friction (3, 4, 1) is elliptic friction (3, 2, 2), fric" in said
+    assert (
+        "is elliptic, and alike forwards and backwards: friction (3, 4, 1) is elliptic friction "
+        "(3, 2, 2), fric" in said
+    )
     assert "nothing of friction" in solution.export(tmp_path / "x.urdf", **SIZE)["note"]
     stated = solution.export(tmp_path / "x.csv", period=4.0)["friction"]
     assert [law["mu_t"] for law in stated["laws"]] == [9, 3, 1]
 
 
 def test_a_law_that_no_contact_has_leaves_the_floor_out_and_says_so(uneven, tmp_path):
-    problem = Problem("drag", friction=colloc.Viscous(normal=2, tangential=1), gait=Harmonic(1), delta=1e-2)
-    stated = colloc.evaluate(problem, colloc.ellipse(0.0, 0.8, 0.6)).export(tmp_path / "x.xml", **SIZE)
+    problem = Problem(
+        "drag", friction=colloc.Viscous(normal=2, tangential=1), gait=Harmonic(1), delta=1e-2
+    )
+    stated = colloc.evaluate(problem, colloc.ellipse(0.0, 0.8, 0.6)).export(
+        tmp_path / "x.xml", **SIZE
+    )
     assert "dry friction alone, not drag" in stated["note"]
     root = ElementTree.parse(tmp_path / "x.xml").getroot()
     assert not list(root.iter("pair"))
@@ -81,8 +114,8 @@ def test_a_law_that_no_contact_has_leaves_the_floor_out_and_says_so(uneven, tmp_
 
 
 def played(path, gait, period, periods=2):
-    """Places of the centre of mass and of the tail [m] through the last of some periods of a file in MuJoCo, as it is written:
-    servos get the gait's angles."""
+    """Places of the centre of mass and of the tail [m] through the last of some periods of a file
+    in MuJoCo, as it is written: servos get the gait's angles."""
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_path(str(path))
     data, steps = mujoco.MjData(model), round(period / model.opt.timestep)
@@ -97,24 +130,40 @@ def played(path, gait, period, periods=2):
 
 
 UNEVEN = (0.2, 0.5, 0.3)
-TURNED = tuple(Wheel(k, 0.4, angle=s * (0.3, 1.5, 0.2)[k], offset=0.03 * s) for k in range(3) for s in (1, -1))
+TURNED = tuple(
+    Wheel(k, 0.4, angle=s * (0.3, 1.5, 0.2)[k], offset=0.03 * s) for k in range(3) for s in (1, -1)
+)
 STANDING = {
     "lying": (Chain(UNEVEN, masses=MASSES), Friction(), (0.2, 1.0, 0.9)),
     "feet": (Chain(feet=1), Friction(), (0.0, 1.6, 1.1)),
-    "wheels": (Chain(UNEVEN, feet=(Wheel(0), Wheel(1), Wheel(2)), masses=MASSES), Friction(), (0.0, 0.8, 0.6)),
+    "wheels": (
+        Chain(UNEVEN, feet=(Wheel(0), Wheel(1), Wheel(2)), masses=MASSES),
+        Friction(),
+        (0.0, 0.8, 0.6),
+    ),
     "turned_wheels": (Chain(feet=TURNED), Friction(), (0.1, 0.8, 0.6)),
-    "pads": (Chain(feet=tuple(Pad(link, 0.25, 0.75) for link in range(3))), Friction(mu_t=2, mu_f=1, mu_b=1), (0.0, 1.6, 1.1)),
+    "pads": (
+        Chain(feet=tuple(Pad(link, 0.25, 0.75) for link in range(3))),
+        Friction(mu_t=2, mu_f=1, mu_b=1),
+        (0.0, 1.6, 1.1),
+    ),
 }
 
 
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "pads")) for kind in STANDING])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "pads")) for kind in STANDING]
+)
 def test_a_file_moves_in_mujoco_as_it_is_written_as_colloc_says(kind, unsolved, tmp_path):
     body, friction, gait = STANDING[kind]
-    solution = unsolved(Problem(kind, colloc.ellipse(*gait), body, friction, Harmonic(1), delta=1e-3))
+    solution = unsolved(
+        Problem(kind, colloc.ellipse(*gait), body, friction, Harmonic(1), delta=1e-3)
+    )
     size = {"length": 1.04, "mass": 2.0, "period": 1.5}
     stated = solution.export(tmp_path / "x.xml", **size)
     centre, tail = played(tmp_path / "x.xml", solution.gait, size["period"])
-    assert np.hypot(*(centre[:, -1] - centre[:, 0])) / 1.04 == pytest.approx(stated["moves_body_lengths_per_period"], rel=0.04)
+    assert np.hypot(*(centre[:, -1] - centre[:, 0])) / 1.04 == pytest.approx(
+        stated["moves_body_lengths_per_period"], rel=0.04
+    )
     assert direction_of_travel(centre, tail) == solution.robot(**size).facts["travels"]
 
 
@@ -129,13 +178,24 @@ def test_a_urdf_is_a_tree_of_links_with_efforts_and_speeds_that_suffice(uneven):
     for k, limit in enumerate(joint.find("limit") for joint in joints):
         assert float(limit.get("effort")) >= robot.facts["peak_torque_N_m"][k]
         assert float(limit.get("velocity")) >= robot.facts["peak_speed_rad_per_s"][k]
-    assert [float(joint.find("limit").get(end)) for joint in joints for end in ("lower", "upper")] == [-1, 2, -1.5, 1.5]
-    np.testing.assert_allclose([numbers(joint.find("origin").get("xyz")) for joint in joints], [[0.24, 0, 0], [0.6, 0, 0]])
+    assert [
+        float(joint.find("limit").get(end)) for joint in joints for end in ("lower", "upper")
+    ] == [-1, 2, -1.5, 1.5]
+    np.testing.assert_allclose(
+        [numbers(joint.find("origin").get("xyz")) for joint in joints], [[0.24, 0, 0], [0.6, 0, 0]]
+    )
     assert len(root.findall("link/collision/geometry/sphere")) == 4
     feet = [numbers(shape.find("origin").get("xyz")) for shape in root.findall("link/collision")]
-    places = [[0.2 * 0.24, 0, 0], [0.5 * 0.6, 0, 0], [0.7 * 0.36, 0.024, 0], [0.7 * 0.36, -0.024, 0]]
+    places = [
+        [0.2 * 0.24, 0, 0],
+        [0.5 * 0.6, 0, 0],
+        [0.7 * 0.36, 0.024, 0],
+        [0.7 * 0.36, -0.024, 0],
+    ]
     np.testing.assert_allclose(sorted(feet), sorted(places), atol=1e-9)
-    np.testing.assert_allclose([float(mass.get("value")) for mass in root.iter("mass")], 3 * np.array(MASSES))
+    np.testing.assert_allclose(
+        [float(mass.get("value")) for mass in root.iter("mass")], 3 * np.array(MASSES)
+    )
     upright = [float(each.get("izz")) for each in root.iter("inertia")]
     np.testing.assert_allclose(upright, 3 * 1.2**2 * np.array(INERTIAS), rtol=1e-6)
     inertia = [[float(i.get(name)) for name in ("ixx", "iyy", "izz")] for i in root.iter("inertia")]
@@ -161,8 +221,12 @@ def test_the_command_writes_both_and_says_what_is_missing(three_link, tmp_path, 
 
 
 def test_bodies_without_a_motor_in_every_joint_are_refused_in_a_sentence():
-    problem = Problem("stuck", body=Coupled(Chain((0.25,) * 4), stuck={1: 0.1}), gait=Harmonic(1), delta=1e-2)
-    with pytest.raises(ProblemError, match="of a Chain with a motor in every joint, not of a Coupled"):
+    problem = Problem(
+        "stuck", body=Coupled(Chain((0.25,) * 4), stuck={1: 0.1}), gait=Harmonic(1), delta=1e-2
+    )
+    with pytest.raises(
+        ProblemError, match="of a Chain with a motor in every joint, not of a Coupled"
+    ):
         mjcf(colloc.evaluate(problem, colloc.ellipse(0, 1, 1)).robot(**SIZE))
 
 

@@ -1,4 +1,5 @@
-"""Numbers of a robot whose joints also brake, at the pace of its gait alone, on a slope; and what an arc is."""
+"""Numbers of a robot whose joints also brake, at the pace of its gait alone, on a slope; and what
+an arc is."""
 
 import math
 from xml.etree import ElementTree
@@ -7,7 +8,17 @@ import numpy as np
 import pandas
 import pytest
 
-from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate, inertial_motion, slope_motion, solve
+from colloc import (
+    Fourier,
+    Friction,
+    Harmonic,
+    Problem,
+    ProblemError,
+    evaluate,
+    inertial_motion,
+    slope_motion,
+    solve,
+)
 from colloc.results.arc import Arc, arc
 
 LENGTH, MASS, FROUDE = 1.2, 3.0, 1.0
@@ -28,17 +39,27 @@ def test_peak_power_of_a_joint_is_the_most_it_drives_with_not_the_most_it_brakes
     assert -powers[0].min() > 1.2 * powers[0].max()  # what this gait is here for
     assert robot.facts["peak_joint_power_W"] == pytest.approx(powers.max(axis=1))
     assert robot.facts["peak_power_W"] == pytest.approx(powers.sum(axis=0).max())
-    torques, speeds = (robot.columns[f"joint_{name}"].values[:, :-1] for name in ("torques", "speeds"))
-    assert robot.facts["rms_torque_N_m"] == pytest.approx(np.linalg.norm(torques, axis=1) / torques.shape[1] ** 0.5)
-    assert robot.facts["rms_speed_rad_per_s"] == pytest.approx(np.linalg.norm(speeds, axis=1) / speeds.shape[1] ** 0.5)
+    torques, speeds = (
+        robot.columns[f"joint_{name}"].values[:, :-1] for name in ("torques", "speeds")
+    )
+    assert robot.facts["rms_torque_N_m"] == pytest.approx(
+        np.linalg.norm(torques, axis=1) / torques.shape[1] ** 0.5
+    )
+    assert robot.facts["rms_speed_rad_per_s"] == pytest.approx(
+        np.linalg.norm(speeds, axis=1) / speeds.shape[1] ** 0.5
+    )
 
 
 def test_powers_of_an_exported_motion_are_negative_where_a_joint_brakes(braking, tmp_path):
     braking.export(tmp_path / "brakes.csv", period=PERIOD, rate=400.0, length=LENGTH, mass=MASS)
     table = pandas.read_csv(tmp_path / "brakes.csv", comment="#")
     for joint in (1, 2):
-        torque, speed, power = (table[f"joint_{joint}_{unit}"].to_numpy() for unit in ("N_m", "rad_per_s", "W"))
-        np.testing.assert_allclose(power, torque * speed, rtol=1e-6, atol=1e-6 * np.abs(power).max())
+        torque, speed, power = (
+            table[f"joint_{joint}_{unit}"].to_numpy() for unit in ("N_m", "rad_per_s", "W")
+        )
+        np.testing.assert_allclose(
+            power, torque * speed, rtol=1e-6, atol=1e-6 * np.abs(power).max()
+        )
         assert power.min() < 0 < power.max()
 
 
@@ -49,13 +70,17 @@ def test_motors_that_take_no_power_back_work_by_what_they_drive_with_each_for_it
     assert robot.facts["motor_work_per_period_J"] == pytest.approx(drive, rel=1e-4)
     assert robot.facts["motor_work_per_period_J"] > 1.5 * robot.facts["work_per_period_J"]
     # work against friction is what is left of driving and braking
-    assert np.trapezoid(powers.sum(axis=0), seconds) == pytest.approx(robot.facts["work_per_period_J"], rel=2e-3)
+    assert np.trapezoid(powers.sum(axis=0), seconds) == pytest.approx(
+        robot.facts["work_per_period_J"], rel=2e-3
+    )
 
 
 def test_the_sheet_of_a_gait_with_inertia_is_of_its_own_pace_alone(braking):
     for factor in (0.95, 1.05):
         with pytest.raises(
-            ProblemError, match=f"the best gait for the Froude number 1: a robot of 1.2 m has to take {PERIOD:.4g} s"
+            ProblemError,
+            match=f"the best gait for the Froude number 1: a robot of 1.2 m has to take "
+            f"{PERIOD:.4g} s",
         ):
             braking.robot(LENGTH, MASS, factor * PERIOD)
     assert braking.robot(LENGTH, MASS, 1.004 * PERIOD).froude == pytest.approx(FROUDE, rel=1e-2)
@@ -64,7 +89,14 @@ def test_the_sheet_of_a_gait_with_inertia_is_of_its_own_pace_alone(braking):
 @pytest.fixture(scope="module")
 def towards_left(once):
     """A gait asked to go half a radian to the left of straight uphill."""
-    problem = Problem("aside", friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), grade=0.1, towards=0.5, delta=1e-2)
+    problem = Problem(
+        "aside",
+        friction=Friction(mu_t=2, mu_f=1, mu_b=1),
+        gait=Harmonic(1),
+        grade=0.1,
+        towards=0.5,
+        delta=1e-2,
+    )
     return once("aside", lambda: solve(problem.with_(intervals=24, mesh_tolerance=1e-3), 1))
 
 
@@ -75,16 +107,21 @@ def test_a_gait_goes_the_way_it_is_asked_to_on_a_slope_and_its_distance_is_that_
     assert np.arctan2(aside, ahead) == pytest.approx(0.5, abs=1e-6)
     assert towards_left.distance == pytest.approx(np.hypot(ahead, aside), rel=1e-3)
     problem, gait = towards_left.problem, towards_left.gait
-    followed = slope_motion(problem.body, problem.friction, gait, problem.delta, problem.grade, theta=gait.theta)
+    followed = slope_motion(
+        problem.body, problem.friction, gait, problem.delta, problem.grade, theta=gait.theta
+    )
     assert followed.climb[0] == pytest.approx(towards_left.distance * np.cos(0.5), rel=1e-3)
     assert followed.aside[0] == pytest.approx(towards_left.distance * np.sin(0.5), rel=1e-3)
 
 
 def test_gravity_of_an_exported_model_leans_downhill_as_seen_from_its_tail(towards_left, tmp_path):
-    """Its size is that on earth, its part across the ground the grade; the tail link lies along +x."""
+    """Its size is that on earth, its part across the ground the grade; the tail link lies along
+    +x."""
     model = tmp_path / "model.xml"
     towards_left.export(model, length=LENGTH, mass=MASS, period=20.0)
-    gravity = np.array([float(part) for part in ElementTree.parse(model).find("option").get("gravity").split()])
+    gravity = np.array(
+        [float(part) for part in ElementTree.parse(model).find("option").get("gravity").split()]
+    )
     assert np.linalg.norm(gravity) == pytest.approx(9.81)
     across = complex(*gravity[:2])
     assert abs(across) / -gravity[2] == pytest.approx(towards_left.problem.grade)
@@ -103,16 +140,24 @@ def test_an_arc_of_any_angle_has_the_radius_of_its_circle_and_goes_the_shorter_w
     assert Arc(0.0, 0.3).length == 0.3
 
 
-def test_on_a_slope_less_than_the_weight_presses_and_transport_is_paid_by_the_whole_of_it(towards_left):
+def test_on_a_slope_less_than_the_weight_presses_and_transport_is_paid_by_the_whole_of_it(
+    towards_left,
+):
     """Played slowly."""
     robot, presses = towards_left.robot(LENGTH, MASS, 2000.0), 9.81 * math.cos(math.atan(0.1))
     facts, way = robot.facts, LENGTH * towards_left.distance
-    assert facts["work_per_period_J"] == pytest.approx(MASS * presses * LENGTH * towards_left.work, rel=1e-4)
-    assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (MASS * 9.81 * way), rel=1e-4)
+    assert facts["work_per_period_J"] == pytest.approx(
+        MASS * presses * LENGTH * towards_left.work, rel=1e-4
+    )
+    assert facts["cost_of_transport"] == pytest.approx(
+        facts["work_per_period_J"] / (MASS * 9.81 * way), rel=1e-4
+    )
     assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 2000.0**2))
 
 
-def test_an_export_with_inertia_on_a_slope_is_of_the_robot_that_is_pressed_down_as_much(unsolved, tmp_path):
+def test_an_export_with_inertia_on_a_slope_is_of_the_robot_that_is_pressed_down_as_much(
+    unsolved, tmp_path
+):
     """By the cosine of the inclination: a shorter robot than on the level has that pace."""
     leaning = Fourier([0.0, 0.0], [[1.2], [0.0]], [[0.0], [0.8]], theta=0.3)
     stated = Problem("steep", leaning, gait=Harmonic(1), delta=1e-2, froude=0.05, grade=0.75)
@@ -124,8 +169,14 @@ def test_an_export_with_inertia_on_a_slope_is_of_the_robot_that_is_pressed_down_
 
 def test_what_inertia_turns_is_what_it_adds_to_the_turn_of_slow_motion():
     skew = Fourier([0.3, -0.5], [[0.4], [0.9]], [[1.1], [-0.2]])
-    solution = evaluate(Problem("skew", gait=Harmonic(1), rotation=None, delta=1e-1, mesh_tolerance=1e-2), skew)
+    solution = evaluate(
+        Problem("skew", gait=Harmonic(1), rotation=None, delta=1e-1, mesh_tolerance=1e-2), skew
+    )
     robot, problem = solution.robot(LENGTH, MASS, 1.5), solution.problem
-    played = inertial_motion(problem.body, problem.friction, skew, 1e-1, robot.froude, tolerance=1e-4)
+    played = inertial_motion(
+        problem.body, problem.friction, skew, 1e-1, robot.froude, tolerance=1e-4
+    )
     assert abs(solution.rotation) > 0.01
-    assert robot.facts["rotation_by_inertia_rad"] == pytest.approx(played.rotation - solution.rotation, abs=1e-4)
+    assert robot.facts["rotation_by_inertia_rad"] == pytest.approx(
+        played.rotation - solution.rotation, abs=1e-4
+    )

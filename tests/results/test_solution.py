@@ -1,4 +1,5 @@
-"""The solved problem: its interpolant, its certificate, its budgets, and the schemes against each other."""
+"""The solved problem: its interpolant, its certificate, its budgets, and the schemes against each
+other."""
 
 import re
 from dataclasses import replace
@@ -31,7 +32,9 @@ SKEW = Fourier([0.3, -0.5], [[0.4], [0.9]], [[1.1], [-0.2]])
 
 def test_a_turn_is_said_to_the_side_to_which_the_tail_link_turns():
     for gait in (SKEW, SKEW.mirrored):
-        found = evaluate(Problem("t", gait=Harmonic(1), rotation=None, delta=1e-1, mesh_tolerance=1e-2), gait)
+        found = evaluate(
+            Problem("t", gait=Harmonic(1), rotation=None, delta=1e-1, mesh_tolerance=1e-2), gait
+        )
         before, after = found.sample(np.array([0.0, 1.0])).theta
         side = "counter-clockwise" if after > before else "clockwise"
         assert f"° {side}," in found.turning
@@ -41,10 +44,17 @@ def test_a_deliberately_poor_guess_reaches_the_paper_s_optimum(three_link):
     assert three_link.status == "solved"
     gait = three_link.gait
     assert abs(three_link.certificate.efficiency - 0.2600) < 1e-4
-    np.testing.assert_allclose([gait.mean[0], gait.cos[0, 0], gait.sin[0, 0]], [0.0, 2.859, 1.302], atol=2e-3)
+    np.testing.assert_allclose(
+        [gait.mean[0], gait.cos[0, 0], gait.sin[0, 0]], [0.0, 2.859, 1.302], atol=2e-3
+    )
     guess = three_link.problem.guess
     start = replay(
-        three_link.problem.body, Friction(), lambda t: (guess.angles(t), guess.rates(t)), 1e-4, instants=400, most_instants=800
+        three_link.problem.body,
+        Friction(),
+        lambda t: (guess.angles(t), guess.rates(t)),
+        1e-4,
+        instants=400,
+        most_instants=800,
     )
     assert start.efficiency < 0.5 * three_link.efficiency
 
@@ -55,7 +65,8 @@ def test_iterations_stay_within_budget(three_link):
 
 
 def test_a_gait_that_is_named_from_the_other_end_travels_the_other_end_first():
-    """Each joint takes the part of its mirror image, and the angles their opposite: the same motion of equal links."""
+    """Each joint takes the part of its mirror image, and the angles their opposite: the same motion
+    of equal links."""
     gait = Fourier([0.0, 0.2], [[1.4], [0.9]], [[0.2], [1.1]])
     turned = Fourier(-gait.mean[::-1], -gait.cos[::-1], -gait.sin[::-1])
     back = Fourier(gait.mean, gait.cos, -gait.sin)
@@ -65,14 +76,21 @@ def test_a_gait_that_is_named_from_the_other_end_travels_the_other_end_first():
     assert reversed_ == other
 
 
-@pytest.mark.parametrize(("mu_f", "mu_b", "first"), [(1.0, 5.0, "head first"), (5.0, 1.0, "tail first")])
+@pytest.mark.parametrize(
+    ("mu_f", "mu_b", "first"), [(1.0, 5.0, "head first"), (5.0, 1.0, "tail first")]
+)
 def test_a_body_travels_to_the_side_to_which_it_slides_easily(mu_f, mu_b, first):
     problem = Problem(
-        "eased", body=Chain((0.5, 0.5)), friction=Friction(mu_t=1.0, mu_f=mu_f, mu_b=mu_b), gait=Harmonic(1), delta=1e-2
+        "eased",
+        body=Chain((0.5, 0.5)),
+        friction=Friction(mu_t=1.0, mu_f=mu_f, mu_b=mu_b),
+        gait=Harmonic(1),
+        delta=1e-2,
     )
     solution = evaluate(problem, Fourier([0.0], [[1.0]], [[0.0]]))
     assert solution.travels == first
-    assert any(first in line for line in summary_lines(solution, None)) == (first != "head first")  # which is told if it is not
+    # which is told if it is not
+    assert any(first in line for line in summary_lines(solution, None)) == (first != "head first")
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
@@ -88,7 +106,14 @@ def test_sampled_motion_is_consistent(symmetry, solved):
     error = np.gradient(motion.theta, dt)[middle] - motion.z[2][middle]
     assert np.median(np.abs(error)) < 1e-3
     body = solution.problem.body
-    now = instant(body, solution.problem.friction, motion.angles, motion.rates, motion.z, solution.answer.delta)
+    now = instant(
+        body,
+        solution.problem.friction,
+        motion.angles,
+        motion.rates,
+        motion.z,
+        solution.answer.delta,
+    )
     cx, cy = body.centre_velocity(now.posture, now.velocity)
     c, s = np.cos(motion.theta), np.sin(motion.theta)
     speed = np.stack([c * cx[0] - s * cy[0], s * cx[0] + c * cy[0]])
@@ -98,11 +123,15 @@ def test_sampled_motion_is_consistent(symmetry, solved):
     velocity = np.stack([c * along - s * across, s * along + c * across])
     assert np.median(np.abs(np.gradient(motion.tail, dt, axis=1) - velocity)) < 2e-3
     # tail velocities are those of the balance
-    exact = solve_balance(body, solution.problem.friction, motion.angles, motion.rates, solution.answer.delta).z
+    exact = solve_balance(
+        body, solution.problem.friction, motion.angles, motion.rates, solution.answer.delta
+    ).z
     assert np.median(np.abs(motion.z - exact)) < 2e-3
     # a period advances by d along x and does not turn, as exactly as its mesh is asked to be
     off = solution.problem.mesh_tolerance * solution.distance
-    np.testing.assert_allclose(motion.centre[:, -1] - motion.centre[:, 0], [solution.distance, 0.0], atol=off)
+    np.testing.assert_allclose(
+        motion.centre[:, -1] - motion.centre[:, 0], [solution.distance, 0.0], atol=off
+    )
     assert abs(motion.theta[-1] - motion.theta[0]) < 1e-9
     later = solution.sample(t[:5] + 3)
     expected = motion.centre[:, :5] + np.array([[3 * solution.distance], [0.0]])
@@ -110,7 +139,9 @@ def test_sampled_motion_is_consistent(symmetry, solved):
 
 
 def test_headings_a_turn_further_are_those_of_the_same_motion(unsolved):
-    problem = Problem("turned", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "antipodal"), delta=0.3, delta_start=0.3)
+    problem = Problem(
+        "turned", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "antipodal"), delta=0.3, delta_start=0.3
+    )
     solution, t = unsolved(problem), np.linspace(0, 2, 41)
     x = solution.answer.x.copy()
     x[solution.layout.theta] += 2 * np.pi
@@ -124,12 +155,23 @@ def test_headings_a_turn_further_are_those_of_the_same_motion(unsolved):
 def turning(unsolved):
     """A gait that turns the body, in balance; not an optimum."""
     guess = Fourier(mean=[0.5, 0.9], cos=[[1.0], [0.2]], sin=[[0.0], [1.1]])
-    return unsolved(Problem("circle", guess, gait=Harmonic(1), rotation=None, delta=0.3, delta_start=0.3, intervals=80))
+    return unsolved(
+        Problem(
+            "circle",
+            guess,
+            gait=Harmonic(1),
+            rotation=None,
+            delta=0.3,
+            delta_start=0.3,
+            intervals=80,
+        )
+    )
 
 
 def test_a_gait_that_turns_moves_on_from_where_a_period_left_it(turning):
     assert abs(turning.rotation) > 0.1
-    # what the tail velocity says adds up to the pose across the ends of periods, also of those before the first
+    # what the tail velocity says adds up to the pose across the ends of periods, also of those
+    # before the first
     t = np.linspace(-1.3, 2.4, 3701)
     motion, dt = turning.sample(t), t[1] - t[0]
     along, across, omega = motion.z
@@ -150,14 +192,25 @@ def test_the_centre_of_mass_goes_round_a_circle_of_the_radius_that_is_stated(tur
     radii = np.hypot(*(ends - middle[:, None]))
     np.testing.assert_allclose(radii, radii[0], rtol=1e-7)
     np.testing.assert_allclose(np.hypot(*np.diff(ends)), turning.distance, rtol=1e-6)
-    # from any phase the arc is the same, and of all phases together the centre of mass is where the arc says
+    # from any phase the arc is the same, and of all phases together the centre of mass is where the
+    # arc says
     t = np.linspace(0.0, 1.0, 2001)
     for begin in (0.0, 0.1, 0.45, 0.83):
         found = arc(turning.rotation, turning.sample(begin + t).centre)
         np.testing.assert_allclose(found, turning.arc, rtol=1e-6)
     assert turning.turning_radius == turning.arc.radius
-    assert turning.arc.chord == pytest.approx(2 * turning.arc.radius * np.sin(abs(turning.rotation) / 2), rel=1e-12)
-    assert np.ptp([np.hypot(*np.diff(turning.sample([begin, begin + 1.0]).centre)) for begin in (0.0, 0.45)]) > 1e-3
+    assert turning.arc.chord == pytest.approx(
+        2 * turning.arc.radius * np.sin(abs(turning.rotation) / 2), rel=1e-12
+    )
+    assert (
+        np.ptp(
+            [
+                np.hypot(*np.diff(turning.sample([begin, begin + 1.0]).centre))
+                for begin in (0.0, 0.45)
+            ]
+        )
+        > 1e-3
+    )
     assert f"turns {abs(np.degrees(turning.rotation)):.4g}°" in turning.turning
 
 
@@ -176,7 +229,12 @@ def _centre_of_circle(a, b, c):
 def _smooth(symmetry):
     """A quick solve at large delta, where everything is smooth."""
     problem = Problem(
-        "smooth", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, symmetry), delta=0.3, delta_start=0.3, mesh_tolerance=1e-4
+        "smooth",
+        ellipse(0.0, 1.4, 0.8),
+        gait=Harmonic(1, symmetry),
+        delta=0.3,
+        delta_start=0.3,
+        mesh_tolerance=1e-4,
     )
     return solve(problem, 1)
 
@@ -200,7 +258,10 @@ def test_a_solution_that_lies_fails_its_certificate(three_link):
     bent = Fourier(other.mean + np.array([0.3, 0.0]), other.cos, other.sin)
     names = {c.name for c in certify(with_answer(gait=bent).answer).failures}
     assert {"joint limits", "replay gap"} <= names
-    for changes in ({"optimal": False}, {"delta": 1.5 * three_link.answer.delta}):  # the answer, and the delta asked for
+    for changes in (
+        {"optimal": False},
+        {"delta": 1.5 * three_link.answer.delta},
+    ):  # the answer, and the delta asked for
         failed = with_answer(**changes)
         failed.certificate = three_link.certificate
         assert failed.status == "not converged"
@@ -221,7 +282,10 @@ def test_refined_meshes_reach_one_part_in_a_million(scheme):
     solution = solve(problem, 1)
     certificate = certify(solution.answer, tolerance=1e-8, instants=6400)
     assert solution.status == "solved"
-    assert abs(solution.efficiency / certificate.efficiency - 1) < 1e-6 + certificate.efficiency_error / certificate.efficiency
+    assert (
+        abs(solution.efficiency / certificate.efficiency - 1)
+        < 1e-6 + certificate.efficiency_error / certificate.efficiency
+    )
     assert abs(certificate.efficiency - 0.2600297) < 1e-6
 
 
@@ -233,19 +297,26 @@ def test_lifted_and_map_formulations_find_the_same_optimum(three_link):
 
 
 def test_a_solution_is_shown_in_a_line(three_link):
-    assert re.fullmatch(r"<Solution three_link, solved, d/W = 0\.26003 \+- \de-\d\d at delta = 1.0e-04>", repr(three_link))
+    assert re.fullmatch(
+        r"<Solution three_link, solved, d/W = 0\.26003 \+- \de-\d\d at delta = 1.0e-04>",
+        repr(three_link),
+    )
     failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     assert "three_link, not converged" in repr(failed)
     assert "(not replayed) at delta = 1.0e-04" in repr(failed)
 
 
-def test_the_tour_of_the_readme_works_on_a_failed_solution_and_certifies_nothing(three_link, tmp_path):
+def test_the_tour_of_the_readme_works_on_a_failed_solution_and_certifies_nothing(
+    three_link, tmp_path
+):
     failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     again = load(save(failed, tmp_path / "failed.h5"))
     for solution in (failed, again):
         assert solution.status == "not converged"
         assert not solution.certificate.passed
-        assert np.isnan([solution.certificate.efficiency, solution.certificate.efficiency_error]).all()
+        assert np.isnan(
+            [solution.certificate.efficiency, solution.certificate.efficiency_error]
+        ).all()
         assert "nothing was checked" in solution.certificate.failures[0].line()
         assert solution.efficiency == solution.answer.efficiency
 

@@ -24,13 +24,18 @@ def test_round_trip_keeps_everything(three_link, tmp_path):
     np.testing.assert_array_equal(again.sample(t).tail, three_link.sample(t).tail)
 
 
-def test_an_answer_met_among_gaits_larger_than_the_problems_own_guess_is_read_back(three_link, tmp_path):
-    """Four links on feet: the search goes on among gaits as fast as a finite one, and the usual first guess is slower."""
+def test_an_answer_met_among_gaits_larger_than_the_problems_own_guess_is_read_back(
+    three_link, tmp_path
+):
+    """Four links on feet: the search goes on among gaits as fast as a finite one, and the usual
+    first guess is slower."""
     gait = three_link.gait
     larger = three_link.answer.problem.with_(smallest_shape_speed=gait.shape_speed, guess=gait)
     answer = dataclasses.replace(three_link.answer, problem=larger)
     small = three_link.problem.with_(guess=gait.scaled(0.5))
-    again = load(save(dataclasses.replace(three_link, problem=small, answer=answer), tmp_path / "x.h5"))
+    again = load(
+        save(dataclasses.replace(three_link, problem=small, answer=answer), tmp_path / "x.h5")
+    )
     assert again.answer.problem.hash == larger.hash
     assert again.problem.hash == small.hash
 
@@ -47,7 +52,9 @@ def test_plain_h5py_reads_the_motion_with_units(three_link, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["distance", "work_error", "value_at_zero_delta", "value"])
-def test_a_certificate_without_one_of_its_numbers_or_with_several_for_one_is_refused(name, three_link, tmp_path):
+def test_a_certificate_without_one_of_its_numbers_or_with_several_for_one_is_refused(
+    name, three_link, tmp_path
+):
     path, said = save(three_link, tmp_path / "x.h5"), f"attribute {name} of /certificate is missing"
     with h5py.File(path, "a") as file:
         del file["certificate"].attrs[name]
@@ -62,7 +69,9 @@ def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
         load(tmp_path / "none.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = [1.0]
-    with pytest.raises(StoreError, match="not a readable colloc solution: attribute format of / is missing"):
+    with pytest.raises(
+        StoreError, match="not a readable colloc solution: attribute format of / is missing"
+    ):
         load(tmp_path / "other.h5")
     good = save(three_link, tmp_path / "good.h5")
     data = good.read_bytes()
@@ -72,7 +81,10 @@ def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
     with h5py.File(good, "a") as file:
         del file["problem"]
         file["problem"] = '{"name": "x"}'
-    with pytest.raises(StoreError, match=r"good.h5 is not a readable colloc solution: not the description of a problem"):
+    with pytest.raises(
+        StoreError,
+        match=r"good.h5 is not a readable colloc solution: not the description of a problem",
+    ):
         load(good)
 
 

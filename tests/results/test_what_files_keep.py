@@ -21,13 +21,18 @@ def quick(once):
 
 
 @pytest.mark.parametrize("place", ["/", "motion/t", "data"])
-def test_a_result_to_which_somebody_added_something_is_not_lost_when_the_problem_is_solved_again(place, quick, tmp_path):
-    """A remark, or measured data. Numbers of its own that were changed by hand are not: `colloc verify` finds those."""
+def test_a_result_to_which_somebody_added_something_is_not_lost_when_the_problem_is_solved_again(
+    place, quick, tmp_path
+):
+    """A remark, or measured data. Numbers of its own that were changed by hand are not: `colloc
+    verify` finds those."""
     path = tmp_path / "quick.h5"
     for again in (save_result(quick, path), save_result(quick, path)):
         assert again[0].former is None
     with h5py.File(path, "a") as file:
-        (file.create_dataset("data", data=[1.0]) if place == "data" else file[place]).attrs["remark"] = "measured on the robot"
+        (file.create_dataset("data", data=[1.0]) if place == "data" else file[place]).attrs[
+            "remark"
+        ] = "measured on the robot"
     (saved,) = save_result(load(path), path)
     assert saved.why == "the former result, which holds more than colloc wrote,"
     with h5py.File(saved.former) as file:
@@ -51,7 +56,12 @@ def test_bounds_for_dry_friction_are_read_again_with_a_result(quick, tmp_path):
 
 def test_a_delta_that_was_lowered_for_a_small_gait_is_that_of_the_result_as_read(tmp_path):
     """Its motion, and what it is worth, are of the lower one; the problem is as it was stated."""
-    problem = Problem("tiny", friction=Friction(mu_t=0.5, mu_f=1, mu_b=5), gait=Harmonic(1, "bilateral"), delta=0.3)
+    problem = Problem(
+        "tiny",
+        friction=Friction(mu_t=0.5, mu_f=1, mu_b=5),
+        gait=Harmonic(1, "bilateral"),
+        delta=0.3,
+    )
     solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 0)), 1)
     assert solution.answer.delta < 0.5 * solution.problem.delta
     again = load(save(solution, tmp_path / "tiny.h5"))
@@ -67,12 +77,19 @@ def test_rows_that_the_disk_refused_are_written_when_it_takes_them_again(tmp_pat
     run = Run(path, QUICK)
     run.kept("stage", (1.0,), lambda: 10.0)
     with monkeypatch.context() as patch:
-        patch.setattr(run_module, "put_rows", lambda *_: (_ for _ in ()).throw(StoreError("the disk is full.")))
+        patch.setattr(
+            run_module,
+            "put_rows",
+            lambda *_: (_ for _ in ()).throw(StoreError("the disk is full.")),
+        )
         with pytest.warns(ReadOnlyRunWarning, match="the disk is full"):
             run.write()
         run.kept("stage", (2.0,), lambda: 20.0)
     run.write()
-    assert sorted(value for key, value in read_rows(path, ROWS).items() if key != "problem") == [10.0, 20.0]
+    assert sorted(value for key, value in read_rows(path, ROWS).items() if key != "problem") == [
+        10.0,
+        20.0,
+    ]
     again = Run(path, QUICK)
     assert [again.kept("stage", (x,), lambda: None) for x in (1.0, 2.0)] == [10.0, 20.0]
 

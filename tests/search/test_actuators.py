@@ -27,7 +27,11 @@ from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import instant
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.reduced.program import ReducedProgram
-from colloc.search.actuator_demand import check_actuators_suffice, least_share, least_share_without_cusps
+from colloc.search.actuator_demand import (
+    check_actuators_suffice,
+    least_share,
+    least_share_without_cusps,
+)
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 
@@ -78,7 +82,10 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
     angles, rates = random_instants(50)
     slow, fast = (moments(BODY, LAW, angles, pace * rates, pace * 1e-3)[0] for pace in (1.0, 2.0))
     np.testing.assert_allclose(fast, slow, rtol=1e-7, atol=1e-9)
-    drag = [moments(Chain(), Viscous(normal=2, tangential=1), angles, pace * rates, 1e-3)[0] for pace in (1.0, 2.0)]
+    drag = [
+        moments(Chain(), Viscous(normal=2, tangential=1), angles, pace * rates, 1e-3)[0]
+        for pace in (1.0, 2.0)
+    ]
     np.testing.assert_allclose(drag[1], 2 * drag[0], rtol=1e-9)
     z = BODY.solve(LAW, angles, rates, 1e-3).z
     powers = Instants(BODY, LAW, angles, rates, 1e-3, z=z).power
@@ -87,18 +94,28 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
 
 @pytest.mark.parametrize(
     ("law", "degree"),
-    [(LAW, 0), (PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.5), (Viscous(normal=2, tangential=1), 1)],
+    [
+        (LAW, 0),
+        (PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.5),
+        (Viscous(normal=2, tangential=1), 1),
+    ],
     ids=str,
 )
 def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
     angles, rates = random_instants(50)
     z = Chain().solve(law, angles, rates, 0.1).z
-    slow, fast = (DRIVEN_WORK.at(Instants(Chain(), law, angles, pace * rates, pace * 0.1, z=pace * z)) for pace in (1.0, 3.0))
+    slow, fast = (
+        DRIVEN_WORK.at(Instants(Chain(), law, angles, pace * rates, pace * 0.1, z=pace * z))
+        for pace in (1.0, 3.0)
+    )
     np.testing.assert_allclose(fast, 3.0 ** (1 + degree) * slow, rtol=1e-9)
 
 
 def test_of_a_law_without_a_degree_driven_power_is_the_positive_part_up_to_what_delta_hides():
-    law, (angles, rates) = OwnLaw("-vs/speed*(1 + exp(-speed))", "-vn/speed*(1 + exp(-speed))"), random_instants(50)
+    law, (angles, rates) = (
+        OwnLaw("-vs/speed*(1 + exp(-speed))", "-vn/speed*(1 + exp(-speed))"),
+        random_instants(50),
+    )
     assert law.degree is None
     z = Chain().solve(law, angles, rates, 1e-3).z
     now = Instants(Chain(), law, angles, rates, 1e-3, z=z)
@@ -118,7 +135,8 @@ def weak():
 
 
 def test_the_replay_tells_the_largest_torques_and_powers(free):
-    # the best ellipse of three equal links swings an end link broadside, and so does every other of its class
+    # the best ellipse of three equal links swings an end link broadside, and so does every other of
+    # its class
     torques, powers = np.split(replay(Chain(), Friction(), free.gait, 1e-4, limits=ONE).shares, 2)
     np.testing.assert_allclose(torques, 1 / 18, rtol=1e-4)
     assert powers[0] == pytest.approx(powers[1], rel=1e-4)
@@ -138,7 +156,10 @@ def test_motors_may_brake_harder_than_they_may_drive_but_turn_no_harder_either_w
     brakes = now.chosen(np.array([instant]))
     power, torque = np.full(2, 100.0), np.full(2, 100.0)
     power[joint], torque[joint] = -0.5 * brakes.power[joint, 0], 0.5 * abs(brakes.moment[joint, 0])
-    for limit, share in (({"power_limit": tuple(power)}, 1.0), ({"torque_limit": tuple(torque)}, 2.0)):
+    for limit, share in (
+        ({"power_limit": tuple(power)}, 1.0),
+        ({"torque_limit": tuple(torque)}, 2.0),
+    ):
         limits = Problem("brakes", body=BODY, gait=Harmonic(1), **limit).path_limits
         most = limits.sizes(limits.at(brakes)).max()
         assert most == pytest.approx(share) if share > 1 else most < share, limit
@@ -169,7 +190,9 @@ def test_limits_are_kept_in_files_and_verified(weak, tmp_path, capsys):
     assert again.problem.power_limit == 0.6
     assert again.problem.hash == weak.problem.hash
     assert "torque_limit" not in again.problem.to_dict()
-    assert Problem.from_dict(again.problem.to_dict()).path_limits == PathLimits(torque_and_power((), (0.6, 0.6)))
+    assert Problem.from_dict(again.problem.to_dict()).path_limits == PathLimits(
+        torque_and_power((), (0.6, 0.6))
+    )
     assert verify.main([str(path)]) == 0
     assert "actuators" in capsys.readouterr().out
 
@@ -183,12 +206,20 @@ def test_weaker_friction_and_motors_as_much_weaker_have_the_same_gait(weak):
 
 @pytest.mark.slow
 def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_price_it():
-    problem = Problem("four", body=Chain((0.25,) * 4), gait=Harmonic(1, "bilateral"), torque_limit=(0.1, 0.047, 0.1))
+    problem = Problem(
+        "four",
+        body=Chain((0.25,) * 4),
+        gait=Harmonic(1, "bilateral"),
+        torque_limit=(0.1, 0.047, 0.1),
+    )
     found = solve(problem.with_(guess=solve(problem.with_(torque_limit=None), 1).gait), 1)
     assert found.status == "solved"
     # the price of a limit is the sum of the multipliers of its rows: shares are moments over it
     price = np.abs(found.answer.lam_g[-3 * found.mesh.n_point :]).sum() / 0.047
-    less, more = (found.problem.with_(torque_limit=(0.1, limit, 0.1), guess=found.gait) for limit in (0.0465, 0.0475))
+    less, more = (
+        found.problem.with_(torque_limit=(0.1, limit, 0.1), guess=found.gait)
+        for limit in (0.0465, 0.0475)
+    )
     gained = solve(more, 1).efficiency - solve(less, 1).efficiency
     assert gained / 1e-3 == pytest.approx(price, rel=0.05)
 
@@ -204,14 +235,24 @@ def test_joints_too_weak_for_a_search_from_one_guess_are_named():
 def largest_share(problem, gait):
     delta = problem.delta * gait.delta_unit
     limits = problem.path_limits
-    return replay(problem.body, problem.friction, gait, delta, limits=limits, tolerance=1e-3, instants=200).shares.max()
+    return replay(
+        problem.body, problem.friction, gait, delta, limits=limits, tolerance=1e-3, instants=200
+    ).shares.max()
 
 
 DEMANDS = {
     "three links": USUAL.with_(guess=None, torque_limit=1.0),
-    "four links": Problem("four", body=Chain((0.25,) * 4), gait=Harmonic(2), torque_limit=(1.0, 0.5, 1.0)),
+    "four links": Problem(
+        "four", body=Chain((0.25,) * 4), gait=Harmonic(2), torque_limit=(1.0, 0.5, 1.0)
+    ),
     "power": USUAL.with_(guess=None, gait=Harmonic(2), power_limit=1.0, smallest_shape_speed=0.5),
-    "drag": Problem("drag", friction=Viscous(normal=2, tangential=1), gait=Harmonic(1), objective="towing", torque_limit=1.0),
+    "drag": Problem(
+        "drag",
+        friction=Viscous(normal=2, tangential=1),
+        gait=Harmonic(1),
+        objective="towing",
+        torque_limit=1.0,
+    ),
 }
 
 
@@ -224,9 +265,12 @@ def test_no_gait_needs_less_than_what_every_gait_needs(case):
     for size in (0.15, 0.3, 0.6, 1.0):
         size = max(size, 1.1 * problem.smallest_shape_speed)
         for _ in range(3):
-            gait = problem.gait.fourier(rng.normal(size=problem.gait.size(problem.body.n_joint)), problem.body.n_joint)
+            gait = problem.gait.fourier(
+                rng.normal(size=problem.gait.size(problem.body.n_joint)), problem.body.n_joint
+            )
             needed = largest_share(problem, gait.scaled(size / gait.shape_speed))
-            assert needed > 0.99 * max(least, across)  # the smallest found may lie above the smallest there is
+            # the smallest found may lie above the smallest there is
+            assert needed > 0.99 * max(least, across)
 
 
 def test_what_every_gait_needs_is_no_more_than_some_gaits_need():
@@ -240,10 +284,19 @@ def test_what_every_gait_needs_is_no_more_than_some_gaits_need():
 
 HOPELESS = {
     "any gait": ({"torque_limit": 0.01}, r"no gait keeps torque_limit: .* about 2\.1 times"),
-    "but for retraced ones": ({"torque_limit": 0.03}, r"no gait that goes anywhere keeps torque_limit: .* about 1\.5 times"),
+    "but for retraced ones": (
+        {"torque_limit": 0.03},
+        r"no gait that goes anywhere keeps torque_limit: .* about 1\.5 times",
+    ),
     "power": ({"power_limit": 0.005}, "no gait keeps power_limit: "),
-    "both": ({"torque_limit": 0.06, "power_limit": 0.005}, "no gait keeps torque_limit and power_limit: "),
-    "as far": ({"power_limit": 0.1, "at_least": {"distance": 0.3}}, r"takes a power of 0\.3 .* may deliver 0\.2\."),
+    "both": (
+        {"torque_limit": 0.06, "power_limit": 0.005},
+        "no gait keeps torque_limit and power_limit: ",
+    ),
+    "as far": (
+        {"power_limit": 0.1, "at_least": {"distance": 0.3}},
+        r"takes a power of 0\.3 .* may deliver 0\.2\.",
+    ),
 }
 
 
@@ -280,7 +333,10 @@ REFUSED = {
         {"power_limit": 1.0, "gait": FreePath(2.0, "none")},
         "leaves the pace open, but the joints' power is limited",
     ),
-    "smooth": ({"torque_limit": 1.0, "body": ModalBody(2), **dict.fromkeys(SIZED)}, "needs the forces"),
+    "smooth": (
+        {"torque_limit": 1.0, "body": ModalBody(2), **dict.fromkeys(SIZED)},
+        "needs the forces",
+    ),
     "sign": ({"torque_limit": -1.0}, "torque_limit must be positive"),
     "text": ({"power_limit": "much"}, "power_limit must be positive"),
     "number": ({"power_limit": (1.0, 2.0, 3.0)}, "power_limit has 3 values"),

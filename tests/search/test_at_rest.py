@@ -1,4 +1,5 @@
-"""When a search on one mesh ends: rows are placed at the worst instants of the gait, which move with it."""
+"""When a search on one mesh ends: rows are placed at the worst instants of the gait, which move
+with it."""
 
 from types import SimpleNamespace
 
@@ -17,14 +18,21 @@ from colloc.search.refine import refine
 from colloc.search.solve import solve
 from tests.shared.stages import optimum_near
 
-PROBLEM = Problem("plain", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=40, mesh_tolerance=0)
+PROBLEM = Problem(
+    "plain",
+    gait=Harmonic(1, "bilateral"),
+    guess=ellipse(0.0, 2.0, 1.0),
+    intervals=40,
+    mesh_tolerance=0,
+)
 
 
 GOAL = np.array([1.0, 2.0])
 
 
 class OneOfTwo:
-    """Least (x - 1)^2 + (y - 2)^2 with x, y <= 0; only the worse of the two is a row, wherever that was placed last."""
+    """Least (x - 1)^2 + (y - 2)^2 with x, y <= 0; only the worse of the two is a row, wherever that
+    was placed last."""
 
     lower, upper = np.full(2, -3.0), np.full(2, 3.0)
     row_lower, row_upper = np.array([-np.inf]), np.zeros(1)
@@ -66,10 +74,15 @@ def found():
 
 
 @pytest.mark.parametrize(("beyond", "kept"), [(0.0, False), (1e-7, False), (1e-4, True)])
-def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(found, monkeypatch, beyond, kept):
-    """Up to what a certificate lets pass; else the gait of the search is, if it satisfies the first-order conditions."""
+def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(
+    found, monkeypatch, beyond, kept
+):
+    """Up to what a certificate lets pass; else the gait of the search is, if it satisfies the
+    first-order conditions."""
     place = ReducedProgram.place_rows
-    monkeypatch.setattr(ReducedProgram, "place_rows", lambda program, v: (place(program, v), beyond)[1])
+    monkeypatch.setattr(
+        ReducedProgram, "place_rows", lambda program, v: (place(program, v), beyond)[1]
+    )
     answer = confirm(found)
     assert answer.optimal
     assert ("beyond its limits" in answer.message) == kept
@@ -78,14 +91,17 @@ def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(found, monkey
 
 
 @pytest.mark.parametrize(
-    ("slope", "missed", "kink"), [(1e-3, 5e-7, True), (1e-3, 5e-6, False), (1.0, 5e-8, True), (1.0, 5e-7, False)]
+    ("slope", "missed", "kink"),
+    [(1e-3, 5e-7, True), (1e-3, 5e-6, False), (1.0, 5e-8, True), (1.0, 5e-7, False)],
 )
 def test_a_kink_may_be_missed_by_more_where_the_slopes_beside_it_are_small(slope, missed, kink):
-    """By a tenth of 1e-6, or of 1e-5 where that changes the objective by less than 1e-8; slope |x| is least at 0."""
+    """By a tenth of 1e-6, or of 1e-5 where that changes the objective by less than 1e-8; slope |x|
+    is least at 0."""
     none = np.empty(0)
     vee = SimpleNamespace(
         lower=-np.ones(1), upper=np.ones(1), row_lower=none, row_upper=none, rows=lambda v: none,
-        row_slopes=lambda v: np.empty((0, 1)), objective=lambda v: slope * abs(v[0]), gradient=lambda v: slope * np.sign(v),
+        row_slopes=lambda v: np.empty((0, 1)), objective=lambda v: slope * abs(v[0]),
+        gradient=lambda v: slope * np.sign(v),
     )  # fmt: skip
     assert (conditions_on_kink(vee, np.array([missed]), FINE) is not None) == kink
 
@@ -107,7 +123,13 @@ def test_a_gait_that_a_finer_mesh_finds_no_member_near_goes_on_from_about_it(mon
 @pytest.mark.parametrize("changed", [{}, {"mu_b": 2.0}], ids=["symmetric", "unequal"])
 def test_a_solve_that_begins_at_its_answer_stays_there_at_one_delta(changed):
     friction = Friction(**changed)
-    problem = Problem("again", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), friction=friction, delta=1e-3)
+    problem = Problem(
+        "again",
+        gait=Harmonic(1, "bilateral"),
+        guess=ellipse(0.0, 2.0, 1.0),
+        friction=friction,
+        delta=1e-3,
+    )
     found = solve(problem, 1)
     again = solve(problem.with_(guess=found.gait), 1)
     assert found.history[0].delta == problem.delta_start

@@ -12,7 +12,14 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, overlapping_pairs, passing_depth
+from colloc.mechanics.contact import (
+    CLEARANCE_SMOOTHING,
+    clearance,
+    crossing_depth,
+    far_pairs,
+    overlapping_pairs,
+    passing_depth,
+)
 from colloc.mechanics.friction import Friction
 from colloc.search.converge import crossing_pairs, last_free
 from colloc.search.ipopt import Solver
@@ -57,7 +64,8 @@ def test_clearance_is_the_same_seen_from_the_head_and_in_a_mirror():
 
 
 def test_parallel_links_that_slip_through_each_other_are_caught():
-    # links 1 and 4 are parallel at every instant, and their distance passes through zero between two samples
+    # links 1 and 4 are parallel at every instant, and their distance passes through zero between
+    # two samples
     body = Chain((0.3, 0.2, 0.2, 0.3))
     tilt = np.array([-0.03, -0.01, 0.01, 0.03])
     angles = np.stack([tilt - 1.0, np.full(4, 2.0), np.pi - 1.0 - tilt])
@@ -75,7 +83,12 @@ def test_parallel_links_that_slip_through_each_other_are_caught():
 def curl(amplitude, **changes):
     """Five links that curl up as a whole; they close a ring at 2 pi / 5 a joint."""
     guess = Fourier(np.zeros(4), np.full((4, 1), amplitude), np.zeros((4, 1)))
-    fields = {"body": Chain((0.2,) * 5), "gait": Harmonic(1, "antipodal"), "intervals": 12, "mesh_tolerance": 0.0}
+    fields = {
+        "body": Chain((0.2,) * 5),
+        "gait": Harmonic(1, "antipodal"),
+        "intervals": 12,
+        "mesh_tolerance": 0.0,
+    }
     return Problem("curl", guess, **(fields | changes))
 
 
@@ -96,7 +109,9 @@ def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell()
     transcription = transcribe(control_problem(problem), far=far)
     own = transcription.layout.parameters[:, 0]
     x = np.zeros(transcription.layout.n)
-    x[own] = problem.gait.parameters(problem.guess) + 0.1 * np.random.default_rng(4).standard_normal(own.size)
+    x[own] = problem.gait.parameters(problem.guess) + 0.1 * np.random.default_rng(
+        4
+    ).standard_normal(own.size)
     solver = Solver(transcription)
     parameters = solver.oracles.parameter_vector(0.01, transcription.block_parameters(x[own]))
     value = np.array(solver.oracles.options["jac_g"](x, parameters)[0]).ravel()
@@ -104,13 +119,16 @@ def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell()
     angles = transcription.member(x[transcription.layout.parameters[:, 0]]).angles(fine.T.ravel())
     for i, j in far:
         rows = transcription.groups[f"links {i + 1} and {j + 1}"]
-        nearest = clearance(problem.body, angles, i, j).reshape(transcription.mesh.n, -1).min(axis=1)
+        nearest = (
+            clearance(problem.body, angles, i, j).reshape(transcription.mesh.n, -1).min(axis=1)
+        )
         np.testing.assert_allclose(-value[rows], nearest, atol=1e-3)
         assert (transcription.constraint_upper[rows] == 0).all()
 
 
 def tips_passing(side):
-    """Four links near a closed square, where head and tail tip pass each other; `side` moves the joints [rad]."""
+    """Four links near a closed square, where head and tail tip pass each other; `side` moves the
+    joints [rad]."""
     square, body = np.full(3, np.pi / 2), Chain((0.25,) * 4)
 
     def gap(q):
@@ -119,7 +137,8 @@ def tips_passing(side):
 
     step = 1e-6 * np.eye(3)
     slope = np.stack([(gap(square + h) - gap(square - h)) / 2e-6 for h in step], axis=1)
-    # the head tip moves across the corner of what is allowed: links cross where it is right of and below the tail tip
+    # the head tip moves across the corner of what is allowed: links cross where it is right of and
+    # below the tail tip
     across = np.linalg.lstsq(slope, np.array([0.3, 0.3]), rcond=None)[0]
     return Fourier(square + side, np.zeros((3, 1)), across[:, None])
 
@@ -127,7 +146,9 @@ def tips_passing(side):
 def test_a_held_share_follows_the_peak_where_tips_pass_to_second_order():
     body = Chain((0.25,) * 4)
     check = next(c for c in shape_checks(body, ((0, 3),)) if c.name == "links 1 and 4")
-    mesh = control_problem(Problem("tips", tips_passing(np.full(3, -0.3)), body, intervals=40)).mesh()
+    mesh = control_problem(
+        Problem("tips", tips_passing(np.full(3, -0.3)), body, intervals=40)
+    ).mesh()
     first = tips_passing(np.array([-0.002, 0.0, 0.001]))
 
     def peak(gait):
@@ -154,7 +175,9 @@ def test_a_held_share_follows_the_peak_where_tips_pass_to_second_order():
 
 
 @pytest.mark.parametrize("lengths", [(0.5, 0.5), (0.3, 0.7)])
-@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=3, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=2, mu_b=2)])
+@pytest.mark.parametrize(
+    "friction", [Friction(), Friction(mu_t=3, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=2, mu_b=2)]
+)
 def test_scallop_theorem(lengths, friction):
     # one joint retraces its path; with equal speeds both ways nothing is left, whatever the delta
     body = Chain(lengths)
@@ -163,26 +186,40 @@ def test_scallop_theorem(lengths, friction):
         return 0.3 + 1.5 * np.sin(2 * np.pi * t)[None], 3 * np.pi * np.cos(2 * np.pi * t)[None]
 
     def uneven(t):
-        phase, rate = 2 * np.pi * t + 0.6 * np.sin(2 * np.pi * t), 2 * np.pi * (1 + 0.6 * np.cos(2 * np.pi * t))
+        phase, rate = (
+            2 * np.pi * t + 0.6 * np.sin(2 * np.pi * t),
+            2 * np.pi * (1 + 0.6 * np.cos(2 * np.pi * t)),
+        )
         return 0.3 + 1.5 * np.sin(phase)[None], 1.5 * (np.cos(phase) * rate)[None]
 
     for delta in (1e-1, 1e-4):
         fine = replay(body, friction, even, delta, instants=100, most_instants=100)
         assert fine.distance < 1e-10
         assert fine.work > 0.1
-    # regularised friction depends on speed a little: different speeds there and back leave a distance of order delta
-    viscous, dry = (replay(body, friction, uneven, delta, instants=400, most_instants=400).distance for delta in (3e-1, 3e-3))
+    # regularised friction depends on speed a little: different speeds there and back leave a
+    # distance of order delta
+    viscous, dry = (
+        replay(body, friction, uneven, delta, instants=400, most_instants=400).distance
+        for delta in (3e-1, 3e-3)
+    )
     assert dry < 3e-3
     assert dry < viscous / 3
 
 
 def test_two_links_without_directional_friction_are_refused_in_words():
     with pytest.raises(ProblemError, match="scallop"):
-        Problem("two", Fourier([0.0], [[1.0]], [[0.0]]), body=Chain((0.5, 0.5)), gait=Harmonic(1, "antipodal"))
+        Problem(
+            "two",
+            Fourier([0.0], [[1.0]], [[0.0]]),
+            body=Chain((0.5, 0.5)),
+            gait=Harmonic(1, "antipodal"),
+        )
 
 
 @pytest.mark.parametrize("kind", [Polygon(2), Basis([np.sin(2 * np.pi * np.arange(50) / 50)])])
-def test_classes_whose_gaits_all_go_back_the_way_they_came_are_refused_unless_that_leads_somewhere(kind):
+def test_classes_whose_gaits_all_go_back_the_way_they_came_are_refused_unless_that_leads_somewhere(
+    kind,
+):
     with pytest.raises(ProblemError, match="it retraces its path, and reversed rates"):
         Problem("back", gait=kind)
     assert Problem("forth", gait=kind, friction=Friction(mu_t=1, mu_f=1, mu_b=2)).gait is kind
@@ -195,7 +232,9 @@ def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_fricti
     def efficiency(amplitude):
         gait = Fourier([0.0], [[amplitude]], [[0.0]])
         body, friction = solution.problem.body, solution.problem.friction
-        return replay(body, friction, lambda t: (gait.angles(t), gait.rates(t)), 1e-4, tolerance=1e-5).efficiency
+        return replay(
+            body, friction, lambda t: (gait.angles(t), gait.rates(t)), 1e-4, tolerance=1e-5
+        ).efficiency
 
     sweep = np.linspace(0.8, 2.4, 9)
     values = [efficiency(a) for a in sweep]

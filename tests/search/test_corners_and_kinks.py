@@ -1,4 +1,5 @@
-"""Optima at the corner of the contact region, and meshes whose knots sit on kinks: random starts that used to fail."""
+"""Optima at the corner of the contact region, and meshes whose knots sit on kinks: random starts
+that used to fail."""
 
 import numpy as np
 import pytest
@@ -13,13 +14,20 @@ from colloc.search.spaces import space_near
 
 def from_start(start, friction, symmetry, **fields):
     problem = Problem(
-        "case", ellipse(0.0, 1.0, 0.5), friction=friction, gait=Harmonic(1, symmetry), delta=1e-4, delta_start=0.1, **fields
+        "case",
+        ellipse(0.0, 1.0, 0.5),
+        friction=friction,
+        gait=Harmonic(1, symmetry),
+        delta=1e-4,
+        delta_start=0.1,
+        **fields,
     )
     return problem.with_(guess=latin_hypercube_gait(problem, 0, start))
 
 
 def test_an_optimum_that_rounds_the_corner_of_the_contact_region_is_certified():
-    """The fourth maximum of the paper's sweep, 0.1240. Constrained at fixed instants it ended 6e-3 rad inside the region."""
+    """The fourth maximum of the paper's sweep, 0.1240. Constrained at fixed instants it ended 6e-3
+    rad inside the region."""
     solution = solve(from_start(2, Friction(), "antipodal", intervals=20), 1)
     assert solution.status == "solved", solution.message
     assert solution.certificate.efficiency == pytest.approx(0.1240, abs=1e-4)
@@ -43,8 +51,14 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
 @pytest.mark.slow
 @pytest.mark.parametrize("start", [0, 3])
 def test_refinement_ends_where_an_optimum_is_flat(start):
-    """Every new mesh moved these gaits by 0.01 rad, away from where it was fine: after eight the error was 8e-5 and 1.1e-4."""
-    problem = Problem("flat", body=Chain((0.2, 0.5, 0.3)), friction=Friction(mu_t=3, mu_f=1, mu_b=1), gait=Harmonic(3, "none"))
+    """Every new mesh moved these gaits by 0.01 rad, away from where it was fine: after eight the
+    error was 8e-5 and 1.1e-4."""
+    problem = Problem(
+        "flat",
+        body=Chain((0.2, 0.5, 0.3)),
+        friction=Friction(mu_t=3, mu_f=1, mu_b=1),
+        gait=Harmonic(3, "none"),
+    )
     solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, start)), 1)
     assert solution.status == "solved", solution.message
     checks = {check.name: check for check in solution.certificate.checks}

@@ -25,7 +25,9 @@ from colloc.search.spaces import transcribed
 
 
 def stated(**changes):
-    return Problem("p", ellipse(0.1, 1.4, 0.8), **{"gait": Harmonic(1, "none"), "intervals": 8, **changes})
+    return Problem(
+        "p", ellipse(0.1, 1.4, 0.8), **{"gait": Harmonic(1, "none"), "intervals": 8, **changes}
+    )
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -50,7 +52,11 @@ def test_every_row_has_a_meaning_and_a_phase(formulation):
     ],
 )
 def test_every_row_of_a_path_has_a_meaning_of_its_own_and_a_phase(gait, links):
-    guess = ellipse(0.0, 1.0, 0.6) if links == 3 else Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
+    guess = (
+        ellipse(0.0, 1.0, 0.6)
+        if links == 3
+        else Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
+    )
     problem = Problem("path", guess, Chain((1 / links,) * links), gait=gait, intervals=24)
     transcription = transcribed(problem)
     said = {row_meaning(transcription, row)[0] for row in range(transcription.assembly.m)}
@@ -62,14 +68,18 @@ def test_every_row_of_a_path_has_a_meaning_of_its_own_and_a_phase(gait, links):
 
 
 def test_a_broken_balance_is_named_with_its_window():
-    solver = Solver(transcribe(control_problem(stated(formulation="implicit velocity"))), {"max_iter": 0})
+    solver = Solver(
+        transcribe(control_problem(stated(formulation="implicit velocity"))), {"max_iter": 0}
+    )
     t = solver.transcription
     x = feasible_point(t, stated().gait.parameters(stated().guess), 0.1)
     x[t.layout.z[2, 10:13]] += 0.1
     result = solver.solve(x, 0.1)
     text = explanation(t, result, 0.1)
     assert "torque" in text or "balance" in text or "rotation" in text
-    first, last, worst = map(float, re.search(r"between phases (.*) and (.*), worst at (0\.\d+)", text).groups())
+    first, last, worst = map(
+        float, re.search(r"between phases (.*) and (.*), worst at (0\.\d+)", text).groups()
+    )
     assert first <= worst <= last < first + 0.3
     assert first < t.mesh.times[11] < last + 0.125
     assert "Try to" in text
@@ -113,25 +123,36 @@ def test_running_out_of_iterations_says_so():
 
 
 def test_a_delta_that_rounding_hides_is_named():
-    """At delta = 1e-10 the flagship's gradient is noise of 2e-6; at 1e-9 it is still told from zero."""
+    """At delta = 1e-10 the flagship's gradient is noise of 2e-6; at 1e-9 it is still told from
+    zero."""
     problem = stated()
     solver = Solver(transcribe(control_problem(problem)), {"max_iter": 0})
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 1e-10)
     result = solver.solve(x, 1e-10)
     result = replace(result, excess=np.zeros_like(result.excess))
-    assert "at least 1e-09, below which rounding" in explanation(solver.transcription, result, 1e-10)
+    assert "at least 1e-09, below which rounding" in explanation(
+        solver.transcription, result, 1e-10
+    )
     assert "rounding" not in explanation(solver.transcription, result, 1e-9)
 
 
 def test_rows_of_a_slope_have_a_meaning():
     transcription = transcribe(control_problem(stated(grade=0.1, towards=0.3)))
-    meanings = {row_meaning(transcription, transcription.groups[name].start)[0] for name in ("heading", "across")}
-    assert meanings == {"where the body points at the start", "the way across the direction that was asked for"}
+    meanings = {
+        row_meaning(transcription, transcription.groups[name].start)[0]
+        for name in ("heading", "across")
+    }
+    assert meanings == {
+        "where the body points at the start",
+        "the way across the direction that was asked for",
+    }
 
 
 def test_what_is_no_optimum_is_replayed_roughly(unsolved, monkeypatch):
     """It cannot be certified, and its mesh may ask for a replay of minutes."""
     asked = {}
-    monkeypatch.setattr(solve, "certify", lambda answer, **settings: asked.update(settings) or UNCERTIFIED)
+    monkeypatch.setattr(
+        solve, "certify", lambda answer, **settings: asked.update(settings) or UNCERTIFIED
+    )
     solve.certified(unsolved(Problem("guess", gait=Harmonic(1, "bilateral"), delta=1e-2)).answer)
     assert asked == {"tolerance": GAP, "instants": 1600}

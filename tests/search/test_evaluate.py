@@ -1,4 +1,5 @@
-"""A gait of one's own: whatever way the angles are given, what comes out is what a replay of them says."""
+"""A gait of one's own: whatever way the angles are given, what comes out is what a replay of them
+says."""
 
 import json
 
@@ -20,7 +21,9 @@ def evaluated():
 
 
 def written(path, time, angles, header="t,joint_1,joint_2"):
-    rows = [",".join(f"{value:.12g}" for value in row) for row in np.concatenate([time[None], angles]).T]
+    rows = [
+        ",".join(f"{value:.12g}" for value in row) for row in np.concatenate([time[None], angles]).T
+    ]
     path.write_text("\n".join(["# measured", *([header] if header else []), *rows]) + "\n")
     return path
 
@@ -31,15 +34,21 @@ def test_it_is_what_a_replay_of_the_angles_says(evaluated):
     assert evaluated.efficiency == pytest.approx(replayed.efficiency, rel=1e-6)
     assert evaluated.rotation == pytest.approx(replayed.rotation, abs=1e-6)
     assert evaluated.turning  # which is told
-    assert {"replay gap", "mesh error", "self-contact"} <= {check.name for check in evaluated.certificate.checks}
-    assert not {"KKT error", "second order"} & {check.name for check in evaluated.certificate.checks}
+    assert {"replay gap", "mesh error", "self-contact"} <= {
+        check.name for check in evaluated.certificate.checks
+    }
+    assert not {"KKT error", "second order"} & {
+        check.name for check in evaluated.certificate.checks
+    }
     assert evaluated.standing == ["none: the gait was given"]
 
 
 def test_every_way_to_give_a_gait_gives_the_same_one(tmp_path):
     angles, unequal = GAIT.angles(T), np.sort(np.random.default_rng(0).uniform(0, 3, 200))
     closed = np.concatenate([angles, angles[:, :1]], axis=1)
-    degrees = written(tmp_path / "d.csv", 2 * T, np.degrees(angles), "time_s,joint_1_deg,joint_2_deg")
+    degrees = written(
+        tmp_path / "d.csv", 2 * T, np.degrees(angles), "time_s,joint_1_deg,joint_2_deg"
+    )
     ways = {
         "array": fitted_gait(angles, 2),
         "closed array": fitted_gait(closed, 2),
@@ -63,8 +72,11 @@ def test_noise_is_smoothed_and_what_is_left_out_is_stated():
     found = fitted_gait(GAIT.angles(t) + 0.02 * rng.normal(size=(2, 400)), 2)
     assert found.gait.n_harmonic == 2
     assert found.rms == pytest.approx(0.02, rel=0.1)
-    # least squares averages: the error is that of the noise times the root of coefficients over samples
-    assert np.sqrt(((found.gait.angles(t) - GAIT.angles(t)) ** 2).mean()) < 2 * 0.02 * np.sqrt(5 / 400)
+    # least squares averages: the error is that of the noise times the root of coefficients over
+    # samples
+    assert np.sqrt(((found.gait.angles(t) - GAIT.angles(t)) ** 2).mean()) < 2 * 0.02 * np.sqrt(
+        5 / 400
+    )
     assert f"400 samples: off by {found.rms:.1e} rad r.m.s." in found.describe()
 
 
@@ -72,7 +84,9 @@ def test_what_is_missing_at_the_end_of_a_record_is_found_and_a_drift_taken_out(t
     unequal = np.sort(np.random.default_rng(0).uniform(0, 1, 60))
     for t in (T[:-3], unequal):
         np.testing.assert_allclose(
-            fitted_gait(written(tmp_path / "a.csv", t, GAIT.angles(t)), 2).gait.angles(T - t[0]), GAIT.angles(T), atol=1e-6
+            fitted_gait(written(tmp_path / "a.csv", t, GAIT.angles(t)), 2).gait.angles(T - t[0]),
+            GAIT.angles(T),
+            atol=1e-6,
         )
     drifts = GAIT.angles(T) + np.array([[0.1], [-0.05]]) * (T - T.mean())
     found = fitted_gait(drifts, 2)
@@ -83,7 +97,9 @@ def test_what_is_missing_at_the_end_of_a_record_is_found_and_a_drift_taken_out(t
         "a drift of 5.73° a period taken out: off by 1.3e+00° r.m.s."
         in fitted_gait(np.degrees(drifts), 2, degrees=True).describe()
     )
-    with pytest.raises(colloc.ProblemError, match=r"joint 1 is off by 57\.3°, and it moves through"):
+    with pytest.raises(
+        colloc.ProblemError, match=r"joint 1 is off by 57\.3°, and it moves through"
+    ):
         fitted_gait(np.degrees(GAIT.angles(T) + np.array([[1.0], [0.0]]) * T), 2, degrees=True)
 
 
@@ -99,7 +115,9 @@ def test_an_exported_gait_comes_back_as_it_was(evaluated, tmp_path):
 
 
 def test_a_retraced_gait_goes_nowhere_and_that_is_said():
-    there_and_back = colloc.evaluate(PROBLEM, colloc.Fourier([0.3, 0.1], [[0.8], [0.5]], np.zeros((2, 1))))
+    there_and_back = colloc.evaluate(
+        PROBLEM, colloc.Fourier([0.3, 0.1], [[0.8], [0.5]], np.zeros((2, 1)))
+    )
     assert not there_and_back.success
     assert abs(there_and_back.distance) < 1e-6
     assert "It goes nowhere for its work" in there_and_back.message
@@ -119,13 +137,19 @@ def test_kept_and_loaded_it_is_the_same(evaluated, tmp_path):
     assert loaded.message == evaluated.message
     assert loaded.status == "solved"
     assert colloc.certify(loaded.answer).efficiency == pytest.approx(evaluated.efficiency, rel=1e-6)
-    assert loaded.robot(1.2, 3, 5000).facts["cost_of_transport"] == pytest.approx(1 / evaluated.efficiency, rel=1e-4)
+    assert loaded.robot(1.2, 3, 5000).facts["cost_of_transport"] == pytest.approx(
+        1 / evaluated.efficiency, rel=1e-4
+    )
 
 
-def test_the_command_saves_a_result_that_compare_holds_against_the_best(tmp_path, monkeypatch, capsys, evaluated):
+def test_the_command_saves_a_result_that_compare_holds_against_the_best(
+    tmp_path, monkeypatch, capsys, evaluated
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('p', delta=1e-3)\n")
-    written(tmp_path / "own.csv", T, colloc.Fourier(GAIT.mean, 0.8 * GAIT.cos, 0.8 * GAIT.sin).angles(T))
+    written(
+        tmp_path / "own.csv", T, colloc.Fourier(GAIT.mean, 0.8 * GAIT.cos, 0.8 * GAIT.sin).angles(T)
+    )
     colloc.save(evaluated, "best.h5")
     assert main(["evaluate", "p.py", "own.csv"]) == 0
     assert "own-evaluated: solved" in capsys.readouterr().out
@@ -134,22 +158,29 @@ def test_the_command_saves_a_result_that_compare_holds_against_the_best(tmp_path
     assert f"joint angles by {0.2 * amplitude:.3g} rad" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("objective", ["speed", "towing", "driven efficiency", "distance / (work + 0.1 * length)"])
+@pytest.mark.parametrize(
+    "objective", ["speed", "towing", "driven efficiency", "distance / (work + 0.1 * length)"]
+)
 @pytest.mark.parametrize("mu", [1.0, 0.02])
 def test_a_gait_is_certified_in_whatever_is_asked_of_it(objective, mu):
-    solution = colloc.evaluate(PROBLEM.with_(objective=objective, friction=colloc.Friction(mu, mu, mu)), GAIT)
+    solution = colloc.evaluate(
+        PROBLEM.with_(objective=objective, friction=colloc.Friction(mu, mu, mu)), GAIT
+    )
     assert solution.status == "solved"
     assert solution.answer.value == pytest.approx(solution.value, rel=1e-4)
 
 
 def test_a_gait_that_does_not_turn_is_refused_by_no_objective_of_its_turn():
     turning = PROBLEM.with_(objective="turning", rotation=None, delta=1e-2)
-    assert colloc.evaluate(turning, colloc.ellipse(A0=0, A1=1.5, B1=1.0)).value == pytest.approx(0, abs=1e-9)
+    assert colloc.evaluate(turning, colloc.ellipse(A0=0, A1=1.5, B1=1.0)).value == pytest.approx(
+        0, abs=1e-9
+    )
 
 
 REST = "5,0,0\n6,0,0\n7,0,0\n8,0,0\n"
 BAD = {
-    "t,a,b\n0,1,nan\n1,2,3\n" + REST: r"only 5 of 6 lines have a number in each .* \(line 2 has not\)",
+    "t,a,b\n0,1,nan\n1,2,3\n"
+    + REST: r"only 5 of 6 lines have a number in each .* \(line 2 has not\)",
     "t,a\n0,1\n1,2\n2,1\n3,1\n4,2\n5,1\n": "1 column of angles, and the body has 2 joints",
     "t,a,b\n0,0,0\n1,1,0\n0,0,1\n" + REST: "times fall after line 3",
     "t,a,b\n0,0,0\n1,1,0\n": "holds 2 samples",
@@ -211,11 +242,16 @@ def exact():
 def test_stated_errors_hold_for_gaits_through_noisy_samples_and_grow_with_the_noise(exact, degrees):
     rng, inside = np.random.default_rng(3), []
     for _ in range(5):
-        noisy = colloc.evaluate(QUICK, GAIT.angles(np.arange(N) / N) + np.radians(degrees) * rng.normal(size=(2, N)))
+        noisy = colloc.evaluate(
+            QUICK, GAIT.angles(np.arange(N) / N) + np.radians(degrees) * rng.normal(size=(2, N))
+        )
         stated = noisy.certificate
         assert 1e-4 * degrees < stated.value_error < 2e-2 * degrees
         assert stated.value_error == stated.efficiency_error
-        assert f"leave d/W uncertain by {stated.of_samples[0]:.1e} (two standard deviations" in noisy.message
+        assert (
+            f"leave d/W uncertain by {stated.of_samples[0]:.1e} (two standard deviations"
+            in noisy.message
+        )
         inside += [
             abs(noisy.efficiency - exact.efficiency) <= stated.efficiency_error,
             abs(noisy.distance - exact.distance) <= stated.errors["distance"],
@@ -234,21 +270,27 @@ def test_two_standard_deviations_cover_the_true_gait_in_95_of_100_records(exact,
             noise[:, k] += slow * noise[:, k - 1]
         noisy = colloc.evaluate(QUICK, GAIT.angles(np.arange(N) / N) + noise)
         errors = noisy.certificate.errors
-        inside.append(abs(noisy.efficiency - exact.efficiency) <= noisy.certificate.efficiency_error)
+        inside.append(
+            abs(noisy.efficiency - exact.efficiency) <= noisy.certificate.efficiency_error
+        )
         inside.append(abs(noisy.distance - exact.distance) <= errors["distance"])
         inside.append(abs(noisy.work - exact.work) <= errors["work"])
     assert np.mean(inside) >= (0.75 if slow else 0.92)
 
 
 def test_noise_about_an_optimum_is_stated_though_its_gradient_vanishes():
-    best = colloc.solve(colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2), starts=1)
+    best = colloc.solve(
+        colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2), starts=1
+    )
     noise = np.radians(3) * np.random.default_rng(0).normal(size=(2, N))
     noisy = colloc.evaluate(QUICK.with_(delta=1e-2), best.gait.angles(np.arange(N) / N) + noise)
     assert 0 < best.value - noisy.value <= noisy.certificate.value_error
 
 
 def test_a_series_that_misses_its_samples_states_its_lack_of_fit():
-    corners = colloc.Fourier([0, 0], [[1.2, 0.0, 0.4], [0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0], [1.2, 0.0, -0.4]])
+    corners = colloc.Fourier(
+        [0, 0], [[1.2, 0.0, 0.4], [0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0], [1.2, 0.0, -0.4]]
+    )
     true, t = colloc.evaluate(QUICK, corners), np.arange(8) / 8
     found = colloc.evaluate(QUICK, corners.angles(t), harmonics=1)
     assert "4.0e-01 rad at most" in found.message
@@ -269,7 +311,9 @@ def test_errors_of_samples_are_kept_and_are_no_disagreement(tmp_path):
 
 
 def test_an_exported_gait_states_no_error_of_its_samples_whatever_its_columns(tmp_path, capsys):
-    gait = colloc.evaluate(QUICK, colloc.Fourier([0.2, -0.1], [[0.9, 0.1], [0.3, 0.0]], [[0.0, 0.1], [0.8, -0.1]]))
+    gait = colloc.evaluate(
+        QUICK, colloc.Fourier([0.2, -0.1], [[0.9, 0.1], [0.3, 0.0]], [[0.0, 0.1], [0.8, -0.1]])
+    )
     for periods in (1, 3):
         gait.export(tmp_path / "x.csv", period=4, length=1, mass=2, periods=periods)
         fitted = fitted_gait(tmp_path / "x.csv", 2)
@@ -280,9 +324,13 @@ def test_an_exported_gait_states_no_error_of_its_samples_whatever_its_columns(tm
     assert "uncertain" not in again.message
 
 
-def test_servos_that_stand_about_90_degrees_are_refused_before_the_replay_where_links_cross(tmp_path):
+def test_servos_that_stand_about_90_degrees_are_refused_before_the_replay_where_links_cross(
+    tmp_path,
+):
     five = colloc.Problem("five", body=colloc.Chain((0.2,) * 5))
     wave = np.degrees(0.7 * np.sin(2 * np.pi * T - np.arange(4)[:, None]))
     path = written(tmp_path / "servo.csv", T, 90 + wave, "t_s,s1_deg,s2_deg,s3_deg,s4_deg")
-    with pytest.raises(colloc.ProblemError, match=r"all joints move about 90°, where links cross: .* subtract it"):
+    with pytest.raises(
+        colloc.ProblemError, match=r"all joints move about 90°, where links cross: .* subtract it"
+    ):
         colloc.evaluate(five, path)

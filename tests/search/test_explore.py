@@ -22,12 +22,17 @@ from colloc.system.errors import NotConvergedError
 
 ALONE = Helpers(Problem("alone"))
 UNEQUAL = Problem(
-    "unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(mu_t=2, mu_f=1, mu_b=1.4), gait=Harmonic(2, "none")
+    "unequal",
+    body=Chain((0.3, 0.2, 0.15, 0.35)),
+    friction=Friction(mu_t=2, mu_f=1, mu_b=1.4),
+    gait=Harmonic(2, "none"),
 )
 
 
 @pytest.mark.slow
-def test_the_answer_is_the_best_gait_of_finite_size_and_a_better_one_that_shrank_is_kept_beside_it(tmp_path):
+def test_the_answer_is_the_best_gait_of_finite_size_and_a_better_one_that_shrank_is_kept_beside_it(
+    tmp_path,
+):
     solution = solve(UNEQUAL)
     assert solution.status == "solved"
     assert not on_speed_floor(solution.problem, solution.gait)
@@ -39,7 +44,11 @@ def test_the_answer_is_the_best_gait_of_finite_size_and_a_better_one_that_shrank
     assert again.message == solution.message
     assert again.standing == solution.standing
     # no distinct gait is told twice, and none of finite size is better than the one that is given
-    finite = [other.value for other in again.others if swing(other.gait) > 9 and other.delta == solution.problem.delta]
+    finite = [
+        other.value
+        for other in again.others
+        if swing(other.gait) > 9 and other.delta == solution.problem.delta
+    ]
     assert max(finite) == pytest.approx(solution.value, rel=1e-3)
 
 
@@ -58,22 +67,37 @@ def swing(gait):
     ids=["all gaits met shrink", "one does not, and is not the best of its size"],
 )
 def test_where_gaits_shrink_the_search_goes_on_among_those_that_a_person_sees_move(body, symmetry):
-    problem = Problem("robot", body=body, gait=Harmonic(2, symmetry), delta=1e-3, intervals=12, **WITHIN)
+    problem = Problem(
+        "robot", body=body, gait=Harmonic(2, symmetry), delta=1e-3, intervals=12, **WITHIN
+    )
     optima = explore.explore(problem, 1).optima
     assert swing(optima[0].gait) < 9
     large = [optimum for optimum in optima if swing(optimum.gait) >= 9]
     assert large
     kept_large = large[0].problem.smallest_shape_speed
     assert large[0].gait.shape_speed == pytest.approx(kept_large, rel=1e-3)
-    assert kept_large == pytest.approx(min((other.gait.shape_speed for other in large[1:]), default=0.5), rel=1e-3)
+    assert kept_large == pytest.approx(
+        min((other.gait.shape_speed for other in large[1:]), default=0.5), rel=1e-3
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("feet", "least"), [(1, 1.666), (0, 1.192)], ids=["feet", "lying"])
-def test_four_links_whose_twitch_is_best_get_a_gait_that_one_sees_and_that_is_as_good_as_other_known_ones(feet, least):
-    """On feet the best bilateral gait, which the class contains, has 1.666; lying the fastest for its path has 1.192."""
+def test_four_links_whose_twitch_is_best_get_a_gait_that_one_sees_and_that_is_as_good_as_other_known_ones(
+    feet, least
+):
+    """On feet the best bilateral gait, which the class contains, has 1.666; lying the fastest for
+    its path has 1.192."""
     friction = Friction(0.3, 0.3, 0.3)
-    solution = solve(Problem("robot", body=Chain(FOUR, feet=feet), friction=friction, gait=Harmonic(2, "none"), **WITHIN))
+    solution = solve(
+        Problem(
+            "robot",
+            body=Chain(FOUR, feet=feet),
+            friction=friction,
+            gait=Harmonic(2, "none"),
+            **WITHIN,
+        )
+    )
     assert solution.status == "solved"
     assert solution.value > least
     assert solution.distance > 0.02
@@ -112,7 +136,9 @@ def test_the_answer_does_not_depend_on_what_the_search_is_given(changed, starts)
 def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch, violation, kept):
     """What breaks the rows of its class may have any value."""
     converged = explore.converged
-    monkeypatch.setattr(explore, "converged", lambda *arguments: replace(converged(*arguments), violation=violation))
+    monkeypatch.setattr(
+        explore, "converged", lambda *arguments: replace(converged(*arguments), violation=violation)
+    )
     problem = Problem("one_start", gait=Harmonic(1, "bilateral"))
     known, tried = candidates(problem, 1, lambda: True, ALONE)
     assert tried == 1
@@ -120,9 +146,12 @@ def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch
 
 
 def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkeypatch):
-    """However good it is: links that pass through each other as delta falls went on to be refined on ten thousand intervals."""
+    """However good it is: links that pass through each other as delta falls went on to be refined
+    on ten thousand intervals."""
     followed = explore._followed
-    monkeypatch.setattr(explore, "_followed", lambda *given: replace_keeping_space(followed(*given), violation=0.5))
+    monkeypatch.setattr(
+        explore, "_followed", lambda *given: replace_keeping_space(followed(*given), violation=0.5)
+    )
     with pytest.raises(NotConvergedError, match="no gait could be followed"):
         explore.explore(Problem("broken", gait=Harmonic(1, "bilateral")), 2, lambda: True)
 
@@ -144,26 +173,33 @@ def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, coun
     def follow(problem, gait, deltas, known, *, hop=False):
         number = next(numbers)
         if number in better:
-            found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem)
+            found = SimpleNamespace(
+                objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem
+            )
             known[-1].append(explore.Candidate(found))
 
     monkeypatch.setattr(explore, "_follow", follow)
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
-    found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, ALONE)
+    found, number = candidates(
+        Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, ALONE
+    )
     assert number == tried
     assert found[0].optimum.objective == -max(better.values())
 
 
 def test_more_starts_go_wherever_fewer_do(monkeypatch):
-    """New starts and hops take turns, and what a hop begins from depends on what came before alone."""
+    """New starts and hops take turns, and what a hop begins from depends on what came before
+    alone."""
     begun = {}
 
     def follow(problem, gait, deltas, known, *, hop=False):
         number = len(begun)
         begun[number] = (gait, len(deltas))
         gait = ellipse(0, 1.0, 0.1 * number)
-        found = SimpleNamespace(objective=-1.0 if number == 0 else -2.0, gait=gait, delta=1.0, problem=problem)
+        found = SimpleNamespace(
+            objective=-1.0 if number == 0 else -2.0, gait=gait, delta=1.0, problem=problem
+        )
         known[-1].append(explore.Candidate(found))
 
     monkeypatch.setattr(explore, "_follow", follow)
@@ -203,12 +239,16 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
         "as many as were asked for",
     ],
 )
-def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(monkeypatch, asked, meeting, froude, tried):
+def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(
+    monkeypatch, asked, meeting, froude, tried
+):
     numbers = itertools.count()
 
     def follow(problem, gait, deltas, known, *, hop=False):
         if not known[-1]:
-            found = SimpleNamespace(objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem)
+            found = SimpleNamespace(
+                objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem
+            )
             known[-1].append(explore.Candidate(found))
         if next(numbers) in meeting:
             known[-1][0].joined(hop=hop)
@@ -229,22 +269,40 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(monkeypatc
         ([(1.0, 0.9), (0.99, 0.8), (0.98, 0.7), (0.97, 1.0)], [1.0, 0.99, 0.98]),
         ([(1.0, 0.9), (0.99, 0.9), (0.98, 0.8), (0.97, 1.0)], [1.0, 0.99, 0.98, 0.97]),
     ],
-    ids=["promises are kept", "the best one promised too much", "and less than the others do", "three", "two are one"],
+    ids=[
+        "promises are kept",
+        "the best one promised too much",
+        "and less than the others do",
+        "three",
+        "two are one",
+    ],
 )
-def test_gaits_are_followed_until_three_have_come_to_different_ones(monkeypatch, promised_and_kept, followed):
+def test_gaits_are_followed_until_three_have_come_to_different_ones(
+    monkeypatch, promised_and_kept, followed
+):
     ends, tried = dict(promised_and_kept), []
 
     def end(problem, optimum):
         tried.append(optimum.value)
-        return SimpleNamespace(objective=-ends[optimum.value], violation=0.0, gait=None, delta=1e-4, history=())
+        return SimpleNamespace(
+            objective=-ends[optimum.value], violation=0.0, gait=None, delta=1e-4, history=()
+        )
 
     monkeypatch.setattr(explore, "_followed", end)
     monkeypatch.setattr(explore, "is_finite", lambda optimum: True)
-    monkeypatch.setattr(explore, "same_gait", lambda problem, one, other: one.objective == other.objective)
+    monkeypatch.setattr(
+        explore, "same_gait", lambda problem, one, other: one.objective == other.objective
+    )
     monkeypatch.setattr(explore, "space_near", lambda problem, gait: (None, None))
-    monkeypatch.setattr(explore, "converged", lambda *at: SimpleNamespace(after=lambda *of: SimpleNamespace(objective=0.0)))
+    monkeypatch.setattr(
+        explore,
+        "converged",
+        lambda *at: SimpleNamespace(after=lambda *of: SimpleNamespace(objective=0.0)),
+    )
     monkeypatch.setattr(explore, "_best", lambda optima: None)
-    known = [explore.Candidate(SimpleNamespace(value=value, history=()), dry=-value) for value in ends]
+    known = [
+        explore.Candidate(SimpleNamespace(value=value, history=()), dry=-value) for value in ends
+    ]
     explore._followed_to_the_end(UNEQUAL, known, lambda: True, ALONE)
     assert tried == followed
 
@@ -265,9 +323,17 @@ def certified(value, holds=True, finite=True):
         ([(0.7, True), (0.9, False), (0.8, True)], 3),
         ([(1.0, False), (0.9, False), (0.8, False), (0.7, True)], 3),
     ],
-    ids=["the best", "the best certified", "the best once refined", "both", "none of the first three"],
+    ids=[
+        "the best",
+        "the best certified",
+        "the best once refined",
+        "both",
+        "none of the first three",
+    ],
 )
-def test_gaits_are_solved_for_until_a_certificate_holds_and_no_other_promises_more(monkeypatch, ends, solved_for):
+def test_gaits_are_solved_for_until_a_certificate_holds_and_no_other_promises_more(
+    monkeypatch, ends, solved_for
+):
     """Gaits promise 1, 0.9, 0.8, 0.7 before their meshes are refined."""
     asked = []
 
@@ -290,38 +356,71 @@ def test_a_gait_of_finite_size_that_shrinks_after_all_makes_room_for_the_next_on
     assert [each.answer.value for each in found] == [0.5, 0.4]
 
 
-def test_where_no_certificate_holds_gaits_that_were_left_are_followed_and_the_best_of_them_is_the_answer(monkeypatch):
-    """The first three of all followed fail; what comes of others is another gait, at the final delta."""
-    problem, asked, finished = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2), [], stages.finished
+def test_where_no_certificate_holds_gaits_that_were_left_are_followed_and_the_best_of_them_is_the_answer(
+    monkeypatch,
+):
+    """The first three of all followed fail; what comes of others is another gait, at the final
+    delta."""
+    problem, asked, finished = (
+        Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2),
+        [],
+        stages.finished,
+    )
     explored = explore.explore(problem, 6)
 
     def failing(optimum):
         found = finished(optimum)
         asked.append(optimum)
-        return found if len(asked) > len(explored.optima) else found._replace(failure="it was told to")
+        return (
+            found if len(asked) > len(explored.optima) else found._replace(failure="it was told to")
+        )
 
     monkeypatch.setattr(stages, "finished", failing)
-    monkeypatch.setattr(stages.Certified, "holds", property(lambda found: found.answer.optimal and not found.failure))
+    monkeypatch.setattr(
+        stages.Certified,
+        "holds",
+        property(lambda found: found.answer.optimal and not found.failure),
+    )
     solution = solve(problem, 6)
     assert len(asked) > len(explored.optima) > 0
-    assert solution.value == pytest.approx(max(other.value for other in asked[len(explored.optima) :]), rel=1e-2)
-    assert not any(explore.same_gait(problem, one, other) for one, other in itertools.combinations(asked, 2))
+    assert solution.value == pytest.approx(
+        max(other.value for other in asked[len(explored.optima) :]), rel=1e-2
+    )
+    assert not any(
+        explore.same_gait(problem, one, other) for one, other in itertools.combinations(asked, 2)
+    )
     assert explore.followed_further(problem, explored, lambda: False) == ()
 
 
 @pytest.mark.slow
 def test_a_gait_that_jumps_between_balanced_motions_gives_way_to_one_that_certifies():
-    """Three links on a foot between two wheels: most of what promises well turns in jumps, whose phase no mesh decides."""
-    wheels = [Wheel(link, place, rolling=0.056, weight=0.2872234) for link, place in ((0, 0.24857), (2, 0.75143))]
+    """Three links on a foot between two wheels: most of what promises well turns in jumps, whose
+    phase no mesh decides."""
+    wheels = [
+        Wheel(link, place, rolling=0.056, weight=0.2872234)
+        for link, place in ((0, 0.24857), (2, 0.75143))
+    ]
     feet = (wheels[0], Foot(1, 0.5, weight=1 - 2 * 0.2872234), wheels[1])
-    solution = solve(Problem("rolls", body=Chain(feet=feet), friction=Friction(mu_t=0.5488), gait=Harmonic(1, "antipodal")))
+    solution = solve(
+        Problem(
+            "rolls",
+            body=Chain(feet=feet),
+            friction=Friction(mu_t=0.5488),
+            gait=Harmonic(1, "antipodal"),
+        )
+    )
     assert solution.status == "solved"
     assert solution.value > 0.69
 
 
 @pytest.mark.parametrize(
     ("failed", "lowered"),
-    [(["delta influence"], True), (["mesh error"], False), (["delta influence", "mesh error"], False), ([], False)],
+    [
+        (["delta influence"], True),
+        (["mesh error"], False),
+        (["delta influence", "mesh error"], False),
+        ([], False),
+    ],
 )
 def test_delta_is_lowered_where_nothing_else_fails(failed, lowered):
     checks = [SimpleNamespace(name=name) for name in failed]

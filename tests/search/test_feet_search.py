@@ -1,4 +1,5 @@
-"""Bodies on feet through the whole search: certified, kept, drawn; and what feet cannot do yet is refused in a sentence."""
+"""Bodies on feet through the whole search: certified, kept, drawn; and what feet cannot do yet is
+refused in a sentence."""
 
 import json
 
@@ -7,7 +8,20 @@ import pytest
 from scipy.optimize import root
 from shared.instants import random_instants
 
-from colloc import Chain, Elliptic, Foot, Friction, Harmonic, Polygon, Problem, ProblemError, Wheel, load, save, solve_balance
+from colloc import (
+    Chain,
+    Elliptic,
+    Foot,
+    Friction,
+    Harmonic,
+    Polygon,
+    Problem,
+    ProblemError,
+    Wheel,
+    load,
+    save,
+    solve_balance,
+)
 from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
@@ -21,7 +35,8 @@ from colloc.verification.dry_balance import dry_balance
 from colloc.verification.replay import replay
 
 KNOWN = Fourier([-1.287, 1.287], [[0.687], [-0.687]], [[1.206], [1.206]])
-"""A gait of three links on a foot each that a program of its own has found, whose efficiency there is .676."""
+"""A gait of three links on a foot each that a program of its own has found, whose efficiency there
+is .676."""
 PAPER = Fourier([0.0, 0.0], [[2.859], [-2.859]], [[1.302], [1.302]])
 """The paper's best gait on a line (problems/three_link.py)."""
 
@@ -40,9 +55,13 @@ def test_three_links_on_a_foot_each_go_three_times_as_far_for_their_work_as_on_a
 
 
 def played(gait, feet, delta, count=300):
-    """Distance over work of three equal links of equal friction by a program of its own: feet as complex numbers in the frame
-    of the tail, the balance by SciPy, the path by the midpoint rule."""
-    angles, rates = gait.angles((np.arange(count) + 0.5) / count), gait.rates((np.arange(count) + 0.5) / count)
+    """Distance over work of three equal links of equal friction by a program of its own: feet as
+    complex numbers in the frame of the tail, the balance by SciPy, the path by the midpoint
+    rule."""
+    angles, rates = (
+        gait.angles((np.arange(count) + 0.5) / count),
+        gait.rates((np.arange(count) + 0.5) / count),
+    )
     places = (np.arange(feet) + 0.5) / feet
     z, heading, way, work = np.zeros(3), 0.0, 0.0, 0.0
     for q, r in zip(angles.T, rates.T, strict=True):
@@ -51,8 +70,13 @@ def played(gait, feet, delta, count=300):
 
         def motion(z, step=step, turn=turn):
             w = 1j * (z[2] + turn) * step
-            ends = (origin + np.concatenate([[0.0], np.cumsum(a)[:-1]]) for origin, a in ((0.0, step), (z[0] + 1j * z[1], w)))
-            at, velocity = (end + np.outer(places, along) for end, along in zip(ends, (step, w), strict=True))
+            ends = (
+                origin + np.concatenate([[0.0], np.cumsum(a)[:-1]])
+                for origin, a in ((0.0, step), (z[0] + 1j * z[1], w))
+            )
+            at, velocity = (
+                end + np.outer(places, along) for end, along in zip(ends, (step, w), strict=True)
+            )
             return at, velocity, -velocity / np.sqrt(abs(velocity) ** 2 + delta**2) / (3 * feet)
 
         def balance(z, motion=motion):
@@ -72,7 +96,9 @@ def played(gait, feet, delta, count=300):
 
 @pytest.mark.parametrize(("gait", "feet"), [(KNOWN, 1), (PAPER, 1), (PAPER, 2), (PAPER, 4)])
 def test_a_replay_is_that_of_a_program_of_its_own(gait, feet):
-    assert replay(Chain(feet=feet), Friction(), gait, 1e-1).efficiency == pytest.approx(played(gait, feet, 1e-1), rel=2e-3)
+    assert replay(Chain(feet=feet), Friction(), gait, 1e-1).efficiency == pytest.approx(
+        played(gait, feet, 1e-1), rel=2e-3
+    )
 
 
 def test_gaits_on_more_and_more_feet_do_what_they_do_on_a_line():
@@ -108,9 +134,13 @@ def test_a_film_shows_which_feet_hold(on_feet):
 
 
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():
-    """Wheels alone: the problem's friction acts nowhere. The search sees it in units of its own size."""
+    """Wheels alone: the problem's friction acts nowhere. The search sees it in units of its own
+    size."""
     wheels = Chain(feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(3)))
-    one, other = (Problem("wheels", body=wheels, friction=own) for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9)))
+    one, other = (
+        Problem("wheels", body=wheels, friction=own)
+        for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9))
+    )
     assert one.law == other.law
     scaled = control_problem(other)
     law = scaled.dynamics.law
@@ -119,11 +149,15 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     assert Problem.from_dict(other.with_(friction=law).to_dict()).law == law
     angles, rates = random_instants(20)
     z, same, again = (
-        solve_balance(wheels, own, angles, rates, 1e-3).z for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9), law)
+        solve_balance(wheels, own, angles, rates, 1e-3).z
+        for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9), law)
     )
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
-    stated, resolved = (replay(wheels, law, KNOWN, 1e-2, tolerance=1e-4, instants=200) for law in (Friction(), one.law))
+    stated, resolved = (
+        replay(wheels, law, KNOWN, 1e-2, tolerance=1e-4, instants=200)
+        for law in (Friction(), one.law)
+    )
     assert stated.work == resolved.work
 
 
@@ -133,7 +167,8 @@ def test_a_certificate_says_how_far_the_feet_press_beside_the_centre_of_mass(sol
     angles = worm.gait.angles(np.linspace(0, 1, 2001))
     assert statics.value == pytest.approx(worm.problem.body.imbalance(angles).max(), rel=1e-3)
     assert statics.value < worm.problem.body.largest_imbalance
-    json.dumps(worm.certificate.facts(), allow_nan=False)  # every number, allowed ones too, is one of JSON
+    # every number, allowed ones too, is one of JSON
+    json.dumps(worm.certificate.facts(), allow_nan=False)
     assert "beside the centre of mass" in worm.problem.body.describe()
 
 
@@ -147,7 +182,8 @@ def test_the_way_from_the_centre_of_mass_is_largest_where_all_links_pull_one_way
 
 
 def test_a_gait_of_no_size_pays_no_more_than_the_least_friction_on_one_foot_a_link_only():
-    """Two feet hold while the third is swung: 1/min(mu), which no gait exceeds. More feet to a link are dragged along."""
+    """Two feet hold while the third is swung: 1/min(mu), which no gait exceeds. More feet to a link
+    are dragged along."""
     folded, straight = np.array([2.5, -2.5]), np.zeros(2)
     assert 1 - 1e-4 < small_gait(Chain(feet=1), Friction(), folded).efficiency <= 1
     assert 1 - 1e-3 < small_gait(Chain(feet=1), Friction(), straight).efficiency <= 1
@@ -156,8 +192,8 @@ def test_a_gait_of_no_size_pays_no_more_than_the_least_friction_on_one_foot_a_li
 
 
 def test_at_a_zigzag_every_foot_steps_the_same_way_while_two_hold_with_no_smoothing():
-    """Three steps bring the joints back, nothing turns, and all that is paid for travels: no potential has a bound below
-    1/min(mu)."""
+    """Three steps bring the joints back, nothing turns, and all that is paid for travels: no
+    potential has a bound below 1/min(mu)."""
     body, rates = Chain(feet=1), np.array([[-1.0, 1, 0], [0, 1, -1]])
     angles = np.array([[2.2] * 3, [-2.2] * 3])
     found, posture = dry_balance(body, Friction(), angles, rates), body.posture(angles)
@@ -171,10 +207,14 @@ def test_at_a_zigzag_every_foot_steps_the_same_way_while_two_hold_with_no_smooth
 def test_what_feet_cannot_do_yet_is_refused():
     with pytest.raises(ProblemError, match="on feet no upper bound"):
         Domain(Chain(feet=1), Friction(mu_t=2, mu_f=1, mu_b=1), 2.0)
-    assert "on feet no upper bound" in refusal(Problem("bound", body=Chain(feet=1), friction=Friction(mu_t=2, mu_f=1, mu_b=1)))
+    assert "on feet no upper bound" in refusal(
+        Problem("bound", body=Chain(feet=1), friction=Friction(mu_t=2, mu_f=1, mu_b=1))
+    )
     assert refusal(Problem("bound", body=Chain(feet=1))) == ""
     with pytest.raises(ProblemError, match="read the same from both ends"):
-        Problem("half", body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=Harmonic(1, "bilateral"))
+        Problem(
+            "half", body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=Harmonic(1, "bilateral")
+        )
 
 
 def test_init_writes_a_problem_on_feet(tmp_path, capsys):
@@ -189,27 +229,39 @@ def test_init_writes_a_problem_on_feet(tmp_path, capsys):
 
 
 def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, three_link):
-    """The outer feet hold in turns, for a good part of the period each; a body that lies has none."""
+    """The outer feet hold in turns, for a good part of the period each; a body that lies has
+    none."""
     shares = on_feet.share_held
-    np.testing.assert_allclose(shares, frames(on_feet, 1001).holding[:, :-1].mean(axis=1), atol=3e-3)
+    np.testing.assert_allclose(
+        shares, frames(on_feet, 1001).holding[:, :-1].mean(axis=1), atol=3e-3
+    )
     assert 0.25 < shares[[0, 2]].min() < shares[[0, 2]].max() < 0.5
     assert any("feet hold" in line for line in summary_lines(on_feet, None))
     # a foot holds where friction is less than 3 / sqrt(10) of the most it can be
     body, motion = on_feet.problem.body, on_feet.sample(np.linspace(0, 1, 300))
     at = on_feet.problem.law, motion.angles, motion.rates, on_feet.delta_per_period, motion.z
-    used = np.hypot(*body.rubbing(*at)[1]) / np.array([foot.weight for foot in body.standing_on])[:, None]
+    used = (
+        np.hypot(*body.rubbing(*at)[1])
+        / np.array([foot.weight for foot in body.standing_on])[:, None]
+    )
     np.testing.assert_array_equal(on_feet.holding(motion), used < 3 / np.sqrt(10))
     assert three_link.share_held.size == 0
     assert not any("feet hold" in line for line in summary_lines(three_link, None))
 
 
 def test_along_a_path_too_a_foot_holds_where_friction_is_less_than_3_over_root_10_of_the_most():
-    """There the speed delta is stated for paths run through at unit speed, and a period is many times that."""
-    path = Problem("path", ellipse(0.0, 0.8, 0.6), body=Chain(feet=1), gait=Polygon(3, "bilateral"), delta=1e-2)
+    """There the speed delta is stated for paths run through at unit speed, and a period is many
+    times that."""
+    path = Problem(
+        "path", ellipse(0.0, 0.8, 0.6), body=Chain(feet=1), gait=Polygon(3, "bilateral"), delta=1e-2
+    )
     found = solve(path, 1, seconds=1e-3)
     assert found.delta_per_period > 2 * found.answer.delta
     body, motion = path.body, found.sample(np.linspace(0, 1, 300))
     at = path.law, motion.angles, motion.rates, found.delta_per_period, motion.z
-    used = np.hypot(*body.rubbing(*at)[1]) / np.array([foot.weight for foot in body.standing_on])[:, None]
+    used = (
+        np.hypot(*body.rubbing(*at)[1])
+        / np.array([foot.weight for foot in body.standing_on])[:, None]
+    )
     assert 0 < (used < 3 / np.sqrt(10)).mean() < 1
     np.testing.assert_array_equal(found.holding(motion), used < 3 / np.sqrt(10))

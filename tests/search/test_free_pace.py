@@ -1,4 +1,5 @@
-"""The pace of a gait sought with it, where time is worth something: against fixed paces, and what cannot be asked."""
+"""The pace of a gait sought with it, where time is worth something: against fixed paces, and what
+cannot be asked."""
 
 from dataclasses import replace
 
@@ -19,7 +20,12 @@ SKATING = colloc.Fourier(mean=[2.7, -2.7], cos=[[0.4], [0.0]], sin=[[0.0], [0.3]
 
 
 def problem(froude, **fields):
-    usual = {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "delta": 1e-2, "objective": STANDING_POWER}
+    usual = {
+        "gait": colloc.Harmonic(1, "antipodal"),
+        "guess": ROUND,
+        "delta": 1e-2,
+        "objective": STANDING_POWER,
+    }
     return colloc.Problem("free", froude=froude, **(usual | fields))
 
 
@@ -39,32 +45,48 @@ def test_gradients_are_those_of_differences(objective, mu):
     usual = {"gait": colloc.Harmonic(1), "rotation": None, "friction": colloc.Friction(mu_t=mu)}
     space, v = space_near(problem(colloc.Free(0.01, 1.0), objective=objective, **usual), ROUND)
     program, step = ReducedProgram(space, 1e-2), 1e-5
-    differences = [(program.objective(v + step * e) - program.objective(v - step * e)) / (2 * step) for e in np.eye(v.size)]
-    np.testing.assert_allclose(program.gradient(v), differences, atol=2e-6 * np.abs(differences).max())
+    differences = [
+        (program.objective(v + step * e) - program.objective(v - step * e)) / (2 * step)
+        for e in np.eye(v.size)
+    ]
+    np.testing.assert_allclose(
+        program.gradient(v), differences, atol=2e-6 * np.abs(differences).max()
+    )
 
 
 def test_the_best_pace_is_that_of_the_best_fixed_one():
-    """Between slow, where standing takes most, and fast, where inertia does; and by the envelope theorem the value of the best
-    gait is stationary in the pace."""
+    """Between slow, where standing takes most, and fast, where inertia does; and by the envelope
+    theorem the value of the best gait is stationary in the pace."""
     found = best(problem(colloc.Free(0.01, 1.0)))
     froude = played(found)
     assert found.optimal
     assert 0.011 < froude < 0.9
-    values = [best(problem(froude * factor, guess=found.gait)).value for factor in (0.8, 1 / 1.01, 1.0, 1.01, 1.25)]
+    values = [
+        best(problem(froude * factor, guess=found.gait)).value
+        for factor in (0.8, 1 / 1.01, 1.0, 1.01, 1.25)
+    ]
     assert values[2] == pytest.approx(found.value, rel=1e-9)
     assert values[2] > max(values) - 1e-12
     assert abs(values[3] - values[1]) / (2e-2 * values[2]) < 1e-3
 
 
 def test_inertia_alone_decides_the_pace_of_the_efficiency_where_sideways_friction_is_small():
-    """Slower and faster the same gait does less for its work; so nothing has to say what time is worth."""
-    law = {"friction": colloc.Friction(mu_t=0.1), "gait": colloc.Harmonic(1), "rotation": None, "intervals": 20}
+    """Slower and faster the same gait does less for its work; so nothing has to say what time is
+    worth."""
+    law = {
+        "friction": colloc.Friction(mu_t=0.1),
+        "gait": colloc.Harmonic(1),
+        "rotation": None,
+        "intervals": 20,
+    }
     found = best(problem(colloc.Free(0.02, 3.0), objective="efficiency", guess=SKATING, **law))
     froude = played(found)
     assert found.optimal
     assert 0.03 < froude < 2.5
     at = [
-        colloc.inertial_motion(colloc.Chain(), law["friction"], found.gait, 1e-2, froude * by).efficiency
+        colloc.inertial_motion(
+            colloc.Chain(), law["friction"], found.gait, 1e-2, froude * by
+        ).efficiency
         for by in (0.7, 1, 1.4)
     ]
     assert at[1] > max(at[0], at[2])
@@ -73,7 +95,9 @@ def test_inertia_alone_decides_the_pace_of_the_efficiency_where_sideways_frictio
 def test_it_is_certified_kept_and_told(tmp_path):
     found = colloc.solve(problem(colloc.Free(0.01, 1.0), mesh_tolerance=2e-4), starts=1)
     assert found.status == "solved", found.message
-    assert found.answer.program == found.problem.formulation, "IPOPT confirms it, with the pace among its variables"
+    assert found.answer.program == found.problem.formulation, (
+        "IPOPT confirms it, with the pace among its variables"
+    )
     kept = colloc.load(colloc.save(found, tmp_path / "free.h5"))
     assert kept.problem.froude == colloc.Free(0.01, 1.0)
     assert (kept.froude, kept.problem.hash) == (found.froude, found.problem.hash)
@@ -91,7 +115,9 @@ def test_a_gait_is_played_at_the_pace_whose_period_it_says():
     space, v = space_near(problem(np.exp(-1.6)), ROUND)
     fixed = ReducedProgram(space, 1e-2).period(v)
     assert free["period"] == pytest.approx(np.exp(0.8))
-    assert (free["distance"], free["work"]) == pytest.approx((fixed["distance"], fixed["work"]), rel=1e-9)
+    assert (free["distance"], free["work"]) == pytest.approx(
+        (fixed["distance"], fixed["work"]), rel=1e-9
+    )
 
 
 def test_a_range_of_one_pace_is_that_pace():
@@ -102,7 +128,13 @@ def test_a_range_of_one_pace_is_that_pace():
 
 
 def test_speed_under_a_limit_of_power_takes_all_of_it():
-    limited = best(problem(colloc.Free(0.001, 1.0), objective="distance / period", at_least={"0.1 - work / period": 0.0}))
+    limited = best(
+        problem(
+            colloc.Free(0.001, 1.0),
+            objective="distance / period",
+            at_least={"0.1 - work / period": 0.0},
+        )
+    )
     period = limited.program().period(limited.v)
     assert limited.optimal
     assert period["work"] / period["period"] == pytest.approx(0.1, rel=1e-6)

@@ -1,4 +1,5 @@
-"""Only the ratios of friction coefficients matter: their size is a unit, for solves and certificates alike."""
+"""Only the ratios of friction coefficients matter: their size is a unit, for solves and
+certificates alike."""
 
 import numpy as np
 import pytest
@@ -15,7 +16,12 @@ from tests.shared.laws import coulomb
 
 
 def stated(*mu, **changes):
-    settings = {"gait": Harmonic(1, "bilateral"), "intervals": 24, "delta": 1e-2, "mesh_tolerance": 1e-4} | changes
+    settings = {
+        "gait": Harmonic(1, "bilateral"),
+        "intervals": 24,
+        "delta": 1e-2,
+        "mesh_tolerance": 1e-4,
+    } | changes
     return Problem("unit", ellipse(0.3, 1.0, 0.5), friction=coulomb(*mu), **settings)
 
 
@@ -50,7 +56,9 @@ def test_coefficients_of_any_size_are_solved_and_certified(usual, size):
     solution = solve(stated(size, size, size), 1, progress=seen.append)
     assert solution.status == "solved"
     assert solution.efficiency * size == pytest.approx(usual.efficiency, rel=1e-9)
-    assert solution.certificate.efficiency * size == pytest.approx(usual.certificate.efficiency, rel=1e-6)
+    assert solution.certificate.efficiency * size == pytest.approx(
+        usual.certificate.efficiency, rel=1e-6
+    )
     assert solution.work / size == pytest.approx(usual.work, rel=1e-9)
     np.testing.assert_allclose(solution.gait.cos, usual.gait.cos, rtol=1e-6)
     assert seen[-1].best.value == pytest.approx(solution.value, rel=1e-4)
@@ -59,7 +67,11 @@ def test_coefficients_of_any_size_are_solved_and_certified(usual, size):
 
 
 def test_what_must_be_reached_is_stated_in_units_of_friction_too():
-    light = Problem("light", friction=Friction(1e-3, 1e-3, 1e-3), at_least={"efficiency": 150.0, "distance": 0.2})
+    light = Problem(
+        "light",
+        friction=Friction(1e-3, 1e-3, 1e-3),
+        at_least={"efficiency": 150.0, "distance": 0.2},
+    )
     scaled = control_problem(light)
     assert (scaled.unit, scaled.dynamics.law.mu_t) == (1e-3, 1.0)
     assert [value for _, value in scaled.aims.at_least] == pytest.approx([0.15, 0.2])
@@ -69,10 +81,13 @@ def test_what_must_be_reached_is_stated_in_units_of_friction_too():
 
 
 def test_a_pace_counts_by_its_ratio_to_friction():
-    """Friction drives the momenta: with a tenth of it, at a tenth of the Froude number, a gait moves as it did."""
+    """Friction drives the momenta: with a tenth of it, at a tenth of the Froude number, a gait
+    moves as it did."""
     periods = []
     for size in (1.0, 0.1):
-        space, v = space_near(stated(size, size, size, froude=0.05 * size, gait=Harmonic(1)), ellipse(0.3, 1.0, 0.5))
+        space, v = space_near(
+            stated(size, size, size, froude=0.05 * size, gait=Harmonic(1)), ellipse(0.3, 1.0, 0.5)
+        )
         periods.append(ReducedProgram(space, 1e-2).period(v))
     usual, light = periods
     assert usual["distance"] > 1e-3

@@ -1,4 +1,5 @@
-"""Other processes compute ahead what a search asks for: its answer does not depend on them, nor on what becomes of them."""
+"""Other processes compute ahead what a search asks for: its answer does not depend on them, nor on
+what becomes of them."""
 
 import time
 from types import SimpleNamespace
@@ -12,14 +13,25 @@ from colloc.search import helpers
 from colloc.search.explore import explore, sketched
 from colloc.search.run import Run
 
-PROBLEM = Problem("quick", gait=Harmonic(1, "none"), delta=1e-2, delta_start=0.1, intervals=12, mesh_tolerance=1e-3)
-DIES = "import sys; print('{}', flush=True); next(line for line in sys.stdin.buffer if b'colloc.search.explore' in line)"
+PROBLEM = Problem(
+    "quick",
+    gait=Harmonic(1, "none"),
+    delta=1e-2,
+    delta_start=0.1,
+    intervals=12,
+    mesh_tolerance=1e-3,
+)
+DIES = (
+    "import sys; print('{}', flush=True); next(line for line in sys.stdin.buffer if "
+    "b'colloc.search.explore' in line)"
+)
 TORN = f"{DIES}; print('{{', end='', flush=True)"
 
 
 @pytest.fixture
 def learnt(monkeypatch):
-    """Processes are begun at once; of each task of theirs how much it has found, and the run that learnt it."""
+    """Processes are begun at once; of each task of theirs how much it has found, and the run that
+    learnt it."""
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     monkeypatch.setattr(helpers, "_WORTH", 0.0)
     learn, numbers = Run.learn, []
@@ -85,8 +97,12 @@ def test_none_is_begun_where_a_stage_is_called_by_itself(learnt):
 
 
 @pytest.mark.parametrize("name", ["random.py", "sitecustomize.py"])
-def test_files_of_the_folder_are_not_run_and_what_python_prints_as_it_starts_is_no_answer(learnt, tmp_path, monkeypatch, name):
-    (tmp_path / name).write_text("print('hello\\n' * 3); open('ran', 'w').close()", encoding="utf-8")
+def test_files_of_the_folder_are_not_run_and_what_python_prints_as_it_starts_is_no_answer(
+    learnt, tmp_path, monkeypatch, name
+):
+    (tmp_path / name).write_text(
+        "print('hello\\n' * 3); open('ran', 'w').close()", encoding="utf-8"
+    )
     monkeypatch.chdir(tmp_path)
     if name == "sitecustomize.py":  # which Python runs, wherever it was told to look for it
         monkeypatch.setenv("PYTHONPATH", str(tmp_path))

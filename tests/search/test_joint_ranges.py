@@ -35,16 +35,23 @@ def test_the_answer_keeps_both_sides_and_uses_one(one_sided, tmp_path):
 
 
 def test_it_lies_between_what_the_narrow_and_the_wide_limit_allow(one_sided):
-    narrow, wide = (solve(problem(limit, Harmonic(1, "bilateral")), starts=4) for limit in (0.6, 1.5))
+    narrow, wide = (
+        solve(problem(limit, Harmonic(1, "bilateral")), starts=4) for limit in (0.6, 1.5)
+    )
     assert narrow.efficiency < one_sided.efficiency < wide.efficiency
 
 
 def test_mirrored_ranges_give_the_mirrored_gait(one_sided):
-    mirrored = solve(problem(tuple((-high, -low) for low, high in ONE_SIDED), Harmonic(1, "bilateral")), starts=4)
+    mirrored = solve(
+        problem(tuple((-high, -low) for low, high in ONE_SIDED), Harmonic(1, "bilateral")), starts=4
+    )
     assert mirrored.efficiency == pytest.approx(one_sided.efficiency, rel=1e-6)
 
 
-@pytest.mark.parametrize("gait", [pytest.param(FreePath(2.0, "bilateral"), marks=pytest.mark.slow), Polygon(3, "bilateral")])
+@pytest.mark.parametrize(
+    "gait",
+    [pytest.param(FreePath(2.0, "bilateral"), marks=pytest.mark.slow), Polygon(3, "bilateral")],
+)
 def test_paths_keep_both_sides_use_them_and_mirror(gait):
     aside = Fourier([0.5, -0.5], [[0.9], [-0.9]], [[0.5], [0.5]])
     stated = Problem("paths", gait=gait, delta=1e-2, mesh_tolerance=1e-2, smallest_shape_speed=0.4)
@@ -64,7 +71,9 @@ def test_a_range_that_is_even_is_a_limit_and_one_may_go_to_half_a_turn():
 
 
 def test_shapes_are_held_against_one_limit_on_either_side():
-    stretched, limit = under_one_limit(np.array([[-0.6, 1.5, 0.75], [0.5, -0.3, 0.0]]), ((-0.6, 1.5), 0.5))
+    stretched, limit = under_one_limit(
+        np.array([[-0.6, 1.5, 0.75], [0.5, -0.3, 0.0]]), ((-0.6, 1.5), 0.5)
+    )
     assert limit == 1.5
     np.testing.assert_allclose(stretched, [[-1.5, 1.5, 0.75], [1.5, -0.9, 0.0]])
 

@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import BSpline, Chain, FreePath, Friction, Harmonic, ModalBody, Problem, ProblemError, Serpenoid, Wave
+from colloc import (
+    BSpline,
+    Chain,
+    FreePath,
+    Friction,
+    Harmonic,
+    ModalBody,
+    Problem,
+    ProblemError,
+    Serpenoid,
+    Wave,
+)
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
@@ -24,13 +35,19 @@ def slow():
 
 
 def test_an_ellipse_is_as_large_as_the_limit_lets_it(slow):
-    """One harmonic of amplitude a is at most 2 pi a fast: the bound is one on (A1, B1), here the circle of radius 12 / 2 pi."""
+    """One harmonic of amplitude a is at most 2 pi a fast: the bound is one on (A1, B1), here the
+    circle of radius 12 / 2 pi."""
     assert slow.status == "solved"
-    assert np.hypot(slow.gait.cos[0, 0], slow.gait.sin[0, 0]) == pytest.approx(12 / (2 * np.pi), rel=1e-6)
+    assert np.hypot(slow.gait.cos[0, 0], slow.gait.sin[0, 0]) == pytest.approx(
+        12 / (2 * np.pi), rel=1e-6
+    )
 
 
 def test_a_limit_that_nothing_reaches_changes_nothing():
-    free, wide = (solve(Problem("wide", gait=Harmonic(1, "bilateral"), speed_limit=s), starts=1) for s in (None, 20))
+    free, wide = (
+        solve(Problem("wide", gait=Harmonic(1, "bilateral"), speed_limit=s), starts=1)
+        for s in (None, 20)
+    )
     assert wide.efficiency == pytest.approx(free.efficiency, rel=1e-8)
 
 
@@ -39,14 +56,27 @@ def test_a_limit_that_nothing_reaches_changes_nothing():
     [
         (Harmonic(2, "bilateral"), (8.0, 8.0), FAR),
         (BSpline(8, symmetry="bilateral"), 8.0, FAR),
-        (Serpenoid(1), 3.0, {"body": Chain((0.2,) * 5), "friction": Friction(mu_t=3, mu_f=1, mu_b=1)}),
+        (
+            Serpenoid(1),
+            3.0,
+            {"body": Chain((0.2,) * 5), "friction": Friction(mu_t=3, mu_f=1, mu_b=1)},
+        ),
         (Harmonic(1, "antipodal"), 10.0, {"froude": 0.05}),
-        (Harmonic(1), 6.0, {"grade": 0.05, "friction": Friction(mu_t=3, mu_f=1, mu_b=1.5), "objective": "distance"}),
+        (
+            Harmonic(1),
+            6.0,
+            {
+                "grade": 0.05,
+                "friction": Friction(mu_t=3, mu_f=1, mu_b=1.5),
+                "objective": "distance",
+            },
+        ),
     ],
     ids=["harmonics", "splines", "serpenoid", "inertia", "slope"],
 )
 def test_the_fastest_instants_are_as_fast_as_allowed(gait, limit, more):
-    """Also between the points of the mesh, of any class paced by time, and of motions with states."""
+    """Also between the points of the mesh, of any class paced by time, and of motions with
+    states."""
     found = solve(Problem("limited", gait=gait, speed_limit=limit, **more), starts=1)
     assert found.status == "solved"
     share = fastest(found) / np.broadcast_to(limit, found.problem.body.n_joint)
@@ -54,7 +84,8 @@ def test_the_fastest_instants_are_as_fast_as_allowed(gait, limit, more):
 
 
 def test_faster_motors_go_farther():
-    """For friction that does not know the pace, a class that may be paced anyhow gains by every limit that binds."""
+    """For friction that does not know the pace, a class that may be paced anyhow gains by every
+    limit that binds."""
     far = Problem("far", gait=Harmonic(2, "bilateral"), delta=1e-3, **FAR)
     ways = [solve(far.with_(speed_limit=s, guess=None), starts=1).distance for s in (6, 8, 10)]
     assert ways == sorted(ways)
@@ -63,13 +94,24 @@ def test_faster_motors_go_farther():
 
 def test_a_flat_top_that_the_second_round_comes_back_to_is_no_end():
     """Instants that move far make the first round overshoot; the rounds that follow them settle."""
-    stated = Problem("flat", gait=Harmonic(2), speed_limit=(7, 11), objective="distance", delta=1e-2, mesh_tolerance=1e-3)
+    stated = Problem(
+        "flat",
+        gait=Harmonic(2),
+        speed_limit=(7, 11),
+        objective="distance",
+        delta=1e-2,
+        mesh_tolerance=1e-3,
+    )
     assert solve(stated, starts=1).status == "solved"
 
 
 def test_derivatives_of_the_rows_are_those_of_differences():
     problem = Problem(
-        "rows", gait=Serpenoid(2), body=Chain((0.25,) * 4), friction=Friction(mu_t=2, mu_f=1, mu_b=1.5), speed_limit=(5, 6, 7)
+        "rows",
+        gait=Serpenoid(2),
+        body=Chain((0.25,) * 4),
+        friction=Friction(mu_t=2, mu_f=1, mu_b=1.5),
+        speed_limit=(5, 6, 7),
     )
     space, v = space_near(problem, problem.guess)
     program, h = ReducedProgram(space, 1e-2), 1e-6

@@ -1,4 +1,5 @@
-"""Other things than efficiency to be best at: exact derivatives, optima that the replay confirms, and what must be reached."""
+"""Other things than efficiency to be best at: exact derivatives, optima that the replay confirms,
+and what must be reached."""
 
 import numpy as np
 import pytest
@@ -34,22 +35,50 @@ FREE = {"rotation": None, "at_least": {"distance": 0.2, TURNED: 0.01}}
 CASES = {
     "speed": {"gait": Harmonic(2, "none"), "objective": "speed"},
     "turning": {"gait": Harmonic(2, "none"), "objective": "turning", **FREE},
-    "expression": {"gait": Harmonic(1, "antipodal"), "objective": THRIFT, "at_least": {"efficiency": 0.1}},
+    "expression": {
+        "gait": Harmonic(1, "antipodal"),
+        "objective": THRIFT,
+        "at_least": {"efficiency": 0.1},
+    },
     "driven": {"gait": Harmonic(1, "none"), "objective": "driven efficiency"},
-    "driven path": {"gait": FreePath(4.0, "bilateral"), "objective": "distance / (driven_work + length)"},
-    "driven polygon": {"gait": Polygon(4, "none"), "objective": "driven efficiency", "at_least": {"distance / work": 0.0}},
+    "driven path": {
+        "gait": FreePath(4.0, "bilateral"),
+        "objective": "distance / (driven_work + length)",
+    },
+    "driven polygon": {
+        "gait": Polygon(4, "none"),
+        "objective": "driven efficiency",
+        "at_least": {"distance / work": 0.0},
+    },
     "polygon": {"gait": Polygon(4, "none"), "objective": TURNED, **FREE},
     "actuators": {"gait": Harmonic(2, "none"), "torque_limit": 0.05, "power_limit": (0.4, 0.9)},
-    "actuated path": {"gait": FreePath(4.0, "bilateral"), "torque_limit": 0.06, "at_least": {"efficiency": 0.0}},
-    "actuated polygon": {"gait": Polygon(4, "none"), "objective": TURNED, "torque_limit": (0.05, 0.06), **FREE},
-    "bilateral path": {"gait": FreePath(4.0, "bilateral"), "objective": "speed", "at_least": {THRIFT: 0.1}},
+    "actuated path": {
+        "gait": FreePath(4.0, "bilateral"),
+        "torque_limit": 0.06,
+        "at_least": {"efficiency": 0.0},
+    },
+    "actuated polygon": {
+        "gait": Polygon(4, "none"),
+        "objective": TURNED,
+        "torque_limit": (0.05, 0.06),
+        **FREE,
+    },
+    "bilateral path": {
+        "gait": FreePath(4.0, "bilateral"),
+        "objective": "speed",
+        "at_least": {THRIFT: 0.1},
+    },
 }
 SKEW = Fourier([0.5, 0.5], [[1.0], [0.2]], [[0.0], [1.0]])
 DELTA = 0.1
 
 
 def stated(case):
-    usual = {"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10, "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)}
+    usual = {
+        "guess": ellipse(0.1, 1.6, 1.1),
+        "intervals": 10,
+        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    }
     return Problem("p", **(usual | CASES[case]))
 
 
@@ -62,7 +91,8 @@ def test_gradients_of_the_reduced_program_are_those_of_differences(case):
     program.place_rows(v)
     steps = h * np.eye(space.n)
     slopes = [(program.objective(v + e) - program.objective(v - e)) / (2 * h) for e in steps]
-    # balances are solved to 1e-12, so that differences over 2 h know the slope of a value of order 1 to 1e-6
+    # balances are solved to 1e-12, so that differences over 2 h know the slope of a value of order
+    # 1 to 1e-6
     np.testing.assert_allclose(program.gradient(v), slopes, atol=1e-6)
     rows = np.transpose([(program.rows(v + e) - program.rows(v - e)) / (2 * h) for e in steps])
     np.testing.assert_allclose(program.row_slopes(v), rows, atol=2e-6)
@@ -77,7 +107,9 @@ def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
     full = transcribed(problem, space.member(v), space.mesh.edges)
     x = feasible_point(full, space.full_parameters(v), delta)
     found = oracles(full.assembly)
-    p = found.parameter_vector(delta / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]]))
+    p = found.parameter_vector(
+        delta / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]])
+    )
     assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(reduced.objective(v), rel=1e-9)
     g = np.array(found.options["jac_g"](x, p)[0]).ravel()
     if problem.at_least:
@@ -88,7 +120,9 @@ def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
         share, point = reduced.actuators.placed
         shares = g[full.groups["actuators"]].reshape(-1, len(problem.path_limits.names))
         assert share.size > 10
-        np.testing.assert_allclose(shares[point, share], reduced.actuators.values(v, delta), atol=1e-9)
+        np.testing.assert_allclose(
+            shares[point, share], reduced.actuators.values(v, delta), atol=1e-9
+        )
     assert_derivatives_are_differences(found, x, p, 3e-5)
 
 
@@ -99,7 +133,9 @@ def usual():
 
 @pytest.fixture(scope="module")
 def fast():
-    return solve(Problem("fast", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective="speed"), 1)
+    return solve(
+        Problem("fast", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective="speed"), 1
+    )
 
 
 def test_an_expression_that_equals_the_efficiency_has_its_optimum(usual):
@@ -113,8 +149,14 @@ def test_an_expression_that_equals_the_efficiency_has_its_optimum(usual):
 def test_the_fastest_gait_is_faster_and_less_efficient_and_the_replay_says_so(usual, fast):
     assert fast.success
     best, known = fast.certificate, usual.certificate
-    measured = replay(fast.problem.body, fast.problem.friction, fast.gait, fast.delta_per_period, objective=SPEED)
-    assert measured.value == measured.distance / measured.length == pytest.approx(best.value, abs=best.value_error)
+    measured = replay(
+        fast.problem.body, fast.problem.friction, fast.gait, fast.delta_per_period, objective=SPEED
+    )
+    assert (
+        measured.value
+        == measured.distance / measured.length
+        == pytest.approx(best.value, abs=best.value_error)
+    )
     assert fast.value == pytest.approx(best.value, rel=1e-4)
     t = np.linspace(0, 1, 200_001)
     length = np.linalg.norm(np.diff(fast.gait.angles(t)), axis=0).sum()
@@ -137,12 +179,16 @@ def test_speed_does_not_depend_on_the_size_of_friction(fast):
     light = solve(fast.problem.with_(friction=Friction(1e-3, 1e-3, 1e-3)), 1)
     assert light.success
     assert light.value == pytest.approx(fast.value, rel=1e-9)
-    assert light.certificate.efficiency == pytest.approx(1e3 * fast.certificate.efficiency, rel=1e-6)
+    assert light.certificate.efficiency == pytest.approx(
+        1e3 * fast.certificate.efficiency, rel=1e-6
+    )
 
 
 def test_a_least_distance_is_reached_for_the_price_of_efficiency():
     friction = Friction(mu_t=3, mu_f=1, mu_b=1)
-    free = solve(Problem("free", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1, "bilateral"), friction=friction), 1)
+    free = solve(
+        Problem("free", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1, "bilateral"), friction=friction), 1
+    )
     least = 1.05 * free.distance
     far = solve(free.problem.with_(at_least={"distance": least}, guess=free.gait), 1)
     assert free.success
@@ -156,7 +202,9 @@ def test_a_turning_gait_turns_by_the_prescribed_angle():
     solution = solve(Problem("turn", SKEW, gait=Harmonic(1), objective="turning", rotation=0.3), 1)
     assert solution.success
     gait, problem = solution.gait, solution.problem
-    measured = replay(problem.body, problem.friction, gait, solution.delta_per_period, instants=3000)
+    measured = replay(
+        problem.body, problem.friction, gait, solution.delta_per_period, instants=3000
+    )
     assert measured.rotation == pytest.approx(0.3, abs=1e-5)
     # of free gaits, one turns by more and for less work per angle
     free = solve(problem.with_(rotation=None, guess=gait), 1)
@@ -192,7 +240,12 @@ def test_an_objective_may_be_negative_and_of_any_sign():
 
 
 def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
-    body, friction, delta, rng = Chain((0.3, 0.2, 0.5)), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), 1e-2, np.random.default_rng(3)
+    body, friction, delta, rng = (
+        Chain((0.3, 0.2, 0.5)),
+        Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+        1e-2,
+        np.random.default_rng(3),
+    )
     angles, rates = rng.normal(size=(2, 2, 40))
     solved = body.solve(friction, angles, rates, delta)
     motion = body.motion(friction, angles, rates, delta, solved)
@@ -200,7 +253,8 @@ def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
     now = Instants(body, friction, angles, rates, delta, forces=forces)
     powers = now.power
     np.testing.assert_allclose(powers.sum(axis=0), motion.actuator_power, atol=1e-12)
-    # the head link's normal force acts half its length from the joint, its tangential force has no arm
+    # the head link's normal force acts half its length from the joint, its tangential force has no
+    # arm
     np.testing.assert_allclose(powers[1], -(0.25 * forces[5] + forces[8]) * rates[1], atol=1e-12)
     driven = DRIVEN_WORK.at(now)[0]
     exact = np.maximum(powers, 0.0).sum(axis=0)
@@ -210,7 +264,8 @@ def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
 
 
 def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
-    """A gait with such joints: its driven work is more than its work, and so it pays to look for another."""
+    """A gait with such joints: its driven work is more than its work, and so it pays to look for
+    another."""
     problem = Problem("brake", SKEW, gait=Harmonic(1), objective="driven efficiency", delta=1e-3)
     before = replay(problem.body, problem.friction, SKEW, 1e-3, quantities=["driven_work"])
     assert before.values["driven_work"] > (1 + 1e-3) * before.work
@@ -220,9 +275,9 @@ def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
     assert found.value == pytest.approx(found.distance / found.values["driven_work"], rel=1e-12)
     assert found.value <= found.efficiency
     usual = solve(problem.with_(objective="efficiency", guess=solution.gait), 1)
-    assert solution.value >= replay(problem.body, problem.friction, usual.gait, 1e-3, objective=problem.objective).value * (
-        1 - 1e-6
-    )
+    assert solution.value >= replay(
+        problem.body, problem.friction, usual.gait, 1e-3, objective=problem.objective
+    ).value * (1 - 1e-6)
 
 
 def test_driven_work_needs_the_forces_on_the_parts():
@@ -231,7 +286,13 @@ def test_driven_work_needs_the_forces_on_the_parts():
 
 
 def test_every_joint_has_a_limit_of_its_own():
-    problem = Problem("stiff", gait=Harmonic(1), joint_limit=(1.0, 2.0), friction=Friction(mu_t=3, mu_f=1, mu_b=1), delta=1e-3)
+    problem = Problem(
+        "stiff",
+        gait=Harmonic(1),
+        joint_limit=(1.0, 2.0),
+        friction=Friction(mu_t=3, mu_f=1, mu_b=1),
+        delta=1e-3,
+    )
     solution = solve(problem, 1)
     assert solution.success
     first, second = np.abs(solution.gait.angles(np.linspace(0, 1, 20_001))).max(axis=1)

@@ -1,4 +1,5 @@
-"""Collocation optima against maxima of grid sweeps that this file does itself with the NumPy solver."""
+"""Collocation optima against maxima of grid sweeps that this file does itself with the NumPy
+solver."""
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ BODY, FRICTION = Chain(), Friction()
 
 
 def efficiencies(A, n):
-    """d/W of ellipses, one per row (A0, A1, B1), by the midpoint rule on the whole period; 0 where inadmissible."""
+    """d/W of ellipses, one per row (A0, A1, B1), by the midpoint rule on the whole period; 0 where
+    inadmissible."""
     t = (np.arange(n) + 0.5) / n
     c, s = np.cos(2 * np.pi * t), np.sin(2 * np.pi * t)
     A0, A1, B1 = (A[:, k, None] for k in range(3))
@@ -36,11 +38,15 @@ def efficiencies(A, n):
 
 
 def swept_maximum(centre, width, n=240):
-    """Maximum over grids that shrink around their best point until they are 1e-3 wide; (value, point)."""
+    """Maximum over grids that shrink around their best point until they are 1e-3 wide; (value,
+    point)."""
     centre = np.array(centre)
     while width > 2e-3:
         axis = np.linspace(-width, width, 7)
-        grid = np.stack([a.ravel() for a in np.meshgrid(axis, axis, axis, indexing="ij")], axis=1) + centre
+        grid = (
+            np.stack([a.ravel() for a in np.meshgrid(axis, axis, axis, indexing="ij")], axis=1)
+            + centre
+        )
         # the joint limit is a curved edge of the admissible set: add points on it
         direction = grid[:, 1:] / np.hypot(grid[:, 1], grid[:, 2])[:, None]
         on_edge = np.column_stack([grid[:, 0], direction * (np.pi - np.abs(grid[:, 0]))[:, None]])
@@ -66,18 +72,23 @@ def test_collocation_finds_the_maximum_of_a_grid_sweep(name, around, width, solv
     value, point = swept_maximum(around, width)
     assert abs(solution.certificate.efficiency / value - 1) < 1e-4
     gait = solution.gait
-    np.testing.assert_allclose([abs(gait.mean[0]), gait.cos[0, 0], gait.sin[0, 0]], np.abs(point), atol=0.02)
+    np.testing.assert_allclose(
+        [abs(gait.mean[0]), gait.cos[0, 0], gait.sin[0, 0]], np.abs(point), atol=0.02
+    )
     assert abs(solution.certificate.efficiency - reference.efficiency) < reference.tolerance
 
 
 def test_with_slow_joints_it_is_the_maximum_over_ellipses_that_are_small_enough():
-    """Joints of one harmonic of amplitude a are at most 2 pi a fast: all that is swept is (A0, a, B1 / A1)."""
+    """Joints of one harmonic of amplitude a are at most 2 pi a fast: all that is swept is (A0, a,
+    B1 / A1)."""
     speed = 12.0
     solution = solve(Problem("slow", gait=Harmonic(1, "bilateral"), speed_limit=speed))
     centre, width = np.array([0.0, 0.8, 0.8]), np.array([1.5, 0.2, 0.7])
     while width[0] > 0.01:
         steps = np.linspace(-1, 1, 7)
-        grid = centre + width * np.stack([a.ravel() for a in np.meshgrid(steps, steps, steps)], axis=1)
+        grid = centre + width * np.stack(
+            [a.ravel() for a in np.meshgrid(steps, steps, steps)], axis=1
+        )
         grid[:, 1] = np.minimum(grid[:, 1], 1.0)
         a, turn = grid[:, 1] * speed / (2 * np.pi), grid[:, 2]
         ellipses = np.column_stack([grid[:, 0], a * np.cos(turn), a * np.sin(turn)])
@@ -85,4 +96,6 @@ def test_with_slow_joints_it_is_the_maximum_over_ellipses_that_are_small_enough(
         best = int(np.argmax(value))
         centre, width = grid[best], 0.5 * width
     assert centre[1] == 1.0
-    assert solution.certificate.efficiency == pytest.approx(efficiencies(ellipses[[best]], 960)[0], rel=1e-4)
+    assert solution.certificate.efficiency == pytest.approx(
+        efficiencies(ellipses[[best]], 960)[0], rel=1e-4
+    )

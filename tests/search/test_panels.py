@@ -20,7 +20,15 @@ GAIT = Fourier([0.0, 0.0], [[0.4562], [0.0]], [[0.0], [-1.429]])
 
 
 def found(panels, friction=Friction(), delta=1e-2, **changes):
-    stated = Problem("two-modes", GAIT, ModalBody(2, panels=panels), friction, Harmonic(1, "antipodal"), intervals=8, **changes)
+    stated = Problem(
+        "two-modes",
+        GAIT,
+        ModalBody(2, panels=panels),
+        friction,
+        Harmonic(1, "antipodal"),
+        intervals=8,
+        **changes,
+    )
     return as_it_is(*space_near(stated, GAIT), delta)
 
 
@@ -29,14 +37,20 @@ def test_panels_are_added_where_a_point_at_rest_moves_over_them():
     finer, v = on_more_panels(coarse)
     exact = -found(96).objective
     assert 8 < finer.control.dynamics.body.panels <= 32  # at most fourfold at a time
-    before, after = (abs(-objective - exact) for objective in (coarse.objective, ReducedProgram(finer, 1e-2).objective(v)))
+    before, after = (
+        abs(-objective - exact)
+        for objective in (coarse.objective, ReducedProgram(finer, 1e-2).objective(v))
+    )
     assert after < 0.2 * before
     np.testing.assert_array_equal(finer.mesh.edges, coarse.space.mesh.edges)
 
 
 def test_panels_stay_where_they_do_not_matter():
     assert on_more_panels(found(16, delta=0.5)) is None
-    assert on_more_panels(found(8, Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), mesh_tolerance=1e-2)) is None
+    assert (
+        on_more_panels(found(8, Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0), mesh_tolerance=1e-2))
+        is None
+    )
 
 
 def test_a_chain_has_none_to_add():
@@ -46,14 +60,31 @@ def test_a_chain_has_none_to_add():
 
 @pytest.mark.slow
 def test_a_gait_on_more_panels_is_replayed_and_kept(tmp_path):
-    stated = Problem("two-modes", GAIT, ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), delta=0.1, delta_start=0.1)
+    stated = Problem(
+        "two-modes",
+        GAIT,
+        ModalBody(2, panels=4),
+        gait=Harmonic(1, "antipodal"),
+        delta=0.1,
+        delta_start=0.1,
+    )
     stated = stated.with_(intervals=8)
     solution = Solution(stated, answer_near(stated))
     gait = solution.gait
-    again = replay(stated.body, stated.friction, lambda t: (gait.angles(t), gait.rates(t)), 0.1, instants=80, tolerance=1e-5)
+    again = replay(
+        stated.body,
+        stated.friction,
+        lambda t: (gait.angles(t), gait.rates(t)),
+        0.1,
+        instants=80,
+        tolerance=1e-5,
+    )
     assert solution.answer.problem.body.panels > 4
     assert abs(solution.efficiency / again.efficiency - 1) < 1e-4
     read = load(save(solution, tmp_path / "two.h5"))
-    assert (read.answer.problem.body, read.problem.body) == (solution.answer.problem.body, stated.body)
+    assert (read.answer.problem.body, read.problem.body) == (
+        solution.answer.problem.body,
+        stated.body,
+    )
     _, now = read.at_points()
     assert np.abs(now.force).max() < 1e-6

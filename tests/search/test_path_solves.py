@@ -1,10 +1,22 @@
-"""Free paths and polygons solved: derivatives, feasibility, certified optima, files, and how classes compare."""
+"""Free paths and polygons solved: derivatives, feasibility, certified optima, files, and how
+classes compare."""
 
 import numpy as np
 import pytest
 from shared.differences import assert_derivatives_are_differences
 
-from colloc import Chain, Corners, Fourier, FreePath, Friction, Polygon, Problem, ellipse, load, save
+from colloc import (
+    Chain,
+    Corners,
+    Fourier,
+    FreePath,
+    Friction,
+    Polygon,
+    Problem,
+    ellipse,
+    load,
+    save,
+)
 from colloc.bounds.infinitesimal import small_gait
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.path_samples import path_length
@@ -15,10 +27,16 @@ from colloc.results.solution import SOLVED
 from colloc.search.solve import solve
 from colloc.search.spaces import nearest_parameters, transcribed
 
-FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
+FOUR = {
+    "body": Chain((0.25,) * 4),
+    "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]]),
+}
 CASES = {
     "free path": {"gait": FreePath(4.0, "none")},
-    "free path, bilateral, unequal": {"gait": FreePath(4.0, "bilateral"), "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3)},
+    "free path, bilateral, unequal": {
+        "gait": FreePath(4.0, "bilateral"),
+        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
+    },
     "free path of three joints": {"gait": FreePath(6.0, "bilateral"), **FOUR},
     "antipodal": {"gait": FreePath(4.0, "antipodal")},
     "polygon": {"gait": Polygon(4, "none"), "friction": Friction(mu_t=3, mu_f=1, mu_b=2)},
@@ -33,7 +51,12 @@ def program(case, delta=0.1, intervals=8, formulation=FULL):
     found = oracles(transcription.assembly)
     parameters = nearest_parameters(transcription, problem.guess)
     x = feasible_point(transcription, parameters, delta)
-    return transcription, found, x, found.parameter_vector(delta, transcription.block_parameters(parameters))
+    return (
+        transcription,
+        found,
+        x,
+        found.parameter_vector(delta, transcription.block_parameters(parameters)),
+    )
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -66,8 +89,12 @@ def test_a_bilateral_triangle_shrinks_to_the_certified_two_fifths(solved):
     # one joint moves along each side but the last, and both move alike along that
     assert np.abs(corners[:, 1] - corners[:, 0]).min() < 1e-2
     motion = solution.sample(np.array([0.0, 0.25, 1.0, 1.25]))
-    np.testing.assert_allclose(motion.centre[0, 2] - motion.centre[0, 0], solution.distance, rtol=1e-9)
-    np.testing.assert_allclose(motion.centre[:, 3] - motion.centre[:, 1], [solution.distance, 0], atol=1e-9)
+    np.testing.assert_allclose(
+        motion.centre[0, 2] - motion.centre[0, 0], solution.distance, rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        motion.centre[:, 3] - motion.centre[:, 1], [solution.distance, 0], atol=1e-9
+    )
 
 
 def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
@@ -82,7 +109,14 @@ def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
 
 
 def test_more_curvature_allows_more_and_each_bound_is_kept(tmp_path):
-    first = Problem("p", ellipse(0, 2.8, 1.3), gait=FreePath(1.0, "bilateral"), intervals=30, mesh_tolerance=1e-4, delta=1e-3)
+    first = Problem(
+        "p",
+        ellipse(0, 2.8, 1.3),
+        gait=FreePath(1.0, "bilateral"),
+        intervals=30,
+        mesh_tolerance=1e-4,
+        delta=1e-3,
+    )
     one = solve(first, 1)
     solutions = [one, solve(prolonged(first, one.gait, FreePath(2.0, "bilateral")), 1)]
     assert [s.status for s in solutions] == ["solved"] * 2
@@ -102,10 +136,13 @@ def test_more_curvature_allows_more_and_each_bound_is_kept(tmp_path):
 
 
 def test_the_size_of_the_program_alone_depends_on_the_mesh():
-    """Local functions, which are what is differentiated, are the same for 60 and for 240 intervals."""
+    """Local functions, which are what is differentiated, are the same for 60 and for 240
+    intervals."""
     sizes = []
     for n in (60, 240):
-        blocks = transcribed(Problem("p", ellipse(0, 2.0, 1.2), gait=FreePath(8.0, "bilateral"), intervals=n)).assembly.blocks
+        blocks = transcribed(
+            Problem("p", ellipse(0, 2.0, 1.2), gait=FreePath(8.0, "bilateral"), intervals=n)
+        ).assembly.blocks
         sizes.append([block.function.hessian.n_instructions() for block in blocks])
     assert sizes[0] == sizes[1]
 
@@ -120,10 +157,17 @@ def test_a_free_path_far_beyond_the_paper(solved):
 
 @pytest.mark.slow
 def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
-    """The far pair binds at the first level. This guess ends at 0.463, the best of 16 starts at 0.521, that of 32 at 0.600."""
+    """The far pair binds at the first level. This guess ends at 0.463, the best of 16 starts at
+    0.521, that of 32 at 0.600."""
     guess = Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
     problem = Problem(
-        "four", guess, FOUR["body"], gait=FreePath(2.0, "bilateral"), intervals=50, delta=1e-3, mesh_tolerance=0.0
+        "four",
+        guess,
+        FOUR["body"],
+        gait=FreePath(2.0, "bilateral"),
+        intervals=50,
+        delta=1e-3,
+        mesh_tolerance=0.0,
     )
     solution = solve(problem)
     assert solution.answer.optimal
@@ -137,8 +181,16 @@ def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
 
 
 def test_ipopt_alone_refines_the_mesh_of_a_path_just_until_the_replay_is_as_near_as_asked():
-    """Speeds of a path are lengths of it per period, and so is its delta: with another one a mesh that will do is refined."""
-    stated = Problem("path", ellipse(1.0, 0.7, 1.1), gait=FreePath(2.0, "bilateral"), delta=0.1, delta_start=None, intervals=12)
+    """Speeds of a path are lengths of it per period, and so is its delta: with another one a mesh
+    that will do is refined."""
+    stated = Problem(
+        "path",
+        ellipse(1.0, 0.7, 1.1),
+        gait=FreePath(2.0, "bilateral"),
+        delta=0.1,
+        delta_start=None,
+        intervals=12,
+    )
     for tolerance, meshes in ((1e-4, 1), (1e-5, 2)):
         found = solve(stated.with_(mesh_tolerance=tolerance), search="full")
         (error,) = [check for check in found.certificate.checks if check.name == "mesh error"]
@@ -154,7 +206,14 @@ def test_triangles_at_the_fold_approach_the_best_infinitesimal_gait_in_proportio
         shape, length = np.array([3.0, -0.03]), 2 * np.pi * speed
         guess = Corners(small_gait(Chain(), Friction(), shape).path(shape, 1.1 * length))
         delta = 1e-3 * speed
-        stated = Problem("small", guess, gait=Polygon(3, "none"), delta=delta, intervals=30, smallest_shape_speed=speed)
+        stated = Problem(
+            "small",
+            guess,
+            gait=Polygon(3, "none"),
+            delta=delta,
+            intervals=30,
+            smallest_shape_speed=speed,
+        )
         solution = solve(stated.with_(delta_start=100 * delta), 1)
         assert solution.status == SOLVED
         assert path_length(solution.gait) == pytest.approx(length, rel=1e-3)

@@ -1,4 +1,5 @@
-"""What a run keeps: everything between stages, exactly; so an interrupted solve ends as if nothing had happened."""
+"""What a run keeps: everything between stages, exactly; so an interrupted solve ends as if nothing
+had happened."""
 
 import signal
 import subprocess
@@ -65,8 +66,12 @@ class Stop:
         monkeypatch.setattr(Run, "kept", stopping)
 
 
-@pytest.mark.parametrize("number", [1, 8, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 5, 12, 14))])
-def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(undisturbed, tmp_path, monkeypatch, number):
+@pytest.mark.parametrize(
+    "number", [1, 8, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 5, 12, 14))]
+)
+def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(
+    undisturbed, tmp_path, monkeypatch, number
+):
     file, wanted = undisturbed
     path = tmp_path / "quick.h5"
     with monkeypatch.context() as patch:
@@ -83,10 +88,23 @@ def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(undisturb
     assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
 
 
-@pytest.mark.parametrize("asked", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "asked", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)]
+)
 def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
     file, wanted = undisturbed
-    command = [sys.executable, "-m", "colloc", "solve", file, "--starts", "4", "--output", f"{tmp_path}/", "--no-figure"]
+    command = [
+        sys.executable,
+        "-m",
+        "colloc",
+        "solve",
+        file,
+        "--starts",
+        "4",
+        "--output",
+        f"{tmp_path}/",
+        "--no-figure",
+    ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     time.sleep(1.0)
     process.send_signal(asked)
@@ -161,7 +179,9 @@ def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_b
     assert found.success
     big = Certified(found.answer, found.certificate)
     tiny = found.gait.scaled(0.01)
-    small = Certified(replace(found.answer, gait=tiny, value=1.1 * found.answer.value), found.certificate)
+    small = Certified(
+        replace(found.answer, gait=tiny, value=1.1 * found.answer.value), found.certificate
+    )
     assert big.is_finite
     assert not small.is_finite
     chosen = choose(found.problem.with_(shrinking=shrinking), [small, big])
@@ -192,9 +212,19 @@ def problems():
     yield QUICK
     yield Problem("series", series(), Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1), **AT)
     yield Problem("path", ellipse(1.0, 0.7, 1.1), gait=FreePath(2.0, "bilateral"), **AT)
-    yield Problem("sides", ellipse(1.0, 0.7, 1.1), gait=Polygon(4, "bilateral"), **{**AT, "intervals": 24})
-    yield Problem("uphill", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), grade=0.1, **{**AT, "delta_start": None})
-    yield Problem("modes", body=ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), **{**AT, "delta": 0.1})
+    yield Problem(
+        "sides", ellipse(1.0, 0.7, 1.1), gait=Polygon(4, "bilateral"), **{**AT, "intervals": 24}
+    )
+    yield Problem(
+        "uphill",
+        ellipse(0, 2.8, 1.3),
+        gait=Harmonic(1, "bilateral"),
+        grade=0.1,
+        **{**AT, "delta_start": None},
+    )
+    yield Problem(
+        "modes", body=ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), **{**AT, "delta": 0.1}
+    )
 
 
 def series():
@@ -218,7 +248,11 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
         again = descend(begin_at(problem, problem.guess))
     assert second.found_again == len(read_rows(path, ROWS)) - 1 > 0
     np.testing.assert_array_equal(again.v, found.v)
-    assert (again.objective, again.kkt_error, again.history) == (found.objective, found.kkt_error, found.history)
+    assert (again.objective, again.kkt_error, again.history) == (
+        found.objective,
+        found.kkt_error,
+        found.history,
+    )
     # its space is made anew, and its program says the same
     assert again.program().objective(again.v) == found.program().objective(found.v)
     np.testing.assert_array_equal(again.program().rows(again.v), found.program().rows(found.v))
@@ -227,7 +261,10 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
 @pytest.mark.slow
 def test_solves_on_two_threads_end_as_one_after_another():
     friction = Friction(mu_t=2, mu_f=1, mu_b=1)
-    kinds = [Problem("a", gait=Harmonic(2), **AT), Problem("b", gait=Harmonic(2), friction=friction, **AT)]
+    kinds = [
+        Problem("a", gait=Harmonic(2), **AT),
+        Problem("b", gait=Harmonic(2), friction=friction, **AT),
+    ]
     with ThreadPoolExecutor(2) as threads:
         together = list(threads.map(colloc.solve, kinds))
     for problem, found in zip(kinds, together, strict=True):
@@ -236,13 +273,23 @@ def test_solves_on_two_threads_end_as_one_after_another():
         assert found.certificate == alone.certificate
 
 
-def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_again(tmp_path, capsys):
+def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_again(
+    tmp_path, capsys
+):
     from colloc.commands.solve import main
 
     (tmp_path / "quick.py").write_text(FILE.replace("delta=1e-3", "delta=0.1"), encoding="utf-8")
     run = run_file(tmp_path / "quick.h5")
     put_rows(run, ROWS, {"problem": "another"})
-    command = [str(tmp_path / "quick.py"), "--output", f"{tmp_path}/", "--no-figure", "--starts", "1", "--quiet"]
+    command = [
+        str(tmp_path / "quick.py"),
+        "--output",
+        f"{tmp_path}/",
+        "--no-figure",
+        "--starts",
+        "1",
+        "--quiet",
+    ]
     assert main(command) == 2
     assert "--fresh begins again" in capsys.readouterr().err
     run.write_bytes(b"not SQLite" * 100)
@@ -252,7 +299,9 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     assert not run.exists()
 
 
-def test_a_run_that_cannot_be_written_is_told_once_and_is_written_at_the_end_if_there_is_room(tmp_path, monkeypatch, at_once):
+def test_a_run_that_cannot_be_written_is_told_once_and_is_written_at_the_end_if_there_is_room(
+    tmp_path, monkeypatch, at_once
+):
     path, tries = tmp_path / "x.run.sqlite", []
 
     def full(*given):
@@ -271,7 +320,9 @@ def test_a_run_that_cannot_be_written_is_told_once_and_is_written_at_the_end_if_
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits")
 @pytest.mark.parametrize("held", [0, 3])
-def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_there(undisturbed, tmp_path, held):
+def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_there(
+    undisturbed, tmp_path, held
+):
     """No file may grow, which a write meets as it meets a full disk."""
     import resource
 
@@ -280,7 +331,18 @@ def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_the
     if held:
         put_rows(run, ROWS, {"problem": read_problem_file(file).problem.hash, **rows})
     before = run.read_bytes() if held else b""
-    command = [sys.executable, "-m", "colloc", "solve", file, "--starts", "4", "--output", f"{tmp_path}/", "--no-figure"]
+    command = [
+        sys.executable,
+        "-m",
+        "colloc",
+        "solve",
+        file,
+        "--starts",
+        "4",
+        "--output",
+        f"{tmp_path}/",
+        "--no-figure",
+    ]
 
     def full():
         resource.setrlimit(resource.RLIMIT_FSIZE, (len(before),) * 2)
@@ -288,24 +350,33 @@ def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_the
     done = subprocess.run(command, capture_output=True, text=True, preexec_fn=full)
     assert done.returncode == 2
     assert done.stdout.startswith("quick: solved in ")
-    for said in (f"cannot write {run}: ", "The solve goes on", "the result is not saved: cannot write "):
+    for said in (
+        f"cannot write {run}: ",
+        "The solve goes on",
+        "the result is not saved: cannot write ",
+    ):
         assert done.stderr.count(said) == 1
     assert "Traceback" not in done.stderr
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == ({run.name: before} if held else {})
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == (
+        {run.name: before} if held else {}
+    )
     subprocess.run(command, capture_output=True, check=True)  # with room
     assert contents(tmp_path / "quick.h5") == wanted
 
 
 @pytest.mark.parametrize("thread", ["main", "worker"])
 def test_time_that_is_over_gives_the_best_gait_so_far(thread):
-    """In a worker too, which no signal reaches: twenty links spend half a minute before SQP first asks."""
+    """In a worker too, which no signal reaches: twenty links spend half a minute before SQP first
+    asks."""
     links = 20
     problem = Problem("long", body=Chain((1 / links,) * links), gait=Harmonic(1, "antipodal"))
     begin, found = time.monotonic(), []
     if thread == "main":
         found.append(solve(problem, seconds=2.0))
     else:
-        worker = threading.Thread(target=lambda: found.append(solve(problem, seconds=2.0)), daemon=True)
+        worker = threading.Thread(
+            target=lambda: found.append(solve(problem, seconds=2.0)), daemon=True
+        )
         worker.start()
         worker.join(10)
     assert time.monotonic() - begin < 4.0
@@ -325,15 +396,26 @@ def test_progress_is_told_from_the_first_moment_on_stage_by_stage():
     assert (seen[0].stage, seen[0].done, seen[0].count) == ("explore", 0, 4)
     assert seen[0].best.value > 0
     tried = [news for news in seen if news.stage == "explore" and news.count == 4]
-    assert list(dict.fromkeys(news.stage for news in seen)) == ["explore", "follow", "refine", "confirm", "certify"]
+    assert list(dict.fromkeys(news.stage for news in seen)) == [
+        "explore",
+        "follow",
+        "refine",
+        "confirm",
+        "certify",
+    ]
     assert str(tried[-1]).startswith("explore, 4 of 4; best d/W = 0.")
     assert solution.certificate.replayed
 
 
 def test_the_best_gait_told_of_is_one_of_finite_size_and_stages_come_in_their_order():
-    """Here small loops are better from the first start on, and one of the gaits that lead the sketches shrinks on its way."""
+    """Here small loops are better from the first start on, and one of the gaits that lead the
+    sketches shrinks on its way."""
     problem = Problem(
-        "three", body=Chain((0.4, 0.2, 0.4)), friction=Friction(mu_t=2, mu_f=1, mu_b=1.4), gait=Harmonic(1), delta=1e-3
+        "three",
+        body=Chain((0.4, 0.2, 0.4)),
+        friction=Friction(mu_t=2, mu_f=1, mu_b=1.4),
+        gait=Harmonic(1),
+        delta=1e-3,
     )
     seen = []
     solution = solve(problem, 2, progress=seen.append)
@@ -357,7 +439,9 @@ def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess(
 
     first, best = solve(QUICK, seconds=1e-9), solve(QUICK, 2, progress=stopping)
     assert (first.status, best.status) == ("interrupted",) * 2
-    np.testing.assert_allclose(first.gait.angles(np.arange(9) / 9), QUICK.guess.angles(np.arange(9) / 9), atol=1e-12)
+    np.testing.assert_allclose(
+        first.gait.angles(np.arange(9) / 9), QUICK.guess.angles(np.arange(9) / 9), atol=1e-12
+    )
     assert best.value == seen[-1].value > 1.5 * first.value
 
 

@@ -13,13 +13,20 @@ from colloc.search.solve import finished
 from colloc.search.spaces import space_near
 from tests.shared.stages import optimum_near
 
-PROBLEM = Problem("symmetric", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=60, mesh_tolerance=0)
+PROBLEM = Problem(
+    "symmetric",
+    gait=Harmonic(1, "bilateral"),
+    guess=ellipse(0.0, 2.0, 1.0),
+    intervals=60,
+    mesh_tolerance=0,
+)
 SADDLE = ellipse(0.0, 0.30734, 0.76781)
 
 
 @pytest.fixture(scope="module")
 def saddle():
-    """Without an offset the gait is its own mirror image, and the gradient has no part that would give it one."""
+    """Without an offset the gait is its own mirror image, and the gradient has no part that would
+    give it one."""
     space, v = space_near(PROBLEM, SADDLE)
     v = root(ReducedProgram(space, PROBLEM.delta).gradient, v, tol=1e-9).x
     return as_it_is(space, v, PROBLEM.delta)

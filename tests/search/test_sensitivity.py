@@ -1,4 +1,5 @@
-"""What a wrong floor costs: derivatives of best values obey identities, and are those of optima that are sought again."""
+"""What a wrong floor costs: derivatives of best values obey identities, and are those of optima
+that are sought again."""
 
 from dataclasses import replace
 
@@ -19,14 +20,20 @@ def found(three_link):
 
 
 def test_as_much_more_friction_all_round_costs_as_much(three_link, found):
-    """Forces are proportional to the coefficients, which the velocities do not notice: sum of mu dV/dmu = -V."""
+    """Forces are proportional to the coefficients, which the velocities do not notice: sum of mu
+    dV/dmu = -V."""
     total = sum(found[f"friction {way}"].slope for way in WAYS)
     assert total == pytest.approx(-three_link.value, rel=2e-5)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "others"), [("three_link_feet", ()), ("three_link_fast", ("Froude number",)), ("three_link_uphill", ("grade",))]
+    ("name", "others"),
+    [
+        ("three_link_feet", ()),
+        ("three_link_fast", ("Froude number",)),
+        ("three_link_uphill", ("grade",)),
+    ],
 )
 def test_so_it_is_on_feet_and_where_gravity_and_inertia_are_as_much_stronger(name, others, solved):
     solution = solved(name)[0]
@@ -37,12 +44,16 @@ def test_so_it_is_on_feet_and_where_gravity_and_inertia_are_as_much_stronger(nam
 
 def test_a_longer_middle_is_shorter_ends(found):
     """A part more of both ends, a third each, takes two parts of the middle."""
-    assert found["length of links 1 and 3"].slope == pytest.approx(-2 * found["length of link 2"].slope, rel=1e-6)
+    assert found["length of links 1 and 3"].slope == pytest.approx(
+        -2 * found["length of link 2"].slope, rel=1e-6
+    )
 
 
 def test_only_what_holds_the_gait_back_has_a_price(found, three_link):
     assert found["smallest shape speed"].slope == 0
-    assert np.abs(three_link.gait.angles(np.linspace(0, 1, 2001))).max() == pytest.approx(np.pi, abs=1e-4)
+    assert np.abs(three_link.gait.angles(np.linspace(0, 1, 2001))).max() == pytest.approx(
+        np.pi, abs=1e-4
+    )
     assert found["joint limit"].slope > 10 * found["joint limit"].error
 
 
@@ -53,14 +64,16 @@ def test_a_table_says_the_value_where_a_number_is_a_tenth_smaller_and_where_it_i
 
 
 def differences(solution, parameter, step):
-    """Derivative of the certified best value by sought gaits, with the step and half of it, and its error; one-sided where the
-    number cannot grow."""
+    """Derivative of the certified best value by sought gaits, with the step and half of it, and its
+    error; one-sided where the number cannot grow."""
     some = sensitivity(solution, resolve=True, change=step)[parameter].again
     half = sensitivity(solution, resolve=True, change=step / 2)[parameter].again
     assert all(each.status == "solved" for each in (*some, *half))
     error = 4 * max(each.error for each in (*some, *half)) / step
     if len(some) == 2:
-        wide, narrow = ((more.value - less.value) / (more.change - less.change) for less, more in (some, half))
+        wide, narrow = (
+            (more.value - less.value) / (more.change - less.change) for less, more in (some, half)
+        )
         return (4 * narrow - wide) / 3, error + abs(narrow - wide) / 3
     (wide,), (narrow,) = some, half
     slopes = [(each.value - solution.value) / each.change for each in (wide, narrow)]
@@ -87,18 +100,27 @@ def test_slopes_are_those_of_gaits_that_are_sought_again(name, three_link, found
 
 
 def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(solved, of):
-    """The gait on the mesh of an answer lies beside the true one, which moves slopes to first order."""
+    """The gait on the mesh of an answer lies beside the true one, which moves slopes to first
+    order."""
     rough = solved("three_link_offset")[0]
-    fine = colloc.solve(rough.problem.with_(guess=rough.gait, delta_start=rough.problem.delta, mesh_tolerance=1e-8), starts=1)
+    fine = colloc.solve(
+        rough.problem.with_(guess=rough.gait, delta_start=rough.problem.delta, mesh_tolerance=1e-8),
+        starts=1,
+    )
     of("friction sideways", "friction backwards")
     for effect, finer in zip(rough.sensitivity().effects, fine.sensitivity().effects, strict=True):
         assert abs(effect.slope - finer.slope) <= effect.error + finer.error, effect.name
         assert effect.error < 5e-3 * abs(effect.slope), effect.name
 
 
-def test_a_slope_that_changes_with_the_step_of_differences_is_off_by_no_more_than_its_error(three_link, monkeypatch):
-    """As where something else begins within a few steps: the derivative at the number itself is that of friction sideways."""
-    plain = next(each for each in parameters(three_link.problem) if each.name == "friction sideways")
+def test_a_slope_that_changes_with_the_step_of_differences_is_off_by_no_more_than_its_error(
+    three_link, monkeypatch
+):
+    """As where something else begins within a few steps: the derivative at the number itself is
+    that of friction sideways."""
+    plain = next(
+        each for each in parameters(three_link.problem) if each.name == "friction sideways"
+    )
     bent = replace(plain, name="bent", changed=lambda step: plain.changed(step + 1e8 * step**3))
     monkeypatch.setattr("colloc.search.sensitivity.parameters", lambda problem: [plain, bent])
     true, found = three_link.sensitivity().effects
@@ -107,15 +129,24 @@ def test_a_slope_that_changes_with_the_step_of_differences_is_off_by_no_more_tha
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("problem", ["three_link", "three_link_folded", "three_link_feet", "three_link_uphill"])
+@pytest.mark.parametrize(
+    "problem", ["three_link", "three_link_folded", "three_link_feet", "three_link_uphill"]
+)
 def test_all_slopes_are_those_of_gaits_that_are_sought_again(problem, solved, of):
-    """Also where the net rotation, the way across a slope, or a joint limit carries a multiplier. The gaits are sought on finer
-    meshes, as what a mesh leaves of a value counts a hundred times in differences of 1 %, and is no part of their errors."""
+    """Also where the net rotation, the way across a slope, or a joint limit carries a multiplier.
+    The gaits are sought on finer meshes, as what a mesh leaves of a value counts a hundred times in
+    differences of 1 %, and is no part of their errors."""
     solution = solved(problem)[0]
     stated = solution.problem
-    finer = colloc.solve(stated.with_(mesh_tolerance=0.1 * stated.mesh_tolerance, guess=solution.gait), 1)
+    finer = colloc.solve(
+        stated.with_(mesh_tolerance=0.1 * stated.mesh_tolerance, guess=solution.gait), 1
+    )
     # a limit that does not bind has the multiplier that IPOPT's barrier leaves, 1e-12
-    effects = [each for each in solution.sensitivity().effects if abs(each.slope) > 1e-9 and each.name != "delta"]
+    effects = [
+        each
+        for each in solution.sensitivity().effects
+        if abs(each.slope) > 1e-9 and each.name != "delta"
+    ]
     for effect in effects:
         of(effect.name)
         slope, error = differences(finer, effect.name, 0.01)
@@ -137,9 +168,15 @@ def test_a_path_on_file_is_replayed_at_delta_at_unit_shape_speed(of):
     """Per period it is ten times that here."""
     of("friction sideways")
     polygon = colloc.Problem(
-        "p", colloc.ellipse(0, 0.8, 0.6), gait=colloc.Polygon(3, "bilateral"), delta=4e-4, mesh_tolerance=1e-2
+        "p",
+        colloc.ellipse(0, 0.8, 0.6),
+        gait=colloc.Polygon(3, "bilateral"),
+        delta=4e-4,
+        mesh_tolerance=1e-2,
     )
-    found = sensitivity(colloc.solve(polygon, starts=1), resolve=True, change=1e-3)["friction sideways"].again
+    found = sensitivity(colloc.solve(polygon, starts=1), resolve=True, change=1e-3)[
+        "friction sideways"
+    ].again
     assert [each.kept for each in found] == pytest.approx([each.value for each in found], rel=1e-5)
 
 
@@ -151,7 +188,9 @@ def test_a_gait_that_exceeds_a_limit_or_turns_says_so(three_link, of):
 
 
 def test_feet_that_have_to_be_alike_move_together():
-    problem = colloc.Problem("x", body=colloc.Chain(feet=MIRRORED), gait=colloc.Harmonic(1, "bilateral"))
+    problem = colloc.Problem(
+        "x", body=colloc.Chain(feet=MIRRORED), gait=colloc.Harmonic(1, "bilateral")
+    )
     stated = {each.name: each for each in parameters(problem)}
     assert "place of foot 2" not in stated  # the middle of the body
     moved = stated["place of feet 1 and 3"].changed(0.1).body.feet
@@ -162,8 +201,14 @@ def test_feet_that_have_to_be_alike_move_together():
 
 def test_feet_beside_each_other_move_together():
     feet = (colloc.Foot(0, 0.2, offset=0.1), colloc.Foot(0, 0.2, offset=-0.1), colloc.Foot(1, 0.6))
-    problem = colloc.Problem("x", body=colloc.Chain((0.5, 0.5), feet=feet), friction=colloc.Friction(mu_b=3))
-    moved = next(each for each in parameters(problem) if each.name == "place of feet 1 and 2").changed(0.1).body.feet
+    problem = colloc.Problem(
+        "x", body=colloc.Chain((0.5, 0.5), feet=feet), friction=colloc.Friction(mu_b=3)
+    )
+    moved = (
+        next(each for each in parameters(problem) if each.name == "place of feet 1 and 2")
+        .changed(0.1)
+        .body.feet
+    )
     assert [foot.place for foot in moved] == pytest.approx([0.3, 0.3, 0.6])
 
 
@@ -189,7 +234,10 @@ def test_wheels_have_numbers_of_their_own(middle, others):
 
 @pytest.mark.parametrize(
     "stated",
-    [{"friction": colloc.OwnLaw()}, {"body": colloc.Chain(feet=[colloc.Foot(k, friction=colloc.OwnLaw()) for k in range(3)])}],
+    [
+        {"friction": colloc.OwnLaw()},
+        {"body": colloc.Chain(feet=[colloc.Foot(k, friction=colloc.OwnLaw()) for k in range(3)])},
+    ],
 )
 def test_formulas_of_a_law_of_ones_own_are_no_numbers(stated):
     names = [each.name for each in parameters(colloc.Problem("x", **stated))]
@@ -208,8 +256,16 @@ def test_a_pad_as_long_as_its_link_has_no_place_to_move_to(extent):
 
 def test_what_has_to_be_reached_is_known_of_the_gait_on_file(of):
     of("length of links 1 and 3")
-    stated = {"gait": colloc.Harmonic(1, "bilateral"), "at_least": {"driven efficiency": 0.2}, "delta": 1e-2}
-    again = colloc.solve(colloc.Problem("x", **stated), starts=1).sensitivity(True)["length of links 1 and 3"].again
+    stated = {
+        "gait": colloc.Harmonic(1, "bilateral"),
+        "at_least": {"driven efficiency": 0.2},
+        "delta": 1e-2,
+    }
+    again = (
+        colloc.solve(colloc.Problem("x", **stated), starts=1)
+        .sensitivity(True)["length of links 1 and 3"]
+        .again
+    )
     assert "driven efficiency" in again[1].breaks
 
 
@@ -226,7 +282,9 @@ def test_a_gait_on_file_that_is_asked_to_turn_is_paid_for_its_chord(of):
 
 def test_slopes_of_paths_of_arcs_say_what_their_errors_leave_out(three_link):
     assert not three_link.sensitivity().note
-    free = colloc.solve(colloc.Problem("x", gait=colloc.FreePath(2, "bilateral"), delta=1e-2), starts=1).sensitivity()
+    free = colloc.solve(
+        colloc.Problem("x", gait=colloc.FreePath(2, "bilateral"), delta=1e-2), starts=1
+    ).sensitivity()
     assert "arcs" in free.note
     assert free.note in str(free)
     assert free.facts()["note"] == free.note
@@ -250,7 +308,9 @@ def test_every_number_can_change_and_nothing_else_does(changes):
         same, less = each.changed(0.0), each.changed(-0.01)
         assert same.with_(guess=problem.guess).hash == problem.hash, each.name
         now = {own.name: own.value for own in parameters(less)}[each.name]
-        assert now == pytest.approx(0.99 * each.value if each.relative else each.value - 0.01, rel=1e-12), each.name
+        assert now == pytest.approx(
+            0.99 * each.value if each.relative else each.value - 0.01, rel=1e-12
+        ), each.name
 
 
 def test_what_is_no_optimum_is_refused(three_link, tmp_path):

@@ -1,4 +1,5 @@
-"""Problems on a slope: solved, certified, kept and shown like any other; no gait or heading beside the one found is better."""
+"""Problems on a slope: solved, certified, kept and shown like any other; no gait or heading beside
+the one found is better."""
 
 from types import SimpleNamespace
 
@@ -33,7 +34,9 @@ from colloc.search.spaces import space_near
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.slope import slope_motion
 
-PROBLEM = Problem("climber", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, grade=0.1)
+PROBLEM = Problem(
+    "climber", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, grade=0.1
+)
 SIDES = PROBLEM.with_(name="sides", gait=Polygon(4), delta=6e-4, delta_start=None, intervals=None)
 """About as dry: the path is 17 rad long."""
 
@@ -56,14 +59,18 @@ def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
     ran = slope_motion(Chain(), Friction(), uphill.gait, 1e-2, 0.1)
     assert uphill.certificate.distance == pytest.approx(ran.climb[0], abs=1e-5)
     assert uphill.certificate.work == pytest.approx(ran.joint_work[0], abs=1e-5)
-    assert uphill.certificate.work == pytest.approx(ran.friction_work[0] + 0.1 * ran.climb[0], abs=1e-5)
+    assert uphill.certificate.work == pytest.approx(
+        ran.friction_work[0] + 0.1 * ran.climb[0], abs=1e-5
+    )
 
 
 def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, capsys):
     found = solve(SIDES, 1)
     assert (found.status, found.answer.program) == ("solved", FULL), found.message
     gait, delta = found.gait, found.answer.delta * found.gait.delta_unit
-    ran = slope_motion(Chain(), Friction(), gait, delta, 0.1, theta=gait.theta, breaks=gait.corner_phases)
+    ran = slope_motion(
+        Chain(), Friction(), gait, delta, 0.1, theta=gait.theta, breaks=gait.corner_phases
+    )
     assert found.certificate.value == pytest.approx(ran.climb[0] / ran.joint_work[0], rel=1e-5)
     assert abs(ran.turn) < 1e-5
     assert found.certificate.value > 1.4 * uphill.certificate.value
@@ -77,10 +84,14 @@ def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, cap
 def test_a_free_path_climbs_better_than_a_harmonic_gait_that_it_contains():
     harmonic = solve(PROBLEM.with_(delta=2e-3), 1)
     delta = 2e-3 / path_length(harmonic.gait)
-    free = SIDES.with_(name="free", gait=FreePath(6), guess=harmonic.gait, delta=delta, intervals=30)
+    free = SIDES.with_(
+        name="free", gait=FreePath(6), guess=harmonic.gait, delta=delta, intervals=30
+    )
     found = solve(free, 1)
     assert found.status == "solved", found.message
-    ran = slope_motion(Chain(), Friction(), found.gait, found.answer.delta * found.gait.delta_unit, 0.1)
+    ran = slope_motion(
+        Chain(), Friction(), found.gait, found.answer.delta * found.gait.delta_unit, 0.1
+    )
     assert ran.climb[0] / ran.joint_work[0] > 2 * harmonic.certificate.value
 
 
@@ -105,7 +116,8 @@ def test_no_gait_and_no_heading_beside_it_climbs_better(uphill):
     v = own.parameters(gait)
     for size in (0.03, 0.1):
         for _ in range(2):
-            step = np.append(-np.abs(rng.normal(size=v.size - 1)) * np.sign(v[:-1]), rng.normal())  # folded links may not cross
+            # folded links may not cross
+            step = np.append(-np.abs(rng.normal(size=v.size - 1)) * np.sign(v[:-1]), rng.normal())
             assert run(Chain(), own.member(v + size * step, 2)) < uphill.certificate.value
     assert uphill.certificate.value > 1.05 * run(Chain(), ellipse(0, 2.8, 1.3))
 
@@ -115,9 +127,13 @@ def test_whole_periods_add_up_along_the_fall_line(uphill):
     np.testing.assert_allclose(motion.centre[0, 1], uphill.certificate.distance, rtol=1e-4)
     np.testing.assert_allclose(motion.theta[1], motion.theta[0], atol=1e-5)
     # turned by what is left of a rotation
-    half, end = (complex(*centre) for centre in (uphill.sample([0.5]).centre[:, 0], motion.centre[:, 1]))
+    half, end = (
+        complex(*centre) for centre in (uphill.sample([0.5]).centre[:, 0], motion.centre[:, 1])
+    )
     turn = np.exp(1j * (motion.theta[1] - motion.theta[0]))
-    np.testing.assert_allclose(complex(*motion.centre[:, 2]), end * (1 + turn) + turn**2 * half, atol=1e-9)
+    np.testing.assert_allclose(
+        complex(*motion.centre[:, 2]), end * (1 + turn) + turn**2 * half, atol=1e-9
+    )
 
 
 def test_it_is_kept_verified_reported_and_summarised_like_any_other(uphill, tmp_path, capsys):
@@ -137,9 +153,13 @@ def test_the_command_line_solves_a_problem_file_with_a_grade(tmp_path, capsys):
     file = tmp_path / "up.py"
     file.write_text(
         "from colloc import Harmonic, Problem, ellipse\n"
-        "PROBLEM = Problem('up', ellipse(0, 2.8, 1.3), gait=Harmonic(1, 'bilateral'), delta=1e-2, grade=0.1)\n"
+        "PROBLEM = Problem('up', ellipse(0, 2.8, 1.3), gait=Harmonic(1, 'bilateral'), delta=1e-2, "
+        "grade=0.1)\n"
     )
-    assert solve_command.main([str(file), "--starts", "2", "--verbose", "--output", f"{tmp_path}/"]) == 0
+    assert (
+        solve_command.main([str(file), "--starts", "2", "--verbose", "--output", f"{tmp_path}/"])
+        == 0
+    )
     out = capsys.readouterr().out
     assert "slope of grade 0.1: d is the climb, W the work of the joints" in out
     assert (tmp_path / "up.png").exists()
@@ -147,15 +167,23 @@ def test_the_command_line_solves_a_problem_file_with_a_grade(tmp_path, capsys):
 
 def test_a_gait_that_turns_and_points_elsewhere_fails_its_certificate(uphill):
     gait = uphill.gait
-    turns = Fourier(gait.mean + np.array([0.1, 0.2]), gait.cos, gait.sin, theta=gait.theta + 0.02)  # no gait of the class
-    found = gait_certificate(PROBLEM.with_(towards=0.05), turns, 1e-2, np.empty(0), tolerance=1e-4, claimed=uphill.value)
+    # no gait of the class
+    turns = Fourier(gait.mean + np.array([0.1, 0.2]), gait.cos, gait.sin, theta=gait.theta + 0.02)
+    found = gait_certificate(
+        PROBLEM.with_(towards=0.05), turns, 1e-2, np.empty(0), tolerance=1e-4, claimed=uphill.value
+    )
     assert {"replay gap", "net rotation", "direction"} <= {check.name for check in found.failures}
-    assert {"work = dissipation", "balance in replay", "replay error"} <= {c.name for c in found.checks if c.passed}
+    assert {"work = dissipation", "balance in replay", "replay error"} <= {
+        c.name for c in found.checks if c.passed
+    }
 
 
 def test_the_error_of_a_mesh_is_known_interval_by_interval(uphill):
     space, v = space_near(PROBLEM, uphill.gait, np.linspace(0.0, 1.0, 21))
-    fine, coarse = (mesh_error(control_problem(PROBLEM), mesh, uphill.gait, 1e-2) for mesh in (uphill.mesh, space.mesh))
+    fine, coarse = (
+        mesh_error(control_problem(PROBLEM), mesh, uphill.gait, 1e-2)
+        for mesh in (uphill.mesh, space.mesh)
+    )
     assert fine.estimate < PROBLEM.mesh_tolerance < 0.1 * coarse.estimate
     assert coarse.total == pytest.approx(coarse.value.sum(), rel=0.05)
     own = -ReducedProgram(space, 1e-2).objective(v)
@@ -163,7 +191,8 @@ def test_the_error_of_a_mesh_is_known_interval_by_interval(uphill):
 
 
 def test_what_joints_give_back_and_can_do_counts_on_slopes(uphill):
-    """On the way up joints brake at times: driven work is more than work, by what they do not get back."""
+    """On the way up joints brake at times: driven work is more than work, by what they do not get
+    back."""
     problem = PROBLEM.with_(objective="driven efficiency", torque_limit=0.05, power_limit=1.0)
     space, v = space_near(problem, uphill.gait, np.linspace(0.0, 1.0, 21))
     program = ReducedProgram(space, 1e-2)
@@ -180,7 +209,10 @@ def test_what_joints_give_back_and_can_do_counts_on_slopes(uphill):
 @pytest.mark.slow
 def test_a_gait_keeps_what_its_joints_can_do_on_a_slope(uphill):
     free, most = (
-        solve(PROBLEM.with_(objective="driven efficiency", guess=uphill.gait, torque_limit=limit), 1) for limit in (1.0, 0.0602)
+        solve(
+            PROBLEM.with_(objective="driven efficiency", guess=uphill.gait, torque_limit=limit), 1
+        )
+        for limit in (1.0, 0.0602)
     )
     for found in (free, most):
         assert found.status == "solved", found.message
@@ -197,7 +229,11 @@ def test_a_motion_that_is_left_open_for_long_fails_its_check():
 def test_friction_and_the_pull_have_one_unit():
     heavy = PROBLEM.with_(friction=Friction(100, 100, 100), grade=10.0)
     scaled = control_problem(heavy)
-    assert (scaled.unit, scaled.dynamics.regime, scaled.dynamics.law) == (100.0, PROBLEM.regime, PROBLEM.law)
+    assert (scaled.unit, scaled.dynamics.regime, scaled.dynamics.law) == (
+        100.0,
+        PROBLEM.regime,
+        PROBLEM.law,
+    )
 
 
 def test_the_level_is_stated_as_before():
@@ -244,10 +280,16 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"gait": FreePath(symmetry="bilateral")}, "no part of a period follows from another: take FreePath"),
+        (
+            {"gait": FreePath(symmetry="bilateral")},
+            "no part of a period follows from another: take FreePath",
+        ),
         ({"body": CrawlerBody(), "gait": None, "guess": None}, "only a Chain"),
         ({"objective": "turning"}, "the objective speaks of the rotation"),
-        ({"gait": Harmonic(1), "rotation": 0.1}, "a body that a period turns has no gait that repeats"),
+        (
+            {"gait": Harmonic(1), "rotation": 0.1},
+            "a body that a period turns has no gait that repeats",
+        ),
         ({"formulation": "implicit velocity"}, "only the formulation 'full'"),
         ({"scheme": "trapezoid"}, "a gauss-N or radau-N scheme is needed"),
         ({"grade": 1.0}, "slides down for ever"),
@@ -263,7 +305,9 @@ def test_what_cannot_be_asked_is_named(changed, said):
 
 
 def test_a_viscous_body_may_be_on_any_slope():
-    assert PROBLEM.with_(friction=Viscous(normal=2.0, tangential=1.0), grade=3.0).regime.grade == 3.0
+    assert (
+        PROBLEM.with_(friction=Viscous(normal=2.0, tangential=1.0), grade=3.0).regime.grade == 3.0
+    )
 
 
 def test_a_slope_that_is_not_climbed_is_said_so():

@@ -13,7 +13,12 @@ ASKED = 0.02
 @pytest.fixture(scope="module")
 def shrunk():
     """An optimum on the bound, of a problem whose delta is far too large for it."""
-    problem = Problem("tiny", friction=Friction(mu_t=0.5, mu_f=1, mu_b=5), gait=Harmonic(1, "bilateral"), delta=ASKED)
+    problem = Problem(
+        "tiny",
+        friction=Friction(mu_t=0.5, mu_f=1, mu_b=5),
+        gait=Harmonic(1, "bilateral"),
+        delta=ASKED,
+    )
     return solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 0)), 1)
 
 
@@ -21,7 +26,9 @@ def test_delta_is_lowered_until_it_matters_no_more(shrunk):
     assert shrunk.status == SOLVED
     assert on_speed_floor(shrunk.problem, shrunk.gait)
     assert shrunk.answer.delta == shrunk.answer.problem.delta < shrunk.problem.delta == ASKED
-    influence = next(check for check in shrunk.certificate.checks if check.name == "delta influence")
+    influence = next(
+        check for check in shrunk.certificate.checks if check.name == "delta influence"
+    )
     assert abs(influence.value) < 1e-2
 
 

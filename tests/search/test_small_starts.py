@@ -1,4 +1,5 @@
-"""Starts that are small loops: members of the class, where small gaits go far, and found to be the best where they are."""
+"""Starts that are small loops: members of the class, where small gaits go far, and found to be the
+best where they are."""
 
 from __future__ import annotations
 
@@ -14,8 +15,12 @@ from colloc.search.small_starts import small_loops
 PROBLEMS = {
     "any": Problem("any", gait=Harmonic(2)),
     "bilateral": Problem("bilateral", gait=Harmonic(3, "bilateral"), joint_limit=2.5),
-    "antipodal": Problem("antipodal", body=Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1, "antipodal")),
-    "limits": Problem("limits", body=Chain((0.3, 0.3, 0.4)), gait=Harmonic(1), joint_limit=(0.5, 2.0)),
+    "antipodal": Problem(
+        "antipodal", body=Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1, "antipodal")
+    ),
+    "limits": Problem(
+        "limits", body=Chain((0.3, 0.3, 0.4)), gait=Harmonic(1), joint_limit=(0.5, 2.0)
+    ),
     "polygon": Problem("polygon", friction=Friction(mu_t=0.4, mu_f=1, mu_b=2), gait=Polygon(8)),
 }
 
@@ -41,12 +46,16 @@ def test_loops_are_admissible_members_of_the_class_hardly_longer_than_they_must_
 def test_loops_travel_as_their_shapes_promise():
     """Two thirds of what corners and no size would give, by replay: sine waves cut the corners."""
     problem = Problem("fold", gait=Harmonic(3))
-    best = max(replay(problem.body, problem.friction, loop, 1e-5).efficiency for loop in small_loops(problem))
+    best = max(
+        replay(problem.body, problem.friction, loop, 1e-5).efficiency
+        for loop in small_loops(problem)
+    )
     assert 0.25 < best < 0.4561
 
 
 def test_mirror_images_are_one():
-    """Of the fold, joints at (pi, 0), there are four by mirror and end swap; the second shape is another one."""
+    """Of the fold, joints at (pi, 0), there are four by mirror and end swap; the second shape is
+    another one."""
     first, _, second, _ = small_loops(Problem("fold", gait=Harmonic(2)))
     assert abs(np.sort(np.abs(first.mean)) - np.sort(np.abs(second.mean))).max() > 0.5
 
@@ -54,7 +63,15 @@ def test_mirror_images_are_one():
 def test_viscous_drag_has_none():
     """In first order what a small loop goes forth it goes back."""
     assert (
-        small_loops(Problem("drag", friction=Viscous(normal=2.0, tangential=1.0), gait=Harmonic(1), objective="towing")) == []
+        small_loops(
+            Problem(
+                "drag",
+                friction=Viscous(normal=2.0, tangential=1.0),
+                gait=Harmonic(1),
+                objective="towing",
+            )
+        )
+        == []
     )
 
 

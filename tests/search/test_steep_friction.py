@@ -1,4 +1,5 @@
-"""Friction as steep as 1 / delta: a gait that is stationary in the space of its class is an answer."""
+"""Friction as steep as 1 / delta: a gait that is stationary in the space of its class is an
+answer."""
 
 import pytest
 
@@ -17,7 +18,9 @@ def test_a_gait_followed_to_a_tiny_delta_is_certified():
     first = case_problem(law, symmetry, DELTA, 0.1, TABLE)
     near = solve(first.with_(guess=latin_hypercube_gait(first, 0, 4)), 1)
     assert near.status == SOLVED
-    solution = solve(case_problem(law, symmetry, SMALL_DELTA, NEXT_DELTA, TABLE).with_(guess=near.gait), 1)
+    solution = solve(
+        case_problem(law, symmetry, SMALL_DELTA, NEXT_DELTA, TABLE).with_(guess=near.gait), 1
+    )
     assert solution.status == SOLVED, solution.message
     assert solution.answer.kkt_error < 1e-6
     assert solution.answer.violation < 1e-8

@@ -1,4 +1,5 @@
-"""Compiled code under the address sanitizer, which ends a process at the first word beside an array."""
+"""Compiled code under the address sanitizer, which ends a process at the first word beside an
+array."""
 
 import os
 import subprocess
@@ -14,9 +15,17 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def stays_within_its_arrays(code):
     """Run Python that has its C compiled with the sanitizer, in a process of its own."""
-    found = subprocess.run([c_compiler(), "-print-file-name=libasan.so"], capture_output=True, text=True).stdout.strip()
+    found = subprocess.run(
+        [c_compiler(), "-print-file-name=libasan.so"], capture_output=True, text=True
+    ).stdout.strip()
     if not os.path.isabs(found):
         pytest.skip("the compiler has no address sanitizer")
     own = {"LD_PRELOAD": found, "ASAN_OPTIONS": "detect_leaks=0"}
-    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, **own}, cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **own},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr[-2000:]

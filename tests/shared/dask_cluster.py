@@ -1,4 +1,5 @@
-"""A Dask scheduler and workers as processes of their own on this machine, to be killed, stopped and starved."""
+"""A Dask scheduler and workers as processes of their own on this machine, to be killed, stopped and
+starved."""
 
 import contextlib
 import os
@@ -31,7 +32,10 @@ class DaskProcesses(contextlib.ExitStack):
 
     def __init__(self, **settings):
         super().__init__()
-        self.environment = {**os.environ, **{f"DASK_DISTRIBUTED__{key}": value for key, value in settings.items()}}
+        self.environment = {
+            **os.environ,
+            **{f"DASK_DISTRIBUTED__{key}": value for key, value in settings.items()},
+        }
         self.scheduler, self.address = self._started("scheduler", "")
 
     def worker(self, **environment):

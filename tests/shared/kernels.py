@@ -9,8 +9,11 @@ from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.native_kernel import numpy_instead
 
 
-def by_both(body, law, angles, rates, delta) -> tuple[tuple[np.ndarray, BalancedMotion, np.ndarray], ...]:
-    """Compiled, then by NumPy: the balanced velocities, what the body does there, its slopes over the largest of an instant."""
+def by_both(
+    body, law, angles, rates, delta
+) -> tuple[tuple[np.ndarray, BalancedMotion, np.ndarray], ...]:
+    """Compiled, then by NumPy: the balanced velocities, what the body does there, its slopes over
+    the largest of an instant."""
     solved = body.solve(law, angles, rates, delta)
     motion, slopes = chain_slopes(body, law, angles, rates, delta, solved)
     with numpy_instead():

@@ -20,7 +20,11 @@ def words(figure):
                     unseen |= {tick.label1, tick.label2}
             if not axes.axison:
                 unseen |= {axis.label, axis.offsetText}
-    shown = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip() and text not in unseen]
+    shown = [
+        text
+        for text in figure.findobj(Text)
+        if text.get_visible() and text.get_text().strip() and text not in unseen
+    ]
     return [(text.get_text(), text.get_window_extent(renderer)) for text in shown]
 
 

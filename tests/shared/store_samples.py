@@ -1,4 +1,5 @@
-"""A small file of every kind that colloc writes, with its reader and a writer; for tests of faults and of damage."""
+"""A small file of every kind that colloc writes, with its reader and a writer; for tests of faults
+and of damage."""
 
 from pathlib import Path
 
@@ -44,7 +45,9 @@ def record(k=0):
 
 
 def table(folder):
-    study = Study("sample", (Axis("x", (1.0, 1.5)), Axis("kind", ("a", "b"))), lambda x, kind: problem(x))
+    study = Study(
+        "sample", (Axis("x", (1.0, 1.5)), Axis("kind", ("a", "b"))), lambda x, kind: problem(x)
+    )
     run = StudyRun(study, folder)
     for k, state in enumerate(run.cells.values()):
         state.attempts.append(Attempt("warm", "key", outcome(k)))
@@ -58,7 +61,11 @@ class Samples:
         self.folder, self.solution, self.table = folder, solution, table(folder / "none")
 
     def path(self, kind: str) -> Path:
-        return self.folder / {"journal": NAME, "cache": "bounds.sqlite", "archive": "archive.sqlite"}.get(kind, f"{kind}.h5")
+        return self.folder / {
+            "journal": NAME,
+            "cache": "bounds.sqlite",
+            "archive": "archive.sqlite",
+        }.get(kind, f"{kind}.h5")
 
     def write(self, kind: str, version: int = 0) -> Path:
         path = self.path(kind)
@@ -73,7 +80,10 @@ class Samples:
         elif kind == "study":
             save_study(self.table, path, source=str(version) * 10)
         elif kind == "journal":
-            append_records(self.folder, [record(5 + version)] if path.exists() else [record(k) for k in range(5)])
+            append_records(
+                self.folder,
+                [record(5 + version)] if path.exists() else [record(k) for k in range(5)],
+            )
         else:
             put_rows(path, CACHE, {f"key{version}": {"value": 1.0 + version}})
         return path
@@ -91,7 +101,9 @@ class Samples:
             return {k: np.asarray(v).tolist() for k, v in read_arrays(path).items()}
         if kind == "study":
             found = load_study(path)
-            return found.attributes, {name: repr(values.tolist()) for name, values in found.variables.items()}
+            return found.attributes, {
+                name: repr(values.tolist()) for name, values in found.variables.items()
+            }
         if kind == "journal":
             return sorted(a.key for r in read_journal(path.parent) for a in r.attempts)
         return read_rows(path, CACHE)

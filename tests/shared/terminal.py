@@ -1,4 +1,5 @@
-"""A program in a terminal: what it writes to a pseudo-terminal, and what stands on the screen then."""
+"""A program in a terminal: what it writes to a pseudo-terminal, and what stands on the screen
+then."""
 
 import contextlib
 import os
@@ -10,7 +11,8 @@ _SIZE = (24, 100)
 
 
 def run_in_terminal(words, folder, **environment):
-    """Exit code of a program and all that it wrote, run to its end with a terminal as its standard streams."""
+    """Exit code of a program and all that it wrote, run to its end with a terminal as its standard
+    streams."""
     import pty
     import termios
 
@@ -18,10 +20,14 @@ def run_in_terminal(words, folder, **environment):
     termios.tcsetwinsize(its, _SIZE)
     streams = dict.fromkeys(("stdin", "stdout", "stderr"), its)
     environment = {**os.environ, "TERM": "xterm", **environment}
-    with subprocess.Popen([*map(str, words)], cwd=folder, env=environment, start_new_session=True, **streams) as process:
+    with subprocess.Popen(
+        [*map(str, words)], cwd=folder, env=environment, start_new_session=True, **streams
+    ) as process:
         os.close(its)
         parts = []
-        with contextlib.suppress(OSError):  # so a terminal says on Linux that its last writer is gone
+        with contextlib.suppress(
+            OSError
+        ):  # so a terminal says on Linux that its last writer is gone
             while part := os.read(ours, 65536):
                 parts.append(part)
         os.close(ours)
@@ -29,7 +35,8 @@ def run_in_terminal(words, folder, **environment):
 
 
 def screen(written):
-    """The lines that a terminal shows in the end, as far as the codes go that the commands use; whether the cursor is seen."""
+    """The lines that a terminal shows in the end, as far as the codes go that the commands use;
+    whether the cursor is seen."""
     lines, row, column, seen = [""], 0, 0, True
     for code in _CODE.finditer(written):
         text, (number, letter) = code[0], code.groups()

@@ -1,4 +1,5 @@
-"""Crawlers with one travelling bump: the paper's is one of them, balance and slopes hold, and optimising helps."""
+"""Crawlers with one travelling bump: the paper's is one of them, balance and slopes hold, and
+optimising helps."""
 
 import runpy
 from dataclasses import replace
@@ -44,7 +45,9 @@ def test_the_paper_s_crawler_is_one_of_them():
     phases = np.array([1 / 12, 1 / 6, 1 / 3])  # half grown, grown, at the front
     shown = np.array([[p, 0.0, a, 0.0, 0.0] for p, a in ((LAP, 0.65), (LAP, 1.3), (0.0, 1.3))]).T
     assert {tuple(shape) for shape in shown.T} <= {tuple(vertex) for vertex in corners.T}
-    np.testing.assert_allclose(BODY.tangent(s, shown), crawler.prescribed().angle(s, phases), atol=1e-12)
+    np.testing.assert_allclose(
+        BODY.tangent(s, shown), crawler.prescribed().angle(s, phases), atol=1e-12
+    )
 
 
 def test_the_mirrored_half_is_the_negative_shape():
@@ -60,14 +63,19 @@ def test_angle_rate_and_slopes_are_those_of_finite_differences():
     np.testing.assert_allclose(BODY.angle_rate(s, q, rates), moved, atol=1e-6)
     angle, rate = BODY.angle_slopes(s, q, rates)
     np.testing.assert_allclose(angle, differences(lambda y: BODY.angle(s, y[:n]), at), atol=1e-7)
-    np.testing.assert_allclose(rate, differences(lambda y: BODY.angle_rate(s, y[:n], y[n:]), at), atol=1e-5)
+    np.testing.assert_allclose(
+        rate, differences(lambda y: BODY.angle_rate(s, y[:n], y[n:]), at), atol=1e-5
+    )
 
 
 @pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)])
 def test_balance_and_power_agree_with_adaptive_panels(friction):
     (q, rates), delta = shapes(3), 1e-2
     solved = BODY.solve(friction, q, rates, delta)
-    motion, (other, _) = BODY.motion(friction, q, rates, delta, solved), BODY.replayed(friction, q, rates, delta, None)
+    motion, (other, _) = (
+        BODY.motion(friction, q, rates, delta, solved),
+        BODY.replayed(friction, q, rates, delta, None),
+    )
     np.testing.assert_allclose(motion.z, other.z, atol=1e-4)
     np.testing.assert_allclose(motion.centre, other.centre, atol=1e-4)
     np.testing.assert_allclose(motion.power, other.power, rtol=1e-3)
@@ -85,7 +93,9 @@ def test_slopes_of_the_motion_are_those_of_finite_differences():
         return np.concatenate([now.z, now.centre, now.power[None]])
 
     numeric = differences(motion, np.concatenate([q, rates]))
-    slopes = BODY.slopes(Friction(), q, rates, delta, BODY.solve(Friction(), q, rates, delta, tolerance=1e-13))
+    slopes = BODY.slopes(
+        Friction(), q, rates, delta, BODY.solve(Friction(), q, rates, delta, tolerance=1e-13)
+    )
     np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
 
 
@@ -93,7 +103,9 @@ def test_optimising_beats_the_paper_s_crawler():
     """On one coarse mesh and few panels, which are enough to tell them apart."""
     body = CrawlerBody(0.1, modes=2, panels=4)
     guess = Corners(body.concertina(1.499), "antipodal")
-    space, v = space_near(Problem("crawler", guess, body, gait=Polygon(8, "antipodal"), intervals=8), guess)
+    space, v = space_near(
+        Problem("crawler", guess, body, gait=Polygon(8, "antipodal"), intervals=8), guess
+    )
     paper = -ReducedProgram(space, 1e-3).objective(v)
     found = converged(space, v, 1e-3, SKETCH)
     assert 0.5 < paper + 0.005 < -found.objective < 1.0
@@ -122,14 +134,21 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     body = CrawlerBody(epsilon=0.2, modes=2, panels=4)
     guess = Corners(body.concertina(1.2), "antipodal")
     problem = Problem(
-        "paper", guess, body=body, friction=Friction(), gait=Polygon(8, "antipodal"), delta=1e-3, delta_start=1e-3
+        "paper",
+        guess,
+        body=body,
+        friction=Friction(),
+        gait=Polygon(8, "antipodal"),
+        delta=1e-3,
+        delta_start=1e-3,
     )
     mesh = Mesh(scheme(problem.scheme), guess.phases)
     answer = as_it_is(problem, mesh, guess, guess.vertices.ravel(order="F"), "guess")
     solution = Solution(problem, replace(answer, knots=guess.phases, history=(answer.step,)))
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
-        ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps", "5", "--periods", "1")),
+        ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps",
+        "5", "--periods", "1")),
         ("compare", (file,)),
     ):  # fmt: skip
         assert colloc_main([command, file, *more]) == 0
@@ -143,7 +162,9 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
-def test_a_bump_lies_at_the_ends_of_its_region_where_it_grows_and_is_flattened_and_never_beyond(share):
+def test_a_bump_lies_at_the_ends_of_its_region_where_it_grows_and_is_flattened_and_never_beyond(
+    share,
+):
     body = CrawlerBody(0.1, share=share)
     ends = body.breaks(np.array([[LAP, -LAP, 0.0, 0.4], *[[1.0] * 4] * body.modes]))[1:-1]
     np.testing.assert_allclose(ends[0, :2], 0.4, atol=1e-15)
@@ -152,7 +173,10 @@ def test_a_bump_lies_at_the_ends_of_its_region_where_it_grows_and_is_flattened_a
     assert 0.4 < ends[0, 3] < ends[-1, 3] < 0.6
 
 
-@pytest.mark.parametrize("asked", [{"way": (0.9,)}, {"way": (0.9, "text")}, {"way": 0.9}, {"sides": 3}, {"amplitude": "wide"}])
+@pytest.mark.parametrize(
+    "asked",
+    [{"way": (0.9,)}, {"way": (0.9, "text")}, {"way": 0.9}, {"sides": 3}, {"amplitude": "wide"}],
+)
 def test_what_is_no_concertina_is_refused_in_one_sentence(asked):
     with pytest.raises(ProblemError, match="must be"):
         BODY.concertina(**{"amplitude": 1.3} | asked)

@@ -1,4 +1,5 @@
-"""Prescribed motions are problems with nothing free: measured, certified, stored and drawn like gaits that were searched."""
+"""Prescribed motions are problems with nothing free: measured, certified, stored and drawn like
+gaits that were searched."""
 
 import numpy as np
 import pytest
@@ -25,7 +26,13 @@ from colloc.system.errors import ProblemError
 from scripts.models.period import measured_period, period
 
 ALONG = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
-BODIES = [Wave(), Wave("tanh", 1.3, 2.0), Wave("standing"), Concertina(epsilon=0.2), Concertina(epsilon=0.1, bumps=2)]
+BODIES = [
+    Wave(),
+    Wave("tanh", 1.3, 2.0),
+    Wave("standing"),
+    Concertina(epsilon=0.2),
+    Concertina(epsilon=0.1, bumps=2),
+]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +59,11 @@ def test_the_largest_angle_at_an_instant_is_that_of_the_steepest_point(body):
 
 def test_it_is_read_as_it_was_written(wave, tmp_path):
     read = load(save(wave, tmp_path / "wave.h5"))
-    assert (read.problem.hash, read.problem.body, read.problem.gait) == (wave.problem.hash, Wave(), wave.problem.gait)
+    assert (read.problem.hash, read.problem.body, read.problem.gait) == (
+        wave.problem.hash,
+        Wave(),
+        wave.problem.gait,
+    )
     np.testing.assert_array_equal(read.sample(0.7).tail, wave.sample(0.7).tail)
     assert frames(read, count=5).ends.shape == (2, 97, 5)
     assert export([str(tmp_path / "wave.h5"), "--period", "1"]) == 2
@@ -76,10 +87,16 @@ def test_the_friction_that_is_drawn_has_no_resultant():
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
 def test_the_work_on_the_mesh_is_that_of_the_general_solver(body):
     problem = Problem(
-        "any", body=body, friction=Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), delta=1e-2, mesh_tolerance=0, scheme="gauss-2"
+        "any",
+        body=body,
+        friction=Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0),
+        delta=1e-2,
+        mesh_tolerance=0,
+        scheme="gauss-2",
     )
     reference = period(body.prescribed(), problem.friction, 1e-2, intervals=4, nodes=2)
-    assert prescribed_answer(problem).work == pytest.approx(reference.W, rel=1e-6)  # the same quadrature in time
+    # the same quadrature in time
+    assert prescribed_answer(problem).work == pytest.approx(reference.W, rel=1e-6)
 
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
@@ -87,7 +104,9 @@ def test_bodies_answer_every_question_and_can_be_kept(body):
     assert isinstance(body, Body)
     assert body_from(fields(body)) == body
     gait = Problem("any", body=body).gait
-    assert gait == class_from(fields(gait)) == Prescribed(body.prescribed().stages, body.symmetries[0])
+    assert (
+        gait == class_from(fields(gait)) == Prescribed(body.prescribed().stages, body.symmetries[0])
+    )
 
 
 def test_sliding_at_the_balanced_velocity_leaves_no_force_and_elsewhere_does():

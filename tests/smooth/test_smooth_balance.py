@@ -1,4 +1,5 @@
-"""The balance of smooth bodies: identities of the panels, limits, an independent quadrature, precision at stick."""
+"""The balance of smooth bodies: identities of the panels, limits, an independent quadrature,
+precision at stick."""
 
 import numpy as np
 import pytest
@@ -34,7 +35,8 @@ def test_path_integrals_are_exact_for_polynomials(reference):
 
 @pytest.mark.parametrize("reference", [0, 2, 4])
 def test_a_stretch_that_rests_is_exactly_at_rest(reference):
-    """Rates vanish on [0, 1/2]; with the reference held there, so does its velocity, to the last bit."""
+    """Rates vanish on [0, 1/2]; with the reference held there, so does its velocity, to the last
+    bit."""
     edges = np.linspace(0, 1, 9)[:, None]
     panels = PanelGrid(edges)
     s = panels.nodes
@@ -69,7 +71,8 @@ def test_straight_rotating_body_agrees_with_the_closed_form_of_a_link():
 
 
 def naive_resultant(motion, friction, t, delta, z):
-    """Force and torque about the tail by nested adaptive quadrature, straight from the paper's equations."""
+    """Force and torque about the tail by nested adaptive quadrature, straight from the paper's
+    equations."""
 
     def position_and_velocity(s):
         def integrand(q, index):
@@ -109,7 +112,9 @@ def test_many_starts_panels_and_methods_agree(motion, friction):
     t = np.array([0.02, 0.2, 0.41])
     base = solve_smooth(motion, friction, t, 1e-3).require()
     other = solve_smooth(motion, friction, t, 1e-3, panels=27, order=10).require()
-    slow = solve_smooth(motion, friction, t, 1e-3, method="fixed_point", max_iterations=20000, panels=24).require()
+    slow = solve_smooth(
+        motion, friction, t, 1e-3, method="fixed_point", max_iterations=20000, panels=24
+    ).require()
     np.testing.assert_allclose(other.z, base.z, atol=2e-8)
     np.testing.assert_allclose(slow.z, base.z, atol=2e-8)
     np.testing.assert_allclose(other.power, base.power, atol=2e-8)
@@ -125,7 +130,8 @@ def test_scaling_of_rates_and_delta():
 
 
 def test_uniform_rotation_of_the_frame_is_undone():
-    """A shape that only turns its frame does not move: the frame turns back, and no work is done."""
+    """A shape that only turns its frame does not move: the frame turns back, and no work is
+    done."""
     solution = solve_smooth(straight(3.0), Friction(), np.array([0.0, 0.2]), 1e-6).require()
     np.testing.assert_allclose(solution.z[2], -3.0, rtol=1e-14)
     np.testing.assert_allclose(solution.z[:2], 0.0, atol=1e-14)
@@ -134,7 +140,8 @@ def test_uniform_rotation_of_the_frame_is_undone():
 
 @pytest.mark.parametrize("delta", [1e-4, 1e-8, 1e-12])
 def test_panels_resolve_the_layer_where_a_body_pivots(delta):
-    """A body hinged in the middle, its front half turning: compare with two straight links, integrated in closed form."""
+    """A body hinged in the middle, its front half turning: compare with two straight links,
+    integrated in closed form."""
     width = 1e-6
 
     def step(s):
@@ -146,7 +153,9 @@ def test_panels_resolve_the_layer_where_a_body_pivots(delta):
         breaks=lambda t: np.array([[0.5 - width / 2], [0.5 + width / 2]]) * np.ones((1, t.size)),
     )
     smooth = solve_smooth(hinge, Friction(), np.array([0.1]), delta).require()
-    chain = solve_balance(Chain((0.5, 0.5)), Friction(), np.array([[0.9]]), np.array([[1.0]]), delta).require()
+    chain = solve_balance(
+        Chain((0.5, 0.5)), Friction(), np.array([[0.9]]), np.array([[1.0]]), delta
+    ).require()
     np.testing.assert_allclose(smooth.z[:, 0], chain.z[:, 0], atol=5e-6)
     assert smooth.quadrature_error.max() < 1e-10
 
@@ -158,7 +167,10 @@ def test_chain_of_many_links_converges_to_the_smooth_body_with_isotropic_frictio
     for n in (20, 40):
         edges = np.linspace(0, 1, n + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])[:, None]
-        angles, rates = np.diff(motion.angle(middle, t), axis=0), np.diff(motion.rate(middle, t), axis=0)
+        angles, rates = (
+            np.diff(motion.angle(middle, t), axis=0),
+            np.diff(motion.rate(middle, t), axis=0),
+        )
         chain = solve_balance(Chain((1 / n,) * n), Friction(), angles, rates, delta).require()
         frame_rate = chain.z[2] - motion.rate(middle[:1], t)[0]
         errors.append(abs(frame_rate[0] - smooth.z[2, 0]))
@@ -169,11 +181,15 @@ def test_unusable_input_is_named():
     with pytest.raises(ProblemError, match="delta must be a positive"):
         solve_smooth(sine_wave(), Friction(), np.array([0.1]), 0.0)
     with pytest.raises(ProblemError, match="finite"):
-        solve_smooth(Motion(lambda s, t: s * np.nan, lambda s, t: s), Friction(), np.array([0.1]), 1e-3)
+        solve_smooth(
+            Motion(lambda s, t: s * np.nan, lambda s, t: s), Friction(), np.array([0.1]), 1e-3
+        )
     with pytest.raises(ProblemError, match="stages must ascend"):
         Motion(lambda s, t: s, lambda s, t: s, stages=(0.0, 0.4))
     with pytest.raises(NotConvergedError, match="did not balance at 1 of 1"):
-        solve_smooth(sine_wave(), Friction(), np.array([0.1]), 1e-6, max_iterations=1, method="fixed_point").require()
+        solve_smooth(
+            sine_wave(), Friction(), np.array([0.1]), 1e-6, max_iterations=1, method="fixed_point"
+        ).require()
 
 
 def test_the_law_is_the_gradient_of_the_potential_when_isotropic():
@@ -183,7 +199,9 @@ def test_the_law_is_the_gradient_of_the_potential_when_isotropic():
     panels = PanelGrid(np.linspace(0, 1, 41)[:, None])
 
     def potential(z):
-        body = curve(panels, motion.angle(panels.nodes, t), motion.rate(panels.nodes, t), 0, np.zeros((1, 1)))
+        body = curve(
+            panels, motion.angle(panels.nodes, t), motion.rate(panels.nodes, t), 0, np.zeros((1, 1))
+        )
         vs, vn = node_velocity(body, np.array(z)[:, None])
         return float(np.sum(panels.weights * np.sqrt(vs**2 + vn**2 + delta**2)))
 

@@ -1,4 +1,5 @@
-"""Concertina crawlers: geometry of the shapes, the bound, scalings with epsilon, and what holds the anchor."""
+"""Concertina crawlers: geometry of the shapes, the bound, scalings with epsilon, and what holds the
+anchor."""
 
 import runpy
 
@@ -8,10 +9,20 @@ import pytest
 from colloc.mechanics.friction import Friction
 from colloc.smooth.concertina import Concertina
 from colloc.system.errors import ProblemError
-from scripts.models.epsilon_study import Crawler, EpsilonPoint, delta_for, epsilon_point, fitted_order, fitted_orders, table
+from scripts.models.epsilon_study import (
+    Crawler,
+    EpsilonPoint,
+    delta_for,
+    epsilon_point,
+    fitted_order,
+    fitted_orders,
+    table,
+)
 
 SIDEWAYS = Crawler(
-    Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2), Friction(mu_t=1.0, mu_f=3.0, mu_b=3.0), delta=1e-6
+    Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2),
+    Friction(mu_t=1.0, mu_f=3.0, mu_b=3.0),
+    delta=1e-6,
 )
 ONE = Crawler(Concertina(epsilon=0.05, amplitude=1.3), delta=1e-6)
 
@@ -20,7 +31,11 @@ ONE = Crawler(Concertina(epsilon=0.05, amplitude=1.3), delta=1e-6)
 def test_rate_is_the_derivative_of_the_angle(crawler):
     motion, h = crawler.body.prescribed(), 1e-6
     s = np.linspace(0, 1, 1501)[:, None] * np.ones((1, 4))
-    t = np.array([0.1, 0.2, 0.3, 0.45]) if crawler.body.bumps == 1 else np.array([0.1, 0.3, 0.6, 0.9])
+    t = (
+        np.array([0.1, 0.2, 0.3, 0.45])
+        if crawler.body.bumps == 1
+        else np.array([0.1, 0.3, 0.6, 0.9])
+    )
     numeric = (motion.angle(s, t + h) - motion.angle(s, t - h)) / (2 * h)
     scale = np.abs(motion.rate(s, t)).max()
     np.testing.assert_allclose(motion.rate(s, t), numeric, atol=1e-5 * scale)
@@ -45,7 +60,8 @@ def test_two_bumps_are_antisymmetric_and_keep_their_length():
 
 @pytest.mark.parametrize("crawler", [ONE, SIDEWAYS])
 def test_the_anchor_holds_and_the_stroke_is_the_geometry(crawler):
-    """The distance is what the shape shortens or shifts, less a creep of order delta; nothing rotates."""
+    """The distance is what the shape shortens or shifts, less a creep of order delta; nothing
+    rotates."""
     p = crawler.period(intervals=2, quadrature_tolerance=1e-8)
     assert p.d == pytest.approx(crawler.body.stroke, rel=2e-4)
     assert p.d < crawler.body.stroke
@@ -55,13 +71,21 @@ def test_the_anchor_holds_and_the_stroke_is_the_geometry(crawler):
 
 
 def test_isotropic_crawler_scales_as_the_paper_says():
-    """d ~ epsilon, W_inner ~ epsilon^2, W_outer/d -> 1, 1 - efficiency ~ epsilon; above 0.99 at epsilon = 0.0025."""
+    """d ~ epsilon, W_inner ~ epsilon^2, W_outer/d -> 1, 1 - efficiency ~ epsilon; above 0.99 at
+    epsilon = 0.0025."""
     epsilons = (0.01, 0.005, 0.0025)
-    periods = [ONE.with_(epsilon=e, delta=delta_for(e)).period(intervals=1, quadrature_tolerance=1e-8) for e in epsilons]
+    periods = [
+        ONE.with_(epsilon=e, delta=delta_for(e)).period(intervals=1, quadrature_tolerance=1e-8)
+        for e in epsilons
+    ]
     assert fitted_order(epsilons, [p.d for p in periods]) == pytest.approx(1.0, abs=0.01)
     assert fitted_order(epsilons, [p.W_inner for p in periods]) == pytest.approx(2.0, abs=0.02)
-    assert fitted_order(epsilons, [1 - p.efficiency for p in periods]) == pytest.approx(1.0, abs=0.05)
-    assert [abs(p.W_outer / p.d - 1) < 2.2 * e for p, e in zip(periods, epsilons, strict=True)] == [True] * 3
+    assert fitted_order(epsilons, [1 - p.efficiency for p in periods]) == pytest.approx(
+        1.0, abs=0.05
+    )
+    assert [abs(p.W_outer / p.d - 1) < 2.2 * e for p, e in zip(periods, epsilons, strict=True)] == [
+        True
+    ] * 3
     assert 0.99 < periods[-1].efficiency < 1.0
 
 
@@ -78,7 +102,8 @@ def test_backwards_is_forwards_with_the_coefficients_exchanged():
 
 
 def test_a_bump_that_takes_half_its_region_tears_the_anchor_loose_on_very_rough_sideways_friction():
-    """With mu_t = 10 the bump drags harder than the anchor's margin; a smaller share of the region mends it."""
+    """With mu_t = 10 the bump drags harder than the anchor's margin; a smaller share of the region
+    mends it."""
     rough = ONE.with_(friction=Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), epsilon=0.02)
     loose, firm = (rough.with_(share=share).period(intervals=1, nodes=4) for share in (0.5, 0.15))
     assert loose.d < 0.8 * rough.body.stroke
@@ -86,7 +111,10 @@ def test_a_bump_that_takes_half_its_region_tears_the_anchor_loose_on_very_rough_
 
 
 def test_fitted_orders_of_exact_powers():
-    points = [EpsilonPoint(e, 1e-6, 2 * e, 3 * e**2, e, 1 - e, {"efficiency": 0.0}, 0.0) for e in (0.1, 0.01)]
+    points = [
+        EpsilonPoint(e, 1e-6, 2 * e, 3 * e**2, e, 1 - e, {"efficiency": 0.0}, 0.0)
+        for e in (0.1, 0.01)
+    ]
     orders = fitted_orders(points, 1.0)
     assert orders["d"] == pytest.approx(1.0)
     assert orders["W_inner"] == pytest.approx(2.0)

@@ -1,4 +1,5 @@
-"""Low-mode gaits of smooth bodies: modes, balance against the general solver, derivatives, optima and what they beat."""
+"""Low-mode gaits of smooth bodies: modes, balance against the general solver, derivatives, optima
+and what they beat."""
 
 import numpy as np
 import pytest
@@ -37,7 +38,10 @@ def gait_motion(body, gait):
     def wide(s, t):
         return np.broadcast_to(s, (len(s), t.size))
 
-    angle, rate = (lambda s, t, part=part: body.tangent(wide(s, t), part(t)) for part in (gait.angles, gait.rates))
+    angle, rate = (
+        lambda s, t, part=part: body.tangent(wide(s, t), part(t))
+        for part in (gait.angles, gait.rates)
+    )
     return Motion(angle, rate, stages=(0.0, 0.5), antipodal=True)
 
 
@@ -59,7 +63,8 @@ def test_fourier_modes_hold_the_paper_s_wave_exactly():
 
 
 def test_a_straight_staircase_is_laid_into_the_line_through_it():
-    """A chain on a circle has headings in arithmetic progression; its nearest degree-one mode has the circle's curvature."""
+    """A chain on a circle has headings in arithmetic progression; its nearest degree-one mode has
+    the circle's curvature."""
     n = 40
     amplitudes = ModalBody(3).laid(np.full(n, 1.0 / n)) @ np.full(n - 1, 1.0 / n)
     np.testing.assert_allclose(amplitudes, [0.5, 0.0, 0.0], atol=2.0 / n**2)
@@ -91,7 +96,10 @@ def shapes(body, n, seed=3):
 def test_the_statement_vanishes_at_the_solver_s_velocity_and_gives_the_same_motion(body):
     (q, rates), delta = shapes(body, 7), 0.1
     solved = body.solve(SIDEWAYS, q, rates, delta)
-    stated, motion = body.sliding(SIDEWAYS, q, rates, solved.z, delta), body.motion(SIDEWAYS, q, rates, delta, solved)
+    stated, motion = (
+        body.sliding(SIDEWAYS, q, rates, solved.z, delta),
+        body.motion(SIDEWAYS, q, rates, delta, solved),
+    )
     assert np.abs(stated.force).max() < 1e-9 * SIDEWAYS.largest
     np.testing.assert_allclose(stated.centre, motion.centre, atol=1e-12)
     np.testing.assert_allclose(stated.power[0], motion.power, rtol=1e-11)
@@ -109,23 +117,40 @@ def test_slopes_are_those_of_finite_differences_whatever_the_anchor(friction):
         return solved, np.concatenate([now.z, now.centre, now.power[None]])
 
     solved, here = motion(at)
-    numeric = np.stack([(motion(at + h * e)[1] - motion(at - h * e)[1]) / (2 * h) for e in np.eye(6)[:, :, None]], axis=1)
+    numeric = np.stack(
+        [(motion(at + h * e)[1] - motion(at - h * e)[1]) / (2 * h) for e in np.eye(6)[:, :, None]],
+        axis=1,
+    )
     for edge in (0, 2, 6):
         anchored = seen_from_edge(body, q, rates, solved, edge)
         slopes = body.slopes(friction, q, rates, delta, anchored)
         np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
-        assert np.abs(body.motion(friction, q, rates, delta, anchored).centre - here[3:5]).max() < 1e-12
+        assert (
+            np.abs(body.motion(friction, q, rates, delta, anchored).centre - here[3:5]).max()
+            < 1e-12
+        )
 
 
 def seen_from_edge(body, q, rates, solved, edge):
-    """The same balance with another anchor: velocity of an edge of the panels, and the rotation rate of the tangent there."""
+    """The same balance with another anchor: velocity of an edge of the panels, and the rotation
+    rate of the tangent there."""
     fine = body.modes_at(body.grid.nodes[:, 0])
     theta, turning = fine @ q, fine @ rates + solved.z[2]
     path = body.grid.edge_path(0)[edge] * body.grid.widths[:, 0]
-    u, v = solved.z[0] - path @ (turning * np.sin(theta)), solved.z[1] + path @ (turning * np.cos(theta))
+    u, v = (
+        solved.z[0] - path @ (turning * np.sin(theta)),
+        solved.z[1] + path @ (turning * np.cos(theta)),
+    )
     omega = solved.z[2] + (body.modes_at(body.grid.edges[edge]) @ rates)[0]
     anchor = np.full(q.shape[1], edge)
-    return BalanceSolution(solved.z, solved.residual, solved.iterations, solved.converged, anchor, np.stack([u, v, omega]))
+    return BalanceSolution(
+        solved.z,
+        solved.residual,
+        solved.iterations,
+        solved.converged,
+        anchor,
+        np.stack([u, v, omega]),
+    )
 
 
 @pytest.mark.parametrize("modes", [2, 4, 6, 12])
@@ -134,12 +159,16 @@ def test_the_tangent_is_bounded_wherever_it_is_largest(basis, modes):
     body = ModalBody(modes, basis)
     shapes, checks = np.random.default_rng(modes).normal(size=(modes, 500)), shape_checks(body)
     everywhere = np.abs(body.modes_at(np.linspace(0.0, 1.0, 20001)) @ shapes).max(axis=0)
-    np.testing.assert_allclose(np.max([np.abs(check.along(shapes)) for check in checks], axis=0), everywhere, rtol=2e-5)
+    np.testing.assert_allclose(
+        np.max([np.abs(check.along(shapes)) for check in checks], axis=0), everywhere, rtol=2e-5
+    )
     for check in checks:
         there = check.cut(shapes, check.itself(shapes))[0]
         np.testing.assert_allclose(there, check.along(shapes), atol=1e-10)
         rows = body.modes_at(check.itself(shapes))
-        np.testing.assert_allclose(check.slope(shapes, check.itself(shapes)[None]).full(), rows.T, atol=1e-10)
+        np.testing.assert_allclose(
+            check.slope(shapes, check.itself(shapes)[None]).full(), rows.T, atol=1e-10
+        )
 
 
 def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_programs_let_them():
@@ -151,25 +180,40 @@ def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_progra
     assert (largest <= gait.largest_parameters(body, 1.0).max() * np.pi / 4).all()
     problem = Problem("modes", body=body, gait=gait, joint_limit=1.0)
     program = transcribe(control_problem(problem))
-    np.testing.assert_allclose(program.upper[program.layout.parameters[:, 0]], LinearSpace(control_problem(problem)).upper)
+    np.testing.assert_allclose(
+        program.upper[program.layout.parameters[:, 0]], LinearSpace(control_problem(problem)).upper
+    )
 
 
 @pytest.mark.parametrize("basis", ["legendre", "fourier"])
 def test_a_gait_seen_from_the_other_end_backwards_in_time_is_the_same_gait(basis):
-    """The reversed swap keeps distance and work under every friction (`colloc.results.distinct_optima`), smooth bodies too."""
-    body, friction, t = ModalBody(4, basis), Friction(mu_t=2.0, mu_f=1.0, mu_b=3.0), np.arange(40) / 40
+    """The reversed swap keeps distance and work under every friction
+    (`colloc.results.distinct_optima`), smooth bodies too."""
+    body, friction, t = (
+        ModalBody(4, basis),
+        Friction(mu_t=2.0, mu_f=1.0, mu_b=3.0),
+        np.arange(40) / 40,
+    )
     gait = wave(body, 0.8)
     image = reversed_in_time(swapped(gait, body))
     powers = []
     for g in (gait, image):
         q, rates = g.angles(t), g.rates(t)
-        powers.append(body.motion(friction, q, rates, 0.05, body.solve(friction, q, rates, 0.05)).power.sum())
+        powers.append(
+            body.motion(friction, q, rates, 0.05, body.solve(friction, q, rates, 0.05)).power.sum()
+        )
     assert powers[1] == pytest.approx(powers[0], rel=1e-9)
     assert distance(gait, image, body, friction) < 1e-12
 
 
 def problem(**changes) -> Problem:
-    fields = {"name": "wave", "body": FOURIER, "friction": SIDEWAYS, "gait": Harmonic(1, "antipodal"), "intervals": 8}
+    fields = {
+        "name": "wave",
+        "body": FOURIER,
+        "friction": SIDEWAYS,
+        "gait": Harmonic(1, "antipodal"),
+        "intervals": 8,
+    }
     return Problem(**(fields | changes))
 
 
@@ -184,7 +228,9 @@ def test_the_optimum_beats_the_paper_s_wave_and_is_certified(tmp_path):
         g = found.gait
         moved = Fourier(g.mean, scale * g.cos, scale * g.sin)
         period = measured_period(gait_motion(FOURIER, moved), SIDEWAYS, found.problem.delta)
-        assert period.efficiency == pytest.approx(found.efficiency, rel=1e-6) if scale == 1.0 else True
+        assert (
+            period.efficiency == pytest.approx(found.efficiency, rel=1e-6) if scale == 1.0 else True
+        )
         assert scale == 1.0 or period.efficiency < found.efficiency - 1e-6
     read = load(save(found, tmp_path / "wave.h5"))
     assert (read.problem.hash, read.problem.body) == (found.problem.hash, found.problem.body)
@@ -217,7 +263,8 @@ def test_unusable_problems_are_refused(changes, message):
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"), [({"modes": 0}, "modes"), ({"basis": "sine"}, "basis"), ({"panels": 2.5}, "panels")]
+    ("changes", "message"),
+    [({"modes": 0}, "modes"), ({"basis": "sine"}, "basis"), ({"panels": 2.5}, "panels")],
 )
 def test_unusable_bodies_are_refused(changes, message):
     with pytest.raises(ProblemError, match=message):

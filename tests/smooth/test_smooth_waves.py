@@ -13,7 +13,8 @@ ALONG = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
 
 
 def test_wave_B_to_eight_digits():
-    """Two unrelated discretisations in time and arc length agree to 8 digits, and with the design notes' 0.737066."""
+    """Two unrelated discretisations in time and arc length agree to 8 digits, and with the design
+    notes' 0.737066."""
     p = measured_period(sine_wave(), ALONG, 1e-4, intervals=8)
     q = period(sine_wave(), ALONG, 1e-4, intervals=3, nodes=7, panels=11, order=11)
     assert p.efficiency == pytest.approx(q.efficiency, abs=2e-9)
@@ -22,10 +23,13 @@ def test_wave_B_to_eight_digits():
 
 
 def test_wave_B_by_a_chain_of_links_extrapolated():
-    """Independent of all panels: links have closed-form friction; their quadratic error is extrapolated away."""
+    """Independent of all panels: links have closed-form friction; their quadratic error is
+    extrapolated away."""
     coarse, fine = (np.array(chain_period(sine_wave(), ALONG, 1e-4, n, 16)) for n in (160, 320))
     d, W = (4 * fine - coarse) / 3
-    assert d / W == pytest.approx(period(sine_wave(), ALONG, 1e-4, intervals=2).efficiency, abs=2e-5)
+    assert d / W == pytest.approx(
+        period(sine_wave(), ALONG, 1e-4, intervals=2).efficiency, abs=2e-5
+    )
 
 
 def test_a_chain_overestimates_the_work_in_proportion_to_the_anisotropy():
@@ -59,7 +63,10 @@ def test_the_half_period_and_the_whole_agree():
     wave = sine_wave()
     whole = Motion(wave.angle, wave.rate, stages=(0.0, 0.5, 1.0))
     a, b = (
-        period(m, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), 1e-3, intervals=3, quadrature_tolerance=1e-8) for m in (wave, whole)
+        period(
+            m, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), 1e-3, intervals=3, quadrature_tolerance=1e-8
+        )
+        for m in (wave, whole)
     )
     assert a.d == pytest.approx(b.d, abs=1e-8)
     assert pytest.approx(b.W, abs=1e-8) == a.W

@@ -1,4 +1,5 @@
-"""The table of known gaits: what it says comes out of a replay, and only what is certified and better gets in."""
+"""The table of known gaits: what it says comes out of a replay, and only what is certified and
+better gets in."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor
@@ -16,7 +17,11 @@ from colloc.system.errors import ProblemError, StoreError
 
 ROWS = known()
 PAGE = Path(__file__).parents[2] / "docs" / "known.md"
-QUICK = [row for row in ROWS if row.statement["name"] in ("three_link", "two_link", "three_link_uphill", "three_link_fast")]
+QUICK = [
+    row
+    for row in ROWS
+    if row.statement["name"] in ("three_link", "two_link", "three_link_uphill", "three_link_fast")
+]
 PROBLEM = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
 
 
@@ -37,7 +42,11 @@ def test_every_row_comes_out_of_its_own_replay(row):
 
 
 def test_no_two_rows_answer_one_question_and_the_page_shows_them_all():
-    assert len({row.question for row in ROWS}) == len(ROWS) == len({row.statement["name"] for row in ROWS})
+    assert (
+        len({row.question for row in ROWS})
+        == len(ROWS)
+        == len({row.statement["name"] for row in ROWS})
+    )
     assert markdown(ROWS) in PAGE.read_text(encoding="utf-8")
 
 
@@ -54,7 +63,9 @@ def test_a_gait_that_breaks_a_limit_is_not_accepted(best):
     false = replace(row, statement={**row.statement, "joint_limit": 1.0})
     with pytest.raises(ProblemError, match="beyond the limit 1"):
         with_row([], false)
-    false = replace(row, statement={**row.statement, "at_least": [[colloc.Objective("distance").fields(), 1.0]]})
+    false = replace(
+        row, statement={**row.statement, "at_least": [[colloc.Objective("distance").fields(), 1.0]]}
+    )
     with pytest.raises(ProblemError, match="fails on"):
         with_row([], false)
 
@@ -100,7 +111,9 @@ def test_the_referee_takes_a_result_and_holds_it(best, tmp_path, capsys):
         known(tmp_path / "none.json")
 
 
-def test_without_a_table_the_referee_begins_a_copy_of_its_own_where_it_is_called(best, tmp_path, monkeypatch):
+def test_without_a_table_the_referee_begins_a_copy_of_its_own_where_it_is_called(
+    best, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     colloc.save(best, "quick.h5")
     arguments = ["referee", "--add", "quick.h5", "--by", "colloc solve quick.py"]
@@ -124,10 +137,22 @@ def test_two_that_are_taken_in_at_once_are_both_there(best, tmp_path, monkeypatc
 
     def take_in(solution):
         result = colloc.save(solution, tmp_path / f"{solution.problem.name}.h5")
-        return main(["referee", "--table", str(table), "--add", str(result), "--by", "colloc solve quick.py"])
+        return main(
+            [
+                "referee",
+                "--table",
+                str(table),
+                "--add",
+                str(result),
+                "--by",
+                "colloc solve quick.py",
+            ]
+        )
 
     monkeypatch.setattr("colloc.studies.known.save_known", after_both_have_read)
-    other = colloc.solve(PROBLEM.with_(name="other", friction=colloc.Friction(mu_t=2, mu_f=1, mu_b=1)), starts=1)
+    other = colloc.solve(
+        PROBLEM.with_(name="other", friction=colloc.Friction(mu_t=2, mu_f=1, mu_b=1)), starts=1
+    )
     with ThreadPoolExecutor(2) as threads:
         assert list(threads.map(take_in, [best, other])) == [0, 0]
     assert {row.statement["name"] for row in known(table)} == {"quick", "other"}

@@ -1,4 +1,5 @@
-"""Many starts: admissible reproducible samples, gaits that are the same, archives, and runs that nothing stops."""
+"""Many starts: admissible reproducible samples, gaits that are the same, archives, and runs that
+nothing stops."""
 
 import itertools
 import json
@@ -26,7 +27,13 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import mesh_errors
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
 from colloc.results.checks import UNCERTIFIED
-from colloc.results.distinct_optima import basins, distance, images, phase_distance, reversed_in_time
+from colloc.results.distinct_optima import (
+    basins,
+    distance,
+    images,
+    phase_distance,
+    reversed_in_time,
+)
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.search import certify
@@ -44,7 +51,12 @@ GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
 
 
 def problem(**changes):
-    fields = {"gait": Harmonic(1, "bilateral"), "delta": 0.1, "intervals": 10, "mesh_tolerance": 0.0}
+    fields = {
+        "gait": Harmonic(1, "bilateral"),
+        "delta": 0.1,
+        "intervals": 10,
+        "mesh_tolerance": 0.0,
+    }
     return Problem(**{"name": "quick", "guess": ellipse(0.2, 1.2, 0.8), **fields, **changes})
 
 
@@ -60,8 +72,11 @@ def test_images_of_a_gait_keep_its_distance_work_and_rotation(friction, n_image)
     assert len(found) == n_image
     for image in found:
         other = replayed(image, friction)
-        # the replay integrates the rotation forwards in time, so its quadrature error is not the same for a reversed gait
-        np.testing.assert_allclose([other.distance, other.work], [original.distance, original.work], rtol=1e-6)
+        # the replay integrates the rotation forwards in time, so its quadrature error is not the
+        # same for a reversed gait
+        np.testing.assert_allclose(
+            [other.distance, other.work], [original.distance, original.work], rtol=1e-6
+        )
         np.testing.assert_allclose(abs(other.rotation), abs(original.rotation), rtol=1e-8)
 
 
@@ -95,19 +110,31 @@ def test_distance_does_not_see_start_phase_or_symmetry_but_sees_everything_else(
     moved = Fourier(GAIT.mean + np.array([0.1, 0.0]), GAIT.cos, GAIT.sin)
     assert phase_distance(GAIT, moved) == pytest.approx(0.1, rel=1e-6)
     assert distance(GAIT, reversed_in_time(GAIT), Chain(), IRREVERSIBLE) > 0.1
-    assert distance(GAIT, images(GAIT, Chain((0.2, 0.3, 0.5)), IRREVERSIBLE)[-1], Chain(), IRREVERSIBLE) < 1e-7
+    assert (
+        distance(
+            GAIT, images(GAIT, Chain((0.2, 0.3, 0.5)), IRREVERSIBLE)[-1], Chain(), IRREVERSIBLE
+        )
+        < 1e-7
+    )
 
 
 def test_phase_distance_is_the_smallest_over_a_brute_force_scan():
     other = reversed_in_time(GAIT)
     t = np.arange(64) / 64
-    scan = [np.sqrt(np.mean(np.sum((GAIT.angles(t) - other.angles(t + a)) ** 2, axis=0))) for a in np.linspace(0, 1, 2001)]
+    scan = [
+        np.sqrt(np.mean(np.sum((GAIT.angles(t) - other.angles(t + a)) ** 2, axis=0)))
+        for a in np.linspace(0, 1, 2001)
+    ]
     assert phase_distance(GAIT, other) == pytest.approx(min(scan), rel=1e-5)
 
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
-@pytest.mark.parametrize(("symmetry", "harmonics"), [("none", 1), ("bilateral", 2), ("antipodal", 1)])
-def test_starts_are_admissible_members_of_their_class_and_reproducible(sampler, symmetry, harmonics):
+@pytest.mark.parametrize(
+    ("symmetry", "harmonics"), [("none", 1), ("bilateral", 2), ("antipodal", 1)]
+)
+def test_starts_are_admissible_members_of_their_class_and_reproducible(
+    sampler, symmetry, harmonics
+):
     stated = problem(gait=Harmonic(harmonics, symmetry), joint_limit=2.8)
     t = np.arange(500) / 500
     seen = []
@@ -163,7 +190,9 @@ def test_a_start_that_reached_no_optimum_is_told_with_what_its_replay_measured(m
 def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
     # without the bound the best gait has a shape speed of 1.86
     bounds = {"smallest_shape_speed": 2.0, "delta": 1e-3, "mesh_tolerance": 1e-4}
-    stated = problem(friction=Friction(mu_t=0.5, mu_f=1, mu_b=5), guess=ellipse(0, 1.8, 1.2), **bounds)
+    stated = problem(
+        friction=Friction(mu_t=0.5, mu_f=1, mu_b=5), guess=ellipse(0, 1.8, 1.2), **bounds
+    )
     solution = solve(stated, 1)
     assert solution.status == SOLVED
     assert on_speed_floor(stated, solution.gait)
@@ -180,7 +209,9 @@ def outcome(start, gait=GAIT, efficiency=0.2, status=SOLVED):
 
 def test_basins_join_images_of_one_gait_and_nothing_else():
     stated = problem(friction=REVERSIBLE, gait=Harmonic(2, "none"))
-    same = [outcome(k, shifted(g, 0.1 * k)) for k, g in enumerate(images(GAIT, Chain(), REVERSIBLE))]
+    same = [
+        outcome(k, shifted(g, 0.1 * k)) for k, g in enumerate(images(GAIT, Chain(), REVERSIBLE))
+    ]
     other = outcome(20, Fourier(GAIT.mean + 0.3, GAIT.cos, GAIT.sin))
     better = outcome(21, GAIT, 0.21)
     failed = outcome(22, status=ERROR)
@@ -196,7 +227,12 @@ def test_an_archive_comes_back_as_it_was_written(tmp_path):
     names = {k: StartName(SAMPLERS[0], 7, k) for k in (4, 1)}
     assert open_archive(problem(), path).outcomes == {}
     archive = open_archive(problem(), path)
-    archive.add({names[4]: outcome(4, efficiency=1 / 3), names[1]: outcome(1, efficiency=np.nan, status=ERROR)})
+    archive.add(
+        {
+            names[4]: outcome(4, efficiency=1 / 3),
+            names[1]: outcome(1, efficiency=np.nan, status=ERROR),
+        }
+    )
     back = open_archive(problem(), path)
     assert sorted(back.outcomes) == sorted(names.values())
     for name in ("status", "efficiency", "iterations", "cpu_seconds", "delta"):
@@ -209,7 +245,10 @@ def test_an_archive_comes_back_as_it_was_written(tmp_path):
 
 @pytest.mark.parametrize(
     "gait",
-    [arcs_through(ellipse(0.2, 1.2, 0.8), FreePath(4), np.linspace(0, 1, 9)), Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]])],
+    [
+        arcs_through(ellipse(0.2, 1.2, 0.8), FreePath(4), np.linspace(0, 1, 9)),
+        Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]]),
+    ],
     ids=["path", "polygon"],
 )
 def test_gaits_that_are_no_series_are_kept_to_the_bit(gait, tmp_path):
@@ -257,12 +296,18 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
         if watched.calls == 2:
             raise ZeroDivisionError("one bad start")
         found = solve(stated, starts, **how)
-        return replace(found, interrupted=True, certificate=UNCERTIFIED) if watched.calls == 3 else found
+        return (
+            replace(found, interrupted=True, certificate=UNCERTIFIED)
+            if watched.calls == 3
+            else found
+        )
 
     watched.calls = 0
     monkeypatch.setattr(campaign, "solve", watched)
     monkeypatch.setattr(campaign.time, "perf_counter", itertools.count(0, 1000).__next__)
-    found = list(campaign.run_starts(problem(), range(3), time_limit=500, executor=ThreadPoolExecutor))
+    found = list(
+        campaign.run_starts(problem(), range(3), time_limit=500, executor=ThreadPoolExecutor)
+    )
     assert [o.start for o in found] == [0, 1, 2]
     assert found[0].iterations > 0
     assert (found[1].status, found[1].message) == (ERROR, "ZeroDivisionError: one bad start")
@@ -328,7 +373,12 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert multistart.main([str(path), "--starts", "3", "--output", str(out)]) == 0
     assert "3 starts done already, 0 to go" in capsys.readouterr().out
     # another seed joins the same archive, and says what else is there
-    assert multistart.main([str(path), "--starts", "2", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 0
+    assert (
+        multistart.main(
+            [str(path), "--starts", "2", "--seed", "1", "--output", str(out / "quick.starts.h5")]
+        )
+        == 0
+    )
     assert asked == [2, 3, 0, 1]
     assert "starts in the file besides: 4; the best of all, 0.200000" in capsys.readouterr().out
     archive = kept()
@@ -362,7 +412,11 @@ def test_of_two_runs_at_once_with_other_seeds_or_problems_neither_overwrites_the
 def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
     path = tmp_path / "quick.py"
     path.write_text(FILE, encoding="utf-8")
-    for options, text in ((["--starts", "0"], "--starts"), (["--workers", "0"], "--workers"), (["--time-limit", "0"], "time")):
+    for options, text in (
+        (["--starts", "0"], "--starts"),
+        (["--workers", "0"], "--workers"),
+        (["--time-limit", "0"], "time"),
+    ):
         assert multistart.main([str(path), *options]) == 2
         assert text in capsys.readouterr().err
     assert multistart.main([str(tmp_path / "none.py")]) == 2
@@ -376,13 +430,30 @@ def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
 
 
 def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
-    stated = Problem("p", ellipse(0.1, 2.0, 1.0), gait=Polygon(3, "bilateral"), delta=1e-2, intervals=24, mesh_tolerance=0.0)
+    stated = Problem(
+        "p",
+        ellipse(0.1, 2.0, 1.0),
+        gait=Polygon(3, "bilateral"),
+        delta=1e-2,
+        intervals=24,
+        mesh_tolerance=0.0,
+    )
     solution = Solution(stated, answer_near(stated))
     gait = solution.gait
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
-    exact = replay(stated.body, stated.friction, path, stated.delta * gait.length, breaks=gait.corner_phases, tolerance=1e-8)
-    # at the problem's own number, which is at unit shape speed, it would come out 40 times too large
-    assert mesh_errors(solution).sum() == pytest.approx(abs(solution.efficiency / exact.efficiency - 1), rel=0.2)
+    exact = replay(
+        stated.body,
+        stated.friction,
+        path,
+        stated.delta * gait.length,
+        breaks=gait.corner_phases,
+        tolerance=1e-8,
+    )
+    # at the problem's own number, which is at unit shape speed, it would come out 40 times too
+    # large
+    assert mesh_errors(solution).sum() == pytest.approx(
+        abs(solution.efficiency / exact.efficiency - 1), rel=0.2
+    )
 
 
 def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
@@ -410,17 +481,26 @@ class _Losing(Executor):
 
 def test_a_start_that_the_executor_loses_does_not_end_the_run():
     found = {o.start: o for o in campaign.run_starts(problem(), range(3), executor=_Losing)}
-    assert (found[1].status, found[1].message) == (CRASHED, "its worker failed twice (RuntimeError: killed worker).")
+    assert (found[1].status, found[1].message) == (
+        CRASHED,
+        "its worker failed twice (RuntimeError: killed worker).",
+    )
     assert found[0].status == found[2].status == SOLVED
 
 
 def test_starts_run_on_a_dask_cluster_and_end_as_they_do_here():
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster,
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
+        ) as cluster,
         distributed.Client(cluster) as client,
     ):
-        found = list(campaign.run_starts(problem(), range(2), workers=2, executor=lambda n: client.get_executor()))
+        found = list(
+            campaign.run_starts(
+                problem(), range(2), workers=2, executor=lambda n: client.get_executor()
+            )
+        )
     assert sorted(o.start for o in found) == [0, 1]
     there = {o.start: o for o in found}
     here = campaign.run_start(problem(), SAMPLERS[0], 0, 1, 300.0)
@@ -438,7 +518,9 @@ class _Enough(Exception):
     pass
 
 
-def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(tmp_path, capsys, monkeypatch):
+def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(
+    tmp_path, capsys, monkeypatch
+):
     """In a pipe too: a line for every start as it ends."""
     path = tmp_path / "quick.py"
     path.write_text(FILE, encoding="utf-8")
@@ -461,9 +543,16 @@ def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(tmp
         multistart.main(words)
     told = capsys.readouterr().out
     assert f"3 starts done already, {many - 3} to go" in told
-    assert [line.split()[0] for line in told.splitlines() if line.endswith("solved")] == ["3", "4", "5"]
+    assert [line.split()[0] for line in told.splitlines() if line.endswith("solved")] == [
+        "3",
+        "4",
+        "5",
+    ]
     tracemalloc.start()
-    for begun in (lambda: multistart.main([*words, "--quiet"]), lambda: calls.multistart(problem(), many)):
+    for begun in (
+        lambda: multistart.main([*words, "--quiet"]),
+        lambda: calls.multistart(problem(), many),
+    ):
         with pytest.raises(_Enough):
             begun()
     most = tracemalloc.get_traced_memory()[1]

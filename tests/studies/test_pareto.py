@@ -1,4 +1,5 @@
-"""A front of two objectives: no gait of it is better in both, and its ends are the best by one alone."""
+"""A front of two objectives: no gait of it is better in both, and its ends are the best by one
+alone."""
 
 import csv
 from dataclasses import replace
@@ -14,7 +15,11 @@ from colloc.search.solve import solve
 from colloc.studies.pareto import Gap
 
 PROBLEM = Problem(
-    "wide", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-4
+    "wide",
+    gait=Harmonic(1, "bilateral"),
+    friction=Friction(mu_t=10, mu_f=1, mu_b=1),
+    delta=1e-2,
+    mesh_tolerance=1e-4,
 )
 
 
@@ -26,7 +31,12 @@ def told():
 
 @pytest.fixture(scope="module")
 def front(told):
-    return pareto_front(PROBLEM, points=4, starts=1, progress=lambda k, solution: told.append((k, solution.measured.value)))
+    return pareto_front(
+        PROBLEM,
+        points=4,
+        starts=1,
+        progress=lambda k, solution: told.append((k, solution.measured.value)),
+    )
 
 
 def test_a_point_is_replaced_only_by_a_better_one(front, told):
@@ -48,13 +58,19 @@ def apart(front):
 
 
 def test_neighbours_lie_no_farther_apart_than_twice_the_even_spacing(front):
-    """Also where the front is so steep that even steps in one objective are large ones in the other."""
+    """Also where the front is so steep that even steps in one objective are large ones in the
+    other."""
     assert not front.gaps
     assert apart(front).max() <= 2 / 3
 
 
 HOLE = Problem(
-    "hole", body=Chain(feet=1), friction=Friction(0.3, 0.3, 0.3), gait=Harmonic(1, "bilateral"), delta=2e-3, mesh_tolerance=1e-4
+    "hole",
+    body=Chain(feet=1),
+    friction=Friction(0.3, 0.3, 0.3),
+    gait=Harmonic(1, "bilateral"),
+    delta=2e-3,
+    mesh_tolerance=1e-4,
 )
 """The farthest gait goes 0.286 with an efficiency of 1.4; the next ones 0.269, with 2.1."""
 
@@ -98,7 +114,10 @@ def test_the_front_bulges_beyond_its_chord(front):
 @pytest.mark.parametrize("signs", [(1, 1, 1, 1, 1), (-1, 1, -1, 1, 1), (1, -1, -1, -1, -1)])
 def test_the_figure_draws_every_value_and_mirror_images_alike(front, signs):
     gaits = [point.gait.scaled(sign) for sign, point in zip(signs, front.points, strict=True)]
-    points = [replace(p, answer=replace(p.answer, gait=gait)) for p, gait in zip(front.points, gaits, strict=True)]
+    points = [
+        replace(p, answer=replace(p.answer, gait=gait))
+        for p, gait in zip(front.points, gaits, strict=True)
+    ]
     values, plane = front_figure(replace(front, points=tuple(points))).axes
     np.testing.assert_array_equal(values.lines[0].get_xydata(), front.values[:, ::-1])
     *others, last = (line.get_xydata() for line in plane.lines)
@@ -115,7 +134,10 @@ def test_one_objective_twice_is_no_front():
 def test_an_objective_that_certificates_do_not_know_is_measured():
     ends = pareto_front(PROBLEM, "speed", "driven efficiency", 2, starts=1)
     driven = [
-        replay(PROBLEM.body, PROBLEM.law, end.gait, end.delta_per_period, objective=ends.objectives[1]) for end in ends.points
+        replay(
+            PROBLEM.body, PROBLEM.law, end.gait, end.delta_per_period, objective=ends.objectives[1]
+        )
+        for end in ends.points
     ]
     np.testing.assert_allclose(ends.values[:, 1], [each.value for each in driven], rtol=1e-5)
 
@@ -123,12 +145,18 @@ def test_an_objective_that_certificates_do_not_know_is_measured():
 @pytest.mark.slow
 def test_the_command_leaves_a_table_a_figure_and_results(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('p', gait=Harmonic(1, 'bilateral'), delta=1e-2)\n")
+    (tmp_path / "p.py").write_text(
+        "from colloc import *\nPROBLEM = Problem('p', gait=Harmonic(1, 'bilateral'), delta=1e-2)\n"
+    )
     assert main(["pareto", "p.py", "--points", "2", "--starts", "1", "--quiet"]) == 0
     assert "p: speed against efficiency, 2 points" in capsys.readouterr().out
-    rows = list(csv.DictReader((tmp_path / "results/p.front.csv").read_text(encoding="utf-8").splitlines()))
+    rows = list(
+        csv.DictReader((tmp_path / "results/p.front.csv").read_text(encoding="utf-8").splitlines())
+    )
     fastest = load(rows[0]["file"])
-    assert float(rows[0]["distance / length"]) == pytest.approx(fastest.certificate.value, rel=1e-12)
+    assert float(rows[0]["distance / length"]) == pytest.approx(
+        fastest.certificate.value, rel=1e-12
+    )
     assert (tmp_path / "results/p.front.png").stat().st_size > 1000
 
 

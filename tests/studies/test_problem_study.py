@@ -1,4 +1,5 @@
-"""Studies: where starts travel, that nothing depends on workers, what is kept, and one file that xarray opens."""
+"""Studies: where starts travel, that nothing depends on workers, what is kept, and one file that
+xarray opens."""
 
 import dataclasses
 import json
@@ -26,7 +27,15 @@ from colloc.results.outcome import CRASHED, PASSED_OVER, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, Work, start_key, value_as_it_is
-from colloc.studies.gait_class import DIRECT, RETROGRADE, STANDING, GaitClass, gait_class, wave_direction, winding
+from colloc.studies.gait_class import (
+    DIRECT,
+    RETROGRADE,
+    STANDING,
+    GaitClass,
+    gait_class,
+    wave_direction,
+    winding,
+)
 from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.run import StudyRun
 from colloc.studies.store import load_study, save_study
@@ -49,7 +58,13 @@ STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1)), Axis("mu_b", (1.0,))), problem,
 
 def problem(x=1.0, y=1.0, kind="a"):
     guess = ellipse(0.0, 1.0 + 0.01 * len(kind), 0.5)
-    return Problem("p", guess, friction=Friction(mu_t=x, mu_f=1, mu_b=y), gait=Harmonic(1, "bilateral"), intervals=10)
+    return Problem(
+        "p",
+        guess,
+        friction=Friction(mu_t=x, mu_f=1, mu_b=y),
+        gait=Harmonic(1, "bilateral"),
+        intervals=10,
+    )
 
 
 def grid(**changes):
@@ -62,13 +77,16 @@ def outcome(start, guess, gait, efficiency, status=SOLVED):
 
 
 def landscape(stated, start_from, start, time_limit, **_):
-    """In place of a solve: two basins, parted by the amplitude of the first joint; only 0.9 of the way is kept each time."""
+    """In place of a solve: two basins, parted by the amplitude of the first joint; only 0.9 of the
+    way is kept each time."""
     guess = start_from()
     good = guess.cos[0, 0] > 1.5
     if stated.friction.mu_t == 3.0 and stated.friction.mu_b == 2.0:
         return outcome(start, guess, guess, np.nan, NOT_CONVERGED)
     top = 2.0 if good else 1.0
-    gait = Fourier(guess.mean, guess.cos + 0.9 * (top - guess.cos[0, 0]) * np.array([[1], [-1]]), guess.sin)
+    gait = Fourier(
+        guess.mean, guess.cos + 0.9 * (top - guess.cos[0, 0]) * np.array([[1], [-1]]), guess.sin
+    )
     return outcome(start, guess, gait, (0.3 if good else 0.2) + 0.01 * stated.friction.mu_t)
 
 
@@ -76,9 +94,13 @@ def landscape(stated, start_from, start, time_limit, **_):
 def fake(monkeypatch):
     monkeypatch.setattr(study_cell, "run_guess", landscape)
     monkeypatch.setattr(
-        study_cell, "value_as_it_is", lambda p, g, *_: (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t
+        study_cell,
+        "value_as_it_is",
+        lambda p, g, *_: (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t,
     )
-    monkeypatch.setattr(study_cell, "start_gait", lambda p, sampler, seed, k: ellipse(0.0, 1.2, 0.4))
+    monkeypatch.setattr(
+        study_cell, "start_gait", lambda p, sampler, seed, k: ellipse(0.0, 1.2, 0.4)
+    )
 
 
 def finished(run, **options):
@@ -86,7 +108,13 @@ def finished(run, **options):
 
 
 def test_starts_travel_from_the_value_before_and_between_all_texts():
-    study = grid(axes=(Axis("x", (1.0, 2.0, 3.0)), Axis("kind", ("a", "b", "c")), Axis("y", (1.0, 2.0), travels=False)))
+    study = grid(
+        axes=(
+            Axis("x", (1.0, 2.0, 3.0)),
+            Axis("kind", ("a", "b", "c")),
+            Axis("y", (1.0, 2.0), travels=False),
+        )
+    )
     assert study.before((0, 0, 0)) == []
     assert set(study.before((2, 2, 1))) == {(1, 2, 1), (2, 0, 1), (2, 1, 1)}
     assert set(study.around((1, 0, 0))) == {(0, 0, 0), (2, 0, 0), (1, 1, 0), (1, 2, 0)}
@@ -143,7 +171,10 @@ def test_a_study_file_is_code_and_its_mistakes_are_named_with_their_line(tmp_pat
         ("Friction(mu_t=-mu_t, mu_b=mu_b", 6, "friction.mu_t must be .*"),
     ):
         path.write_text(FILE.replace("Friction(mu_t=mu_t, mu_b=mu_b", stated))
-        with pytest.raises(ProblemError, match=rf"no problem at mu_t = 1.0, mu_b = 1.0: .*s\.py, line {line}: {what}"):
+        with pytest.raises(
+            ProblemError,
+            match=rf"no problem at mu_t = 1.0, mu_b = 1.0: .*s\.py, line {line}: {what}",
+        ):
             read_study_file(path)[0].problem_at((0, 0))
 
 
@@ -160,7 +191,10 @@ def test_what_is_found_does_not_depend_on_workers_or_on_who_is_faster(fake, tmp_
         run = StudyRun(grid(chunk=chunk), folder)
         finished(run, workers=workers)
         best.append(
-            {cell: state.best and (state.best.outcome.efficiency, state.best.gait_key) for cell, state in run.cells.items()}
+            {
+                cell: state.best and (state.best.outcome.efficiency, state.best.gait_key)
+                for cell, state in run.cells.items()
+            }
         )
     assert best[1:] == best[:1] * 3
 
@@ -172,7 +206,9 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
     run = StudyRun(grid(cold_starts=2), tmp_path)
     rounds = {}
     for progress in run.run(executor=ThreadPoolExecutor):
-        rounds[progress.round] = sum(s.best is not None and s.best.outcome.efficiency > 0.3 for s in run.cells.values())
+        rounds[progress.round] = sum(
+            s.best is not None and s.best.outcome.efficiency > 0.3 for s in run.cells.values()
+        )
     assert rounds[0] == 1
     final = study_table(run).variables["efficiency"]
     # the cell that never converges is walked around
@@ -184,14 +220,22 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
     assert not study_table(run).variables["below_neighbour"].any()
 
 
-def test_the_guess_of_every_problem_is_tried_and_every_cell_has_random_starts_of_its_own(fake, tmp_path, monkeypatch):
+def test_the_guess_of_every_problem_is_tried_and_every_cell_has_random_starts_of_its_own(
+    fake, tmp_path, monkeypatch
+):
     numbers = []
-    monkeypatch.setattr(study_cell, "start_gait", lambda p, sampler, seed, k: numbers.append(k) or ellipse(0.0, 1.2, 0.4))
+    monkeypatch.setattr(
+        study_cell,
+        "start_gait",
+        lambda p, sampler, seed, k: numbers.append(k) or ellipse(0.0, 1.2, 0.4),
+    )
     run = StudyRun(grid(cold_starts=3), tmp_path)
     finished(run)
     assert sorted(numbers) == list(range(3 * 12))
     for state in run.cells.values():
-        assert start_key(state.problem.guess) in {a.key for a in state.attempts if a.origin == GUESS}
+        assert start_key(state.problem.guess) in {
+            a.key for a in state.attempts if a.origin == GUESS
+        }
 
 
 def test_cells_that_an_earlier_colloc_finished_without_their_guess_are_missing(fake, tmp_path):
@@ -212,7 +256,9 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
         # in the cell (1, 1) every search ends in the poor basin; elsewhere the guess is good
         if (stated.friction.mu_t, stated.friction.mu_b) == (2.0, 2.0):
             return outcome(start, guess := start_from(), guess, 0.22)
-        return outcome(start, start_from(), ellipse(0.0, 2.0, 0.5), 0.3 + 0.01 * stated.friction.mu_t)
+        return outcome(
+            start, start_from(), ellipse(0.0, 2.0, 0.5), 0.3 + 0.01 * stated.friction.mu_t
+        )
 
     monkeypatch.setattr(study_cell, "run_guess", stubborn)
     run = StudyRun(grid(cold_starts=0), tmp_path)
@@ -235,14 +281,21 @@ def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     exact = replay(stated.body, stated.friction, path, stated.delta)
     assert abs(exact.rotation) > 0.01
     sure = (exact.distance - 0.5 * abs(exact.rotation)) / exact.work
-    assert study_cell.value_as_it_is(stated, gait) == pytest.approx(max(sure, 0.0), abs=1e-3 * exact.efficiency)
-    # where it could add all of it nothing counts, not even by the square of what is less than nothing
+    assert study_cell.value_as_it_is(stated, gait) == pytest.approx(
+        max(sure, 0.0), abs=1e-3 * exact.efficiency
+    )
+    # where it could add all of it nothing counts, not even by the square of what is less than
+    # nothing
     turning = Fourier([0.6, 0.6], [[0.5], [-0.3]], [[0.1], [0.5]])
-    turned = replay(stated.body, stated.friction, turning, stated.delta, instants=200, tolerance=1e-3)
+    turned = replay(
+        stated.body, stated.friction, turning, stated.delta, instants=200, tolerance=1e-3
+    )
     assert 0.5 * abs(turned.rotation) > turned.distance > 0.01
     assert study_cell.value_as_it_is(stated.with_(objective="towing"), turning) == 0.0
     closed = study_cell.member(stated, gait)
-    again = replay(stated.body, stated.friction, lambda t: (closed.angles(t), closed.rates(t)), stated.delta)
+    again = replay(
+        stated.body, stated.friction, lambda t: (closed.angles(t), closed.rates(t)), stated.delta
+    )
     assert abs(again.rotation) < 1e-4
 
 
@@ -274,7 +327,10 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
     finished(run)
     table = study_table(run).variables
     assert set(table["status"][1]) == {NO_PROBLEM}
-    assert re.search(r"x = 2.0, y = 1.0: .*study.py, line \d+: ZeroDivisionError: not here", table["message"][1, 0])
+    assert re.search(
+        r"x = 2.0, y = 1.0: .*study.py, line \d+: ZeroDivisionError: not here",
+        table["message"][1, 0],
+    )
     assert set(table["status"][0]) == {"error"}
     assert "division by zero" in table["message"][0, 0]
     assert StudyRun(grid(problem=stated), tmp_path).missing == []
@@ -284,11 +340,16 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
 
 
 def test_what_was_solved_stays_when_the_rest_is_tried_again(fake, tmp_path, monkeypatch):
-    """The landscape has one cell that never converges, which is no failure of the machine: it is left alone too."""
+    """The landscape has one cell that never converges, which is no failure of the machine: it is
+    left alone too."""
     finished(StudyRun(grid(cold_starts=0), tmp_path))
-    died = Attempt(GUESS, "0", outcome(0, ellipse(0.0, 1.2, 0.4), ellipse(0.0, 1.2, 0.4), np.nan, CRASHED))
+    died = Attempt(
+        GUESS, "0", outcome(0, ellipse(0.0, 1.2, 0.4), ellipse(0.0, 1.2, 0.4), np.nan, CRASHED)
+    )
     append_records(tmp_path, [Record(grid().problem_at((0, 0)).hash, (died,))])
-    kept, forgotten = (StudyRun(grid(cold_starts=0), tmp_path, retry=retry) for retry in (False, True))
+    kept, forgotten = (
+        StudyRun(grid(cold_starts=0), tmp_path, retry=retry) for retry in (False, True)
+    )
     assert forgotten.missing == []
     for cell, state in kept.cells.items():
         left = [a.key for a in state.attempts if a is not state.attempts[-1] or cell != (0, 0)]
@@ -306,8 +367,11 @@ def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path
     monkeypatch.setattr(study_cell, "run_guess", counted)
     run = StudyRun(grid(cold_starts=2), tmp_path)
     finished(run)
-    assert len(solved) == len(set(solved)) == sum(len(state.attempts) for state in run.cells.values())
-    # a visit that is told what was tried solves what is left, be it the guess, a start of its own or a gait from elsewhere
+    assert (
+        len(solved) == len(set(solved)) == sum(len(state.attempts) for state in run.cells.values())
+    )
+    # a visit that is told what was tried solves what is left, be it the guess, a start of its own
+    # or a gait from elsewhere
     stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
     work = Work((0,), stated, True, (), (elsewhere,), (0,), 0.0, frozenset(), 1, 300.0, 1)
     first = study_cell.visit(work, {})
@@ -319,7 +383,9 @@ def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path
 
 
 def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_gait_of_all_its_starts():
-    stated = Problem("two", ellipse(0.0, 2.0, 1.0), gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12)
+    stated = Problem(
+        "two", ellipse(0.0, 2.0, 1.0), gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12
+    )
     elsewhere = ellipse(0.0, 2.85, 1.3)
     work = Work((0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 300.0, 1)
     done = study_cell.visit(work, {})
@@ -338,15 +404,23 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
 
 
 def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
-    append_records(tmp_path, [Record("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})])
+    append_records(
+        tmp_path, [Record("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})]
+    )
     (kept,) = read_journal(tmp_path)
     assert kept.scores == {"known": 0.2}
 
 
-def test_a_gait_that_promises_more_than_was_found_is_measured_as_finely_as_a_certificate_does(monkeypatch):
+def test_a_gait_that_promises_more_than_was_found_is_measured_as_finely_as_a_certificate_does(
+    monkeypatch,
+):
     """So that a cell is not marked for what a coarse replay has seen too large."""
     stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
-    monkeypatch.setattr(study_cell, "run_guess", lambda s, start, number, limit, **_: outcome(number, start(), start(), 0.01))
+    monkeypatch.setattr(
+        study_cell,
+        "run_guess",
+        lambda s, start, number, limit, **_: outcome(number, start(), start(), 0.01),
+    )
     monkeypatch.setattr(study_cell, "value_as_it_is", lambda p, g, *grid: 0.2 if grid else 0.21)
     work = Work((0,), stated, True, (), (elsewhere,), (), 0.0, frozenset(), 1, 300.0, 1)
     assert list(study_cell.visit(work, {}).scores.values()) == [0.2]
@@ -391,17 +465,25 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
         assert json.loads(data.attrs["versions"])["numpy"] == np.__version__
         assert data.joint.attrs["units"] == "1"
         assert data.message.values[0, 0] == ""
-        assert {name: data[name].dtype.kind for name in ("kind", "status", "message", "gait_class")} == dict.fromkeys(
-            ("kind", "status", "message", "gait_class"), data.kind.dtype.kind
+        assert {
+            name: data[name].dtype.kind for name in ("kind", "status", "message", "gait_class")
+        } == dict.fromkeys(("kind", "status", "message", "gait_class"), data.kind.dtype.kind)
+        assert all(
+            isinstance(value, str)
+            for variable in data.variables.values()
+            for value in variable.attrs.values()
         )
-        assert all(isinstance(value, str) for variable in data.variables.values() for value in variable.attrs.values())
     back = load_study(path)
     np.testing.assert_array_equal(back.variables["efficiency"], table.variables["efficiency"])
     assert back.dimensions["mean"] == ("x", "kind", "joint")
     assert json.loads(back.attributes["versions"])["numpy"] == np.__version__
 
 
-CLASSES = {"ellipse": Harmonic(1, "bilateral"), "triangle": Polygon(3, "bilateral"), "path": FreePath(4.0, "bilateral")}
+CLASSES = {
+    "ellipse": Harmonic(1, "bilateral"),
+    "triangle": Polygon(3, "bilateral"),
+    "path": FreePath(4.0, "bilateral"),
+}
 
 
 def in_class(kind, guess=None, intervals=20):
@@ -409,7 +491,9 @@ def in_class(kind, guess=None, intervals=20):
     return Problem("p", near, gait=CLASSES[kind], delta=1e-3, intervals=intervals)
 
 
-def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_kept_exactly(tmp_path, monkeypatch):
+def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_kept_exactly(
+    tmp_path, monkeypatch
+):
     def next_to(stated, start_from, start, time_limit, **_):
         guess = start_from()
         gait = study_cell.member(stated, guess)
@@ -423,9 +507,13 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
     # the ellipse was looked at in both other classes, as it is
     ellipses = run.cells[0,].best
     for k in (1, 2):
-        assert run.cells[k,].scores[ellipses.gait_key] == pytest.approx(ellipses.outcome.efficiency, rel=0.02)
+        assert run.cells[k,].scores[ellipses.gait_key] == pytest.approx(
+            ellipses.outcome.efficiency, rel=0.02
+        )
     again = StudyRun(study, tmp_path)
-    assert [again.cells[k,].best.gait_key for k in range(3)] == [run.cells[k,].best.gait_key for k in range(3)]
+    assert [again.cells[k,].best.gait_key for k in range(3)] == [
+        run.cells[k,].best.gait_key for k in range(3)
+    ]
     table = load_study(save_study(study_table(run), tmp_path / "kinds.nc"))
     assert set(table.variables["status"]) == {SOLVED}
     triangle = run.cells[1,].best.outcome.gait
@@ -439,9 +527,18 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
 @pytest.mark.slow
 def test_a_study_over_classes_is_solved_and_certified(tmp_path):
     corners = Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
-    guesses = {"ellipse": ellipse(0.0, 2.8, 1.3), "triangle": corners, "path": ellipse(0.0, 2.8, 1.3)}
+    guesses = {
+        "ellipse": ellipse(0.0, 2.8, 1.3),
+        "triangle": corners,
+        "path": ellipse(0.0, 2.8, 1.3),
+    }
     axis = Axis("kind", tuple(CLASSES), travels=False)
-    study = Study("kinds", (axis,), lambda kind: in_class(kind, guesses[kind], 60 if kind == "path" else 24), cold_starts=0)
+    study = Study(
+        "kinds",
+        (axis,),
+        lambda kind: in_class(kind, guesses[kind], 60 if kind == "path" else 24),
+        cold_starts=0,
+    )
     run = StudyRun(study, tmp_path)
     finished(run)
     efficiency = study_table(run).variables["efficiency"]
@@ -452,14 +549,16 @@ def test_a_study_over_classes_is_solved_and_certified(tmp_path):
 
 
 def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
-    quarter = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [1.0]])  # joint 2 repeats joint 1 a quarter period later
+    # joint 2 repeats joint 1 a quarter period later
+    quarter = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [1.0]])
     assert winding(quarter) == 1
     assert wave_direction(quarter) == pytest.approx(1.0)
     back = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [-1.0]])
     assert (winding(back), wave_direction(back)) == (-1, pytest.approx(-1.0))
     together = Fourier([0, 0], [[1.0], [1.0]], [[0.0], [0.0]])
     assert wave_direction(together) == pytest.approx(0.0)
-    # a small wave of twice the pace is as much as one of half its square: it runs twice about the mean, and back
+    # a small wave of twice the pace is as much as one of half its square: it runs twice about the
+    # mean, and back
     both = Fourier([0.8, -0.5], [[1.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [1.0, -0.5]])
     assert wave_direction(both) == pytest.approx((1 - 2 * 0.25) / (1 + 2 * 0.25))
     assert winding(both) == 1
@@ -468,7 +567,9 @@ def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
-def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_end_all_runs_the_other_way(symmetry):
+def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_end_all_runs_the_other_way(
+    symmetry,
+):
     kind = Harmonic(3, symmetry)
     gait = kind.member(0.4 * np.random.default_rng(3).normal(size=kind.size(2)), 2)
     body, friction = Chain(), Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0)
@@ -490,7 +591,12 @@ def test_what_is_off_by_a_hundredth_of_a_gait_still_counts_as_symmetric(size):
 
 @pytest.mark.parametrize(
     ("retraced", "wave", "forward", "kind"),
-    [(True, 1, 1, STANDING), (False, 0.04, 1, STANDING), (False, 0.5, 0.04, STANDING), (False, -0.5, -0.3, DIRECT)],
+    [
+        (True, 1, 1, STANDING),
+        (False, 0.04, 1, STANDING),
+        (False, 0.5, 0.04, STANDING),
+        (False, -0.5, -0.3, DIRECT),
+    ],
 )
 def test_a_gait_is_standing_if_it_goes_back_its_way_or_hardly_has_a_wave_or_hardly_moves_along_itself(
     retraced, wave, forward, kind
@@ -500,7 +606,8 @@ def test_a_gait_is_standing_if_it_goes_back_its_way_or_hardly_has_a_wave_or_hard
 
 @pytest.mark.parametrize(("mu_t", "kind"), [(20.0, RETROGRADE), (0.1, DIRECT)])
 def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
-    # the paper, section I: retrograde waves where transverse friction is large, direct ones where it is small
+    # the paper, section I: retrograde waves where transverse friction is large, direct ones where
+    # it is small
     for sign in (1, -1):
         gait = Fourier([0, 0], [[0.4], [0.0]], [[0.0], [sign * 0.4]])
         found = gait_class(gait, Chain(), Friction(mu_t=mu_t, mu_f=1, mu_b=1))
@@ -511,7 +618,10 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
 
 
 def test_the_displacement_that_decides_the_class_is_that_of_the_replay():
-    gait, friction = Fourier([0, 0], [[0.9], [-0.3]], [[0.0], [0.8]]), Friction(mu_t=5, mu_f=1, mu_b=1)
+    gait, friction = (
+        Fourier([0, 0], [[0.9], [-0.3]], [[0.0], [0.8]]),
+        Friction(mu_t=5, mu_f=1, mu_b=1),
+    )
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
     assert replay(Chain(), friction, path, 1e-3, instants=400, most_instants=400).distance > 0.01
     assert abs(gait_class(gait, Chain(), friction).forward) > 0.9
@@ -522,7 +632,11 @@ def test_the_name_of_a_gait_is_the_same_in_every_process():
     given = f"from colloc.gaits.gait_fields import gait_from; gait = gait_from({fields(gait)})"
     code = f"{given}; from colloc.studies.cell import start_key; print(start_key(gait))"
     other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert other.stdout.strip() == start_key(gait) != start_key(Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [0.5]]))
+    assert (
+        other.stdout.strip()
+        == start_key(gait)
+        != start_key(Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [0.5]]))
+    )
 
 
 def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
@@ -539,7 +653,9 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     assert table["gait_class"][0, 0].endswith("both")
     assert sweep_study.main([str(path), "--output", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
-    np.testing.assert_array_equal(load_study(out / "tiny.nc").variables["efficiency"], table["efficiency"])
+    np.testing.assert_array_equal(
+        load_study(out / "tiny.nc").variables["efficiency"], table["efficiency"]
+    )
 
 
 def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
@@ -561,19 +677,28 @@ def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     path = tmp_path / "many.py"
-    path.write_text(FILE.replace("(1.0, 1.1)", "tuple(1 + 0.01 * k for k in range(40))"), encoding="utf-8")
+    path.write_text(
+        FILE.replace("(1.0, 1.1)", "tuple(1 + 0.01 * k for k in range(40))"), encoding="utf-8"
+    )
     command = [sys.executable, "-m", "colloc", "sweep", str(path), "--output", str(tmp_path)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     lines = [process.stdout.readline() for _ in range(3)]
     process.send_signal(signal.SIGINT)
     rest, errors = process.communicate(timeout=240)
     assert process.returncode == 130
-    assert errors == "colloc: interrupted; what is done is kept, and the same command goes on from there.\n"
+    assert (
+        errors
+        == "colloc: interrupted; what is done is kept, and the same command goes on from there.\n"
+    )
     assert " not tried yet" in rest
     assert "no certified gait" not in rest
-    reported = sum(": round 0" in line or "round 0" in line for line in [*lines, *rest.splitlines()])
+    reported = sum(
+        ": round 0" in line or "round 0" in line for line in [*lines, *rest.splitlines()]
+    )
     assert reported >= 2
-    kept = sum(bool(e > 0) for e in load_study(tmp_path / "tiny.nc").variables["efficiency"].ravel())
+    kept = sum(
+        bool(e > 0) for e in load_study(tmp_path / "tiny.nc").variables["efficiency"].ravel()
+    )
     assert kept >= reported
 
 
@@ -584,7 +709,9 @@ def test_dask_runs_a_study_on_a_local_cluster(tmp_path):
     path.write_text(FILE, encoding="utf-8")
     study, _ = read_study_file(path)
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=":0"
+        ) as cluster,
         distributed.Client(cluster) as client,
     ):
         run = StudyRun(study, tmp_path)

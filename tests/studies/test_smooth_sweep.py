@@ -66,7 +66,9 @@ PROBLEM = Problem("p", Corners(BODY.concertina(1.2), "antipodal"), BODY, gait=Po
 STUDY = Study("p", (Axis("mu_t", (1.0, 1.1)),), lambda mu_t: PROBLEM.with_(friction=Friction(mu_t=mu_t)), cold_starts=0)
 """)
     for command, more in (("multistart", ("--starts", "1")), ("sweep", ())):
-        assert colloc_main([command, str(tmp_path / "p.py"), *more, "--output", f"{tmp_path}/"]) == 0
+        assert (
+            colloc_main([command, str(tmp_path / "p.py"), *more, "--output", f"{tmp_path}/"]) == 0
+        )
     told = capsys.readouterr().out
     assert "1 distinct optima" in told
     assert "2 cells: 2 solved" in told

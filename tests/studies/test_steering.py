@@ -1,4 +1,5 @@
-"""Gaits that steer: certified at every turn, and between two of them a controller can interpolate."""
+"""Gaits that steer: certified at every turn, and between two of them a controller can
+interpolate."""
 
 from types import SimpleNamespace
 
@@ -6,14 +7,30 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from colloc import Chain, Coupled, FreePath, Friction, Harmonic, Polygon, Problem, ProblemError, Serpenoid, replay, steer
+from colloc import (
+    Chain,
+    Coupled,
+    FreePath,
+    Friction,
+    Harmonic,
+    Polygon,
+    Problem,
+    ProblemError,
+    Serpenoid,
+    replay,
+    steer,
+)
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.steering_figure import steering_figure
 from colloc.studies.steering import Steering
 
 PROBLEM = Problem(
-    "p", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-4
+    "p",
+    gait=Harmonic(1, "bilateral"),
+    friction=Friction(mu_t=4, mu_f=1, mu_b=1),
+    delta=1e-2,
+    mesh_tolerance=1e-4,
 )
 TURNS = np.radians([-10, 0, 10])
 
@@ -25,7 +42,9 @@ def family():
 
 def test_every_gait_turns_by_what_is_asked_and_the_sharper_the_dearer(family):
     assert family.certified
-    np.testing.assert_allclose([point.rotation for point in family.points], TURNS, atol=PROBLEM.mesh_tolerance)
+    np.testing.assert_allclose(
+        [point.rotation for point in family.points], TURNS, atol=PROBLEM.mesh_tolerance
+    )
     assert family.efficiency.argmax() == 1
     assert family.points[1].problem.gait == PROBLEM.gait
 
@@ -41,14 +60,22 @@ def test_a_turn_to_the_right_is_the_mirror_image_of_that_to_the_left(family):
     right, _, left = family.points
     t = np.linspace(0, 1, 50)
     # the mirror image is found at one of two phases, half a period apart
-    apart = min(np.abs(right.gait.angles(t) + left.gait.angles(t + later)).max() for later in (0, 0.5))
+    apart = min(
+        np.abs(right.gait.angles(t) + left.gait.angles(t + later)).max() for later in (0, 0.5)
+    )
     assert apart < 2e-4
-    assert (right.value, right.distance) == pytest.approx((left.value, left.distance), rel=PROBLEM.mesh_tolerance)
+    assert (right.value, right.distance) == pytest.approx(
+        (left.value, left.distance), rel=PROBLEM.mesh_tolerance
+    )
 
 
 @pytest.mark.parametrize("kind", [Polygon(3, "bilateral"), FreePath(2, "bilateral")])
 def test_gaits_of_every_class_have_a_mirror_image(kind):
-    family = steer(Problem("p", gait=kind, friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2), [-0.2, 0.2], starts=1)
+    family = steer(
+        Problem("p", gait=kind, friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2),
+        [-0.2, 0.2],
+        starts=1,
+    )
     right, left = family.points
     assert family.certified
     # sought from the other's mirror image, on a mesh and so with arcs of its own
@@ -57,14 +84,20 @@ def test_gaits_of_every_class_have_a_mirror_image(kind):
 
 def test_a_body_that_is_not_its_mirror_image_turns_to_both_sides():
     bent = Coupled(Chain((0.2,) * 5), stuck={1: 0.5})
-    problem = Problem("stuck", body=bent, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), delta=1e-2)
+    problem = Problem(
+        "stuck", body=bent, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), delta=1e-2
+    )
     assert steer(problem, [-0.2, 0.2], starts=2).certified
 
 
 def test_the_table_holds_the_joint_angles_of_every_gait(family):
     table = family.table(phases=8)
-    for angles, point, begin in zip(table["joint_angles_rad"], family.points, family.begins, strict=True):
-        np.testing.assert_array_equal(np.transpose(angles), point.gait.angles(np.arange(8) / 8 + begin))
+    for angles, point, begin in zip(
+        table["joint_angles_rad"], family.points, family.begins, strict=True
+    ):
+        np.testing.assert_array_equal(
+            np.transpose(angles), point.gait.angles(np.arange(8) / 8 + begin)
+        )
     assert family.begins[1] == 0
     assert table["radius_body_lengths"][1] is None
 
@@ -118,7 +151,9 @@ def test_all_tracks_set_out_along_x_and_have_a_dot_a_period(family):
     assert chords.shape == (3, 6)
     np.testing.assert_allclose(np.angle(chords), np.outer(TURNS, np.arange(6) + 0.5), atol=0.02)
     np.testing.assert_allclose(np.abs(chords), np.abs(chords[:, :1]) * np.ones(6))
-    np.testing.assert_allclose(np.abs(chords[:, 0]), family.table()["chord_body_lengths"], rtol=0.02)
+    np.testing.assert_allclose(
+        np.abs(chords[:, 0]), family.table()["chord_body_lengths"], rtol=0.02
+    )
 
 
 @pytest.mark.parametrize("turns", [[], [4.0], [float("nan")]])

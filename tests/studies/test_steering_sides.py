@@ -1,4 +1,5 @@
-"""Which side a turn is taken from: right from the mirror image of left, unless limits differ between the sides."""
+"""Which side a turn is taken from: right from the mirror image of left, unless limits differ
+between the sides."""
 
 import numpy as np
 
@@ -23,7 +24,12 @@ def test_with_one_sided_limits_both_sides_are_sought_from_the_straight_gait_and_
     limits = ((-1.5, 2.6), (-1.5, 2.6))
     straight = []
     problem = Problem("p", joint_limit=limits, gait=Harmonic(1), **AT)
-    family = steer(problem, [-TURN, TURN], starts=2, progress=lambda turn, point: straight.append(point) if turn == 0 else None)
+    family = steer(
+        problem,
+        [-TURN, TURN],
+        starts=2,
+        progress=lambda turn, point: straight.append(point) if turn == 0 else None,
+    )
     assert family.certified
     begun = straight[0].gait.angles(T)
     for point in family.points:

@@ -1,4 +1,5 @@
-"""A study on a Dask cluster of which a process is killed, stopped or cannot write: nothing finished is lost, nothing hangs."""
+"""A study on a Dask cluster of which a process is killed, stopped or cannot write: nothing finished
+is lost, nothing hangs."""
 
 import json
 import os
@@ -20,7 +21,10 @@ from colloc.studies.store import load_study
 from colloc.system.dask_pool import connected
 from colloc.system.task_pool import EngineGone, Task, completed
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and limits")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and limits"),
+]
 pytest.importorskip("distributed")
 STUDY = """
 from colloc import *
@@ -61,7 +65,12 @@ def test_a_local_cluster_listens_to_this_machine_alone():
     executor, _ = connected("local", 1)
     try:
         processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
-        listening = [each for process in processes for each in process.net_connections("inet") if each.status == "LISTEN"]
+        listening = [
+            each
+            for process in processes
+            for each in process.net_connections("inet")
+            if each.status == "LISTEN"
+        ]
         assert {each.laddr.ip for each in listening} == {"127.0.0.1"}
     finally:
         executor(1)._client.shutdown()
@@ -83,7 +92,15 @@ def test_a_scheduler_that_is_stopped_ends_the_run():
 
 def study_file(folder, cells):
     (folder / "s.py").write_text(f"CELLS = {cells}\n{STUDY}")
-    return [sys.executable, "-m", "colloc", "sweep", str(folder / "s.py"), "--output", str(folder / "out")]
+    return [
+        sys.executable,
+        "-m",
+        "colloc",
+        "sweep",
+        str(folder / "s.py"),
+        "--output",
+        str(folder / "out"),
+    ]
 
 
 def test_a_worker_on_a_full_disk_finds_what_others_find(tmp_path):
@@ -93,7 +110,13 @@ def test_a_worker_on_a_full_disk_finds_what_others_find(tmp_path):
     with DaskProcesses() as dask:
         worker = dask.worker()
         resource.prlimit(worker.pid, resource.RLIMIT_FSIZE, (0, 0))  # from now on
-        other = [*study_file(tmp_path, 3)[:-1], str(tmp_path / "starved"), "--dask", dask.address, "--json"]
+        other = [
+            *study_file(tmp_path, 3)[:-1],
+            str(tmp_path / "starved"),
+            "--dask",
+            dask.address,
+            "--json",
+        ]
         done = subprocess.run(other, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     found = load_study(tmp_path / "starved" / "tiny.nc").variables["efficiency"]
@@ -118,7 +141,10 @@ def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
         with DaskProcesses() as dask:
             dask.worker()
             run = subprocess.Popen(
-                [*command, "--dask", dask.address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                [*command, "--dask", dask.address],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
             )
             until(most)
             (dask.scheduler if victim == "scheduler" else run).kill()
@@ -132,7 +158,11 @@ def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
     assert 7 <= kept < cells
     done = subprocess.run([*command, "--json"], capture_output=True, text=True)
     assert json.loads(done.stdout)["counts"] == {"solved": cells}
-    keys = [(record.problem_hash, attempt.key) for record in read_journal(journal) for attempt in record.attempts]
+    keys = [
+        (record.problem_hash, attempt.key)
+        for record in read_journal(journal)
+        for attempt in record.attempts
+    ]
     assert len(keys) == len(set(keys))  # nothing was solved twice
 
 
@@ -149,7 +179,9 @@ kill -- -$(cat "$(dirname "$0")/sbatch.pid")
 
 def test_the_recipe_for_slurm_runs_with_a_stand_in_for_its_commands(tmp_path):
     pytest.importorskip("dask_jobqueue")
-    page = (Path(__file__).resolve().parents[2] / "docs/howto/cluster.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs/howto/cluster.md").read_text(
+        encoding="utf-8"
+    )
     (recipe,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     for stated, here in (
         ('"64GB"', '"4GB"'),
@@ -165,13 +197,21 @@ def test_the_recipe_for_slurm_runs_with_a_stand_in_for_its_commands(tmp_path):
     for name, program in (("sbatch", SBATCH), ("scancel", SCANCEL)):
         (tmp_path / name).write_text(program)
         (tmp_path / name).chmod(0o755)
-    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "DASK_DISTRIBUTED__DASHBOARD__LINK": ""}
+    environment = {
+        **os.environ,
+        "PATH": f"{tmp_path}:{os.environ['PATH']}",
+        "DASK_DISTRIBUTED__DASHBOARD__LINK": "",
+    }
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "env": environment}
     with subprocess.Popen([sys.executable, str(tmp_path / "workers.py")], **pipes) as workers:
         try:
             address = workers.stdout.readline().strip()
             assert address.startswith("tcp://127.0.0.1:")
-            done = subprocess.run([*study_file(tmp_path, 4), "--dask", address, "--json"], capture_output=True, text=True)
+            done = subprocess.run(
+                [*study_file(tmp_path, 4), "--dask", address, "--json"],
+                capture_output=True,
+                text=True,
+            )
             assert done.returncode == 0, done.stderr
             assert json.loads(done.stdout)["counts"] == {"solved": 4}
             workers.communicate(timeout=60)  # the end of its input

@@ -1,4 +1,5 @@
-"""Ctrl-C, and time that is over: a block ends in one KeyboardInterrupt, and compiled code does not swallow it."""
+"""Ctrl-C, and time that is over: a block ends in one KeyboardInterrupt, and compiled code does not
+swallow it."""
 
 import contextlib
 import signal
@@ -29,7 +30,8 @@ def pressed(times, seen, **options):
 
 
 def press(times=1, **options):
-    """What Ctrl-C does in a block: how often it was pressed before an exception came, and whether the block knew."""
+    """What Ctrl-C does in a block: how often it was pressed before an exception came, and whether
+    the block knew."""
     seen = {"pressed": 0, "known": False}
     with pytest.raises(KeyboardInterrupt):
         pressed(times, seen, **options)
@@ -104,7 +106,9 @@ def test_no_solve_begins_after_an_interruption_that_was_swallowed():
 
 def test_ipopt_stops_between_iterations_and_says_nothing(capfd, monkeypatch):
     gait = Harmonic(1, "bilateral")
-    problem = Problem("p", ellipse(0.3, 1.0, 0.5), gait=gait, intervals=20, formulation="implicit velocity")
+    problem = Problem(
+        "p", ellipse(0.3, 1.0, 0.5), gait=gait, intervals=20, formulation="implicit velocity"
+    )
     solver, calls = Solver(transcribe(control_problem(problem))), []
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
 
@@ -144,7 +148,8 @@ def test_a_time_limit_ends_a_block_as_ctrl_c_does():
 
 
 def test_a_time_limit_that_is_over_before_its_block_begins_leaves_nothing_behind(monkeypatch):
-    """On a busy machine a millisecond is over within the start of the timer; what runs later must not be taken for too late."""
+    """On a busy machine a millisecond is over within the start of the timer; what runs later must
+    not be taken for too late."""
     start = threading.Timer.start
 
     def slow(timer):
@@ -183,7 +188,8 @@ def test_a_limit_that_is_not_reached_leaves_nothing_behind():
 
 
 def test_after_a_limit_in_another_thread_a_profiler_can_be_switched_on():
-    """CPython 3.11 stands still at the first profiled call if a thread's exception was withdrawn before."""
+    """CPython 3.11 stands still at the first profiled call if a thread's exception was withdrawn
+    before."""
     code = """
 import sys, threading, time
 from colloc.system.interruption import time_limit
@@ -204,5 +210,7 @@ sys.setprofile(lambda *_: None)
 sys.setprofile(None)
 print(ended[0])
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
     assert done.stdout == "30\n", done.stderr

@@ -1,8 +1,10 @@
-"""kill -9 at 120 random moments of a solve, a multi-start and a study: nothing that was finished is lost or broken.
+"""kill -9 at 120 random moments of a solve, a multi-start and a study: nothing that was finished is
+lost or broken.
 
-A run is forked, and killed after a random time, or (every other cycle) within milliseconds of the moment a result begins
-to be written. It says what it has finished through a pipe, after the function that writes has returned: that, with the
-very numbers, must be found afterwards. The next cycle goes on in the same folder; a complete one is started anew.
+A run is forked, and killed after a random time, or (every other cycle) within milliseconds of the
+moment a result begins to be written. It says what it has finished through a pipe, after the
+function that writes has returned: that, with the very numbers, must be found afterwards. The next
+cycle goes on in the same folder; a complete one is started anew.
 """
 
 import contextlib
@@ -34,7 +36,10 @@ from colloc.studies.store import load_study
 from colloc.system import task_pool
 from colloc.system.row_file import read_rows
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="forks and kills")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="forks and kills"),
+]
 CYCLES = 120
 RAISED = 99
 PROBLEM = """
@@ -78,10 +83,16 @@ def child(kind, folder, pipe):
         return solve.main([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
     if kind == "multistart":
         campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)
-        Archive.add = told(say, kind, Archive.add, lambda archive, outcomes: start_facts(archive.outcomes))
-        return multistart.main([str(folder / "p.py"), "--output", str(folder), "--starts", "4", "--quiet"])
+        Archive.add = told(
+            say, kind, Archive.add, lambda archive, outcomes: start_facts(archive.outcomes)
+        )
+        return multistart.main(
+            [str(folder / "p.py"), "--output", str(folder), "--starts", "4", "--quiet"]
+        )
     task_pool.process_pool = ThreadPoolExecutor
-    study_run.append_records = told(say, kind, study_run.append_records, lambda folder, records: attempt_facts(records))
+    study_run.append_records = told(
+        say, kind, study_run.append_records, lambda folder, records: attempt_facts(records)
+    )
     return sweep_study.main([str(folder / "s.py"), "--output", str(folder), "--quiet"])
 
 
@@ -97,7 +108,9 @@ def start_facts(outcomes):
 
 def attempt_facts(records):
     """What the journal of a study holds: the gait of each attempt at each problem."""
-    return {f"{r.problem_hash} {a.key}": a.outcome.gait.cos.sum() for r in records for a in r.attempts}
+    return {
+        f"{r.problem_hash} {a.key}": a.outcome.gait.cos.sum() for r in records for a in r.attempts
+    }
 
 
 def kept(kind, folder):

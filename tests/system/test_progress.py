@@ -20,7 +20,8 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(0.4, "0 s"), (59.4, "59 s"), (60, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")]
+    ("seconds", "text"),
+    [(0.4, "0 s"), (59.4, "59 s"), (60, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")],
 )
 def test_durations_are_for_people(seconds, text):
     assert duration(seconds) == text
@@ -34,7 +35,8 @@ def test_the_line_says_what_and_how_long_and_vanishes():
     printed = stream.getvalue()
     assert "solving   0 s, about 20 s left" in printed
     assert "drawing   0 s" in printed
-    assert printed.count(" left") == printed.count("about 20 s left")  # nothing is foretold of the drawing
+    # nothing is foretold of the drawing
+    assert printed.count(" left") == printed.count("about 20 s left")
     assert printed.endswith(WIPED)
 
 
@@ -91,8 +93,14 @@ def test_nothing_is_written_where_nobody_watches():
 
 
 def test_nothing_is_loaded_to_draw_where_nobody_watches():
-    code = "import sys\nfrom colloc.system.progress import StatusLine\nwith StatusLine() as line: line.say('x')\n"
+    code = (
+        "import sys\nfrom colloc.system.progress import StatusLine\nwith StatusLine() as line: "
+        "line.say('x')\n"
+    )
     said = subprocess.run(
-        [sys.executable, "-c", code + "print('rich' in sys.modules)"], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code + "print('rich' in sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert (said.stdout, said.stderr) == ("False\n", "")

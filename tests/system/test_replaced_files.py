@@ -1,4 +1,5 @@
-"""Full disks, folders that cannot be written, two writers: a clear error or both results, never a broken file."""
+"""Full disks, folders that cannot be written, two writers: a clear error or both results, never a
+broken file."""
 
 import contextlib
 import errno
@@ -58,7 +59,10 @@ def test_a_full_disk_is_a_clear_error_and_keeps_the_old_file(samples, kind, shar
     path = samples.write(kind)
     before, names = samples.read(kind), sorted(p.name for p in path.parent.iterdir())
     size = path.stat().st_size
-    with no_file_larger_than(int(share * size)), pytest.raises(CollocError, match="cannot write") as caught:
+    with (
+        no_file_larger_than(int(share * size)),
+        pytest.raises(CollocError, match="cannot write") as caught,
+    ):
         samples.write(kind, 1)
     assert str(path.parent) in str(caught.value)
     assert samples.read(kind) == before
@@ -81,10 +85,13 @@ def in_child(function, *arguments):
 
 @contextlib.contextmanager
 def open_to_others(folder, root):
-    """Others may pass through pytest's own folders: those from `folder` up to, and without, the system's temporary folder."""
+    """Others may pass through pytest's own folders: those from `folder` up to, and without, the
+    system's temporary folder."""
     temporary = Path(tempfile.gettempdir())
     top = temporary if root.is_relative_to(temporary) else root.parent
-    before = {p: p.stat().st_mode for p in (folder, *folder.parents) if p.is_relative_to(top) and p != top}
+    before = {
+        p: p.stat().st_mode for p in (folder, *folder.parents) if p.is_relative_to(top) and p != top
+    }
     try:
         for p, mode in before.items():
             p.chmod(mode | 0o011)
@@ -94,7 +101,9 @@ def open_to_others(folder, root):
             p.chmod(mode)
 
 
-def test_a_folder_that_cannot_be_written_is_refused_before_any_work(samples, tmp_path, tmp_path_factory):
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
+    samples, tmp_path, tmp_path_factory
+):
     temporary = Path(tempfile.gettempdir()).stat().st_mode
     folder = tmp_path / "locked away"
     folder.mkdir(mode=0o755)
@@ -169,7 +178,9 @@ def test_a_lock_keeps_other_processes_out_until_its_holder_lets_go(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["lock"]
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="two users need the superuser")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="two users need the superuser"
+)
 def test_two_users_go_on_from_each_other_in_a_folder_of_their_group(tmp_path, tmp_path_factory):
     folder, group = tmp_path / "shared", 60_000
     folder.mkdir()
@@ -183,7 +194,9 @@ def test_two_users_go_on_from_each_other_in_a_folder_of_their_group(tmp_path, tm
         os.umask(0o002)
         with locked(folder / "x.study" / "lock"):
             append_records(folder / "x.study", [record(number)])
-        open_archive(problem(), folder / "a.h5").add({StartName("sobol", 1, number): outcome(number, 0.1)})
+        open_archive(problem(), folder / "a.h5").add(
+            {StartName("sobol", 1, number): outcome(number, 0.1)}
+        )
 
     with open_to_others(folder.parent, tmp_path_factory.getbasetemp()):
         assert [in_child(as_user, number) for number in (61_001, 61_002)] == [0, 0]
@@ -211,7 +224,9 @@ def _write_many(kind, folder, who, count):
         if kind == "cache":
             put_rows(folder / "c.sqlite", CACHE, {f"{who}-{k}": {"value": k}})
         elif kind == "archive":
-            open_archive(problem(), folder / "a.h5").add({StartName("sobol", who, k): outcome(k, 0.1 + 0.001 * k)})
+            open_archive(problem(), folder / "a.h5").add(
+                {StartName("sobol", who, k): outcome(k, 0.1 + 0.001 * k)}
+            )
         else:
             append_records(folder, [record(1000 * who + k)])
 
@@ -220,7 +235,9 @@ def _write_many(kind, folder, who, count):
 def test_two_writers_at_once_end_with_both_results(kind, tmp_path):
     count = 12
     context = multiprocessing.get_context("fork")
-    writers = [context.Process(target=_write_many, args=(kind, tmp_path, who, count)) for who in (1, 2)]
+    writers = [
+        context.Process(target=_write_many, args=(kind, tmp_path, who, count)) for who in (1, 2)
+    ]
     for writer in writers:
         writer.start()
     for writer in writers:
@@ -268,7 +285,10 @@ def test_what_a_killed_process_left_is_swept_after_an_hour_and_what_others_write
     (left,) = unfinished(killed)
     foreign.write_bytes(b"not ours")
     os.utime(foreign, (0, 0))
-    for age, there in ((3590, [".movie.mp4.part", left.name, "y.h5"]), (3605, [".movie.mp4.part", "y.h5"])):
+    for age, there in (
+        (3590, [".movie.mp4.part", left.name, "y.h5"]),
+        (3605, [".movie.mp4.part", "y.h5"]),
+    ):
         os.utime(left, (time.time() - age,) * 2)
         with replaced_file(tmp_path / "y.h5") as name:
             Path(name).write_bytes(b"whole")
@@ -295,7 +315,10 @@ def test_an_error_of_the_disk_when_a_file_is_flushed_is_reported(tmp_path, monke
 
     (tmp_path / "x").write_text("old")
     monkeypatch.setattr("colloc.system.replaced_file.os.fsync", broken)
-    with pytest.raises(StoreError, match="Input/output error"), replaced_file(tmp_path / "x") as name:
+    with (
+        pytest.raises(StoreError, match="Input/output error"),
+        replaced_file(tmp_path / "x") as name,
+    ):
         Path(name).write_text("new")
     assert (tmp_path / "x").read_text() == "old"
 
@@ -306,12 +329,17 @@ def _fill(samples, kind):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="mounting a small disk needs the superuser")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0,
+    reason="mounting a small disk needs the superuser",
+)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_small_disk_that_fills_up(samples, kind, tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)], capture_output=True).returncode:
+    if subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)], capture_output=True
+    ).returncode:
         pytest.skip("no file system may be mounted here")
     try:
         samples.folder = disk

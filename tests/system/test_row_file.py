@@ -33,11 +33,14 @@ def with_statement(path, statement):
     "statement",
     [
         f'CREATE TRIGGER t AFTER INSERT ON "{KIND}" BEGIN DELETE FROM "{KIND}"; END',
-        "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT x FROM c",
+        "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT x "
+        "FROM c",
         "CREATE TABLE other (a)",
     ],
 )
-def test_a_file_with_anything_but_its_one_table_is_refused_by_readers_and_writers(statement, tmp_path):
+def test_a_file_with_anything_but_its_one_table_is_refused_by_readers_and_writers(
+    statement, tmp_path
+):
     path = tmp_path / "x.sqlite"
     with_statement(path, statement)
     before = path.read_bytes()
@@ -100,7 +103,8 @@ def test_an_empty_file_is_one_whose_writer_was_killed_before_its_first_row(tmp_p
 
 
 def test_a_reader_finishes_what_a_killed_writer_began(tmp_path):
-    """The file in the middle of a transaction, with its rollback journal, as kill -9 leaves both."""
+    """The file in the middle of a transaction, with its rollback journal, as kill -9 leaves
+    both."""
     path, left = tmp_path / "x.sqlite", tmp_path / "left.sqlite"
     put_rows(path, KIND, {"a": "x" * 10_000})
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
@@ -108,7 +112,9 @@ def test_a_reader_finishes_what_a_killed_writer_began(tmp_path):
         connection.execute("BEGIN IMMEDIATE")
         connection.execute(f"""UPDATE "{KIND}" SET value = '{"y" * 100_000}'""")
         left.write_bytes(path.read_bytes())
-        left.with_name("left.sqlite-journal").write_bytes((tmp_path / "x.sqlite-journal").read_bytes())
+        left.with_name("left.sqlite-journal").write_bytes(
+            (tmp_path / "x.sqlite-journal").read_bytes()
+        )
     assert read_rows(left, KIND) == {"a": "x" * 10_000}
 
 
@@ -117,7 +123,9 @@ def test_without_locks_of_the_file_system_files_beside_keep_writers_apart(tmp_pa
     monkeypatch.setattr(row_file, "_has_locks", lambda folder: False)
     monkeypatch.setattr(row_file, "_PATIENCE", 0.1)
     put_rows(path, KIND, {"a": 1})
-    with closing(sqlite3.connect(f"{path.as_uri()}?vfs=unix-dotfile", uri=True, isolation_level=None)) as other:
+    with closing(
+        sqlite3.connect(f"{path.as_uri()}?vfs=unix-dotfile", uri=True, isolation_level=None)
+    ) as other:
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(StoreError, match="database is locked"):
             put_rows(path, KIND, {"b": 2})

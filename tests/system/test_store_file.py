@@ -11,7 +11,15 @@ from colloc.system.errors import StoreError
 from colloc.system.store_file import array, attribute, mark, new_file, open_file, put, put_attribute
 from scripts.paper.array_store import read_arrays, write_arrays
 
-TEXTS = ["", "1", "ä", "Reibung \N{GREEK SMALL LETTER MU}_t / µ_f", "tab\tand\nline", "nul\0inside", "\N{SNAKE}" * 500]
+TEXTS = [
+    "",
+    "1",
+    "ä",
+    "Reibung \N{GREEK SMALL LETTER MU}_t / µ_f",
+    "tab\tand\nline",
+    "nul\0inside",
+    "\N{SNAKE}" * 500,
+]
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +43,12 @@ def test_texts_round_trip(tmp_path, value):
     assert returned(tmp_path / "x.h5", value) == (value, value)
 
 
-@settings(max_examples=50, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=50,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(st.lists(st.text(st.characters(exclude_categories=["Cs"]), max_size=20), max_size=5))
 def test_lists_of_texts_round_trip_but_for_trailing_nuls(tmp_path, values):
     for found in returned(tmp_path / "x.h5", np.array(values, dtype=object)):
@@ -48,7 +61,10 @@ def test_trailing_nuls_are_not_kept_and_what_utf8_cannot_hold_is_replaced(tmp_pa
     assert returned(tmp_path / "x.h5", "name \udcff") == ("name ?", "name ?")
 
 
-@pytest.mark.parametrize("value", [True, 3, -2.5, [1.0, np.nan], [[1, 2]], [True, False], np.zeros((0, 2)), np.float32(0.5)])
+@pytest.mark.parametrize(
+    "value",
+    [True, 3, -2.5, [1.0, np.nan], [[1, 2]], [True, False], np.zeros((0, 2)), np.float32(0.5)],
+)
 def test_numbers_round_trip_with_their_types(tmp_path, value):
     for found in returned(tmp_path / "x.h5", value):
         np.testing.assert_array_equal(found, value)
@@ -72,7 +88,9 @@ def test_a_damaged_file_is_refused_in_a_sentence_or_read(samples, kind, tmp_path
         except StoreError as error:
             refused.append(str(error).removeprefix(f"{path} "))
     assert len(refused) >= 6
-    assert all(each.startswith("is not a readable colloc ") and "\n" not in each for each in refused)
+    assert all(
+        each.startswith("is not a readable colloc ") and "\n" not in each for each in refused
+    )
 
 
 def test_files_of_an_older_or_newer_colloc_and_of_another_kind_are_told_apart(tmp_path):
@@ -80,7 +98,9 @@ def test_files_of_an_older_or_newer_colloc_and_of_another_kind_are_told_apart(tm
     for version, remedy in ((1, "Make it again"), (3, "Update colloc")):
         with new_file(path) as file:
             mark(file, "test", version)
-        with pytest.raises(StoreError, match=f"its format is {version}, where this colloc reads 2. {remedy}"):
+        with pytest.raises(
+            StoreError, match=f"its format is {version}, where this colloc reads 2. {remedy}"
+        ):
             open_file(path, "test", 2).__enter__()
     with pytest.raises(StoreError, match="is not a readable colloc study: it is a test"):
         open_file(path, "colloc study", 2).__enter__()
@@ -93,7 +113,10 @@ def test_what_is_missing_or_no_dataset_is_named(tmp_path):
         mark(file, "test", 1)
         file.create_group("group")
     for read, name in ((array, "none"), (array, "group"), (attribute, "none")):
-        with pytest.raises(StoreError, match=f"x.h5 .*{name}.* is missing"), open_file(tmp_path / "x.h5", "test", 1) as file:
+        with (
+            pytest.raises(StoreError, match=f"x.h5 .*{name}.* is missing"),
+            open_file(tmp_path / "x.h5", "test", 1) as file,
+        ):
             read(file, name)
 
 

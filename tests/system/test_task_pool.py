@@ -1,4 +1,5 @@
-"""The pool: nothing is lost with a worker, order may depend on results, one BLAS thread a process."""
+"""The pool: nothing is lost with a worker, order may depend on results, one BLAS thread a
+process."""
 
 import asyncio
 import os
@@ -56,7 +57,10 @@ def threads_in_use(n):
 
 def test_a_worker_killed_mid_run_loses_nothing_and_one_that_always_dies_is_named(tmp_path):
     tasks = [Task(x, (x, str(tmp_path))) for x in range(9)]
-    found = {task.key: result for task, result in completed(dying_once, listed(tasks), workers=2, ahead=2)}
+    found = {
+        task.key: result
+        for task, result in completed(dying_once, listed(tasks), workers=2, ahead=2)
+    }
     assert {x: r for x, r in found.items() if x != 5} == {x: 2 * x for x in range(9) if x != 5}
     assert isinstance(found[5], Lost)
     assert "died twice" in found[5].message
@@ -90,7 +94,9 @@ print(sorted(result for _, result in completed(task, lambda: next(waiting, None)
     )
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "pickle.py").write_text("open('ran', 'w').close()", encoding="utf-8")
-    ran = subprocess.run([sys.executable, "../script.py"], cwd=tmp_path / "elsewhere", capture_output=True, text=True)
+    ran = subprocess.run(
+        [sys.executable, "../script.py"], cwd=tmp_path / "elsewhere", capture_output=True, text=True
+    )
     assert (ran.stdout, ran.stderr) == ("[-2, -1, 0]\n", "")
     assert not (tmp_path / "elsewhere" / "ran").exists()
 
@@ -100,7 +106,11 @@ def test_a_task_may_wait_for_the_result_of_another():
 
     def ready():
         last = max(known)
-        return Task(last + 1, (known[last],)) if last < 6 and last + 1 not in asked and not asked.add(last + 1) else None
+        return (
+            Task(last + 1, (known[last],))
+            if last < 6 and last + 1 not in asked and not asked.add(last + 1)
+            else None
+        )
 
     asked = set()
     for task, result in completed(doubled, ready, workers=3, executor=ThreadPoolExecutor):
@@ -109,7 +119,8 @@ def test_a_task_may_wait_for_the_result_of_another():
 
 
 class Unreliable(Executor):
-    """Like a cluster that gives up on a task: an exception that is no result, every time for 4, once for 2."""
+    """Like a cluster that gives up on a task: an exception that is no result, every time for 4,
+    once for 2."""
 
     failed: ClassVar[set] = set()
 
@@ -131,7 +142,12 @@ class Unreliable(Executor):
 
 def test_what_a_cluster_gives_up_on_is_tried_again_alone_and_then_named():
     Unreliable.failed.clear()
-    found = {t.key: r for t, r in completed(doubled, listed(Task(x, (x,)) for x in range(6)), workers=2, executor=Unreliable)}
+    found = {
+        t.key: r
+        for t, r in completed(
+            doubled, listed(Task(x, (x,)) for x in range(6)), workers=2, executor=Unreliable
+        )
+    }
     assert found[2] == 4
     assert found[4] == Lost("its worker failed twice (ConnectionError: worker gone).")
     assert sorted(found) == list(range(6))
@@ -148,7 +164,12 @@ def test_a_pool_that_never_starts_is_an_error_and_not_an_endless_loop():
 
 
 def test_nobody_waits_for_work_under_way_once_the_run_is_left():
-    run = completed(time.sleep, listed([Task(0, (0.0,)), Task(1, (5.0,))]), workers=2, executor=ThreadPoolExecutor)
+    run = completed(
+        time.sleep,
+        listed([Task(0, (0.0,)), Task(1, (5.0,))]),
+        workers=2,
+        executor=ThreadPoolExecutor,
+    )
     begin = time.perf_counter()
     next(run)
     run.close()
@@ -194,14 +215,18 @@ def cluster():
     """A Dask cluster in this process, without workers; its port is one that is free."""
     distributed = pytest.importorskip("distributed")
     ENDED.clear()
-    with distributed.LocalCluster(n_workers=0, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster:
+    with distributed.LocalCluster(
+        n_workers=0, threads_per_worker=1, processes=False, dashboard_address=":0"
+    ) as cluster:
         yield cluster
         ENDED.set()  # the thread of a worker is waited for
 
 
 def test_a_dask_scheduler_without_workers_is_waited_for_a_stated_time_only(cluster):
     said = []
-    with pytest.raises(ProblemError, match=r"had no workers for 1 s; start some, for example: dask worker"):
+    with pytest.raises(
+        ProblemError, match=r"had no workers for 1 s; start some, for example: dask worker"
+    ):
         connected(cluster.scheduler_address, 1, said.append, patience=1.0)
     assert "waiting for one, 1 s at most" in said[0]
 
@@ -210,7 +235,12 @@ def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_ta
     cluster.scale(1)
     executor, workers = connected(cluster.scheduler_address, 1, patience=1.0)
     assert workers == 1
-    run = completed(doubled_in_the_end, listed([Task(0, (0,)), Task(1, (0,)), Task(2, (1,))]), workers=1, executor=executor)
+    run = completed(
+        doubled_in_the_end,
+        listed([Task(0, (0,)), Task(1, (0,)), Task(2, (1,))]),
+        workers=1,
+        executor=executor,
+    )
     assert [next(run)[1] for _ in range(2)] == [0, 0]
     cluster.scale(0)
     with pytest.raises(EngineGone, match="no workers for 1 s"):
@@ -220,7 +250,9 @@ def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_ta
 def test_a_dask_scheduler_that_gives_no_answer_ends_the_run_and_blames_no_task(cluster):
     cluster.scale(1)
     executor, _ = connected(cluster.scheduler_address, 1, patience=1.0)
-    run = completed(doubled_in_the_end, listed([Task(0, (0,)), Task(1, (1,))]), workers=1, executor=executor)
+    run = completed(
+        doubled_in_the_end, listed([Task(0, (0,)), Task(1, (1,))]), workers=1, executor=executor
+    )
     assert next(run)[1] == 0
     cluster.scheduler.handlers["ncores"] = lambda **_: asyncio.sleep(60)
     with pytest.raises(EngineGone, match="gave no answer for 1 s"):
@@ -233,7 +265,9 @@ def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task():
         dask.worker()
         executor, _ = connected(dask.address, 1)
         # a function that other processes know as well
-        run = completed(time.sleep, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor)
+        run = completed(
+            time.sleep, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor
+        )
         assert next(run)[1] is None
         dask.scheduler.kill()
         with pytest.raises(EngineGone, match="is gone; what is done is kept"):
@@ -241,7 +275,8 @@ def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task():
 
 
 def test_ctrl_c_while_a_task_is_handed_over_leaves_the_executors_locks_open():
-    """It falls where a lock is taken already and no block would open it again, as in `with lock` of CPython 3.13."""
+    """It falls where a lock is taken already and no block would open it again, as in `with lock` of
+    CPython 3.13."""
 
     class Locked(ThreadPoolExecutor):
         lock = threading.Lock()

@@ -1,4 +1,5 @@
-"""Motion at delta = 0, between bounds: against cone programs by another solver, against small delta, and by what must hold."""
+"""Motion at delta = 0, between bounds: against cone programs by another solver, against small
+delta, and by what must hold."""
 
 import clarabel
 import numpy as np
@@ -12,7 +13,10 @@ from colloc.verification.dry_balance import dry_balance
 from colloc.verification.dry_friction import dry_friction
 
 ISOTROPIC, ELLIPTIC = Friction(), Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0)
-UNEVEN = Chain((0.3, 0.2, 0.5), feet=(Foot(0, 0.4, weight=0.2), Foot(1, 0.5, weight=0.3), Foot(2, 0.1), Foot(2, 0.9)))
+UNEVEN = Chain(
+    (0.3, 0.2, 0.5),
+    feet=(Foot(0, 0.4, weight=0.2), Foot(1, 0.5, weight=0.3), Foot(2, 0.1), Foot(2, 0.9)),
+)
 
 
 def instants(body, seed, count=20):
@@ -21,7 +25,8 @@ def instants(body, seed, count=20):
 
 
 def places(body, each):
-    """Link, place along and beside its middle, and weight of the points that stand for a body: its feet, or many on a line."""
+    """Link, place along and beside its middle, and weight of the points that stand for a body: its
+    feet, or many on a line."""
     if body.feet:
         for foot in body.standing_on:
             yield foot.link, (foot.place - 0.5) * body.lengths[foot.link], foot.offset, foot.weight
@@ -32,13 +37,16 @@ def places(body, each):
 
 
 def least_power(body, mu_t, angles, rates, each=1):
-    """Of one instant, by Clarabel: the least sum of weights times |(v along, mu_t v across)| over velocities of the tail."""
+    """Of one instant, by Clarabel: the least sum of weights times |(v along, mu_t v across)| over
+    velocities of the tail."""
     turn = np.concatenate([[0.0], np.cumsum(angles)])
     spin = np.concatenate([[0.0], np.cumsum(rates)])
     hinges = np.concatenate([[0.0], np.cumsum(np.array(body.lengths) * np.exp(1j * turn))])
     moving = np.zeros(len(turn), dtype=complex)
     for k in range(1, len(turn)):
-        moving[k] = moving[k - 1] + 1j * spin[k - 1] * body.lengths[k - 1] * np.exp(1j * turn[k - 1])
+        moving[k] = moving[k - 1] + 1j * spin[k - 1] * body.lengths[k - 1] * np.exp(
+            1j * turn[k - 1]
+        )
     rows, offsets, weights = [], [], []
     for link, along, beside, weight in places(body, each):
         axis = np.exp(1j * turn[link])
@@ -60,7 +68,11 @@ def least_power(body, mu_t, angles, rates, each=1):
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
     cost, cones = np.concatenate([np.zeros(n), weights]), [clarabel.SecondOrderConeT(3)] * m
     nothing = sparse.csc_matrix((n + m, n + m))
-    return clarabel.DefaultSolver(nothing, cost, sparse.csc_matrix(table), right, cones, settings).solve().obj_val
+    return (
+        clarabel.DefaultSolver(nothing, cost, sparse.csc_matrix(table), right, cones, settings)
+        .solve()
+        .obj_val
+    )
 
 
 @pytest.mark.parametrize(
@@ -85,7 +97,10 @@ def test_on_a_line_it_is_what_cone_programs_on_ever_more_points_come_to():
     angles, rates = instants(Chain(), 2, 4)
     found = dry_balance(Chain(), ISOTROPIC, angles, rates)
     few, many = (
-        np.array([least_power(Chain(), 1.0, *at, each) for at in zip(angles.T, rates.T, strict=True)]) for each in (40, 160)
+        np.array(
+            [least_power(Chain(), 1.0, *at, each) for at in zip(angles.T, rates.T, strict=True)]
+        )
+        for each in (40, 160)
     )
     assert np.abs(few - found.most).max() < 2e-3
     assert np.abs(many - found.most).max() < 0.25 * np.abs(few - found.most).max()
@@ -122,7 +137,11 @@ def test_bounds_are_proportional_to_rates_and_to_friction_and_nothing_moves_at_r
 def test_the_interval_of_a_period_holds_what_a_certificate_states_for_delta_to_zero(three_link):
     dry, stated = three_link.dry(), three_link.certificate
     least, most = dry.efficiency
-    assert least - stated.error_at_zero_delta <= stated.efficiency_at_zero_delta <= most + stated.error_at_zero_delta
+    assert (
+        least - stated.error_at_zero_delta
+        <= stated.efficiency_at_zero_delta
+        <= most + stated.error_at_zero_delta
+    )
     assert most - least < 1e-5
     assert dry.open == 0.0
 
@@ -157,24 +176,43 @@ def test_verify_tells_the_interval_on_demand(three_link, tmp_path, capsys):
 
 
 def test_where_either_foot_may_hold_the_motion_is_bounded_only_loosely():
-    """One joint between two single feet: either may rest and the other move, or both move, with the same dissipation."""
+    """One joint between two single feet: either may rest and the other move, or both move, with the
+    same dissipation."""
     found = dry_balance(Chain((0.5, 0.5), feet=1), ISOTROPIC, np.array([[0.8]]), np.array([[1.0]]))
     assert found.most - found.least < 1e-8
     assert found.apart.max() > 1e-2
 
 
 @pytest.mark.parametrize(
-    ("lengths", "places", "rates"), [((1 / 3,) * 3, (0.5,) * 3, (1, 1)), ((0.2, 0.5, 0.3), (0.1, 0.2, 0.9), (0.3, 1))]
+    ("lengths", "places", "rates"),
+    [((1 / 3,) * 3, (0.5,) * 3, (1, 1)), ((0.2, 0.5, 0.3), (0.1, 0.2, 0.9), (0.3, 1))],
 )
-def test_of_three_feet_in_a_row_any_two_may_rest_and_the_bounds_hold_all_these_motions(lengths, places, rates):
-    """Where each bears as much as makes it cost the same whichever of them moves: the middle one half."""
+def test_of_three_feet_in_a_row_any_two_may_rest_and_the_bounds_hold_all_these_motions(
+    lengths, places, rates
+):
+    """Where each bears as much as makes it cost the same whichever of them moves: the middle one
+    half."""
     masses, hinges = (0.5, 0.2, 0.3), np.array([0.0, lengths[0], lengths[0] + lengths[1]])
-    at, middle = hinges + np.array(places) * lengths, np.dot(masses, hinges + 0.5 * np.array(lengths))
+    at, middle = (
+        hinges + np.array(places) * lengths,
+        np.dot(masses, hinges + 0.5 * np.array(lengths)),
+    )
     weights = np.array([at[2] - at[1], at[2] - at[0], at[1] - at[0]]) / (2 * (at[2] - at[0]))
     feet = tuple(Foot(k, places[k], weight=weights[k]) for k in range(3))
-    found = dry_balance(Chain(lengths, feet=feet, masses=masses), ISOTROPIC, np.zeros((2, 1)), np.array(rates)[:, None])
-    bent = np.array(rates) @ np.maximum(at - hinges[1:, None], 0.0)  # speeds across while the tail rests
-    rest = np.array([np.linalg.solve([[1, at[i]], [1, at[j]]], -bent[[i, j]]) for i, j in ((0, 1), (1, 2), (0, 2))])
+    found = dry_balance(
+        Chain(lengths, feet=feet, masses=masses),
+        ISOTROPIC,
+        np.zeros((2, 1)),
+        np.array(rates)[:, None],
+    )
+    # speeds across while the tail rests
+    bent = np.array(rates) @ np.maximum(at - hinges[1:, None], 0.0)
+    rest = np.array(
+        [
+            np.linalg.solve([[1, at[i]], [1, at[j]]], -bent[[i, j]])
+            for i, j in ((0, 1), (1, 2), (0, 2))
+        ]
+    )
     speeds = bent + rest @ [np.ones(3), at]
     power = np.abs(speeds) @ weights
     assert np.all((found.least <= power) & (power <= found.most))

@@ -1,4 +1,5 @@
-"""Each part of the interval for dry friction widens it by as much as that part is off, and none is left out."""
+"""Each part of the interval for dry friction widens it by as much as that part is off, and none is
+left out."""
 
 from dataclasses import replace
 
@@ -21,12 +22,15 @@ def replayed():
 
 
 def interval(monkeypatch, change):
-    """The interval, were dry friction known exactly, to be what the replay has, but for one change."""
+    """The interval, were dry friction known exactly, to be what the replay has, but for one
+    change."""
 
     def known(body, law, angles, rates):
         delta = 1e-6 * float(np.abs(GAIT(np.linspace(0.0, 1.0, 101))[1]).max(axis=0).mean())
         z = body.solve(body.law(law), angles, rates, delta).z
-        power = body.sliding(body.law(law), angles, rates, z, np.full((1, angles.shape[1]), delta)).power[0]
+        power = body.sliding(
+            body.law(law), angles, rates, z, np.full((1, angles.shape[1]), delta)
+        ).power[0]
         found = {"least": power, "most": power, "z": z, "apart": np.zeros_like(z)}
         return DryBalance(**(found | change(found)))
 
@@ -64,7 +68,9 @@ def test_what_the_quadrature_is_off_by_counts_once_to_each_side(monkeypatch, rep
 
 @pytest.mark.parametrize("row", [0, 1])
 @pytest.mark.parametrize("what", ["z", "apart"])
-def test_a_velocity_that_is_off_or_open_leads_as_far_as_it_carries_in_a_period(monkeypatch, what, row):
+def test_a_velocity_that_is_off_or_open_leads_as_far_as_it_carries_in_a_period(
+    monkeypatch, what, row
+):
     exact = widths(interval(monkeypatch, lambda known: {}))
     found = widths(interval(monkeypatch, lambda known: {what: known[what] + shifted(row, OFF)}))
     assert found[0] - exact[0] == pytest.approx(2 * OFF, rel=1e-3)
@@ -83,7 +89,9 @@ def test_a_rotation_that_is_open_turns_the_whole_way(monkeypatch):
 
 
 @pytest.mark.parametrize(("what", "sign", "end"), [("least", -1, 0), ("most", 1, 1)])
-def test_power_that_may_be_less_or_more_moves_that_end_of_the_work_alone(monkeypatch, what, sign, end):
+def test_power_that_may_be_less_or_more_moves_that_end_of_the_work_alone(
+    monkeypatch, what, sign, end
+):
     exact = interval(monkeypatch, lambda known: {}).work
     found = interval(monkeypatch, lambda known: {what: known[what] + sign * OFF}).work
     assert abs(found[end] - exact[end]) == pytest.approx(OFF, rel=1e-3)

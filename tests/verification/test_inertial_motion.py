@@ -1,4 +1,5 @@
-"""Gaits played with inertia: against a program of dense points and Newton's law, limits, symmetries, conservation."""
+"""Gaits played with inertia: against a program of dense points and Newton's law, limits,
+symmetries, conservation."""
 
 from dataclasses import replace
 
@@ -18,8 +19,11 @@ CHAIN, UNEQUAL = colloc.Chain(), colloc.Chain((0.3, 0.45, 0.25))
 ISOTROPIC, ANISOTROPIC = colloc.Friction(), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
 
-def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=40, masses=None, inertias=None):
-    """Distance, work and rotation of the last period: mass points, differences in time, Runge and Kutta's method."""
+def newtons_law(
+    lengths, mu, gait, delta, froude, steps=1200, periods=3, points=40, masses=None, inertias=None
+):
+    """Distance, work and rotation of the last period: mass points, differences in time, Runge and
+    Kutta's method."""
     mu_t, mu_f, mu_b = mu
     lengths = np.array(lengths)
     masses = lengths if masses is None else np.array(masses)
@@ -33,10 +37,13 @@ def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=
         return np.concatenate([[0.0], np.cumsum(gait(np.array([t % 1.0]))[0][:, 0])])
 
     def shape(t):
-        """Places of all points from the tail, and directions there, in the axes of the tail link."""
+        """Places of all points from the tail, and directions there, in the axes of the tail
+        link."""
         turn = np.exp(1j * tangents(t))
         ends = np.concatenate([[0.0], np.cumsum(lengths * turn)])
-        return (ends[:-1, None] + lengths[:, None] * along * turn[:, None]).ravel(), np.repeat(turn, points)
+        return (ends[:-1, None] + lengths[:, None] * along * turn[:, None]).ravel(), np.repeat(
+            turn, points
+        )
 
     def known(t, h=1e-6):
         place, turn = shape(t)
@@ -45,7 +52,8 @@ def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=
         return place - mass @ place, moving - mass @ moving, turn, cells @ spins
 
     def law(t, state, shape_now):
-        """Unknowns: orientation, place and velocity of the centre of mass in the plane, angular momentum, work."""
+        """Unknowns: orientation, place and velocity of the centre of mass in the plane, angular
+        momentum, work."""
         place, moving, turn, own = shape_now
         theta, velocity, h = state[0].real, state[2], state[3].real
         inertia = mass @ np.abs(place) ** 2 + cells.sum()
@@ -53,7 +61,12 @@ def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=
         v = velocity * np.exp(-1j * theta) + moving + 1j * omega * place
         tangential, normal = (np.conj(turn) * v).real, (np.conj(turn) * v).imag
         size = np.sqrt(np.abs(v) ** 2 + delta**2)
-        force = -turn * (np.where(tangential > 0, mu_f, mu_b) * tangential + 1j * mu_t * normal) / size * weight
+        force = (
+            -turn
+            * (np.where(tangential > 0, mu_f, mu_b) * tangential + 1j * mu_t * normal)
+            / size
+            * weight
+        )
         power = -(np.conj(force) * v).real.sum()
         moment = (np.conj(place) * force).imag.sum()
         pull = force.sum() * np.exp(1j * theta)
@@ -64,7 +77,10 @@ def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=
     for _ in range(periods):
         before = state
         for k in range(steps):
-            t, (first, middle, last) = k * step, (places[2 * k], places[2 * k + 1], places[(2 * k + 2) % (2 * steps)])
+            t, (first, middle, last) = (
+                k * step,
+                (places[2 * k], places[2 * k + 1], places[(2 * k + 2) % (2 * steps)]),
+            )
             k1 = law(t, state, first)
             k2 = law(t + step / 2, state + step / 2 * k1, middle)
             k3 = law(t + step / 2, state + step / 2 * k2, middle)
@@ -76,7 +92,10 @@ def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=
 
 @pytest.mark.parametrize(
     ("lengths", "friction", "gait"),
-    [((0.3, 0.45, 0.25), ANISOTROPIC, LEANING), pytest.param((1 / 3, 1 / 3, 1 / 3), ISOTROPIC, GAIT, marks=pytest.mark.slow)],
+    [
+        ((0.3, 0.45, 0.25), ANISOTROPIC, LEANING),
+        pytest.param((1 / 3, 1 / 3, 1 / 3), ISOTROPIC, GAIT, marks=pytest.mark.slow),
+    ],
 )
 def test_newtons_law_for_dense_points_says_the_same(lengths, friction, gait):
     """A program that shares no line: error of 40 points a link, 1e-4."""
@@ -89,16 +108,21 @@ def test_newtons_law_for_dense_points_says_the_same(lengths, friction, gait):
 
 
 def test_masses_and_inertias_of_ones_own_move_as_newtons_law_says():
-    """A body that presses evenly, with a heavy head of little inertia: a program that shares no line."""
+    """A body that presses evenly, with a heavy head of little inertia: a program that shares no
+    line."""
     lengths, masses, inertias = (0.3, 0.45, 0.25), (0.2, 0.2, 0.6), (0.001, 0.02, 0.001)
-    distance, work, rotation = newtons_law(lengths, (1.7, 1.0, 1.3), LEANING, 0.05, 0.1, masses=masses, inertias=inertias)
+    distance, work, rotation = newtons_law(
+        lengths, (1.7, 1.0, 1.3), LEANING, 0.05, 0.1, masses=masses, inertias=inertias
+    )
     own, plain = (
         colloc.inertial_motion(body, ANISOTROPIC, LEANING, 0.05, 0.1)
         for body in (colloc.Chain(lengths, masses=masses, inertias=inertias), UNEQUAL)
     )
     assert (own.distance, own.work) == pytest.approx((distance, work), rel=1e-3)
     assert own.rotation == pytest.approx(rotation, abs=1e-3)
-    assert abs(own.distance / plain.distance - 1) > 0.05, "what it is compared with would be nothing"
+    assert abs(own.distance / plain.distance - 1) > 0.05, (
+        "what it is compared with would be nothing"
+    )
 
 
 def test_momenta_and_tail_velocity_are_inverse_to_each_other():
@@ -110,21 +134,29 @@ def test_momenta_and_tail_velocity_are_inverse_to_each_other():
 
 
 def test_a_straight_body_has_the_moment_of_inertia_of_a_rod():
-    assert moment_of_inertia(UNEQUAL, UNEQUAL.posture(np.zeros((2, 1))))[0] == pytest.approx(1 / 12, rel=1e-14)
+    assert moment_of_inertia(UNEQUAL, UNEQUAL.posture(np.zeros((2, 1))))[0] == pytest.approx(
+        1 / 12, rel=1e-14
+    )
 
 
 def test_without_friction_momentum_is_conserved():
-    """A free body that is not pushed keeps its velocity in the plane and its angular momentum, however its joints move."""
+    """A free body that is not pushed keeps its velocity in the plane and its angular momentum,
+    however its joints move."""
     angles, rates = LEANING(np.array([0.3]))
     states = np.array([[0.2], [-0.4], [0.05]])
-    now = momentum_rates(CHAIN, colloc.Friction(1e-12, 1e-12, 1e-12), angles, rates, states, delta=1e-3, froude=1.0)
+    now = momentum_rates(
+        CHAIN, colloc.Friction(1e-12, 1e-12, 1e-12), angles, rates, states, delta=1e-3, froude=1.0
+    )
     omega = now.z[2, 0]
-    np.testing.assert_allclose(now.rates[:, 0], [omega * states[1, 0], -omega * states[0, 0], 0.0], atol=1e-11)
+    np.testing.assert_allclose(
+        now.rates[:, 0], [omega * states[1, 0], -omega * states[0, 0], 0.0], atol=1e-11
+    )
 
 
 @pytest.mark.parametrize("mu", [0.02, 0.01])
 def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
-    """A period leaves nearly all of a change of the momenta, so a small gap at its end is a motion far off."""
+    """A period leaves nearly all of a change of the momenta, so a small gap at its end is a motion
+    far off."""
     at = CHAIN, colloc.Friction(mu, mu, mu), LEANING, 1e-3, 1.0
     rough, fine = (colloc.inertial_motion(*at, tolerance=tolerance) for tolerance in (1e-4, 1e-6))
     assert np.abs(rough.multipliers).max() > 0.96
@@ -132,7 +164,8 @@ def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
 
 
 def test_a_period_that_does_not_close_is_off_by_no_more_than_is_stated():
-    """However small its steps are: what is left open leads away from the motion in which all periods are alike."""
+    """However small its steps are: what is left open leads away from the motion in which all
+    periods are alike."""
     gait = GaitWithInertia(CHAIN, colloc.Friction(0.1, 0.1, 0.1), LEANING, 1e-2, froude=1.0)
     closed = gait.closed_from(None)
     exact = gait.periodic_run(closed.momenta, 1e-6, closed.slopes)
@@ -158,21 +191,27 @@ def test_slow_motion_is_the_limit():
     on_mesh = GaitOnMesh(CHAIN, ISOTROPIC, GAIT, mesh)
     near = on_mesh.played(1e-2)
     assert near.efficiency == pytest.approx(slow, rel=1e-5)
-    off = [1 - on_mesh.played(1e-2, froude, near).efficiency / near.efficiency for froude in (1.6e-3, 4e-4, 1e-4)]
+    off = [
+        1 - on_mesh.played(1e-2, froude, near).efficiency / near.efficiency
+        for froude in (1.6e-3, 4e-4, 1e-4)
+    ]
     assert off[0] > 3.5 * off[1] > 3.5**2 * off[2] > 0
 
 
 @pytest.mark.slow
 def test_a_mirror_image_of_a_gait_turns_the_other_way():
     mirrored = colloc.Fourier(mean=-LEANING.mean, cos=-LEANING.cos, sin=-LEANING.sin)
-    one, other = (colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.2) for gait in (LEANING, mirrored))
+    one, other = (
+        colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.2) for gait in (LEANING, mirrored)
+    )
     assert one.rotation == pytest.approx(-other.rotation, abs=1e-5)
     assert one.distance == pytest.approx(other.distance, rel=1e-4)
 
 
 @pytest.mark.slow
 def test_corners_are_passed_where_they_are():
-    """A gait of straight lines between corners, against steps that know nothing of these but are small."""
+    """A gait of straight lines between corners, against steps that know nothing of these but are
+    small."""
     gait = colloc.Corners(np.array([[0.0, 1.5, 0.4], [0.0, 0.2, 1.4]]))
     exact = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1, breaks=gait.corner_phases)
     blind = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1)
@@ -180,7 +219,9 @@ def test_corners_are_passed_where_they_are():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [ISOTROPIC, ANISOTROPIC, colloc.Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)])
+@pytest.mark.parametrize(
+    "friction", [ISOTROPIC, ANISOTROPIC, colloc.Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)]
+)
 def test_slow_enough_is_where_the_part_is_lost(friction):
     froude = colloc.slow_enough(CHAIN, friction, GAIT, 1e-3, 0.01)
     slow = colloc.replay(CHAIN, friction, GAIT, 1e-3).efficiency
@@ -190,18 +231,28 @@ def test_slow_enough_is_where_the_part_is_lost(friction):
 
 @pytest.mark.parametrize("loss", [0.01, 0.2])
 def test_on_a_rougher_floor_slow_enough_is_as_much_faster_and_there_the_part_is_lost(loss):
-    froude = [colloc.slow_enough(CHAIN, colloc.Friction(mu, mu, mu), GAIT, 1e-2, loss) for mu in (1.0, 30.0)]
+    froude = [
+        colloc.slow_enough(CHAIN, colloc.Friction(mu, mu, mu), GAIT, 1e-2, loss)
+        for mu in (1.0, 30.0)
+    ]
     assert froude[1] == pytest.approx(30 * froude[0], rel=1e-6)
-    slow, played = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2), colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, froude[0])
+    slow, played = (
+        colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2),
+        colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, froude[0]),
+    )
     assert abs(1 - played.efficiency / slow.efficiency) == pytest.approx(loss, rel=0.05)
 
 
 def test_a_gait_whose_efficiency_no_pace_changes_much_is_slow_enough_at_none():
     gait = colloc.ellipse(A0=0.3, A1=0.6, B1=0.5)
-    with pytest.raises(colloc.NotConvergedError, match=r"by less than 0.3 up to a Froude number of 10\."):
+    with pytest.raises(
+        colloc.NotConvergedError, match=r"by less than 0.3 up to a Froude number of 10\."
+    ):
         colloc.slow_enough(CHAIN, ISOTROPIC, gait, 1e-2, 0.3)
     slow = colloc.replay(CHAIN, ISOTROPIC, gait, 1e-2).efficiency
-    assert abs(1 - colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 10.0).efficiency / slow) < 0.3
+    assert (
+        abs(1 - colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 10.0).efficiency / slow) < 0.3
+    )
 
 
 def test_what_inertia_takes_from_a_gait_that_turns_does_not_depend_on_where_its_period_begins():
@@ -236,14 +287,18 @@ def test_a_body_from_rest_moves_as_newtons_law_says():
 def test_periods_from_rest_become_alike_and_are_joined_without_a_gap():
     begun = colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=4)
     played = colloc.inertial_motion(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1)
-    assert begun.periods[-1] == pytest.approx((played.distance, played.work, played.rotation), abs=1e-4)
+    assert begun.periods[-1] == pytest.approx(
+        (played.distance, played.work, played.rotation), abs=1e-4
+    )
     assert not begun.states[:, 0].any()
     assert np.abs(np.diff(begun.states, axis=1)).max() < 0.1
     assert begun.states[3, -1] == pytest.approx(begun.periods[:, 2].sum(), abs=1e-12)
     assert begun.states[6, -1] == pytest.approx(begun.periods[:, 1].sum(), abs=1e-12)
     vx, vy, _, theta, x, y, _ = begun.states
     moved = np.trapezoid(np.exp(1j * theta) * (vx + 1j * vy), begun.phases)
-    assert abs(x[-1] + 1j * y[-1] - moved) < 1e-4, "the way is that of the velocities, whatever the body has turned before"
+    assert abs(x[-1] + 1j * y[-1] - moved) < 1e-4, (
+        "the way is that of the velocities, whatever the body has turned before"
+    )
     with pytest.raises(colloc.ProblemError, match="whole number"):
         colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=0)
 
@@ -251,7 +306,9 @@ def test_periods_from_rest_become_alike_and_are_joined_without_a_gap():
 def test_a_stiff_body_glides_down_a_slope_that_is_steeper_than_friction():
     """At g (sin - mu cos); what its weight does goes into friction and kinetic energy."""
     stiff, mu, grade, froude = colloc.ellipse(A0=0, A1=0, B1=0), 0.3, 0.5, 0.2
-    ran = colloc.motion_from_rest(CHAIN, colloc.Friction(mu, mu, mu), stiff, 1e-4, froude, periods=2, grade=grade, theta=np.pi)
+    ran = colloc.motion_from_rest(
+        CHAIN, colloc.Friction(mu, mu, mu), stiff, 1e-4, froude, periods=2, grade=grade, theta=np.pi
+    )
     speed, _, _, theta, x, y, work = ran.states[:, -1]
     assert speed == pytest.approx(2 * (grade - mu) / froude, rel=1e-3)
     assert x == pytest.approx(-speed, rel=1e-3)
@@ -263,7 +320,10 @@ def test_on_a_slope_slow_motion_is_approached_as_the_froude_number():
     at = CHAIN, ANISOTROPIC, LEANING, 3e-2
     slow = colloc.slope_motion(*at, 0.2, theta=0.4).states[:3, -1]
     off = [
-        np.abs(colloc.motion_from_rest(*at, froude, periods=1, grade=0.2, theta=0.4).states[3:6, -1] - slow).max()
+        np.abs(
+            colloc.motion_from_rest(*at, froude, periods=1, grade=0.2, theta=0.4).states[3:6, -1]
+            - slow
+        ).max()
         for froude in (4e-3, 1e-3)
     ]
     assert off[1] < 2e-3
@@ -272,7 +332,8 @@ def test_on_a_slope_slow_motion_is_approached_as_the_froude_number():
 
 def test_on_the_level_it_does_not_matter_where_a_body_points_at_first():
     ran, turned = (
-        colloc.motion_from_rest(CHAIN, ANISOTROPIC, LEANING, 1e-2, 0.05, periods=2, theta=theta) for theta in (0.0, 1.0)
+        colloc.motion_from_rest(CHAIN, ANISOTROPIC, LEANING, 1e-2, 0.05, periods=2, theta=theta)
+        for theta in (0.0, 1.0)
     )
     np.testing.assert_allclose(turned.periods, ran.periods, atol=1e-4)
     (x, y), (u, v) = ran.states[4:6, -1], turned.states[4:6, -1]
@@ -280,13 +341,23 @@ def test_on_the_level_it_does_not_matter_where_a_body_points_at_first():
 
 
 def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_friction_is(monkeypatch):
-    """Steps that err by more than delta shake a body that should rest, and there is no end to them."""
+    """Steps that err by more than delta shake a body that should rest, and there is no end to
+    them."""
     standing, asked, at = colloc.Chain((0.3, 0.45, 0.25), feet=1), [], GaitWithInertia._at
-    played = GaitWithInertia(standing, standing.law(colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)), LEANING, 1e-7, froude=0.02)
+    played = GaitWithInertia(
+        standing,
+        standing.law(colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)),
+        LEANING,
+        1e-7,
+        froude=0.02,
+    )
     monkeypatch.setattr(GaitWithInertia, "_at", lambda *given: asked.append(1) or at(*given))
     _, slopes = played.mapped(played.slow_momenta())
-    assert np.abs(slopes[:3]).max() < 1e-6, "friction leaves nothing of the momenta of the period before"
-    assert len(asked) < 50_000  # some 30,000, by rounding, where more would let the first method give up
+    assert np.abs(slopes[:3]).max() < 1e-6, (
+        "friction leaves nothing of the momenta of the period before"
+    )
+    # some 30,000, by rounding, where more would let the first method give up
+    assert len(asked) < 50_000
 
 
 def test_momenta_that_lead_nowhere_give_way_to_slow_ones_and_these_to_rest(monkeypatch):

@@ -1,4 +1,5 @@
-"""The polygon of many corners in results/curated, the best gait of three equal links that is known within 2.5 rad."""
+"""The polygon of many corners in results/curated, the best gait of three equal links that is known
+within 2.5 rad."""
 
 import json
 from pathlib import Path

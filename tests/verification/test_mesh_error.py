@@ -1,4 +1,5 @@
-"""The error estimate of a mesh against references that share nothing with it, and meshes planned from it."""
+"""The error estimate of a mesh against references that share nothing with it, and meshes planned
+from it."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -32,13 +33,21 @@ DELTA = 1e-3
 
 
 def problem(name="gauss-3", friction=Friction(), **changes):
-    fields = {"delta": DELTA, "delta_start": DELTA, "gait": Harmonic(1, "bilateral"), "intervals": 20, "scheme": name}
+    fields = {
+        "delta": DELTA,
+        "delta_start": DELTA,
+        "gait": Harmonic(1, "bilateral"),
+        "intervals": 20,
+        "scheme": name,
+    }
     return Problem("p", GAIT, friction=friction, **(fields | changes))
 
 
 @cache
 def replayed(friction):
-    return replay(problem().body, friction, path, DELTA, tolerance=1e-9, instants=6400, most_instants=25600)
+    return replay(
+        problem().body, friction, path, DELTA, tolerance=1e-9, instants=6400, most_instants=25600
+    )
 
 
 def path(t):
@@ -80,7 +89,9 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
     assert error.value.sum() == pytest.approx(true, rel=0.1, abs=1e-6)
 
 
-@pytest.mark.parametrize("objective", ["distance / driven_work", "distance / length", "distance / (work + driven_work)"])
+@pytest.mark.parametrize(
+    "objective", ["distance / driven_work", "distance / length", "distance / (work + driven_work)"]
+)
 def test_shares_of_intervals_add_up_to_the_error_of_other_objectives(objective):
     """The total is known from the scheme's own increments and the fine motion alone."""
     stated = problem("trapezoid", objective=objective)
@@ -90,7 +101,8 @@ def test_shares_of_intervals_add_up_to_the_error_of_other_objectives(objective):
 
 
 def test_shares_of_intervals_add_up_where_the_body_turns_in_half_a_period():
-    """Antipodal gaits turn back in the other half: what counts is the displacement half way between both headings."""
+    """Antipodal gaits turn back in the other half: what counts is the displacement half way between
+    both headings."""
     gait = Fourier(np.zeros(2), np.array([[1.5], [-1.0]]), np.array([[0.3], [1.0]]))
     stated = problem("trapezoid", gait=Harmonic(1, "antipodal"), intervals=40)
     fine = gait_motion(control_problem(stated), gait, DELTA, control_problem(stated).mesh(), 1e-6)
@@ -104,7 +116,10 @@ def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
     stated = problem(delta=10.0, delta_start=10.0)
     for name, order in (("gauss-2", 4), ("radau-2", 3), ("gauss-3", 6)):
         meshes = (Mesh(scheme(name), np.linspace(0, 0.5, n + 1)) for n in (20, 40))
-        coarse, fine = (np.abs(mesh_error(control_problem(stated), mesh, GAIT, 10.0, 1e-11).work).sum() for mesh in meshes)
+        coarse, fine = (
+            np.abs(mesh_error(control_problem(stated), mesh, GAIT, 10.0, 1e-11).work).sum()
+            for mesh in meshes
+        )
         assert np.log2(coarse / fine) == pytest.approx(order, abs=0.5)
 
 
@@ -114,12 +129,20 @@ def test_the_velocity_error_of_an_interval_is_that_of_the_polynomial_through_its
     fine = gait_motion(control_problem(stated), GAIT, DELTA, mesh, 1e-6)
     found = mesh_error(control_problem(stated), mesh, GAIT, DELTA, 1e-6, fine).velocity
     nodes = mesh.edges[:-1, None] + mesh.h[:, None] * mesh.scheme.c
-    z, known = rates_at(stated.body, stated.friction, path, DELTA, nodes).z, fine.rates.z.reshape(3, -1)
+    z, known = (
+        rates_at(stated.body, stated.friction, path, DELTA, nodes).z,
+        fine.rates.z.reshape(3, -1),
+    )
     for k in range(mesh.n):
         t = fine.nodes.ravel()
         inside = (t > mesh.edges[k]) & (t < mesh.edges[k + 1])
-        through = [np.polyval(np.polyfit(nodes[k] - nodes[k, 1], row[k], 2), t[inside] - nodes[k, 1]) for row in z]
-        assert found[k] == pytest.approx(np.abs(np.array(through) - known[:, inside]).max(), rel=1e-6, abs=1e-9)
+        through = [
+            np.polyval(np.polyfit(nodes[k] - nodes[k, 1], row[k], 2), t[inside] - nodes[k, 1])
+            for row in z
+        ]
+        assert found[k] == pytest.approx(
+            np.abs(np.array(through) - known[:, inside]).max(), rel=1e-6, abs=1e-9
+        )
 
 
 def test_velocity_error_is_largest_where_links_stick():
@@ -129,16 +152,21 @@ def test_velocity_error_is_largest_where_links_stick():
     fine = gait_motion(control_problem(stated), GAIT, DELTA, mesh, 1e-7)
     kinks = kink_phases(stated.body, stated.friction, path, DELTA, fine)
     worst = int(error.velocity.argmax())
-    assert np.any((kinks > mesh.edges[worst] - mesh.h[0]) & (kinks < mesh.edges[worst + 1] + mesh.h[0]))
+    assert np.any(
+        (kinks > mesh.edges[worst] - mesh.h[0]) & (kinks < mesh.edges[worst + 1] + mesh.h[0])
+    )
 
 
 @pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)], ids=str)
 def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     stated = problem(friction=friction)
-    fine = gait_motion(control_problem(stated), GAIT, DELTA, uniform_mesh(scheme("gauss-3"), 20, 0.5), 1e-6)
+    fine = gait_motion(
+        control_problem(stated), GAIT, DELTA, uniform_mesh(scheme("gauss-3"), 20, 0.5), 1e-6
+    )
     kinks = kink_phases(stated.body, friction, path, DELTA, fine)
     assert 4 <= kinks.size <= 24
-    # reversing the motion of the body about the middle of the half period maps kinks to kinks (A0 = 0)
+    # reversing the motion of the body about the middle of the half period maps kinks to kinks (A0 =
+    # 0)
     np.testing.assert_allclose(np.sort(0.5 - kinks), kinks, atol=2e-4)
     angles, rates = path(kinks)
     z = solve_balance(stated.body, friction, angles, rates, DELTA).z
@@ -148,7 +176,11 @@ def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
 
 def test_a_kink_is_found_where_the_body_comes_to_rest():
     """One joint that swings to and fro: everything rests where it turns back."""
-    body, friction, turns = Chain((0.4, 0.6)), Friction(mu_t=1, mu_f=1, mu_b=3), np.array([0.1234, 0.6234])
+    body, friction, turns = (
+        Chain((0.4, 0.6)),
+        Friction(mu_t=1, mu_f=1, mu_b=3),
+        np.array([0.1234, 0.6234]),
+    )
 
     def swinging(t):
         phase = 2 * np.pi * (t - turns[0])
@@ -160,7 +192,8 @@ def test_a_kink_is_found_where_the_body_comes_to_rest():
 
 @pytest.mark.parametrize(("least", "counts"), [(2.0, True), (5.0, False)])
 def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts):
-    """One joint that slows down to a rate at which some point of the links moves at 17 delta, or at 43."""
+    """One joint that slows down to a rate at which some point of the links moves at 17 delta, or at
+    43."""
     body, friction, delta = Chain((0.4, 0.6)), Friction(), 1e-3
 
     def slowing(t):
@@ -183,8 +216,11 @@ def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts
         ("gauss-3", Friction(mu_t=1.7, mu_f=1, mu_b=1.3), True),
     ],
 )
-def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards(rule, friction, held, monkeypatch):
-    """Schemes with nodes at the ends of an interval would have one there, and the efficiency a kink in the gait."""
+def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards(
+    rule, friction, held, monkeypatch
+):
+    """Schemes with nodes at the ends of an interval would have one there, and the efficiency a kink
+    in the gait."""
     stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
     monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.array([kink]))
     plan = planned_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-4)
@@ -215,16 +251,32 @@ def test_knots_on_kinks_save_points(monkeypatch):
 def test_planned_meshes_are_as_accurate_as_they_say(name):
     stated = problem(name)
     for tolerance in (1e-4, 1e-6):
-        plan = planned_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, tolerance)
+        plan = planned_mesh(
+            control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, tolerance
+        )
         assert plan.reached
-        error = mesh_error(control_problem(stated), Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 0.1 * tolerance)
+        error = mesh_error(
+            control_problem(stated),
+            Mesh(scheme(plan.scheme), plan.edges),
+            GAIT,
+            DELTA,
+            0.1 * tolerance,
+        )
         assert abs(error.total) <= error.estimate <= 1.1 * tolerance
-        again = planned_mesh(control_problem(stated), Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1.1 * tolerance)
+        again = planned_mesh(
+            control_problem(stated),
+            Mesh(scheme(plan.scheme), plan.edges),
+            GAIT,
+            DELTA,
+            1.1 * tolerance,
+        )
         assert again is None
 
 
 @pytest.mark.parametrize(("share", "good"), [(0.85, True), (0.95, False)])
-def test_a_mesh_that_is_just_good_enough_is_refined_as_the_answer_on_it_still_moves(monkeypatch, share, good):
+def test_a_mesh_that_is_just_good_enough_is_refined_as_the_answer_on_it_still_moves(
+    monkeypatch, share, good
+):
     stated = problem("gauss-3")
     mesh = control_problem(stated).mesh()
     nearly = SimpleNamespace(estimate=share * 1e-5, turning=0.0, violation=np.zeros(mesh.h.size))
@@ -235,20 +287,32 @@ def test_a_mesh_that_is_just_good_enough_is_refined_as_the_answer_on_it_still_mo
 def test_a_nested_mesh_has_every_knot_of_the_one_before():
     stated = problem("gauss-3")
     mesh = control_problem(stated).mesh()
-    plan, free = (planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6, nested=nested) for nested in (True, False))
+    plan, free = (
+        planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6, nested=nested)
+        for nested in (True, False)
+    )
     assert np.isin(mesh.edges, plan.edges).all()
     assert not np.isin(mesh.edges, free.edges).all()
     assert plan.reached
-    assert mesh_error(control_problem(stated), Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1e-7).estimate <= 1.1e-6
+    assert (
+        mesh_error(
+            control_problem(stated), Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1e-7
+        ).estimate
+        <= 1.1e-6
+    )
 
 
 def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     stated = problem("gauss-2", mesh_tolerance=1e-7, intervals=20)
-    plan = planned_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-7, most_points=60)
+    plan = planned_mesh(
+        control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-7, most_points=60
+    )
     assert not plan.reached
     assert plan.estimate > 1e-7
     small = planned_mesh
-    monkeypatch.setattr(refine, "planned_mesh", lambda *a, **k: small(*a, **{**k, "most_points": 60}))
+    monkeypatch.setattr(
+        refine, "planned_mesh", lambda *a, **k: small(*a, **{**k, "most_points": 60})
+    )
     solution = solve(stated, 1)
     assert solution.status == "certificate failed"
     assert "mesh error" in solution.message
@@ -261,7 +325,13 @@ def test_a_refined_solution_knows_its_scheme_and_its_error():
     assert answer.optimal
     assert answer.scheme == answer.mesh.scheme.name != "gauss-2"
     gait = answer.gait
-    known = replay(stated.body, stated.friction, lambda t: (gait.angles(t), gait.rates(t)), DELTA, tolerance=1e-8)
+    known = replay(
+        stated.body,
+        stated.friction,
+        lambda t: (gait.angles(t), gait.rates(t)),
+        DELTA,
+        tolerance=1e-8,
+    )
     assert abs(answer.efficiency / known.efficiency - 1) < 1e-5
 
 
@@ -272,14 +342,18 @@ def test_violations_are_reported_in_the_interval_where_they_are():
     wide = Fourier(GAIT.mean, 1.2 * GAIT.cos, 1.2 * GAIT.sin)
     violation = constraint_violation(control_problem(stated).admissible, mesh, wide)
     t = np.linspace(0, 0.5, 2001)
-    excess = np.maximum(np.abs(wide.angles(t)).max(axis=0) - np.pi, crossing_depth(stated.body, wide.angles(t)))
+    excess = np.maximum(
+        np.abs(wide.angles(t)).max(axis=0) - np.pi, crossing_depth(stated.body, wide.angles(t))
+    )
     cells = np.unique(np.clip(np.searchsorted(mesh.edges, t[excess > 1e-3]) - 1, 0, mesh.n - 1))
     assert cells.size
     assert (violation[cells] > 0).all()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("index", range(len(CASES)), ids=[case[0].replace(" ", "-") for case in CASES])
+@pytest.mark.parametrize(
+    "index", range(len(CASES)), ids=[case[0].replace(" ", "-") for case in CASES]
+)
 def test_estimate_is_never_optimistic_by_more_than_a_factor_two(index):
     result = outcome(case_problem(index))
     if not result["optimal"]:

@@ -17,7 +17,9 @@ from tests.shared.laws import coulomb
 
 def test_reciprocal_gaits_go_nowhere():
     gait = ellipse(0.0, 0.0, 1.2)
-    result = replay(Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 1e-4, instants=400)
+    result = replay(
+        Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 1e-4, instants=400
+    )
     assert result.distance < 1e-10
     assert result.work > 0.1
     assert len(repr(result)) < 800, "the velocities are printed"
@@ -39,7 +41,10 @@ def test_a_scallop_with_directional_friction_crawls_and_obeys_the_bound():
 def test_the_length_of_parts_of_a_path_is_their_arc():
     gait, ends = ellipse(0.3, 0.8, 0.2), np.array([0.1, 0.35, 0.4])
     parts = totals_along(LENGTH, lambda t: (gait.angles(t), gait.rates(t)), ends[:-1], ends[1:], 5)
-    arcs = [quad(lambda t: np.linalg.norm(gait.rates(np.array([t]))), *part)[0] for part in pairwise(ends)]
+    arcs = [
+        quad(lambda t: np.linalg.norm(gait.rates(np.array([t]))), *part)[0]
+        for part in pairwise(ends)
+    ]
     np.testing.assert_allclose(parts, arcs, rtol=1e-9)
 
 
@@ -50,13 +55,22 @@ def random_path(seed):
     """A wave of two harmonics through three to five links, and a law."""
     rng = np.random.default_rng(seed)
     n_joint = int(rng.integers(2, 5))
-    gait = Fourier(rng.uniform(-1, 1, n_joint), rng.normal(0, 0.4, (n_joint, 2)), rng.normal(0, 0.4, (n_joint, 2)))
-    return Chain((1 / (n_joint + 1),) * (n_joint + 1)), coulomb(*LAWS[seed % 4]), lambda t: (gait.angles(t), gait.rates(t))
+    gait = Fourier(
+        rng.uniform(-1, 1, n_joint),
+        rng.normal(0, 0.4, (n_joint, 2)),
+        rng.normal(0, 0.4, (n_joint, 2)),
+    )
+    return (
+        Chain((1 / (n_joint + 1),) * (n_joint + 1)),
+        coulomb(*LAWS[seed % 4]),
+        lambda t: (gait.angles(t), gait.rates(t)),
+    )
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_stated_error_holds_against_another_quadrature(seed):
-    """Against Gauss nodes on adaptive panels, from grids of any size: their kinks lie anywhere between the instants."""
+    """Against Gauss nodes on adaptive panels, from grids of any size: their kinks lie anywhere
+    between the instants."""
     body, friction, path = random_path(seed)
     fine = fine_motion(body, friction, path, 1e-4, np.linspace(0, 1, 21), 1e-9)
     exact = abs(fine.path[-1]) / fine.work[-1]
@@ -78,18 +92,24 @@ def test_what_the_balance_leaves_over_is_part_of_the_error_that_is_asked_for():
     gait = ellipse(0.0, 2.8, 1.3)
     found = replay(Roughly(), Friction(), gait, 1e-3, instants=40, tolerance=1e-4)
     assert 0.9e-4 < found.error <= 1e-4
-    assert found.instants > replay(Chain(), Friction(), gait, 1e-3, instants=40, tolerance=1e-4).instants
+    assert (
+        found.instants
+        > replay(Chain(), Friction(), gait, 1e-3, instants=40, tolerance=1e-4).instants
+    )
 
 
 def test_panels_gather_at_kinks():
     body, friction, path = random_path(0)
-    loose, tight = (replay(body, friction, path, 1e-4, instants=400, tolerance=tol) for tol in (1e-4, 1e-8))
+    loose, tight = (
+        replay(body, friction, path, 1e-4, instants=400, tolerance=tol) for tol in (1e-4, 1e-8)
+    )
     assert tight.error < 1e-8
     assert tight.instants < 20 * loose.instants
 
 
 def test_the_largest_residual_of_all_instants_is_reported(monkeypatch):
-    """Between breaks the replay runs in pieces; an instant out of balance counts in whichever of them it is."""
+    """Between breaks the replay runs in pieces; an instant out of balance counts in whichever of
+    them it is."""
     body, friction, path = random_path(1)
     exact = Chain.replayed
     for where in (0.1, 0.5, 0.9):
@@ -111,7 +131,8 @@ def test_an_accuracy_beyond_that_of_the_balance_is_not_claimed():
 
 
 def test_another_followed_point_changes_the_distance_by_at_most_rotation_times_lever():
-    """The ends of the body against its centre of mass, for gaits that turn: first order in the rotation."""
+    """The ends of the body against its centre of mass, for gaits that turn: first order in the
+    rotation."""
     for seed in range(4):
         body, friction, path = random_path(seed)
         result = replay(body, friction, path, 1e-4, tolerance=1e-4)
@@ -123,13 +144,16 @@ def test_another_followed_point_changes_the_distance_by_at_most_rotation_times_l
         assert np.abs(arms).max() <= result.lever <= 1
         # in any direction of travel the centre of mass may have had
         headings = np.exp(1j * np.linspace(0, 2 * np.pi, 60))
-        moved = np.abs(result.distance * headings[:, None] + (np.exp(1j * result.rotation) - 1) * arms)
+        moved = np.abs(
+            result.distance * headings[:, None] + (np.exp(1j * result.rotation) - 1) * arms
+        )
         change = np.abs(moved / result.distance - 1).max()
         assert 0.3 * result.turning < change <= result.turning
 
 
 def triangle(c, e):
-    """Joint one moves, then joint two, then both go back together, at unit rates per leg (a polygon in shape space)."""
+    """Joint one moves, then joint two, then both go back together, at unit rates per leg (a polygon
+    in shape space)."""
     corners = np.array([[c + e, -c], [c, -c], [c, -c - e], [c + e, -c]])
 
     def path(t):
@@ -145,7 +169,15 @@ def test_the_triangle_that_moves_one_joint_at_a_time_reaches_two_fifths():
     values = []
     for e in (0.2, 0.1, 0.05):
         # corners of the polygon must be grid points: 3 divides the number of intervals
-        result = replay(Chain(), Friction(), triangle(2.2, e), 1e-9, instants=4800, most_instants=4800, tolerance=1e-9)
+        result = replay(
+            Chain(),
+            Friction(),
+            triangle(2.2, e),
+            1e-9,
+            instants=4800,
+            most_instants=4800,
+            tolerance=1e-9,
+        )
         values.append((result.efficiency, result.distance / e, result.work / e))
     efficiency, distance, work = np.array(values[-1])
     assert abs(efficiency - 0.4) < 2e-3

@@ -1,11 +1,24 @@
-"""Gaits on a slope: against a program of its own, the level, conservation of energy, and what symmetry demands."""
+"""Gaits on a slope: against a program of its own, the level, conservation of energy, and what
+symmetry demands."""
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq, root
 from shared.loaded_chain import left_over, lying, standing
 
-from colloc import Chain, CrawlerBody, Foot, Fourier, Friction, NotConvergedError, Pad, ProblemError, Wheel, ellipse, replay
+from colloc import (
+    Chain,
+    CrawlerBody,
+    Foot,
+    Fourier,
+    Friction,
+    NotConvergedError,
+    Pad,
+    ProblemError,
+    Wheel,
+    ellipse,
+    replay,
+)
 from colloc.verification.slope import gait_on_slope, slope_motion
 from tests.shared.laws import coulomb
 
@@ -16,7 +29,8 @@ REVERSIBLE = ellipse(A0=0.4, A1=1.5, B1=1.0)
 LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 ON_FEET = Chain(
     (0.2, 0.5, 0.3), masses=(0.3, 0.3, 0.4),
-    feet=(Wheel(0, 0.2, rolling=0.5, weight=0.3), Foot(1, 0.6, 0.1, 0.05), Foot(1, 0.6, 0.1, -0.05), Foot(2, 0.9, 0.5)),
+    feet=(Wheel(0, 0.2, rolling=0.5, weight=0.3), Foot(1, 0.6, 0.1, 0.05), Foot(1, 0.6, 0.1,
+    -0.05), Foot(2, 0.9, 0.5)),
 )  # fmt: skip
 """Wheel, feet beside each other and a foot, whose weights press beside the centre of mass."""
 PADS = Chain((0.2, 0.5, 0.3), feet=(Pad(0, 0.5, 1.0), Wheel(1, 0.3), Pad(2, 0.2, 0.6)))
@@ -36,9 +50,12 @@ def still(t):
     return np.tile([[0.4], [-0.7]], np.size(t)), np.zeros((2, np.size(t)))
 
 
-@pytest.mark.parametrize(("body", "grade"), [(LOPSIDED, 0.5), (ON_FEET, 0.25)], ids=["lying", "standing"])
+@pytest.mark.parametrize(
+    ("body", "grade"), [(LOPSIDED, 0.5), (ON_FEET, 0.25)], ids=["lying", "standing"]
+)
 def test_the_motion_is_that_of_a_program_of_its_own(body, grade):
-    """Runge and Kutta's rule on balances point by point; delta is large, so that both are smooth and few steps do."""
+    """Runge and Kutta's rule on balances point by point; delta is large, so that both are smooth
+    and few steps do."""
     mu, delta, steps = (1.7, 1.0, 1.3), 0.3, 20
     ours = slope_motion(body, coulomb(*mu), SKEW, delta, grade, heading=1.0)
     points = standing(body.feet, mu) if body.feet else lying(body.weights, mu)
@@ -84,14 +101,22 @@ def test_on_the_level_it_is_the_replay():
 
 @pytest.mark.parametrize("body", [Chain(), PADS], ids=["lying", "pads"])
 def test_a_gentle_slope_changes_little_and_in_proportion(body):
-    level, gentle, twice = (slope_motion(body, Friction(), SKEW, 0.1, g, tolerance=1e-8) for g in (0.0, 2e-4, 4e-4))
+    level, gentle, twice = (
+        slope_motion(body, Friction(), SKEW, 0.1, g, tolerance=1e-8) for g in (0.0, 2e-4, 4e-4)
+    )
     assert twice.turn - level.turn == pytest.approx(2 * (gentle.turn - level.turn), rel=1e-2)
-    assert twice.climb[0] - level.climb[0] == pytest.approx(2 * (gentle.climb[0] - level.climb[0]), rel=1e-2)
+    assert twice.climb[0] - level.climb[0] == pytest.approx(
+        2 * (gentle.climb[0] - level.climb[0]), rel=1e-2
+    )
 
 
-@pytest.mark.parametrize(("body", "grade"), [(LOPSIDED, 0.4), (ON_FEET, 0.25)], ids=["lying", "standing"])
+@pytest.mark.parametrize(
+    ("body", "grade"), [(LOPSIDED, 0.4), (ON_FEET, 0.25)], ids=["lying", "standing"]
+)
 def test_joints_pay_for_friction_and_for_the_climb(body, grade):
-    ran = slope_motion(body, Friction(mu_t=1.7, mu_f=1, mu_b=1.3), SKEW, 1e-2, grade, heading=1.0, periods=2)
+    ran = slope_motion(
+        body, Friction(mu_t=1.7, mu_f=1, mu_b=1.3), SKEW, 1e-2, grade, heading=1.0, periods=2
+    )
     lifted = grade * ran.climb
     assert np.abs(lifted).min() > 1e-3
     np.testing.assert_allclose(ran.joint_work, ran.friction_work + lifted, atol=1e-9)
@@ -100,7 +125,9 @@ def test_joints_pay_for_friction_and_for_the_climb(body, grade):
 @pytest.mark.parametrize("body", [Chain(), ON_FEET], ids=["lying", "standing"])
 def test_a_mirrored_gait_drifts_to_the_other_side(body):
     ran = slope_motion(body, Friction(), SKEW, 1e-2, 0.2, heading=0.9)
-    mirrored = slope_motion(body, Friction(), lambda t: tuple(-a for a in SKEW(t)), 1e-2, 0.2, heading=-0.9)
+    mirrored = slope_motion(
+        body, Friction(), lambda t: tuple(-a for a in SKEW(t)), 1e-2, 0.2, heading=-0.9
+    )
     assert mirrored.climb == pytest.approx(ran.climb, abs=1e-5)
     assert mirrored.aside == pytest.approx(-ran.aside, abs=1e-5)
     assert mirrored.turn == pytest.approx(-ran.turn, abs=1e-5)
@@ -114,7 +141,9 @@ def test_joints_at_rest_rest_on_any_slope_that_friction_holds():
         assert abs(ran.turn) < 1e-9
     wheels = Chain(feet=tuple(Wheel(link, sideways=0.9) for link in range(3)))
     for body, grade in ((Chain(), 1.2), (wheels, 0.9)):
-        with pytest.raises(ProblemError, match=f"slides down for ever: friction holds at most {grade} times"):
+        with pytest.raises(
+            ProblemError, match=f"slides down for ever: friction holds at most {grade} times"
+        ):
             slope_motion(body, Friction(1.2, 1.2, 1.2), still, 1e-6, grade)
 
 
@@ -131,10 +160,13 @@ def test_skates_hold_across_the_slope_and_not_along():
 
 @pytest.mark.parametrize("mu", [(1, 1, 1), (2, 1, 3)], ids=str)
 def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
-    """Backwards in time, and read from the other end, it is the same gait; the slope is turned over with the friction. So the
-    map of headings is its own inverse, and a monotone one that is must be none."""
+    """Backwards in time, and read from the other end, it is the same gait; the slope is turned over
+    with the friction. So the map of headings is its own inverse, and a monotone one that is must be
+    none."""
     for heading in (-np.pi, -0.5 * np.pi, 0.0, 0.5 * np.pi):
-        ran = slope_motion(Chain(), coulomb(*mu), REVERSIBLE, 1e-2, 0.3, heading=heading, tolerance=1e-5)
+        ran = slope_motion(
+            Chain(), coulomb(*mu), REVERSIBLE, 1e-2, 0.3, heading=heading, tolerance=1e-5
+        )
         assert abs(ran.turn) < 1e-4
     there = slope_motion(Chain(), coulomb(*mu), REVERSIBLE, 1e-2, 0.3, heading=1.0, tolerance=1e-5)
     assert there.steering[0] == pytest.approx(1.0, abs=1e-4)
@@ -145,19 +177,34 @@ def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
 
 
 def test_an_antipodal_gait_settles_along_the_fall_line():
-    """Of the two headings that a period does not turn, others come closer to one, and leave the other."""
+    """Of the two headings that a period does not turn, others come closer to one, and leave the
+    other."""
 
     def period(heading):
-        return slope_motion(Chain(), Friction(), ANTIPODAL, 0.05, 0.1, heading=heading, tolerance=1e-4)
+        return slope_motion(
+            Chain(), Friction(), ANTIPODAL, 0.05, 0.1, heading=heading, tolerance=1e-4
+        )
 
-    lasting = [period(brentq(lambda heading: period(heading).turn, h - 0.5, h + 0.5, xtol=1e-4)) for h in (0.0, np.pi)]
+    lasting = [
+        period(brentq(lambda heading: period(heading).turn, h - 0.5, h + 0.5, xtol=1e-4))
+        for h in (0.0, np.pi)
+    ]
     assert sorted(ran.stable for ran in lasting) == [False, True]
     for ran in lasting:
         assert abs(ran.turn) < 1e-3
         assert abs(ran.aside[0]) < 1e-3  # its halves are mirror images
         assert abs(ran.climb[0]) > 1e-2
     (settled,) = (ran for ran in lasting if ran.stable)
-    run = slope_motion(Chain(), Friction(), ANTIPODAL, 0.05, 0.1, heading=settled.headings[0] + 0.3, periods=4, tolerance=1e-4)
+    run = slope_motion(
+        Chain(),
+        Friction(),
+        ANTIPODAL,
+        0.05,
+        0.1,
+        heading=settled.headings[0] + 0.3,
+        periods=4,
+        tolerance=1e-4,
+    )
     left = run.headings - settled.headings[0]
     np.testing.assert_allclose(left[1:] / left[:-1], settled.steering[0], atol=3e-3)
     assert left[-1] < 0.9 * left[0]
@@ -165,13 +212,19 @@ def test_an_antipodal_gait_settles_along_the_fall_line():
 
 def test_a_body_that_turns_on_the_level_has_no_lasting_heading_on_a_gentle_slope():
     headings = np.linspace(-np.pi, np.pi, 4)[:3]
-    turns = [slope_motion(Chain(), Friction(), SKEW, 1e-2, 0.02, heading=heading, tolerance=1e-5).turn for heading in headings]
+    turns = [
+        slope_motion(Chain(), Friction(), SKEW, 1e-2, 0.02, heading=heading, tolerance=1e-5).turn
+        for heading in headings
+    ]
     assert len(set(np.sign(turns))) == 1
     assert np.abs(turns).min() > 1e-4
 
 
 def test_the_steering_is_the_slope_of_the_map():
-    ends = [slope_motion(Chain(), Friction(), SKEW, 0.1, 0.4, heading=0.5 + s, tolerance=1e-7) for s in (-1e-3, 0.0, 1e-3)]
+    ends = [
+        slope_motion(Chain(), Friction(), SKEW, 0.1, 0.4, heading=0.5 + s, tolerance=1e-7)
+        for s in (-1e-3, 0.0, 1e-3)
+    ]
     slope = (ends[2].headings[1] - ends[0].headings[1]) / 2e-3
     assert ends[1].steering[0] == pytest.approx(slope, abs=1e-4)
     assert abs(slope - 1.0) > 1e-2
@@ -197,7 +250,8 @@ def test_rates_may_jump_where_that_is_said():
         return start[:, leg] + along[:, leg] * (there - leg / 4), along[:, leg]
 
     told, untold = (
-        slope_motion(Chain(), Friction(), corners, 1e-2, 0.2, breaks=b, tolerance=1e-5) for b in ((0.25, 0.5, 0.75), ())
+        slope_motion(Chain(), Friction(), corners, 1e-2, 0.2, breaks=b, tolerance=1e-5)
+        for b in ((0.25, 0.5, 0.75), ())
     )
     np.testing.assert_allclose(told.states[:5, -1], untold.states[:5, -1], atol=1e-4)
 
@@ -206,7 +260,10 @@ def test_rates_may_jump_where_that_is_said():
     ("changed", "said"),
     [
         ({"body": CrawlerBody()}, "only a Chain"),
-        ({"body": Belt()}, "only a Chain, whose joints are its own, can be put on a slope, not Belt"),
+        (
+            {"body": Belt()},
+            "only a Chain, whose joints are its own, can be put on a slope, not Belt",
+        ),
         ({"grade": -0.1}, "grade must be a number that is not negative"),
         ({"grade": np.nan}, "grade must be"),
         ({"periods": 0}, "periods must be a whole number from 1"),
@@ -217,6 +274,12 @@ def test_rates_may_jump_where_that_is_said():
     ],
 )
 def test_what_cannot_be_is_named(changed, said):
-    given = {"body": Chain(), "friction": Friction(), "gait": SKEW, "delta": 1e-2, "grade": 0.1} | changed
+    given = {
+        "body": Chain(),
+        "friction": Friction(),
+        "gait": SKEW,
+        "delta": 1e-2,
+        "grade": 0.1,
+    } | changed
     with pytest.raises(ProblemError, match=said):
         slope_motion(**given)

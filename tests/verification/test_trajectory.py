@@ -1,4 +1,5 @@
-"""Joint angles over time: what a limit on the joint speeds does to the period, at an even pace and at any."""
+"""Joint angles over time: what a limit on the joint speeds does to the period, at an even pace and
+at any."""
 
 import numpy as np
 import pytest

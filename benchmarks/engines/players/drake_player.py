@@ -1,6 +1,8 @@
-"""Drake: contacts in discrete time, friction from the normal force of the step before ("lagged"), regularised at a slip speed.
+"""Drake: contacts in discrete time, friction from the normal force of the step before ("lagged"),
+regularised at a slip speed.
 
-Its other approximations, "sap" and "similar", lift a foot that slides, as MuJoCo does: three links on feet go 16 % too short.
+Its other approximations, "sap" and "similar", lift a foot that slides, as MuJoCo does: three links
+on feet go 16 % too short.
 """
 
 import numpy as np
@@ -26,16 +28,26 @@ def play(task: Task, step: float) -> np.ndarray:
     steps = task.steps(step)
     step = task.seconds / steps
     builder = DiagramBuilder()
-    config = MultibodyPlantConfig(time_step=step, discrete_contact_approximation="lagged", stiction_tolerance=SLIP)
+    config = MultibodyPlantConfig(
+        time_step=step, discrete_contact_approximation="lagged", stiction_tolerance=SLIP
+    )
     plant, scene = AddMultibodyPlant(config, builder)
     (robot,) = Parser(plant).AddModelsFromString(task.urdf, "urdf")
     plant.mutable_gravity_field().set_gravity_vector([0, 0, -task.gravity])
-    plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "floor", CoulombFriction(1, 1))
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform(), HalfSpace(), "floor", CoulombFriction(1, 1)
+    )
     actuators = [plant.AddJointActuator(name, plant.GetJointByName(name)) for name in task.joints]
     for actuator in actuators:
         actuator.set_controller_gains(PdControllerGains(p=STIFF, d=DAMPED))
     plant.Finalize()
-    feet = GeometrySet([g for name in task.feet for g in plant.GetCollisionGeometriesForBody(plant.GetBodyByName(name))])
+    feet = GeometrySet(
+        [
+            g
+            for name in task.feet
+            for g in plant.GetCollisionGeometriesForBody(plant.GetBodyByName(name))
+        ]
+    )
     scene.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(feet))
     simulator = Simulator(builder.Build())
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
@@ -46,7 +58,10 @@ def play(task: Task, step: float) -> np.ndarray:
     q[[joint.position_start() for joint in joints]], v[speeds] = task.at(0.0)
     plant.SetPositions(context, q)
     plant.SetVelocities(context, v)
-    wanted, torques = plant.get_desired_state_input_port(robot), plant.get_net_actuation_output_port(robot)
+    wanted, torques = (
+        plant.get_desired_state_input_port(robot),
+        plant.get_net_actuation_output_port(robot),
+    )
     work, rows = 0.0, [[0.0] * 4]
     for k in range(task.periods * steps):
         wanted.FixValue(context, np.concatenate(task.at((k + 1) * step)))

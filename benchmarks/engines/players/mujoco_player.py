@@ -1,7 +1,9 @@
-"""MuJoCo: soft contacts from a convex problem, in which a foot that slides is also lifted, the more the faster it slides.
+"""MuJoCo: soft contacts from a convex problem, in which a foot that slides is also lifted, the more
+the faster it slides.
 
-As it comes (solref 0.02, solimp from 0.9) feet hover and hop: three links on feet go 7 % too short slowly, and 33 % at a
-Froude number of 0.05. Contacts of two steps whose impedance begins at 0 take the hops' cause away.
+As it comes (solref 0.02, solimp from 0.9) feet hover and hop: three links on feet go 7 % too short
+slowly, and 33 % at a Froude number of 0.05. Contacts of two steps whose impedance begins at 0 take
+the hops' cause away.
 """
 
 import mujoco
@@ -10,7 +12,10 @@ import numpy as np
 from benchmarks.engines.task import Task
 
 NAME, DIRECTIONS = "MuJoCo", False
-SETTINGS = "elliptic cones, impratio 100, solref of two steps, solimp from 0, Newton to 1e-12, implicitfast"
+SETTINGS = (
+    "elliptic cones, impratio 100, solref of two steps, solimp from 0, Newton to 1e-12, "
+    "implicitfast"
+)
 STIFF, DAMPED = 1e4, 1e2
 """Of the servos [N m/rad], [N m s/rad]: angles are held to 1e-4 rad."""
 
@@ -22,11 +27,22 @@ def play(task: Task, step: float) -> np.ndarray:
     option.cone, option.solver = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_NEWTON
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.impratio, option.tolerance, option.iterations = 100, 1e-12, 200
-    touch = {"condim": 3, "solref": [2 * option.timestep, 1.0], "solimp": [0.0, 0.95, 0.001, 0.5, 2.0]}
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=0, conaffinity=1, **touch)
+    touch = {
+        "condim": 3,
+        "solref": [2 * option.timestep, 1.0],
+        "solimp": [0.0, 0.95, 0.001, 0.5, 2.0],
+    }
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=0, conaffinity=1, **touch
+    )
     for name, law in task.feet.items():
         for geom in spec.body(name).geoms:
-            geom.friction, geom.priority, geom.contype, geom.conaffinity = [law.largest, 0, 0], 1, 1, 0
+            geom.friction, geom.priority, geom.contype, geom.conaffinity = (
+                [law.largest, 0, 0],
+                1,
+                1,
+                0,
+            )
             geom.condim, geom.solref, geom.solimp = touch.values()
     for name in task.joints:
         servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
