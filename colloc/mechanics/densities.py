@@ -72,6 +72,7 @@ class Instants:
     forces: Array = None
     unit: float = 1.0
     load: Array = None
+    moments: Array = None
 
     def chosen(self, which: np.ndarray) -> Instants:
         """Some of them."""
@@ -92,6 +93,8 @@ class Instants:
 
     @cached_property
     def moment(self) -> Array:
+        if self.moments is not None:
+            return self.moments
         body, friction, forces = self.body, self.friction, self.forces
         if forces is None:
             forces = body.forces(friction, self.angles, self.rates, self.z, self.delta)

@@ -150,7 +150,11 @@ class FloorContact:
     def _grouped(self) -> dict[Law, list[_Group]]:
         return {}
 
-    def _groups(self, friction: Law) -> list[_Group]:
+    def couples(self, parts: Sequence[int]) -> list[int]:
+        """Which of the forces are the couples on pads."""
+        return [2 * len(self.parts) + self._pads.index(part) for part in parts]
+
+    def groups(self, friction: Law) -> list[_Group]:
         """The parts, those of one kind and law together."""
         if friction not in self._grouped:
             each, found = self._each(friction), []
@@ -169,7 +173,7 @@ class FloorContact:
     ) -> list[tuple[_Group, Any]]:
         """What laws say of points, and of lines."""
         moves, found = self.velocities(velocity), []
-        for group in self._groups(friction):
+        for group in self.groups(friction):
             own = [part[group.rows, :] for part in moves]
             at = (*own, self.length[group.rows], delta) if group.pads else (*own[:2], delta)
             found.append((group, of[group.pads](group.law)(*at)))
@@ -269,7 +273,7 @@ class FloorContact:
         difference over the law's secant."""
         moves, n = self.velocities(velocity), len(self.parts)
         found: list[list[tuple[list[int], Array]]] = [[], [], []]
-        for rows, law, pads in self._groups(friction):
+        for rows, law, pads in self.groups(friction):
             vs, vn, w = (part[rows, :] for part in moves)
             pressed = self.pressure[rows]
             along, across = (forces[[k * n + row for row in rows], :] / pressed for k in range(2))
@@ -291,7 +295,7 @@ class FloorContact:
     def largest_forces(self, friction: Law) -> np.ndarray:
         """Their largest magnitudes, ``(n_force, 1)``."""
         found = np.full((3, len(self.parts), 1), np.inf)
-        for rows, law, pads in self._groups(friction):
+        for rows, law, pads in self.groups(friction):
             if pads:
                 found[:, rows] = (
                     line_integrals(law).largest_forces(self.length[rows]).reshape(3, -1, 1)

@@ -12,8 +12,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from colloc.collocation.motion_rows import ACTUATORS
-from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.densities import PathLimits
 from colloc.motion.kinds import Shapes
@@ -154,15 +152,9 @@ class ActuatorRows:
         on_points[each, :, point] = slopes[share, :, each]
         return motion.through_points(v, delta, on_points)
 
-    def laid_on(self, program: GaitProgram) -> GaitProgram:
-        """The full program on the same mesh with the same bounds."""
-        lower, upper, rows = (
-            program.constraint_lower.copy(),
-            program.constraint_upper.copy(),
-            program.groups[ACTUATORS],
-        )
-        lower[rows], upper[rows] = self.lower.T.ravel(), self.upper.T.ravel()
-        return program.with_rows(lower, upper)
+    def every_bound(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds at all points, point by point, as rows of the full program have them."""
+        return self.lower.T.ravel(), self.upper.T.ravel()
 
     def multipliers(self, on_rows: np.ndarray) -> np.ndarray:
         """Of the full program's rows, from those of these."""

@@ -9,14 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.collocation.worst_instants import (
-    check_values,
-    followed,
-    held_shares,
-    moving,
-    near_peaks,
-)
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import widest
@@ -27,6 +19,14 @@ from colloc.numerics.sqp import remembered
 from colloc.reduced.constraints import Constraints, Function
 from colloc.reduced.given import Given
 from colloc.reduced.pointed import pointed
+from colloc.transcription.shape_checks import ShapeCheck, shape_checks
+from colloc.transcription.worst_instants import (
+    check_values,
+    followed,
+    held_shares,
+    moving,
+    near_peaks,
+)
 
 
 class LinearSpace:

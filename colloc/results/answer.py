@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.collocation.layout import Layout, layout_of
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.collocated_motion import CollocatedMotion
+from colloc.transcription.layout import Layout, layout_of
 
 REDUCED, PRESCRIBED, EVALUATED = "reduced", "prescribed", "evaluated"
 
@@ -96,12 +96,9 @@ class Answer:
     edges : (n_interval + 1,)
         The mesh, in phases of the gait.
     scheme : str
-    knots : (n_arc + 1,), optional
-        Phases where the arcs of a free path meet; they are among the edges. By default they are the
-        edges.
     x, lam_x : (n,)
-        Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces
-        are in units of `colloc.gaits.control_problem`.
+        Variables of the motion (`colloc.transcription.layout`) and multipliers of their bounds;
+        work and forces are in units of `colloc.gaits.control_problem`.
     lam_g : (m,)
         Multipliers of the constraints.
     value, distance, work : float
@@ -129,7 +126,6 @@ class Answer:
     delta: float
     edges: np.ndarray
     scheme: str
-    knots: np.ndarray | None
     x: np.ndarray
     lam_x: np.ndarray
     lam_g: np.ndarray
@@ -181,7 +177,7 @@ class Answer:
     @property
     def layout(self) -> Layout:
         """Where every variable is in `x`."""
-        return layout_of(control_problem(self.problem), self.mesh, self.knots)
+        return layout_of(control_problem(self.problem), self.mesh)
 
     @property
     def delta_per_period(self) -> float:

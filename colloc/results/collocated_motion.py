@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.collocation.layout import Layout
 from colloc.gaits.gait import finite_array
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
@@ -20,6 +19,7 @@ from colloc.motion.collocated import CollocatedPose
 from colloc.motion.heading import whole_turns
 from colloc.numerics.mesh import Mesh
 from colloc.results.motion import RigidMotion, SampledMotion, turned
+from colloc.transcription.layout import RADIANS, Layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +50,8 @@ class CollocatedMotion:
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates and tail velocities per period at the collocation points."""
-        x, layout, problem = self.x, self.layout, self.problem
-        if layout.z.size:
-            unit = self.gait.speed_unit
-            return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
         angles, rates = self.gait(self.mesh.times)
-        return angles, rates, problem.body.solve(problem.law, angles, rates, self.delta).z
+        return angles, rates, RADIANS * self.layout.tail_velocity(self.problem.body, self.x)
 
     @cached_property
     def at_points(self) -> Sliding:
@@ -73,8 +69,8 @@ class CollocatedMotion:
     def _growth(self) -> np.ndarray:
         """Force, and torque about the tail, that change the momenta as the scheme's polynomials
         say, ``(3, n_point)``."""
-        mesh, unit = self.mesh, self.gait.speed_unit
-        momenta = unit * self.x[self.layout.momenta]
+        mesh = self.mesh
+        momenta = RADIANS * self.x[self.layout.momenta]
         grown = momenta[:, mesh.sites] - momenta[:, mesh.edge_sites[:-1], None]
         growth = np.empty((3, mesh.n_point))
         growth[:, mesh.points] = (

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from colloc.collocation.layout import Layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
@@ -36,6 +35,7 @@ from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.system.versions import versions
+from colloc.transcription.layout import Layout
 from colloc.verification.dry_friction import DryFriction, dry_friction
 from colloc.verification.replayer import replayer
 

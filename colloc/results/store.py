@@ -9,7 +9,7 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
          symmetry
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result; of a smooth body
         modes and mode_rates
-    /answer/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, value, distance, work,
+    /answer/{edges,x,lam_x,lam_g}, attributes delta, value, distance, work,
     kkt_error, panels, ... /history/{delta,intervals,value,distance,work,...}: how the search came
     there, a row a step /certificate/{name,value,threshold,passed,meaning}, attributes value,
     value_error, distance, distance_error, work, ...
@@ -26,7 +26,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from colloc.collocation.layout import layout_of
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from
 from colloc.gaits.problem import Problem
@@ -47,16 +46,17 @@ from colloc.system.store_file import (
     put,
     put_attribute,
 )
+from colloc.transcription.layout import layout_of
 
 FORMAT, FORMAT_VERSION = "colloc solution", 5
-_LAYOUT = "see colloc.collocation.layout"
+_LAYOUT = "see colloc.transcription.layout"
 _ANSWER_ARRAYS = {
     "edges": ("period", "edge"),
     "x": (_LAYOUT, "variable"),
     "lam_x": (_LAYOUT, "variable"),
     "lam_g": (_LAYOUT, "constraint"),
 }
-_APART = ("problem", "gait", "knots", "second_order", "history", *_ANSWER_ARRAYS)
+_APART = ("problem", "gait", "second_order", "history", *_ANSWER_ARRAYS)
 """Of an answer; the rest are attributes."""
 
 _GAIT_ARRAYS = {
@@ -164,8 +164,6 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
     group = file.create_group("answer")
     for name, (units, dims) in _ANSWER_ARRAYS.items():
         put(group, name, getattr(answer, name), units=units, dims=dims)
-    if answer.knots is not None:
-        put(group, "knots", answer.knots, units="period", dims="knot")
     for field in dataclasses.fields(answer):
         if field.name not in _APART:
             put_attribute(group, field.name, getattr(answer, field.name))
@@ -182,7 +180,6 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
 def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     group = child(file, "answer")
     arrays = {name: array(group, name) for name in _ANSWER_ARRAYS}
-    knots = array(group, "knots") if "knots" in group else None
     plain = {
         f.name: attribute(group, f.name) for f in dataclasses.fields(Answer) if f.name not in _APART
     }
@@ -208,19 +205,11 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)
     )
     # by the variables, not by what the group gait says for other readers
-    layout = layout_of(
-        control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]), knots
-    )
+    layout = layout_of(control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]))
     if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
         raise StoreError("its variables do not fit its mesh.")
-    parameters, meet = (
-        arrays["x"][layout.parameters[:, 0]],
-        arrays["edges"] if knots is None else knots,
-    )
-    gait = problem.gait.member(parameters, problem.body.n_joint, meet)
-    return Answer(
-        problem, gait, knots=knots, **arrays, **plain, second_order=second, history=history
-    )
+    gait = problem.gait.member(arrays["x"][layout.parameters[:, 0]], problem.body.n_joint)
+    return Answer(problem, gait, **arrays, **plain, second_order=second, history=history)
 
 
 def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:

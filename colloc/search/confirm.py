@@ -18,12 +18,8 @@ from enum import Enum
 
 import numpy as np
 
-from colloc.collocation.layout import distance_and_work, layout_of
-from colloc.collocation.motion_rows import ACTUATORS
-from colloc.collocation.program import GaitProgram
-from colloc.collocation.warm_start import balanced_variables, feasible_point
 from colloc.numerics.sqp import Stationarity, stationarity
-from colloc.reduced.program import ReducedProgram
+from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
 from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
 from colloc.search.certify import EXACT, VIOLATION
@@ -33,7 +29,10 @@ from colloc.search.effort import ROUGH, SKETCH
 from colloc.search.ipopt import CONFIRMING, NlpResult, Solver
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
-from colloc.search.spaces import heading, space_near, transcribed, with_far
+from colloc.search.spaces import heading, with_far
+from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram, full_program
+from colloc.transcription.layout import distance_and_work, layout_of
+from colloc.transcription.warm_start import balanced_variables
 
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
@@ -58,7 +57,7 @@ class _Outcome:
     """What became of a gait on the full program."""
 
     verdict: Verdict
-    program: GaitProgram
+    program: FullProgram
     result: NlpResult
     ended: str = ""
     """How IPOPT ended, where that is not the answer."""
@@ -98,7 +97,9 @@ def confirm(optimum: Optimum) -> Answer:
             seconds=time.perf_counter() - begin,
             message=" ".join(part for part in (_sentence(found, outcome), found.lacks) if part),
         )
-        answer = replace(answer, second_order=second_order(answer))
+        # at the search's gait, which is on the bounds that hold it; IPOPT's is a little inside
+        curved = second_order(found.space, found.v, optimum.delta, answer.value)
+        answer = replace(answer, second_order=curved)
         return replace(answer, history=(*found.history, answer.step))
 
     this_run().told("confirm", 0, 1, optimum)
@@ -107,12 +108,14 @@ def confirm(optimum: Optimum) -> Answer:
 
 def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity) -> _Outcome:
     space, delta = optimum.space, optimum.delta
-    mesh = space.phase_mesh(optimum.gait)
-    program = transcribed(
-        optimum.problem, optimum.gait, mesh.edges, mesh.scheme.name, space.given.far
+    mesh = space.mesh
+    program = full_program(
+        space.control, optimum.gait, mesh.edges, mesh.scheme.name, space.given.far
     )
-    x = feasible_point(program, space.full_parameters(optimum.v), delta)
-    program = _limited(reduced, heading(program, x))
+    x = program.feasible(space.full_parameters(optimum.v), delta)
+    program = heading(program, x)
+    if reduced.actuators is not None:
+        program = program.with_bounds(ACTUATORS, *reduced.actuators.every_bound())
     solver = Solver(program, CONFIRMING)
     before = solver.measured(x, delta, *_multipliers(reduced, conditions, program))
     here = replace(
@@ -136,10 +139,10 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
         if reduced.place_rows(result.x[own]) <= allowed:
             return _Outcome(Verdict.CONFIRMED, program, result)
         # the gait has moved so far that other instants are the worst
-        solver.transcription = program = _limited(reduced, program)
-        result = solver.solve_within(
-            result.x, delta, (result.lam_x, result.lam_g), RADIUS
-        ).accumulated(result)
+        program, x = program.moved_to(result.x)
+        result = (
+            Solver(program, CONFIRMING).solve_within(x, delta, None, RADIUS).accumulated(result)
+        )
     ended = (
         f"IPOPT, begun there, ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
     )
@@ -178,19 +181,18 @@ def _sentence(optimum: Optimum, outcome: _Outcome) -> str:
     return f"{text} {outcome.ended}." if outcome.ended else text
 
 
-def answer_of(program: GaitProgram, result: NlpResult, delta: float) -> Answer:
+def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
     """A point of a full program, as an answer to the stated problem."""
-    gait = program.member(result.x[program.layout.parameters[:, 0]])
+    gait, n = program.member(result.x), program.layout.n
     distance, work = distance_and_work(program.control, program.layout, result.x)
     answer = Answer(
         program.control.problem,
         gait,
         delta,
-        edges=program.phase_mesh(gait).edges,
+        edges=program.mesh.edges,
         scheme=program.mesh.scheme.name,
-        knots=program.knots,
-        x=result.x,
-        lam_x=result.lam_x,
+        x=result.x[:n],
+        lam_x=result.lam_x[:n],
         lam_g=result.lam_g,
         value=program.control.stated(-result.objective),
         distance=distance,
@@ -211,26 +213,16 @@ def unconfirmed(optimum: Optimum) -> Answer:
     """The gait as the search found it, every other variable following from its balance: where there
     is no time for more."""
     space, control = optimum.space, optimum.space.control
-    mesh, layout = (
-        space.phase_mesh(optimum.gait),
-        layout_of(control, space.mesh, optimum.gait.knots),
-    )
-    x = balanced_variables(
-        control.dynamics,
-        layout,
-        mesh,
-        optimum.gait,
-        space.full_parameters(optimum.v),
-        optimum.delta,
-    )
+    mesh, layout = space.mesh, layout_of(control, space.mesh)
+    parameters = space.full_parameters(optimum.v)
+    x = balanced_variables(control, layout, mesh, optimum.gait, parameters, optimum.delta)
     distance, work = distance_and_work(control, layout, x)
     return Answer(
         optimum.problem,
         optimum.gait,
         optimum.delta,
         edges=mesh.edges,
-        scheme=space.mesh.scheme.name,
-        knots=optimum.gait.knots,
+        scheme=mesh.scheme.name,
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
@@ -248,15 +240,15 @@ def unconfirmed(optimum: Optimum) -> Answer:
     )
 
 
-def second_order(answer: Answer) -> SecondOrder:
-    """The curvature of the Lagrangian at an answer, with all pairs of links kept apart."""
-    problem = answer.problem
-    space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
+def second_order(space: SearchSpace, v: np.ndarray, delta: float, value: float) -> SecondOrder:
+    """The curvature of the Lagrangian at parameters v over a value of the objective, with all pairs
+    of links kept apart."""
+    body = space.control.dynamics.body
     if v.size > _MOST_PARAMETERS:
         return replace(NOT_MEASURED, why_not=f"not measured, for {v.size} parameters")
-    program = ReducedProgram(with_far(space, problem.body.far_pairs), answer.delta)
+    program = ReducedProgram(with_far(space, body.far_pairs), delta)
     program.place_rows(v)
-    found, size = curvature(program, v), abs(answer.value / program.stated(-1.0))
+    found, size = curvature(program, v), abs(value / program.stated(-1.0))
     if not found.kkt_error < ROUGH.kkt_error * size:  # elsewhere a curvature means nothing
         return replace(
             NOT_MEASURED,
@@ -265,16 +257,11 @@ def second_order(answer: Answer) -> SecondOrder:
     return SecondOrder(found.smallest / size, found.error / size, found.n_free)
 
 
-def _limited(reduced: ReducedProgram, program: GaitProgram) -> GaitProgram:
-    """The full program with the bounds on actuators where the reduced one has them."""
-    return program if reduced.actuators is None else reduced.actuators.laid_on(program)
-
-
 def _multipliers(
-    reduced: ReducedProgram, conditions: Stationarity, program: GaitProgram
+    reduced: ReducedProgram, conditions: Stationarity, program: FullProgram
 ) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
-    lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
+    lam_x, lam_g = np.zeros(program.n), np.zeros(program.row_lower.size)
     space, reached = reduced.space, len(reduced.space.control.aims.at_least)
     of_period, on_rows = np.split(
         conditions.on_rows, [conditions.on_rows.size - reduced.constraints.lower.size]
@@ -284,10 +271,13 @@ def _multipliers(
         of_period, on_actuators = np.split(of_period, [of_period.size - limited.placed.shape[1]])
         lam_g[program.groups[ACTUATORS]] = limited.multipliers(on_actuators)
     if reached:
-        lam_g[program.groups["at least"]] = of_period[-reached:]
+        lam_g[program.groups[AT_LEAST]] = of_period[-reached:]
     at = 0
-    for name, rows in reduced.constraints.kinds.items():
-        lam_g[program.groups[name].start + rows] = on_rows[at : at + rows.size]
-        at += rows.size
+    for name, cells in reduced.constraints.kinds.items():
+        _, of_reduced, of_full = np.intersect1d(
+            cells, program.cells.get(name, cells), assume_unique=True, return_indices=True
+        )
+        lam_g[program.groups[name].start + of_full] = on_rows[at + of_reduced]
+        at += cells.size
     lam_x[program.layout.parameters[space.own, 0]] = conditions.on_bounds
     return lam_x, lam_g

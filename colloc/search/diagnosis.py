@@ -6,31 +6,27 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from colloc.collocation.motion_rows import ACTUATORS
-from colloc.collocation.program import GaitProgram
+from colloc.numerics.mesh import Mesh
 from colloc.numerics.multiplier_estimate import quasi_definite_factors
 from colloc.search.certify import VIOLATION
 from colloc.search.ipopt import NlpResult, Solver
+from colloc.transcription.full_program import ACTUATORS, FullProgram
 
 SMALLEST_DELTA = 1e-9
 """Below it the Lagrangian's gradient cannot be told from zero: a link at stick moves at the order
 of delta, the tail velocity that is solved for resolves 1e-16, so the gradient is known to about
 1e-16/delta. Measured on one harmonic of three links: a KKT error of 1.8e-8 at 1e-8, 1.3e-7 at 1e-9
 and 2e-6 at 1e-10, where 1e-6 is allowed."""
-_COMPONENTS = ("force along the tail", "force across the tail", "torque about the tail")
-_PATH = {
-    "path": "the joining of arcs to a path",
-    "closure": "closure of the path",
-    "smooth closure": "closure of the path's direction",
-    "curvature": "the bound on curvature",
-    "curvature to the left": "the bound on curvature",
-    "curvature to the right": "the bound on curvature",
-    "turn": "the most that one arc may turn",
-    "winding": "the winding of the path",
-    "unit tangent": "the unit length of the path's direction",
-    "start": "the start of the path",
-    "sides": "the least length of sides and path",
+_EQUATIONS = {
+    "tail": "the direction of the tail",
+    "velocity x": "the joining of links",
+    "velocity y": "the joining of links",
+    "force x": "the balance of forces",
+    "force y": "the balance of forces",
+    "torque": "the balance of torques",
+    "balance": "the balance of the body",
 }
+"""Rows of a motion by name; other names speak for themselves."""
 _OF_PERIOD = {
     "at least": "a value that has to be reached",
     "shape speed": "the lower bound on the shape speed",
@@ -46,64 +42,57 @@ _STEPS, _SHARE = 2, 0.1
 the combination."""
 
 
-def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
+def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
     """What a constraint row, by its index among all, states, and the phase at which it does."""
-    name, rows = next((n, s) for n, s in transcription.groups.items() if s.start <= row < s.stop)
-    index, body, mesh = row - rows.start, transcription.control.dynamics.body, transcription.mesh
-    if name in ("angles", "rates"):
-        point, joint = divmod(index, body.n_joint)
-        return f"the {name[:-1]} of {body.coordinate} {joint + 1} against its gait", float(
-            mesh.times[point]
-        )
-    if name == "balance":
-        point, component = divmod(index, 3)
-        return f"the balance of {_COMPONENTS[component]}", float(mesh.times[point])
-    if name == "force law":
-        point, which = divmod(index, len(body.force_names))
-        return f"the friction law of the {body.force_names[which]}", float(mesh.times[point])
+    name, rows = next((n, s) for n, s in program.groups.items() if s.start <= row < s.stop)
+    index, mesh, count = row - rows.start, program.mesh, rows.stop - rows.start
+    body, aims = program.control.dynamics.body, program.control.aims
     if name == ACTUATORS:
-        point, which = divmod(index, len(transcription.control.actuators.names))
-        return f"the limit on the {transcription.control.actuators.names[which]}", float(
-            mesh.times[point]
-        )
-    if name == "orientation":
-        return "the rotation between nodes", float(
-            mesh.edges[index * mesh.n // (rows.stop - rows.start)]
-        )
+        point, which = divmod(index, len(program.control.actuators.names))
+        limit = program.control.actuators.names[which]
+        return f"the limit on the {limit}", float(mesh.times[point])
     if name == "rotation":
         return "closure of the net rotation", float(mesh.edges[-1])
-    named = _OF_PERIOD | {
-        each.name: f"the {each.meaning or each.name}"
-        for each in transcription.control.aims.integrals
-    }
+    named = _OF_PERIOD | {each.name: f"the {each.meaning or each.name}" for each in aims.integrals}
     if name in named:
         return named[name], 0.0
-    if name in ("distance", "work"):
-        return f"the {name} gained over an interval", float(mesh.edges[index])
-    phase = float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
-    if name in body.limit_names:
-        return f"the limit of {name}", phase
-    if name.startswith("links"):
-        return f"contact of {name}", phase
-    return _PATH.get(name, f"the {name}"), phase
+    if name in program.cells:
+        what = "contact of" if name.startswith("links") else "the limit of"
+        what = what if name.startswith("links") or name in body.limit_names else "the"
+        return f"{what} {name}", float(mesh.edges[program.cells[name][index]])
+    if name in ("angles", "rates"):
+        joint = f"{body.coordinate} {index // mesh.n_point + 1}"
+        return f"the {name[:-1]} of {joint} against its gait", _phase(mesh, index)
+    if name.startswith("force law"):
+        return "the law of friction", _phase(mesh, index)
+    if count % mesh.n_point == 0:  # rows of points, part by part
+        return _EQUATIONS.get(name, f"the {name}"), _phase(mesh, index)
+    what = {"orientation": "the rotation between nodes"} | {
+        way: f"the {way} gained over an interval" for way in ("distance", "work")
+    }
+    return what.get(name, f"the {name}"), float(mesh.edges[index * mesh.n // count])
 
 
-def time_window(transcription: GaitProgram, excess: np.ndarray, group: str) -> tuple[float, float]:
+def _phase(mesh: Mesh, index: int) -> float:
+    return float(mesh.times[index % mesh.n_point])
+
+
+def time_window(program: FullProgram, excess: np.ndarray, group: str) -> tuple[float, float]:
     """First and last phase at which a group of rows is violated by at least a tenth of its
     worst."""
-    rows = transcription.groups[group]
+    rows = program.groups[group]
     bad = rows.start + np.flatnonzero(excess[rows] >= 0.1 * excess[rows].max())
-    phases = [row_meaning(transcription, int(row))[1] for row in bad]
+    phases = [row_meaning(program, int(row))[1] for row in bad]
     return min(phases), max(phases)
 
 
-def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> str:
+def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
     """One or two sentences: what failed where, and what to try next."""
     worst = int(np.argmax(result.excess))
     if result.excess[worst] > VIOLATION:
-        what, when = row_meaning(transcription, worst)
-        group = next(n for n, s in transcription.groups.items() if s.start <= worst < s.stop)
-        first, last = time_window(transcription, result.excess, group)
+        what, when = row_meaning(program, worst)
+        group = next(n for n, s in program.groups.items() if s.start <= worst < s.stop)
+        first, last = time_window(program, result.excess, group)
         window = (
             f"at phase {when:.3f}"
             if first == last
@@ -117,7 +106,7 @@ def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> 
             "start from a better guess",
         )
     else:
-        what = transcription.control.aims.objective.name
+        what = program.control.aims.objective.name
         failed = (
             f"every equation holds, but the {what} is not stationary (KKT error "
             f"{result.kkt_error:.1e})"
@@ -136,7 +125,7 @@ def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> 
 
 
 def _advice(group: str) -> str:
-    if group in ("balance", "force law"):
+    if group in _EQUATIONS or group.startswith("force law"):
         return (
             "start the continuation at a larger delta_start, use more intervals, or another "
             "formulation"
@@ -155,7 +144,7 @@ def _advice(group: str) -> str:
 def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str]:
     """Kinds of equations that are (nearly) linear combinations of others at x ``(n,)`` and delta
     per period; an optimiser fails on those."""
-    transcription = solver.transcription
+    program = solver.program
     jacobian, equality = solver.equality_jacobian(x, delta)
     scale = np.sqrt(np.asarray(jacobian.multiply(jacobian).sum(axis=1)).ravel())
     rows = (sparse.diags(1.0 / np.maximum(scale, 1e-300)) @ jacobian).tocsr()
@@ -172,7 +161,5 @@ def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str
     if np.linalg.norm(rows.T @ combination) ** 2 > _SMALLEST_EIGENVALUE:
         return []
     suspicious = equality[np.abs(combination) > _SHARE * np.abs(combination).max()]
-    names = {
-        n for n, s in transcription.groups.items() for row in suspicious if s.start <= row < s.stop
-    }
+    names = {n for n, s in program.groups.items() for row in suspicious if s.start <= row < s.stop}
     return sorted(names)

@@ -12,12 +12,13 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.collocation.program import GaitProgram
-from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
+from colloc.numerics.repeated import as_sparse
 from colloc.numerics.sqp import remembered
 from colloc.search.certify import EXACT
 from colloc.system.interruption import interrupted, interruptible
+from colloc.transcription.full_program import FullProgram
+from colloc.transcription.layout import RADIANS
 
 _PUSHED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
 IPOPT_OPTIONS: dict[str, object] = {
@@ -88,40 +89,34 @@ active bound by its tolerance over the multiplier, which is small where efficien
 
 
 class Solver:
-    """A transcription bound to IPOPT; built once, solved for many deltas and starts."""
+    """A full program bound to IPOPT; built once, solved for many deltas and starts."""
 
-    def __init__(
-        self, transcription: GaitProgram, options: dict[str, object] | None = None
-    ) -> None:
-        self.transcription = transcription
-        self.oracles: Oracles = oracles(transcription.assembly)
-        own = LIFTED_OPTIONS if transcription.lifted else {}
-        chosen = {**IPOPT_OPTIONS, **own, **(options or {})}
+    def __init__(self, program: FullProgram, options: dict[str, object] | None = None) -> None:
+        self.program, self._nlp = program, program.nlp
+        lifted = LIFTED_OPTIONS if program.layout.friction.size else {}
+        chosen = {**IPOPT_OPTIONS, **lifted, **(options or {})}
         settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
-        settings |= {
-            "print_time": False,
-            "calc_lam_p": False,
-            "calc_lam_x": False,
-            "calc_f": False,
-            "calc_g": False,
-        }
+        settings |= dict.fromkeys(
+            ("print_time", "calc_lam_p", "calc_lam_x", "calc_f", "calc_g"), False
+        )
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
-        self._stop = StopRequest(self.oracles.nlp)  # held here: CasADi does not keep it alive
-        self._settings = settings | {**self.oracles.options, "iteration_callback": self._stop}
+        # held here: CasADi does not keep it alive
+        self._stop = StopRequest(self._nlp.expressions)
+        self._settings = settings | {**self._nlp.functions, "iteration_callback": self._stop}
         self._values_and_slopes = remembered(self._evaluated)
 
     @cached_property
     def _solver(self) -> ca.Function:
-        return ca.nlpsol("colloc", "ipopt", self.oracles.nlp, self._settings)
+        return ca.nlpsol("colloc", "ipopt", self._nlp.expressions, self._settings)
 
-    def solve(
+    def solve_within(
         self,
         x: np.ndarray,
         delta: float,
-        multipliers: tuple[np.ndarray, np.ndarray] | None = None,
-        radius: float = np.inf,
+        multipliers: tuple[np.ndarray, np.ndarray] | None,
+        radius: float,
     ) -> NlpResult:
-        """Maximise efficiency from x.
+        """Maximise the objective from x within a trust region, on whose edge the result may lie.
 
         Parameters
         ----------
@@ -131,60 +126,35 @@ class Solver:
         multipliers : (lam_x, lam_g), optional
             By default those of the equations that come closest to stationarity at x.
         radius : float
-            Trust region: how far each gait parameter may move [rad]. A result on its edge is solved
-            again from there.
+            How far each gait parameter may move [rad].
         """
-        result = self.solve_within(x, delta, multipliers, radius)
-        own = self.transcription.layout.parameters[:, 0]
-        for _ in range(_REGIONS):
-            if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * radius:
-                return result
-            x = result.x
-            result = self.solve_within(x, delta, None, radius).accumulated(result)
-        return replace(result, complementarity=np.inf, status="still moving")
-
-    def solve_within(
-        self,
-        x: np.ndarray,
-        delta: float,
-        multipliers: tuple[np.ndarray, np.ndarray] | None,
-        radius: float,
-    ) -> NlpResult:
-        """The same within one trust region, on whose edge the result may lie."""
-        t = self.transcription
+        t = self.program
         own = t.layout.parameters[:, 0]
-        parameters = self._parameters(x, delta)
         lower, upper = t.lower.copy(), t.upper.copy()
         lower[own], upper[own] = (
             np.maximum(lower[own], x[own] - radius),
             np.minimum(upper[own], x[own] + radius),
         )
-        limits = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
+        limits = {"lbx": lower, "ubx": upper, "lbg": t.row_lower, "ubg": t.row_upper}
         lam_x, lam_g = multipliers or self._completed(
-            x, parameters, np.zeros_like(x), np.zeros(t.assembly.m)
+            x, delta, np.zeros_like(x), np.zeros_like(t.row_lower)
         )
         duals = {"lam_x0": lam_x, "lam_g0": lam_g}
         start = time.perf_counter()
         with interruptible():
-            solution = self._solver(x0=x, p=parameters, **limits, **duals)
+            solution = self._solver(x0=x, p=delta / RADIANS, **limits, **duals)
         seconds = time.perf_counter() - start
         stats = self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
-        return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
+        return self._measured(x, lam_x, lam_g, delta, (lower, upper), stats, seconds)
 
     def _evaluated(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
         """Objective, its gradient ``(n,)``, rows ``(m,)`` and their Jacobian ``(m, n)`` at
-        variables, then parameters."""
-        x, parameters = np.split(at, [self.transcription.layout.n])
-        f, gradient = self.oracles.options["grad_f"](x, parameters)
-        g, jacobian = self.oracles.options["jac_g"](x, parameters)
+        variables, then delta per period."""
+        x, delta = at[:-1], at[-1] / RADIANS
+        f, gradient = self._nlp.functions["grad_f"](x, delta)
+        g, jacobian = self._nlp.functions["jac_g"](x, delta)
         return float(f), gradient.full().ravel(), g.full().ravel(), as_sparse(jacobian)
-
-    def _parameters(self, x: np.ndarray, delta: float) -> np.ndarray:
-        t = self.transcription
-        return self.oracles.parameter_vector(
-            delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]])
-        )
 
     def measured(
         self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
@@ -192,21 +162,20 @@ class Solver:
         """The first-order conditions at x ``(n,)``, solving nothing, from multipliers of the bounds
         and of the inequalities; those of the equations are the ones that come closest to the
         conditions."""
-        parameters = self._parameters(x, delta)
-        multipliers = self._completed(x, parameters, lam_x, lam_g)
-        bounds = self.transcription.lower, self.transcription.upper
+        multipliers = self._completed(x, delta, lam_x, lam_g)
+        bounds = self.program.lower, self.program.upper
         nothing = {"return_status": "measured", "iter_count": 0}
-        return self._measured(x, *multipliers, parameters, bounds, nothing, 0.0)
+        return self._measured(x, *multipliers, delta, bounds, nothing, 0.0)
 
     def _completed(
-        self, x: np.ndarray, parameters: np.ndarray, lam_x: np.ndarray, lam_g: np.ndarray
+        self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's
         gradient, given all others."""
-        t = self.transcription
-        free, equality = t.lower < t.upper, np.flatnonzero(t.constraint_lower == t.constraint_upper)
-        _, gradient, _, jacobian = self._values_and_slopes(np.concatenate([x, parameters]))
-        lam_g = np.where(t.constraint_lower == t.constraint_upper, 0.0, lam_g)
+        t = self.program
+        free, equality = t.lower < t.upper, np.flatnonzero(t.row_lower == t.row_upper)
+        _, gradient, _, jacobian = self._values_and_slopes(np.append(x, delta))
+        lam_g = np.where(t.row_lower == t.row_upper, 0.0, lam_g)
         gradient = gradient + jacobian.T @ lam_g + lam_x
         lam_g[equality] = estimated_multipliers(jacobian[equality][:, free], gradient[free])
         return lam_x, lam_g
@@ -216,9 +185,9 @@ class Solver:
     ) -> tuple[sparse.csr_matrix, np.ndarray]:
         """Jacobian of the equations in the free variables at x, and their row numbers among all
         constraints."""
-        t = self.transcription
-        equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
-        jacobian = self._values_and_slopes(np.concatenate([x, self._parameters(x, delta)]))[3]
+        t = self.program
+        equality = np.flatnonzero(t.row_lower == t.row_upper)
+        jacobian = self._values_and_slopes(np.append(x, delta))[3]
         return jacobian[equality][:, t.lower < t.upper], equality
 
     def _measured(
@@ -226,21 +195,21 @@ class Solver:
         x: np.ndarray,
         lam_x: np.ndarray,
         lam_g: np.ndarray,
-        parameters: np.ndarray,
+        delta: float,
         bounds: tuple[np.ndarray, np.ndarray],
         stats: dict,
         seconds: float,
     ) -> NlpResult:
-        t = self.transcription
+        t = self.program
         lower, upper = bounds
-        f, gradient, g, jacobian = self._values_and_slopes(np.concatenate([x, parameters]))
+        f, gradient, g, jacobian = self._values_and_slopes(np.append(x, delta))
         free = t.lower < t.upper
         stationarity = gradient + jacobian.T @ lam_g + lam_x
-        outside = np.maximum(np.maximum(t.constraint_lower - g, g - t.constraint_upper), 0.0)
+        outside = np.maximum(np.maximum(t.row_lower - g, g - t.row_upper), 0.0)
         bounds_outside = np.maximum(np.maximum(lower - x, x - upper), 0.0)
         products = [
             _complementarity(lam_x[free], x[free], lower[free], upper[free]),
-            _complementarity(lam_g, g, t.constraint_lower, t.constraint_upper),
+            _complementarity(lam_g, g, t.row_lower, t.row_upper),
         ]
         evaluation = sum(v for k, v in stats.items() if k.startswith("t_wall_nlp_"))
         return NlpResult(
@@ -257,6 +226,27 @@ class Solver:
             float(evaluation),
             outside,
         )
+
+
+def solve_in_regions(
+    program: FullProgram,
+    x: np.ndarray,
+    delta: float,
+    radius: float,
+    options: dict[str, object] | None = None,
+) -> tuple[FullProgram, NlpResult]:
+    """The optimum that trust regions lead to, each about the last one's end, with the limits of
+    the shape where that gait comes closest to them; and the program of the last region."""
+    result: NlpResult | None = None
+    p = program.layout.parameters[:, 0]
+    for _ in range(_REGIONS):
+        last = Solver(program, options).solve_within(x, delta, None, radius)
+        result = last if result is None else last.accumulated(result)
+        if not result.optimal or np.abs(result.x[p] - x[p]).max() < _INSIDE * radius:
+            return program, result
+        program, x = program.moved_to(result.x)
+    assert result is not None
+    return program, replace(result, complementarity=np.inf, status="still moving")
 
 
 def _complementarity(

@@ -11,18 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.collocation.program import GaitProgram
-from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer, Step
 from colloc.search.confirm import answer_of, second_order
 from colloc.search.converge import BOX
 from colloc.search.descend import levels
 from colloc.search.diagnosis import explanation, redundant_equations
-from colloc.search.ipopt import NlpResult, Solver
+from colloc.search.ipopt import NlpResult, Solver, solve_in_regions
 from colloc.search.refine import MESHES
 from colloc.search.run import this_run
-from colloc.search.spaces import heading, nearest_parameters, transcribed
+from colloc.search.spaces import heading, program_of, space_near
+from colloc.transcription.full_program import FullProgram, full_program
 from colloc.verification.refinement import planned_mesh
 
 _ITERATIONS = 1500
@@ -41,8 +41,8 @@ def literal_answer(problem: Problem) -> Answer:
     Answer
         Its message says what failed.
     """
-    program = transcribed(problem)
-    parameters, history = nearest_parameters(program, problem.guess), tuple[Step, ...]()
+    program, history = program_of(problem), tuple[Step, ...]()
+    parameters = _parameters(problem, program.gait)
     below = levels(problem, problem.delta_start)
     for done, delta in enumerate(below):
         this_run().told("descend", done, len(below))
@@ -51,35 +51,41 @@ def literal_answer(problem: Problem) -> Answer:
         if not answer.optimal:
             return replace(answer, history=history)
         parameters = answer.x[program.layout.parameters[:, 0]]
+        program = full_program(program.control, answer.gait)
     kept = np.empty(0)
     for done in range(MESHES if problem.mesh_tolerance > 0 else 0):
         this_run().told("refine", done, MESHES)
-        gait = program.member(parameters)
-        mesh = program.phase_mesh(gait)
-        plan = planned_mesh(
-            program.control, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept
-        )
+        gait, mesh = answer.gait, program.mesh
+        plan = planned_mesh(program.control, mesh, gait, delta, problem.mesh_tolerance, kept=kept)
         if plan is None:
             break
         kept = np.concatenate([kept, plan.kept])
-        program = transcribed(problem, gait, plan.edges, plan.scheme)
-        answer = _solved(program, nearest_parameters(program, gait), delta)
+        program = full_program(program.control, gait, plan.edges, plan.scheme)
+        answer = _solved(program, _parameters(problem, gait), delta)
         history = (*history, answer.step)
         if not answer.optimal:
             return replace(answer, history=history)
-        parameters = answer.x[program.layout.parameters[:, 0]]
-    return replace(answer, second_order=second_order(answer), history=history)
+    space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
+    curved = second_order(space, v, answer.delta, answer.value)
+    return replace(answer, second_order=curved, history=history)
 
 
-def _solved(program: GaitProgram, parameters: np.ndarray, delta: float) -> Answer:
+def _parameters(problem: Problem, gait: AnyGait) -> np.ndarray:
+    space, v = space_near(problem, gait)
+    return space.full_parameters(v)
+
+
+def _solved(program: FullProgram, parameters: np.ndarray, delta: float) -> Answer:
     """The full program solved from the gait of some parameters."""
 
     def compute() -> Answer:
-        x = feasible_point(program, parameters, delta)
-        solver = Solver(heading(program, x), {"max_iter": _ITERATIONS})
-        result = solver.solve(x, delta, None, BOX)
-        answer = answer_of(program, result, delta)
-        return answer if result.optimal else replace(answer, message=_why(solver, x, result, delta))
+        x = program.feasible(parameters, delta)
+        stated = heading(program, x)
+        last, result = solve_in_regions(stated, x, delta, BOX, {"max_iter": _ITERATIONS})
+        answer = answer_of(last, result, delta)
+        if result.optimal:
+            return answer
+        return replace(answer, message=_why(Solver(stated), x, last, result, delta))
 
     given = (
         program.control.problem,
@@ -91,11 +97,11 @@ def _solved(program: GaitProgram, parameters: np.ndarray, delta: float) -> Answe
     return this_run().kept("literal", given, compute)
 
 
-def _why(solver: Solver, x: np.ndarray, result: NlpResult, delta: float) -> str:
+def _why(solver: Solver, x: np.ndarray, last: FullProgram, result: NlpResult, delta: float) -> str:
     """What failed, and whether the equations were to blame from the start."""
     redundant, text = (
         redundant_equations(solver, x, delta),
-        explanation(solver.transcription, result, delta),
+        explanation(last, result, delta),
     )
     if redundant:
         text += (

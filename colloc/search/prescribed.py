@@ -10,8 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.collocation.layout import distance_and_work, layout_of
-from colloc.collocation.warm_start import balanced_variables
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier
@@ -23,6 +21,8 @@ from colloc.reduced.motion import ReducedMotion
 from colloc.results.answer import EVALUATED, PRESCRIBED, Answer
 from colloc.search.certify import goes_nowhere
 from colloc.search.refine import MESHES
+from colloc.transcription.layout import distance_and_work, layout_of
+from colloc.transcription.warm_start import balanced_variables
 from colloc.verification.refinement import planned_mesh
 
 
@@ -101,7 +101,7 @@ def as_it_is(
     """A gait with everything else following from its balance."""
     control = control_problem(problem)
     layout, aim = layout_of(control, mesh), control.aims.objective
-    x = balanced_variables(control.dynamics, layout, mesh, gait, parameters, problem.delta)
+    x = balanced_variables(control, layout, mesh, gait, parameters, problem.delta)
     distance, work = distance_and_work(control, layout, x)
     motion = ReducedMotion(
         kind_of_motion(control.dynamics), mesh, _Given(gait, mesh), aim.integrals
@@ -113,7 +113,6 @@ def as_it_is(
         problem.delta,
         edges=mesh.edges,
         scheme=mesh.scheme.name,
-        knots=None,
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),

@@ -7,18 +7,11 @@ line in `SEARCHED`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
-
 import numpy as np
 
-from colloc.collocation.program import GaitProgram
-from colloc.collocation.transcription import transcribe, transcribe_path
-from colloc.gaits.control_problem import ControlProblem, control_problem
-from colloc.gaits.free_path import FreePath
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.linear import LinearClass
-from colloc.gaits.polygon import Polygon
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.gaits.serpenoid import Serpenoid
@@ -26,77 +19,38 @@ from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.heading import whole_turns
 from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
-from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
 from colloc.system.errors import ProblemError
+from colloc.transcription.full_program import FullProgram, full_program
 
 
-class Searched(NamedTuple):
-    """How a class of gaits is collocated, and how a search sees it."""
-
-    program: Callable[[ControlProblem, AnyGait, np.ndarray | None, str, Pairs], GaitProgram]
-    """Of a control problem, a gait near, the edges of a mesh, a scheme, and pairs of links that
-    must not cross: its nonlinear program."""
-    space: Callable[[ControlProblem, AnyGait, np.ndarray | None, str, Pairs], SearchSpace]
-    """Of the same: its parameters."""
-
-
-_LINEAR = Searched(
-    lambda control, gait, edges, scheme, far: transcribe(control, edges, scheme, far),
-    lambda control, gait, edges, scheme, far: LinearSpace(control, edges, scheme, far),
-)
-_ALONG_PATHS = Searched(transcribe_path, PathSpace)
-_SERPENOID = Searched(
-    _LINEAR.program,
-    lambda control, gait, edges, scheme, far: SerpenoidSpace(control, edges, scheme, far),
-)
-SEARCHED: dict[type, Searched] = {
-    FreePath: _ALONG_PATHS,
-    Polygon: _ALONG_PATHS,
-    Serpenoid: _SERPENOID,
-    LinearClass: _LINEAR,
-    Prescribed: _LINEAR,
-}
-"""By class, for it and those that derive from it; the first that fits counts."""
+def _space_class(problem: Problem) -> type[LinearSpace]:
+    if isinstance(problem.gait, Serpenoid):
+        return SerpenoidSpace
+    if isinstance(problem.gait, LinearClass | Prescribed):
+        return LinearSpace
+    raise ProblemError(
+        f"no search is known for the class {type(problem.gait).__name__}: derive it from "
+        f"LinearClass (docs/howto/own_gait_class.md)."
+    )
 
 
-def _searched(problem: Problem) -> Searched:
-    found = next((how for kind, how in SEARCHED.items() if isinstance(problem.gait, kind)), None)
-    if found is None:
-        raise ProblemError(
-            f"no search is known for the class {type(problem.gait).__name__}: derive it from "
-            f"LinearClass if its angles are "
-            "linear in its parameters, or give its program and its space a line in SEARCHED of "
-            "colloc.search.spaces "
-            "(docs/howto/own_gait_class.md)."
-        )
-    return found
+def program_of(problem: Problem, gait: AnyGait | None = None) -> FullProgram:
+    """The full program of a problem on its first mesh, in units of friction, with the limits of
+    the shape at the worst instants of the member nearest to a gait, by default its guess."""
+    space, v = space_near(problem, problem.guess if gait is None else gait)
+    return full_program(space.control, space.member(v))
 
 
-def transcribed(
-    problem: Problem,
-    gait: AnyGait | None = None,
-    edges: np.ndarray | None = None,
-    scheme: str = "",
-    far: Pairs = (),
-) -> GaitProgram:
-    """The nonlinear program of a problem of any class near a gait, by default its guess, in units
-    of friction.
-
-    Self-contact is constrained between links two apart, and between the pairs `far`
-    (see `colloc.search.converge.crossing_pairs`).
-    """
-    near = problem.guess if gait is None else gait
-    return _searched(problem).program(control_problem(problem), near, edges, scheme, far)
-
-
-def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
+def heading(program: FullProgram, x: np.ndarray) -> FullProgram:
     """The program with the net rotation closed as variables x close it."""
     if program.control.admissible.gait.closing_symmetry != ANTIPODAL:
         return program
-    theta, rows = x[program.layout.theta[0]], np.zeros(program.constraint_lower.size)
-    rows[program.groups["rotation"]] = whole_turns(theta[0], theta[-1])
-    return program.with_rows(program.constraint_lower + rows, program.constraint_upper + rows)
+    if "rotation" not in program.groups:
+        return program
+    theta = x[program.layout.theta[0]]
+    turns = np.array([whole_turns(theta[0], theta[-1])])
+    return program.with_bounds("rotation", turns, turns)
 
 
 def space_near(
@@ -117,7 +71,7 @@ def space_of(
 ) -> SearchSpace:
     """The class of a problem on its first mesh, or a given one, with the pairs `far` kept apart;
     `near` says which of several kinds of members are meant."""
-    return _searched(problem).space(control_problem(problem), near, edges, scheme, far)
+    return _space_class(problem)(control_problem(problem), edges, scheme, far)
 
 
 def with_far(space: SearchSpace, far: Pairs) -> SearchSpace:
@@ -136,12 +90,3 @@ def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarra
     every row: ten times as fast for free paths."""
     space = space_of(problem, gait)
     return space, space.laid(gait)
-
-
-def nearest_parameters(program: GaitProgram, gait: AnyGait) -> np.ndarray:
-    """Parameters of the member of a program's class that is nearest to a gait, on the program's
-    mesh."""
-    space, v = space_near(
-        program.control.problem, gait, program.mesh.edges, program.mesh.scheme.name
-    )
-    return space.full_parameters(v)

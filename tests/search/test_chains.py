@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from colloc.collocation.shape_checks import shape_checks
+from colloc.transcription.shape_checks import shape_checks
 from colloc.collocation.transcription import transcribe
-from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.transcription.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.columns import Basis
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic

@@ -4,7 +4,7 @@ and what they beat."""
 import numpy as np
 import pytest
 
-from colloc.collocation.shape_checks import shape_checks
+from colloc.transcription.shape_checks import shape_checks
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.limits import Limit
 from colloc.gaits.path_samples import Gait
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, peaks, vertex
+from colloc.transcription.shape_checks import ShapeCheck
 
 _NEAR, _FAR = 0.1, 1.0
 """A search watches every cell in which a check is nearer to its bound than the first [rad], and

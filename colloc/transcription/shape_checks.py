@@ -48,6 +48,27 @@ class ShapeCheck:
     derivative: int = 0
 
     @property
+    def linear(self) -> bool:
+        """Whether, at given shares, it is linear in the shape coordinates."""
+        return self.row is not None or self.place >= 0
+
+    @property
+    def n_joint(self) -> int:
+        """Number of shape coordinates."""
+        return int(self.slope.size1_in(0))
+
+    @property
+    def joints(self) -> np.ndarray:
+        """Shape coordinates on which it depends, ``(n,)`` int."""
+        pattern = self.slope.sparsity_out(0)
+        return np.array(pattern.row(), dtype=int)
+
+    def slopes(self, shares: np.ndarray) -> np.ndarray:
+        """Derivatives ``(n_time, n_joint)`` of a linear one with respect to the shape."""
+        still = np.zeros((self.n_joint, shares.size))
+        return np.array(ca.densify(self.slope(still, shares[None]))).T.reshape(shares.size, -1)
+
+    @property
     def both_ways(self) -> bool:
         """Whether there is a bound from below, too."""
         return self.fixed is None or np.isfinite(self.fixed[0])
@@ -187,7 +208,7 @@ def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> Sh
 def _slope(cut: Callable[[Array, Array], Array], angles: ca.SX) -> ca.Function:
     share = ca.SX.sym("share")
     return ca.Function(
-        "slope", [angles, share], [ca.densify(ca.gradient(cut(angles, share), angles))]
+        "slope", [angles, share], [ca.sparsify(ca.jacobian(cut(angles, share), angles).T)]
     )
 
 

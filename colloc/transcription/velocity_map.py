@@ -1,7 +1,13 @@
-"""The velocity map as a CasADi function: tail velocities from the NumPy solver, for a whole mesh at
-once."""
+"""The velocity map z = Z(q, r) of a body as a repeated function: tail velocities from the NumPy
+solver for a whole mesh at once, derivatives from the balance by the implicit function theorem.
+
+The balance itself is a step function of z as delta goes to 0 and does not converge as a
+constraint; the velocity map is mild where the balance is not.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
@@ -14,7 +20,29 @@ _TOLERANCE, ACCEPTED = 1e-12, 1e3
 will do."""
 
 
-class ImplicitVelocity(ca.Callback):
+def velocity_map(
+    body: Body, law: Law, delta: ca.SX, velocity: BalancedVelocity
+) -> tuple[ca.SX, ca.SX, tuple[ca.SX, ca.SX, Callable[[ca.MX, ca.MX], ca.MX]]]:
+    """Local variables (theta, q, r, z); what vanishes, z - Z, then the velocities of the centre of
+    mass ahead and aside and the power at Z; and how Z follows, as a
+    `colloc.numerics.repeated.Repeated` takes it."""
+    sizes = (("theta", 1), ("q", body.n_joint), ("r", body.n_joint), ("z", 3))
+    theta, q, r, z = (ca.SX.sym(name, size) for name, size in sizes)
+    solved = ca.SX.sym("Z", 3)
+    balanced = body.sliding(law, q, r, solved, delta)
+    centre, c, s = body.sliding(law, q, r, z, delta).centre, ca.cos(theta), ca.sin(theta)
+    ahead, aside = c * centre[0] - s * centre[1], s * centre[0] + c * centre[1]
+
+    def solve(local: ca.MX, delta: ca.MX) -> ca.MX:
+        ends = np.cumsum([1, body.n_joint, body.n_joint]).tolist()
+        _, q, r, start = ca.vertsplit(local, [0, *ends, local.shape[0]])
+        return velocity(q, r, start, delta)
+
+    out = ca.vertcat(z - solved, ahead, aside, balanced.power)
+    return ca.vertcat(theta, q, r, z), out, (solved, balanced.force, solve)
+
+
+class BalancedVelocity(ca.Callback):
     """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``; not differentiable
     by CasADi.
 

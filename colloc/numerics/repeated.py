@@ -1,0 +1,177 @@
+"""Nonlinear programs that are linear in small functions repeated over a mesh, with derivatives.
+
+With y the outputs of all functions at all their instances, every row is ``R [x; y(x); 1]`` with a
+constant sparse matrix R, and so is the objective. Each function is differentiated once, for one
+instance, whatever the size of the mesh: CasADi's own Hessian of the whole takes three times as
+long to build and to evaluate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """A function of local variables, given numbers and delta, at many instances.
+
+    Parameters
+    ----------
+    local, given, delta, out : casadi.SX
+        Symbols ``(n_local, 1)``, ``(n_given, 1)``, ``(1, 1)``, and the expression ``(n_out, 1)``.
+    gather : (n_local, n_instance) int
+        Which variables of the program are the local ones of each instance.
+    values : (n_given, n_instance)
+        The given numbers.
+    implicit : tuple, optional
+        Symbols ``(n_solved, 1)`` of which `out` is also a function, equations ``(n_solved, 1)``
+        that they solve, and a function of local variables ``(n_local, n_instance)`` and delta, MX
+        both, that returns their values: derivatives are those of the implicit function theorem.
+    """
+
+    local: ca.SX
+    given: ca.SX
+    delta: ca.SX
+    out: ca.SX
+    gather: np.ndarray
+    values: np.ndarray
+    implicit: tuple | None = None
+
+    @property
+    def n_instance(self) -> int:
+        return self.gather.shape[1]
+
+    @property
+    def n_out(self) -> int:
+        return self.out.shape[0] * self.n_instance
+
+    def derivatives(self) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Weights ``(n_out, 1)``, Jacobian of the outputs, and Hessian of their weighted sum."""
+        weight = ca.SX.sym("weight", self.out.shape[0])
+        total = ca.dot(weight, self.out)
+        if self.implicit is None:
+            return weight, ca.jacobian(self.out, self.local), ca.hessian(total, self.local)[0]
+        # R(z, y) = 0: dz/dy = -R_z^-1 R_y; the Hessian of L is that of L + nu.R along (I, dz/dy),
+        # nu = -R_z^-T L_z
+        z, equations, _ = self.implicit
+        R_z, R_y = ca.jacobian(equations, z), ca.jacobian(equations, self.local)
+        slope, nu = -ca.solve(R_z, ca.densify(R_y)), ca.SX.sym("nu", z.shape[0])
+        by_row = ca.vertcat(*(ca.jacobian(row, z) for row in ca.vertsplit(self.out)))
+        inner = ca.hessian(total + ca.dot(nu, equations), ca.vertcat(self.local, z))[0]
+        at_nu = -ca.solve(R_z.T, ca.densify(ca.jacobian(total, z).T))
+        frame = ca.vertcat(ca.SX.eye(self.local.shape[0]), slope)
+        hessian = frame.T @ ca.substitute(inner, nu, at_nu) @ frame
+        return weight, ca.jacobian(self.out, self.local) + by_row @ slope, hessian
+
+
+@dataclass(frozen=True, eq=False)
+class Nlp:
+    """Functions of a nonlinear program in variables x ``(n,)`` and the parameter delta, as
+    `casadi.nlpsol` takes them.
+
+    Attributes
+    ----------
+    expressions : dict
+        x, p, f and g.
+    functions : dict
+        grad_f, jac_g and hess_lag.
+    """
+
+    expressions: dict[str, ca.MX]
+    functions: dict[str, ca.Function]
+
+
+def nonlinear_program(
+    n: int, repeated: Sequence[Repeated], rows: sparse.spmatrix, objective: sparse.spmatrix
+) -> Nlp:
+    """The program of n variables with the rows ``rows @ [x; y; 1]`` and the objective
+    ``objective @ [x; y; 1]``, y the outputs of the repeated functions, instance by instance."""
+    x, delta = ca.MX.sym("x", n), ca.MX.sym("delta")
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows.shape[0])
+    every = sparse.csr_matrix(sparse.vstack([objective, rows]))
+    on_x, on_y, constant = (
+        every[:, a:b] for a, b in ((0, n), (n, every.shape[1] - 1), (every.shape[1] - 1, None))
+    )
+    weights = _dm(on_y.T) @ ca.vertcat(lam_f, lam_g)
+    outputs, slopes, curvatures = [], [], []
+    jac_places, hess_places, start = [], [], 0
+    for f in repeated:
+        local = ca.reshape(x[f.gather.ravel(order="F").tolist()], *f.gather.shape)
+        arguments = [local, ca.DM(f.values), ca.repmat(delta, 1, f.n_instance)]
+        symbols = [f.local, f.given, f.delta]
+        if f.implicit is not None:
+            arguments.append(f.implicit[2](local, delta))
+            symbols.append(f.implicit[0])
+        weight, jacobian, hessian = f.derivatives()
+        jacobian, upper = ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
+        outputs.append(_mapped([*symbols], f.out, arguments))
+        slopes.append(_mapped(symbols, ca.vertcat(*jacobian.nonzeros()), arguments))
+        own = ca.reshape(weights[start : start + f.n_out], f.out.shape[0], f.n_instance)
+        curvatures.append(
+            _mapped([*symbols, weight], ca.vertcat(*upper.nonzeros()), [*arguments, own])
+        )
+        row, column = (np.array(k, dtype=int) for k in jacobian.sparsity().get_triplet())
+        out = start + row[:, None] + f.out.shape[0] * np.arange(f.n_instance)
+        jac_places.append((out, f.gather[column], np.ones(out.shape)))
+        row, column = (np.array(k, dtype=int) for k in upper.sparsity().get_triplet())
+        a, b = f.gather[row], f.gather[column]
+        # one variable in the place of two local ones has both of their mixed derivatives
+        twice = np.where((a == b) & (row != column)[:, None], 2.0, 1.0)
+        hess_places.append((np.minimum(a, b), np.maximum(a, b), twice))
+        start += f.n_out
+    y = ca.vertcat(*outputs)
+    values = _dm(on_x) @ x + _dm(on_y) @ y + _dm(constant)
+    whole = _dm(on_x) + _dm(on_y) @ _matrix((start, n), jac_places, ca.vertcat(*slopes))
+    hessian = _matrix((n, n), hess_places, ca.vertcat(*curvatures))
+    f, g = values[0], values[1:]
+    gradient, jac_g = ca.densify(whole[0, :].T), whole[1:, :]
+    ins = ["x", "p"]
+    return Nlp(
+        {"x": x, "p": delta, "f": f, "g": g},
+        {
+            "grad_f": ca.Function("nlp_grad_f", [x, delta], [f, gradient], ins, ["f", "grad_f_x"]),
+            "jac_g": ca.Function("nlp_jac_g", [x, delta], [g, jac_g], ins, ["g", "jac_g_x"]),
+            "hess_lag": ca.Function(
+                "nlp_hess_l",
+                [x, delta, lam_f, lam_g],
+                [hessian],
+                [*ins, "lam_f", "lam_g"],
+                ["triu_hess_gamma_x_x"],
+            ),
+        },
+    )
+
+
+def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
+    """A CasADi matrix as a SciPy one."""
+    parts = matrix.nonzeros(), matrix.row(), matrix.colind()
+    return sparse.csc_matrix(parts, shape=matrix.shape).tocsr()
+
+
+def _mapped(symbols: list[ca.SX], out: ca.SX, arguments: list[ca.MX]) -> ca.MX:
+    function = ca.Function("local", symbols, [ca.densify(out)])
+    return ca.vec(function.map(arguments[0].shape[1])(*arguments))
+
+
+def _matrix(shape: tuple[int, int], places: list, values: ca.MX) -> ca.MX:
+    """The sparse matrix with entries at places (row, column, factor), each ``(n_entry,
+    n_instance)``; values that fall on one place add up."""
+    row, column, factor = (
+        np.concatenate([part[k].ravel(order="F") for part in places]) for k in range(3)
+    )
+    key, place = np.unique(column.astype(np.int64) * shape[0] + row, return_inverse=True)
+    sums = sparse.csr_matrix((factor, (place, np.arange(row.size))), shape=(key.size, row.size))
+    rows, columns = (key % shape[0]).tolist(), (key // shape[0]).tolist()
+    return ca.MX(ca.Sparsity.triplet(*shape, rows, columns), _dm(sums) @ values)
+
+
+def _dm(matrix: sparse.spmatrix) -> ca.DM:
+    csc = sparse.csc_matrix(matrix)
+    csc.sort_indices()
+    pattern = ca.Sparsity(*csc.shape, csc.indptr.tolist(), csc.indices.tolist())
+    return ca.DM(pattern, csc.data.tolist())

@@ -1,0 +1,701 @@
+r"""The full nonlinear program of a problem, by direct collocation: what IPOPT is given.
+
+Decision variables are the gait's parameters p; at every point of the mesh and link of a chain its
+direction phi, rotation rate w, midpoint velocity v, the friction f and couple c on it, and the
+force N and moment M at the joint behind it; the tail's orientation theta; distance D and work W.
+Components of v, f and N are those in the axes of the plane, rates are per radian of phase. With
+link i of length l_i, e_i = (cos phi_i, sin phi_i), and the class of gaits q = Phi(t) p::
+
+    phi_0 = theta,   phi_i - phi_(i-1) = Phi_i p,   w_i - w_(i-1) = Phi_i' p       the gait
+    v_i - v_(i-1) = l_(i-1)/2 w_(i-1) e'_(i-1) + l_i/2 w_i e'_i                   links are joined
+    f_i, c_i = friction(v_i, w_i, phi_i; delta)                                   on what touches
+    N_i - N_(i+1) + f_i + m_i g = 0                                               force balance
+    M_i - M_(i+1) + c_i - l_i/2 e_i x (N_i + N_(i+1)) = 0                         torque balance
+    theta' = w_0,   D' = sum m_i v_i . ahead,   W' = - sum (f_i . v_i + c_i w_i)  collocated
+
+theta, and distances of gaits that turn, are seen from axes that turn evenly. The first orientation
+is free on level ground, so maximising D turns the motion ahead. A load g is that of a slope. With
+inertia the momenta m of the body take the place of N and M::
+
+    m = (sum m_i v_i in the tail's axes, sum J_i w_i + m_i x_i x v_i)
+    m' = (sum f_i + m_i g, sum c_i + x_i x f_i) / Fr + turning of the axes        collocated
+
+with x_i the midpoints seen from the centre of mass. Other bodies, and the formulation "implicit
+velocity", have shape coordinates q, rates r and tail velocity z as variables, and z = Z(q, r), the
+velocity that balances them, in place of friction and balance (`colloc.transcription.velocity_map`).
+
+Inequalities are the limits of the shape, each at the worst instant of the mesh cells in which it
+may bind for a given gait; what actuators can do, at every point; and the mean shape speed. All
+rows are linear in the variables and in small functions of one link, one contact, one check.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from colloc.gaits.control_problem import ControlProblem
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.limits import widest
+from colloc.gaits.period import chord_per_way
+from colloc.mechanics.bodies import FULL, Pairs
+from colloc.mechanics.densities import Instants
+from colloc.mechanics.inertia import STATES, turning
+from colloc.mechanics.line_integrals import line_integrals
+from colloc.mechanics.link_friction import LinkForce
+from colloc.motion.heading import closing_sign, momenta_image
+from colloc.motion.kinds import kind_of_motion
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.repeated import Nlp, Repeated, nonlinear_program
+from colloc.transcription.layout import RADIANS, Layout, layout_of
+from colloc.transcription.shape_checks import shape_checks
+from colloc.transcription.velocity_map import BalancedVelocity, velocity_map
+from colloc.transcription.warm_start import balanced_variables
+from colloc.transcription.worst_instants import held_shares, near_peaks
+
+ACTUATORS, AT_LEAST, SHAPE_SPEED = "actuators", "at least", "shape speed"
+"""Rows of what actuators can do, of what has to be reached, and of the mean square shape speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class FullProgram:
+    """A nonlinear program ``min f(x), lower <= x <= upper, row_lower <= g(x) <= row_upper``.
+
+    Attributes
+    ----------
+    control : ControlProblem
+    mesh : Mesh
+    gait : AnyGait
+        At whose worst instants the limits of the shape are constrained.
+    far : tuple of pairs of int
+        Links more than two apart that are kept from crossing.
+    layout : Layout
+        Where the variables of the motion are; those of shape checks follow them.
+    groups : dict of str to slice
+        Rows of a name.
+    cells : dict of str to (n_cell,) int
+        Mesh cells in which a shape check has its rows.
+    lower, upper : (n,)
+    row_lower, row_upper : (m,)
+    repeated : tuple of Repeated
+    rows : (m, n + n_out + 1)
+        Sparse, of the variables, the outputs of the repeated functions, and 1.
+    objective : (1, n + n_out + 1)
+    bends : (n_bend, n_parameter)
+        Sparse: the variables of shape checks from the parameters.
+    """
+
+    control: ControlProblem
+    mesh: Mesh
+    gait: AnyGait
+    far: Pairs
+    layout: Layout
+    groups: dict[str, slice]
+    cells: dict[str, np.ndarray]
+    lower: np.ndarray
+    upper: np.ndarray
+    row_lower: np.ndarray
+    row_upper: np.ndarray
+    repeated: tuple[Repeated, ...]
+    rows: sparse.csr_matrix
+    objective: sparse.csr_matrix
+    bends: sparse.csr_matrix
+    velocity: BalancedVelocity | None = None
+    """Kept alive here for the functions that call it."""
+
+    @property
+    def n(self) -> int:
+        return self.lower.size
+
+    @cached_property
+    def nlp(self) -> Nlp:
+        """Its functions and their derivatives."""
+        return nonlinear_program(self.n, self.repeated, self.rows, self.objective)
+
+    def member(self, x: np.ndarray) -> AnyGait:
+        """The gait of variables x."""
+        return self.control.admissible.member(x[self.layout.parameters[:, 0]])
+
+    def moved_to(self, x: np.ndarray) -> tuple[FullProgram, np.ndarray]:
+        """The program with the limits of the shape at the worst instants of the gait of variables
+        x, and its variables there."""
+        edges, scheme = self.mesh.edges, self.mesh.scheme.name
+        program = full_program(self.control, self.member(x), edges, scheme, self.far)
+        for name in ("rotation", ACTUATORS):
+            if name in self.groups:
+                rows = self.groups[name]
+                program = program.with_bounds(name, self.row_lower[rows], self.row_upper[rows])
+        p = self.layout.parameters[:, 0]
+        return program, np.concatenate([x[: self.layout.n], program.bends @ x[p]])
+
+    def with_bounds(self, name: str, lower: np.ndarray, upper: np.ndarray) -> FullProgram:
+        """The program with other bounds of the rows of a name."""
+        low, high = self.row_lower.copy(), self.row_upper.copy()
+        low[self.groups[name]], high[self.groups[name]] = lower, upper
+        return replace(self, row_lower=low, row_upper=high)
+
+    def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
+        """Variables ``(n,)`` of a gait, by its parameters ``(n_parameter,)``, that satisfy every
+        equation but the closure of the net rotation; delta per period."""
+        gait = self.control.admissible.member(parameters)
+        motion = balanced_variables(self.control, self.layout, self.mesh, gait, parameters, delta)
+        return np.concatenate([motion, self.bends @ parameters])
+
+
+def full_program(
+    control: ControlProblem,
+    gait: AnyGait,
+    edges: np.ndarray | None = None,
+    scheme: str = "",
+    far: Pairs = (),
+) -> FullProgram:
+    """The program on the first mesh, or on the one with the given edges and scheme.
+
+    Parameters
+    ----------
+    control : ControlProblem
+    gait : AnyGait
+        At whose worst instants the limits of the shape are constrained.
+    edges : (n + 1,), optional
+    scheme : str
+    far : tuple of pairs of int
+        Links more than two apart that are kept from crossing; those two apart always are.
+    """
+    mesh = control.mesh(edges, scheme)
+    layout, admissible, aims = layout_of(control, mesh), control.admissible, control.aims
+    gaits, n_joint, fraction = admissible.gait, admissible.n_joint, admissible.gait.fraction
+    turn = control.dynamics.turn
+    p = layout.parameters[:, 0]
+    limits = _ShapeLimits(control, mesh, layout, gait, far)
+    program = _Rows(layout.n + limits.n_bend)
+
+    # the motion: link by link, or by the velocity map
+    lifted = control.formulation == FULL
+    motion = (_Links if lifted else _Mapped)(program, control, mesh, layout)
+
+    # functions of a whole period
+    delta = ca.SX.sym("delta")
+    names = sorted({name for aim in (aims.objective, *dict(aims.at_least)) for name in aim.uses})
+    parts = {name: ca.SX.sym(name, 1 + (name == "rotation")) for name in names}
+    period = {name: part / fraction for name, part in parts.items()}
+    for name, value in {
+        "distance": lambda part: chord_per_way(turn) * part / fraction,
+        "rotation": lambda part: part[0] - part[1] + turn,
+        "period": ca.exp,
+    }.items():
+        if name in parts:
+            period[name] = value(parts[name])
+    values = ca.vertcat(*(aim(period) for aim in (aims.objective, *dict(aims.at_least))))
+    of_period = program.repeat(
+        ca.vertcat(*parts.values()), values, layout.of_period(names), delta=delta
+    )
+    w = ca.SX.sym("p", p.size)
+    square = ca.bilin(ca.DM(gaits.mean_square_rate(n_joint) / RADIANS**2), w, w)
+    speed = program.repeat(w, square, p[:, None], delta=delta)
+    if not gaits.linear:
+        given = ca.vertcat(*(a for row in gaits.coefficients(w, n_joint) for a in row))
+        left = w[gaits.n_own : gaits.n_own + given.numel()] - given
+        members = program.repeat(w, left, p[:, None], delta=delta)
+    crossing = limits.repeat(program)
+    sums = motion.totals()
+    program.close()
+
+    # rows
+    pick = program.pick
+    state, rate = mesh.integration()
+    motion.add_rows(state, rate)
+    sign = closing_sign(gaits.closing_symmetry)
+    theta = pick(layout.theta[0])
+    if sign is not None and aims.rotation is not None:
+        program.add("rotation", theta[-1] + sign * theta[0])
+    if "theta" in kind_of_motion(control.dynamics).told:
+        program.add("heading", theta[0] - pick(p[-1:]))
+    state, rate = mesh.quadrature()
+    ahead, aside, power = motion.ways()
+    program.add("distance", state @ pick(layout.distance[0]) - RADIANS * rate @ ahead)
+    program.add("work", state @ pick(layout.work[0]) - RADIANS * rate @ power)
+    integral = sparse.csr_matrix(rate.sum(axis=0))
+    for quantity, total, gained in zip(aims.integrals, layout.totals, sums, strict=True):
+        program.add(quantity.name, pick(total) - RADIANS * integral @ pick(gained))
+    if aims.no_way_across:
+        program.add("across", integral @ aside)
+    if not gaits.linear:
+        program.add("members", pick(members))
+    cells = limits.add_rows(program, crossing)
+    program.add(SHAPE_SPEED, pick(speed), admissible.smallest_shape_speed**2, np.inf)
+    if aims.at_least:
+        least = np.array([value for _, value in aims.at_least])
+        program.add(AT_LEAST, pick(of_period[1:]), least, np.inf)
+    motion.add_limits()
+
+    lower, upper = np.full(program.n, -np.inf), np.full(program.n, np.inf)
+    lower[p], upper[p] = gaits.bounds(admissible.body, widest(admissible.joint_limit))
+    if lifted:
+        most = control.dynamics.body.largest_forces(control.dynamics.law)
+        lower[layout.friction], upper[layout.friction] = -most, most
+    for total in (layout.distance, layout.work):
+        lower[total[0, 0]] = upper[total[0, 0]] = 0.0
+    return FullProgram(
+        control, mesh, gait, far, layout, program.groups, cells, lower, upper,
+        *map(np.concatenate, (program.lower, program.upper)), tuple(program.repeated),
+        sparse.vstack(program.rows).tocsr(), -pick(of_period[0]), limits.bends, motion.velocity,
+    )  # fmt: skip
+
+
+class _Rows:
+    """Rows of a program, by name, as sparse matrices over ``[x; y; 1]``, y the outputs of repeated
+    functions."""
+
+    def __init__(self, n: int) -> None:
+        self.n, self.width = n, n
+        self.repeated: list[Repeated] = []
+        self.rows: list[sparse.csr_matrix] = []
+        self.lower: list[np.ndarray] = []
+        self.upper: list[np.ndarray] = []
+        self.groups: dict[str, slice] = {}
+        self._m = 0
+
+    def repeat(
+        self,
+        local: ca.SX,
+        out: ca.SX,
+        gather: np.ndarray,
+        given: ca.SX | None = None,
+        values: np.ndarray | None = None,
+        *,
+        delta: ca.SX,
+        implicit: tuple | None = None,
+    ) -> np.ndarray:
+        """Where the outputs ``(n_out, n_instance)`` of a function at many instances are; see
+        `Repeated`."""
+        given = ca.SX(0, 1) if given is None else given
+        values = np.empty((0, gather.shape[1])) if values is None else values
+        repeated = Repeated(local, given, delta, out, gather, values, implicit)
+        self.repeated.append(repeated)
+        places = self.width + np.arange(repeated.n_out).reshape(gather.shape[1], -1).T
+        self.width += repeated.n_out
+        return places
+
+    def close(self) -> None:
+        """No function is added from here on."""
+        self.width += 1
+
+    def pick(self, places: np.ndarray) -> sparse.csr_matrix:
+        """Variables or outputs, one below the other, as rows."""
+        places = np.asarray(places).ravel()
+        entries = np.ones(places.size), (np.arange(places.size), places)
+        return sparse.csr_matrix(entries, shape=(places.size, self.width))
+
+    def constant(self, values: np.ndarray) -> sparse.csr_matrix:
+        """Numbers ``(n_row,)`` as rows."""
+        last = np.full(values.size, self.width - 1)
+        entries = values, (np.arange(values.size), last)
+        return sparse.csr_matrix(entries, shape=(values.size, self.width))
+
+    def add(self, name: str, rows: sparse.spmatrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
+        """``lower <= rows <= upper``; by default the rows vanish."""
+        m = rows.shape[0]
+        self.rows.append(sparse.csr_matrix(rows))
+        self.lower.append(np.zeros(m) + lower)
+        self.upper.append(np.zeros(m) + upper)
+        self.groups[name] = slice(self._m, self._m + m)
+        self._m += m
+
+
+class _Motion:
+    """The equations of motion of a body at the points of a mesh."""
+
+    velocity: BalancedVelocity | None = None
+
+    def __init__(self, program: _Rows, control: ControlProblem, mesh: Mesh, layout: Layout) -> None:
+        self.program, self.control, self.mesh, self.layout = program, control, mesh, layout
+        self.dynamics = control.dynamics.in_speeds_of(RADIANS)
+        self.sites = np.empty(mesh.n_point, dtype=int)
+        self.sites[mesh.points] = mesh.sites
+        gait, n_joint = control.admissible.gait, control.admissible.n_joint
+        # (joint, point), as index arrays are picked
+        self.Phi, self.Phi_t = (
+            sparse.csr_matrix(matrix.transpose(1, 0, 2).reshape(-1, matrix.shape[2]))
+            for matrix in (
+                gait.angle_matrix(mesh.times, n_joint),
+                gait.rate_matrix(mesh.times, n_joint) / RADIANS,
+            )
+        )
+        self.delta = ca.SX.sym("delta")
+        self.functions()
+
+    def functions(self) -> None:
+        """Add the repeated functions."""
+        raise NotImplementedError
+
+    def of_points(self, size: int) -> sparse.csr_matrix:
+        """The sum over `size` parts, for every point."""
+        return self.spread(np.ones((1, size)))
+
+    def spread(self, matrix: np.ndarray) -> sparse.csr_matrix:
+        """A matrix that acts on the parts of a body, for every point."""
+        return sparse.csr_matrix(sparse.kron(matrix, sparse.eye(self.mesh.n_point)))
+
+    def at_points(self, formulas: Sequence[Any]) -> np.ndarray:
+        """Where the values of formulas of an instant are at every point, ``(n_value, n_point)``."""
+        body, law = self.dynamics.body, self.dynamics.law
+        local, gather, q, r, moment = self.joints(any(each.needs_forces for each in formulas))
+        now = Instants(body, law, q, r, self.delta, unit=RADIANS, moments=moment)
+        out = ca.vertcat(*(each.at(now) for each in formulas))
+        return self.program.repeat(local, out, gather, delta=self.delta)
+
+    def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
+        """Local variables of a point, where they are, and angles, rates and moments of them."""
+        raise NotImplementedError
+
+    def totals(self) -> list[np.ndarray]:
+        """Where the densities of integrals, and what actuators do, are at the points."""
+        actuators = self.control.actuators
+        self.limited = self.at_points([actuators]) if actuators.names else None
+        return [self.at_points([quantity]) for quantity in self.control.aims.integrals]
+
+    def add_limits(self) -> None:
+        """Add the rows of what actuators can do, point by point."""
+        if self.limited is not None:
+            least = np.tile(self.control.actuators.least, self.mesh.n_point)
+            self.program.add(
+                ACTUATORS, self.program.pick(self.limited.ravel(order="F")), least, 1.0
+            )
+
+    def add_orientation(self, spin: np.ndarray, state: Any, rate: Any) -> None:
+        """theta' = w_0, less the turning of the axes."""
+        pick, theta = self.program.pick, self.layout.theta[0]
+        even = -self.dynamics.turn * np.asarray(rate.sum(axis=1)).ravel()
+        self.program.add(
+            "orientation", state @ pick(theta) - RADIANS * rate @ pick(spin), even, even
+        )
+
+
+class _Links(_Motion):
+    """A chain, link by link."""
+
+    def functions(self) -> None:
+        layout, body = self.layout, self.dynamics.body
+        n_link, inertial = body.n_link, bool(layout.momenta.size)  # type: ignore[attr-defined]
+        self.halves = self._halves(inertial)
+        self.contacts = [(group.rows, self._contact(group, inertial)) for group in self._groups()]
+        joint = np.arange(n_link - 1)
+        if inertial:
+            self.swing, self.change = self._swing(), self._change()
+        else:
+            self.levers = [self._lever(joint, joint + side) for side in (0, 1)]
+
+    def _groups(self) -> list[Any]:
+        return self.dynamics.body.contact.groups(self.dynamics.law)  # type: ignore[attr-defined]
+
+    def _instances(self, rows: Sequence[np.ndarray], parts: Any) -> np.ndarray:
+        """Where local variables are, ``(n_local, n_part * n_point)``, part by part."""
+        return np.stack([row[parts].ravel() for row in rows])
+
+    def _given(self, **columns: np.ndarray) -> tuple[list[Any], ca.SX, np.ndarray]:
+        """Numbers of parts: those that all share as they are, others as given of a function."""
+        shared, symbols, values = [], [], []
+        for name, column in columns.items():
+            column = np.ravel(column)
+            if np.ptp(column) == 0.0:
+                shared.append(float(column[0]))
+                continue
+            symbols.append(ca.SX.sym(name))
+            shared.append(symbols[-1])
+            values.append(np.repeat(column, self.mesh.n_point))
+        size = self.mesh.n_point * np.size(next(iter(columns.values())))
+        return shared, ca.vertcat(ca.SX(0, 1), *symbols), np.reshape(values, (len(values), size))
+
+    def _halves(self, inertial: bool) -> np.ndarray:
+        """l/2 w sin phi, l/2 w cos phi; with inertia l/2 cos phi, l/2 sin phi, too."""
+        body, local = self.dynamics.body, ca.SX.sym("link", 2)
+        (length,), given, values = self._given(length=body.length_column())  # type: ignore[attr-defined]
+        phi, w = ca.vertsplit(local)
+        half = 0.5 * length * ca.vertcat(ca.sin(phi), ca.cos(phi))
+        out = ca.vertcat(half * w, half[[1, 0]]) if inertial else half * w
+        gather = self._instances([self.layout.directions, self.layout.spins], slice(None))
+        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
+
+    def _contact(self, group: Any, inertial: bool) -> np.ndarray:
+        """Of parts under one law: laws of friction, scaled like velocities, force in the axes of
+        the plane, moment about the link's midpoint, or with inertia about the centre of mass, and
+        power."""
+        layout, contact = self.layout, self.dynamics.body.contact  # type: ignore[attr-defined]
+        law, rows, links = group.law, group.rows, np.array(contact.links)[group.rows]
+        (along, offset, cos, sin, length, pressure), given, values = self._given(
+            along=contact.along[rows],
+            offset=contact.offset[rows],
+            cos=contact.cos[rows],
+            sin=contact.sin[rows],
+            length=contact.length[rows],
+            pressure=contact.pressure[rows],
+        )
+        n_part, places = len(contact.parts), [layout.friction[rows]]
+        places.append(layout.friction[[n_part + row for row in rows]])
+        if group.pads:
+            places.append(layout.friction[contact.couples(rows)])
+        moving = [layout.directions, layout.spins, layout.vx, layout.vy]
+        moving += [layout.x, layout.y] if inertial else []
+        gather = np.concatenate(
+            [self._instances(moving, links), np.stack([part.ravel() for part in places])]
+        )
+        local = ca.SX.sym("contact", gather.shape[0])
+        (phi, w, vx, vy), force = ca.vertsplit(local)[:4], ca.vertsplit(local)[len(moving) :]
+        c, s = ca.cos(phi), ca.sin(phi)
+        us, un = vx * c + vy * s - offset * w, vy * c - vx * s + along * w
+        vs, vn = cos * us + sin * un, cos * un - sin * us
+        if group.pads:
+            pressed = LinkForce(*(each / pressure for each in force))
+            laws = line_integrals(law).scaled_laws(vs, vn, w, length, self.delta, pressed)
+        else:
+            density = law.density(vs, vn, self.delta)
+            secant = law.density_secant(vs, vn, self.delta)
+            laws = [(force[k] / pressure - density[k]) / secant[k][k] for k in range(2)]
+        couple = force[2] if group.pads else 0.0
+        fs, fn = cos * force[0] - sin * force[1], sin * force[0] + cos * force[1]
+        fx, fy = c * fs - s * fn, s * fs + c * fn
+        moment = along * fn - offset * fs + couple
+        if inertial:
+            x, y = ca.vertsplit(local)[4:6]
+            moment += x * fy - y * fx
+        power = -(force[0] * vs + force[1] * vn + couple * w)
+        out = ca.vertcat(fx, fy, moment, power, *laws)
+        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
+
+    def _lever(self, joint: np.ndarray, link: np.ndarray) -> np.ndarray:
+        """l/2 e x N of the forces at joints on one of their links."""
+        layout, local = self.layout, ca.SX.sym("joint", 3)
+        lengths = self.dynamics.body.length_column()[link]  # type: ignore[attr-defined]
+        (length,), given, values = self._given(length=lengths)
+        phi, nx, ny = ca.vertsplit(local)
+        gather = np.concatenate(
+            [
+                self._instances([layout.directions], link),
+                self._instances([layout.joint_fx, layout.joint_fy], joint),
+            ]
+        )
+        out = 0.5 * length * (ca.cos(phi) * ny - ca.sin(phi) * nx)
+        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
+
+    def _swing(self) -> np.ndarray:
+        """J w + m x cross v of every link."""
+        layout, body, local = self.layout, self.dynamics.body, ca.SX.sym("link", 5)
+        (mass, inertia), given, values = self._given(
+            mass=body.mass_column(),  # type: ignore[attr-defined]
+            inertia=body.inertia_column(),  # type: ignore[attr-defined]
+        )
+        w, vx, vy, x, y = ca.vertsplit(local)
+        rows = [layout.spins, layout.vx, layout.vy, layout.x, layout.y]
+        gather, out = self._instances(rows, slice(None)), inertia * w + mass * (x * vy - y * vx)
+        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
+
+    def _change(self) -> np.ndarray:
+        """Of a point with inertia: velocity of the centre of mass in the tail's axes, and how the
+        momenta change."""
+        layout, regime = self.layout, self.dynamics.regime
+        free = [layout.pace] if regime.free_pace else []
+        paces = np.repeat(layout.parameters[free], self.mesh.n_point, axis=1)
+        gather = np.concatenate(
+            [
+                layout.directions[:1],
+                layout.spins[:1],
+                layout.centre,
+                layout.momenta[:, self.sites],
+                paces.reshape(len(free), self.mesh.n_point),
+            ]
+        )
+        local = ca.SX.sym("point", gather.shape[0])
+        phi, w, vx, vy, fx, fy, moment = ca.vertsplit(local)[:7]
+        momenta = local[7 : 7 + len(STATES)]
+        froude = (ca.exp(-2.0 * local[-1]) if free else regime.froude) * RADIANS**2
+        c, s = ca.cos(phi), ca.sin(phi)
+        pushed = ca.vertcat(c * fx + s * fy, c * fy - s * fx, moment) / froude
+        changes = pushed + turning(ca.vertcat(0, 0, w), momenta)
+        out = ca.vertcat(c * vx + s * vy, c * vy - s * vx, changes)
+        return self.program.repeat(local, out, gather, delta=self.delta)
+
+    def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
+        layout, n = self.layout, self.dynamics.body.n_joint
+        rows = [layout.directions, layout.spins, *([layout.moments] if with_moments else [])]
+        gather = np.concatenate(rows)
+        local = ca.SX.sym("point", gather.shape[0])
+        phi, w, moment = local[: n + 1], local[n + 1 : 2 * n + 2], local[2 * n + 2 :]
+        return local, gather, ca.diff(phi), ca.diff(w), moment if with_moments else None
+
+    def _on_links(self, output: int) -> sparse.csr_matrix:
+        """The sum over the contacts of each link of one of their outputs."""
+        n_link = self.dynamics.body.n_link  # type: ignore[attr-defined]
+        links, total = np.array(self.dynamics.body.contact.links), 0  # type: ignore[attr-defined]
+        for rows, outputs in self.contacts:
+            to_links = 1.0 * (links[rows] == np.arange(n_link)[:, None])
+            total = total + self.spread(to_links) @ self.program.pick(outputs[output])
+        return total
+
+    def add_rows(self, state: Any, rate: Any) -> None:
+        program, layout, pick = self.program, self.layout, self.program.pick
+        body = self.dynamics.body
+        n_link = body.n_link  # type: ignore[attr-defined]
+        p, theta = pick(layout.parameters), pick(layout.theta[0, self.sites])
+        phi, w, vx, vy = map(pick, (layout.directions, layout.spins, layout.vx, layout.vy))
+        diff = np.diff(np.eye(n_link), axis=0)
+        d, both = self.spread(diff), self.spread(np.abs(diff))  # of neighbours, at their joint
+        # outputs are ordered instance by instance, instances part by part
+        sin, cos = (pick(row) for row in self.halves[:2])
+        program.add("tail", phi[: self.mesh.n_point] - theta)
+        program.add("angles", d @ phi - self.Phi @ p)
+        program.add("rates", d @ w - self.Phi_t @ p)
+        program.add("velocity x", d @ vx + both @ sin)
+        program.add("velocity y", d @ vy - both @ cos)
+        for k, (_, outputs) in enumerate(self.contacts):
+            program.add(f"force law {k + 1}", pick(outputs[4:]))
+        pull = self.dynamics.regime.pull(np.zeros((1, 1)))
+        weight = np.repeat(body.mass_column(), self.mesh.n_point)  # type: ignore[attr-defined]
+        self.pull = np.zeros(2) if pull is None else pull[:, 0]
+        loads = [self._on_links(k) + program.constant(weight * self.pull[k]) for k in range(2)]
+        moment = self._on_links(2)
+        if layout.momenta.size:
+            self._add_momenta(loads, moment, state, rate)
+        else:
+            up = self.spread(diff.T)
+            program.add("force x", up @ pick(layout.joint_fx) + loads[0])
+            program.add("force y", up @ pick(layout.joint_fy) + loads[1])
+            lever = sum(
+                self.spread(np.eye(n_link)[:, side : n_link - 1 + side]) @ pick(self.levers[side])
+                for side in (0, 1)
+            )
+            program.add("torque", up @ pick(layout.moments) + moment - lever)
+        self.add_orientation(layout.spins[0], state, rate)
+
+    def _add_momenta(
+        self, loads: list[sparse.csr_matrix], moment: sparse.csr_matrix, state: Any, rate: Any
+    ) -> None:
+        program, layout, pick = self.program, self.layout, self.program.pick
+        body = self.dynamics.body
+        n_link = body.n_link  # type: ignore[attr-defined]
+        mass, every = self.spread(body.mass_column().T), self.of_points(n_link)  # type: ignore[attr-defined]
+        diff = np.diff(np.eye(n_link), axis=0)
+        d, both = self.spread(diff), self.spread(np.abs(diff))
+        for axis, place, half in (("x", layout.x, 2), ("y", layout.y, 3)):
+            program.add(f"place {axis}", d @ pick(place) - both @ pick(self.halves[half]))
+            program.add(f"centre {axis}", mass @ pick(place))
+        sums = [mass @ pick(layout.vx), mass @ pick(layout.vy)]
+        sums += [every @ load for load in (*loads, moment)]
+        for name, row, total in zip(
+            ("speed x", "speed y", "force x", "force y", "torque"), layout.centre, sums, strict=True
+        ):
+            program.add(name, pick(row) - total)
+        now = [pick(self.change[0]), pick(self.change[1]), every @ pick(self.swing)]
+        for k, name in enumerate(STATES):
+            sites = pick(layout.momenta[k])
+            program.add(f"{name} of the body", now[k] - sites[self.sites])
+            program.add(
+                f"momentum {name}", state @ sites - RADIANS * rate @ pick(self.change[2 + k])
+            )
+        image = momenta_image(self.dynamics.symmetry)
+        begin, end = pick(layout.momenta[:, 0]), pick(layout.momenta[:, -1])
+        program.add("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin))
+
+    def ways(self) -> tuple[Any, Any, Any]:
+        """Velocities of the centre of mass ahead and aside, and power, at every point."""
+        pick, layout, body = self.program.pick, self.layout, self.dynamics.body
+        mass, angle = self.spread(body.mass_column().T), self.dynamics.regime.ahead  # type: ignore[attr-defined]
+        vx, vy = mass @ pick(layout.vx), mass @ pick(layout.vy)
+        c, s = np.cos(angle), np.sin(angle)
+        power = self.of_points(body.n_link) @ self._on_links(3)  # type: ignore[attr-defined]
+        climb = self.pull[0] * vx + self.pull[1] * vy
+        return c * vx + s * vy, c * vy - s * vx, power - climb
+
+
+class _Mapped(_Motion):
+    """A body whose tail velocity is tied to the one that balances it."""
+
+    def functions(self) -> None:
+        layout, body, law = self.layout, self.dynamics.body, self.dynamics.law
+        self.velocity = BalancedVelocity(body, law, self.mesh.n_point)
+        local, out, implicit = velocity_map(body, law, self.delta, self.velocity)
+        gather = np.concatenate(
+            [layout.theta[:, self.sites], layout.angles, layout.rates, layout.z]
+        )
+        self.point = self.program.repeat(local, out, gather, delta=self.delta, implicit=implicit)
+
+    def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
+        n = self.dynamics.body.n_joint
+        local = ca.SX.sym("point", 2 * n)
+        gather = np.concatenate([self.layout.angles, self.layout.rates])
+        return local, gather, local[:n], local[n:], None
+
+    def add_rows(self, state: Any, rate: Any) -> None:
+        program, layout, pick = self.program, self.layout, self.program.pick
+        p = pick(layout.parameters)
+        program.add("angles", pick(layout.angles) - self.Phi @ p)
+        program.add("rates", pick(layout.rates) - self.Phi_t @ p)
+        program.add("balance", pick(self.point[:3]))
+        self.add_orientation(layout.z[2], state, rate)
+
+    def ways(self) -> tuple[Any, Any, Any]:
+        return tuple(self.program.pick(self.point[k]) for k in (3, 4, 5))  # type: ignore[return-value]
+
+
+class _ShapeLimits:
+    """Shape checks of a program, at the worst instants of a gait in the cells in which they may
+    bind. Those that are linear are rows in p; others are functions of the angles between their
+    links, which are variables."""
+
+    def __init__(
+        self, control: ControlProblem, mesh: Mesh, layout: Layout, gait: AnyGait, far: Pairs
+    ) -> None:
+        admissible = control.admissible
+        checks = shape_checks(admissible.body, far, admissible.largest_speeds)
+        peaks = near_peaks(gait, mesh, checks, admissible.joint_limit)
+        self.limit, self.p = admissible.joint_limit, layout.parameters[:, 0]
+        self.placed, bends, start = [], [], layout.n
+        for check, (cells, times) in zip(checks, peaks, strict=True):
+            matrix = check.matrix(admissible.gait, times, admissible.n_joint)
+            joints = check.joints
+            places = np.empty((0, times.size), dtype=int)
+            if not check.linear and times.size:
+                places = start + np.arange(joints.size * times.size).reshape(-1, times.size)
+                bends.append(matrix[:, joints].transpose(1, 0, 2).reshape(-1, self.p.size))
+                start += places.size
+            self.placed.append((check, cells, held_shares(check, gait, times), matrix, places))
+        self.n_bend = start - layout.n
+        self.first = layout.n
+        self.bends = sparse.csr_matrix(np.concatenate([np.empty((0, self.p.size)), *bends]))
+
+    def repeat(self, program: _Rows) -> dict[str, np.ndarray]:
+        """Where the values of the checks that are not linear are, by their names."""
+        delta, share, found = ca.SX.sym("delta"), ca.SX.sym("share"), {}
+        for check, _, shares, _, places in self.placed:
+            if places.size:
+                local = ca.SX.sym("bend", check.joints.size)
+                angles = ca.SX.zeros(check.n_joint)
+                angles[check.joints.tolist()] = local
+                out = check.cut(angles, share)
+                found[check.name] = program.repeat(
+                    local, out, places, share, shares[None], delta=delta
+                )
+        return found
+
+    def add_rows(self, program: _Rows, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells in which each check has its rows, by its name."""
+        pick, cells = program.pick, {}
+        if self.n_bend:
+            bends = pick(self.first + np.arange(self.n_bend))
+            program.add("bends", bends - self.bends @ pick(self.p))
+        for check, where, shares, matrix, _ in self.placed:
+            cells[check.name] = where
+            if check.name in values:
+                rows = pick(values[check.name])
+            elif not where.size:
+                rows = pick(where)
+            else:
+                slopes = check.slopes(shares)
+                rows = sparse.csr_matrix(np.einsum("tj,tjp->tp", slopes, matrix)) @ pick(self.p)
+            program.add(check.name, rows, *check.bounds(self.limit))
+        return cells

@@ -1,0 +1,123 @@
+"""Where each decision variable of a collocated problem sits in the vector x, and its unit of time.
+No CasADi."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.control_problem import ControlProblem
+from colloc.gaits.period import chord_per_way
+from colloc.mechanics.bodies import FULL, Body
+from colloc.mechanics.densities import Quantity
+from colloc.mechanics.inertia import STATES
+from colloc.motion.kinds import kind_of_motion
+from colloc.numerics.mesh import Mesh
+
+RADIANS = 2 * np.pi
+"""Radians of phase per period: rates, velocities and delta of the variables are those per period
+divided by it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Index arrays ``(n_component, n_position)`` into x.
+
+    At the mesh's sites theta and, with inertia, the momenta; at its edges distance and work. At its
+    points of a lifted chain the directions of the links, their rotation rates, the velocities of
+    their midpoints, the friction on what touches the floor, and the force and the moment at each
+    joint or, with inertia, positions of the midpoints from the centre of mass and the velocity of
+    that, force and moment about it; of other bodies shape coordinates, their rates and the tail
+    velocity z.
+    """
+
+    parameters: np.ndarray
+    theta: np.ndarray
+    distance: np.ndarray
+    work: np.ndarray
+    totals: np.ndarray
+    momenta: np.ndarray
+    directions: np.ndarray
+    spins: np.ndarray
+    vx: np.ndarray
+    vy: np.ndarray
+    friction: np.ndarray
+    joint_fx: np.ndarray
+    joint_fy: np.ndarray
+    moments: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    centre: np.ndarray
+    angles: np.ndarray
+    rates: np.ndarray
+    z: np.ndarray
+    n: int
+    integrals: tuple[Quantity, ...] = ()
+    """What `totals` are of, over the solved part of the period."""
+    pace: int = -1
+    """Which of the parameters is the logarithm of the period, if one is."""
+
+    def of_period(self, names: Iterable[str]) -> np.ndarray:
+        """``(n, 1)``: where quantities of the solved part of the period are; of the rotation its
+        end and its begin."""
+        places = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
+        places |= {
+            "distance": self.distance[0, -1:],
+            "work": self.work[0, -1:],
+            "rotation": self.theta[0, [-1, 0]],
+            "period": self.parameters[self.pace],  # its logarithm
+        }
+        return np.concatenate([places[name] for name in names])[:, None]
+
+    def tail_velocity(self, body: Body, x: np.ndarray) -> np.ndarray:
+        """z ``(3, n_point)`` that variables x say."""
+        if self.z.size:
+            return x[self.z]
+        phi, w, vx, vy = (x[part[0]] for part in (self.directions, self.spins, self.vx, self.vy))
+        velocity, half = (vx + 1j * vy) * np.exp(-1j * phi), 0.5 * body.lengths[0]  # type: ignore[attr-defined]
+        return np.stack([velocity.real, velocity.imag - half * w, w])
+
+
+def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
+    """Index arrays of all variables on a mesh."""
+    body, gait, dynamics = control.dynamics.body, control.admissible.gait, control.dynamics
+    n_joint, inertial = body.n_joint, bool(dynamics.regime.froude)
+    lifted = mesh.n_point * (control.formulation == FULL)
+    balanced, moved = (0, lifted) if inertial else (lifted, 0)
+    mapped = mesh.n_point - lifted
+    sizes = {
+        "parameters": (gait.size(n_joint), 1),
+        "theta": (1, mesh.n_site),
+        "distance": (1, mesh.n + 1),
+        "work": (1, mesh.n + 1),
+        "totals": (len(control.aims.integrals), 1),
+        "momenta": (len(STATES) * inertial, mesh.n_site),
+        **dict.fromkeys(("directions", "spins", "vx", "vy"), (n_joint + 1, lifted)),
+        "friction": (len(body.force_names), lifted),
+        **dict.fromkeys(("joint_fx", "joint_fy", "moments"), (n_joint, balanced)),
+        **dict.fromkeys(("x", "y"), (n_joint + 1, moved)),
+        "centre": (5, moved),
+        **dict.fromkeys(("angles", "rates"), (n_joint, mapped)),
+        "z": (3, mapped),
+    }
+    indices, start = {}, 0
+    for name, (rows, columns) in sizes.items():
+        indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
+        start += rows * columns
+    pace = -len(kind_of_motion(dynamics).told)  # which comes first of what a gait tells
+    return Layout(n=start, **indices, integrals=control.aims.integrals, pace=pace)
+
+
+def distance_and_work(
+    control: ControlProblem, layout: Layout, x: np.ndarray
+) -> tuple[float, float]:
+    """Distance and work of a whole period as the problem states them, from variables ``(n,)`` in
+    units of friction. A gait that turns has the way in x that is seen from axes that turn evenly
+    (`colloc.gaits.period`)."""
+    way, work = (
+        float(x[row[0, -1]]) / control.admissible.gait.fraction
+        for row in (layout.distance, layout.work)
+    )
+    return chord_per_way(control.dynamics.turn) * way, work * control.unit

@@ -1,0 +1,114 @@
+"""Feasible starting points: from a gait alone to all variables of a full program, through the
+balance solver."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.gaits.control_problem import ControlProblem
+from colloc.gaits.gait_fields import AnyGait
+from colloc.mechanics.links import Links
+from colloc.motion.collocated import CollocatedPose, stage_weights, sums
+from colloc.motion.kinds import OMEGA, Passed, Shapes, begin_of, first_theta, kind_of_motion
+from colloc.numerics.mesh import Mesh
+from colloc.transcription.layout import RADIANS, Layout
+
+
+def balanced_variables(
+    control: ControlProblem,
+    layout: Layout,
+    mesh: Mesh,
+    gait: AnyGait,
+    parameters: np.ndarray,
+    delta: float,
+) -> np.ndarray:
+    """Variables ``(n,)`` that satisfy every equation but the closure of the net rotation, for a
+    gait, its parameters ``(n_parameter,)`` and delta per period."""
+    x = np.zeros(layout.n)
+    x[layout.parameters[:, 0]] = parameters
+    slow = delta / RADIANS
+    shapes = Shapes(gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS, slow, RADIANS)
+    kind = kind_of_motion(control.dynamics.in_speeds_of(RADIANS))
+    begin = begin_of(kind, gait)
+    along = kind.along(mesh, shapes, begin)
+    now, z = along.now, along.z
+
+    weight, points = RADIANS * stage_weights(mesh), mesh.points
+    pose = CollocatedPose.on_mesh(
+        mesh,
+        RADIANS * z[OMEGA] - kind.turn,
+        RADIANS * np.array(now.centre),
+        first_theta(kind, begin),
+    )
+    power = (weight * now.power[points]).sum(axis=1)
+    shares = kind.shares(
+        Passed(complex(pose.place[-1]), float(pose.rotations.sum()), float(power.sum()), begin)
+    )
+    heading = float(np.angle(shares["distance"].side))
+    ahead = (pose.place * np.exp(-1j * heading)).real
+    climbed = (pose.place * np.conj(shares["work"].side)).real
+    # where the orientation is no state the plane is turned so that the gait goes along +x
+    theta_0 = 0.0 if "theta" in kind.told else -heading
+    x[layout.distance[0, 1:]] = ahead[1:]
+    x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
+    x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
+    x[layout.theta[0, mesh.edge_sites]] = theta_0 + pose.theta
+    at = kind.instants(shapes, pose.theta_on(mesh), z)
+    for quantity, total in zip(layout.integrals, layout.totals, strict=True):
+        x[total] = (weight * quantity.at(at)[0, points]).sum()
+    if layout.momenta.size:
+        x[layout.momenta[:, mesh.sites]] = along.states[: len(layout.momenta), points]
+        x[layout.momenta[:, mesh.edge_sites]] = along.edges
+    if layout.z.size:
+        x[layout.angles], x[layout.rates], x[layout.z] = shapes.angles, shapes.rates, z
+    else:
+        _lift(control, layout, x, shapes, z, theta_0 + pose.theta_on(mesh))
+    return x
+
+
+def _lift(
+    control: ControlProblem,
+    layout: Layout,
+    x: np.ndarray,
+    shapes: Shapes,
+    z: np.ndarray,
+    theta: np.ndarray,
+) -> None:
+    """Set the variables of the links, from the motion of the tail and its orientations
+    ``(1, n_point)``."""
+    dynamics = control.dynamics.in_speeds_of(RADIANS)
+    body, law, pull = dynamics.body, dynamics.law, _pull(dynamics.regime)
+    assert isinstance(body, Links)
+    posture = body.posture(shapes.angles)
+    link = body.velocity(posture, shapes.rates, z)
+    axes = np.exp(1j * theta)
+    along = axes * (posture.cos + 1j * posture.sin)  # directions of the links, complex
+    velocity, place = (link.vs + 1j * link.vn) * along, axes * (posture.x + 1j * posture.y)
+    friction = body.forces(law, shapes.angles, shapes.rates, z, shapes.delta)  # type: ignore[attr-defined]
+    on_link = body.contact.on_links(friction)
+    mass = body.mass_column()
+    force = (on_link.tangential + 1j * on_link.normal) * along + mass * pull
+    x[layout.directions] = theta + body.tangent_angles(shapes.angles)
+    x[layout.spins] = link.w
+    x[layout.vx], x[layout.vy] = velocity.real, velocity.imag
+    x[layout.friction] = friction
+    if layout.moments.size:
+        # N_(i+1) = N_i + f_i,   M_(i+1) = M_i + c_i - l_i/2 e_i x (N_i + N_(i+1))
+        at_joints = np.cumsum(force, axis=0)
+        both = at_joints + np.concatenate([0 * at_joints[:1], at_joints[:-1]])
+        lever = 0.5 * body.length_column() * (np.conj(along) * both).imag
+        moments = np.cumsum(on_link.couple - lever, axis=0)
+        x[layout.joint_fx], x[layout.joint_fy] = at_joints.real[:-1], at_joints.imag[:-1]
+        x[layout.moments] = moments[:-1]
+    else:
+        arm = place - (mass * place).sum(axis=0)
+        total, moving = force.sum(axis=0), (mass * velocity).sum(axis=0)
+        moment = (on_link.couple + (np.conj(arm) * force).imag).sum(axis=0)
+        x[layout.x], x[layout.y] = arm.real, arm.imag
+        x[layout.centre] = [moving.real, moving.imag, total.real, total.imag, moment]
+
+
+def _pull(regime) -> complex:
+    """The weight's pull along the ground, in the axes of the plane."""
+    pull = regime.pull(np.zeros((1, 1)))
+    return 0.0 if pull is None else complex(pull[0, 0], pull[1, 0])
