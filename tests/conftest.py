@@ -80,16 +80,14 @@ def unsolved():
 
 
 def guess_in_balance(problem):
-    from colloc.collocation.transcription import transcribe
-    from colloc.collocation.warm_start import feasible_point
-    from colloc.gaits.control_problem import control_problem
     from colloc.results.answer import Answer
     from colloc.results.solution import Solution
+    from colloc.search.spaces import program_of
     from colloc.verification.replay import replay
 
-    transcription = transcribe(control_problem(problem))
-    x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)
-    gait, mesh = transcription.member(x[transcription.layout.parameters[:, 0]]), transcription.mesh
+    program = program_of(problem)
+    x = program.feasible(problem.gait.parameters(problem.guess), problem.delta)
+    gait, mesh, x = program.member(x), program.mesh, x[: program.layout.n]
     fine = replay(
         problem.body,
         problem.friction,
@@ -106,8 +104,8 @@ def guess_in_balance(problem):
         "status": "guess",
     }
     answer = Answer(
-        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, None, x, 0 * x,
-        np.zeros(transcription.assembly.m),
+        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, x, 0 * x,
+        np.zeros_like(program.row_lower),
         **measured, **conditions, iterations=0, seconds=0.0,
     )  # fmt: skip
     return Solution(problem, answer, message="only a guess.")

@@ -15,7 +15,6 @@ from colloc.gaits.limits import Limit, range_of
 from colloc.mechanics.bodies import Body, Pairs, Stretch
 from colloc.mechanics.contact import Contact, smooth_minimum, tangent_of_minimum
 from colloc.numerics.arrays import Array, namespace
-from colloc.numerics.constraint_rows import Group, block_group
 from colloc.numerics.peaks import vertex
 
 _PLACES, _FLAT = 9, 1e-12
@@ -101,11 +100,6 @@ class ShapeCheck:
     def itself(self, shapes: np.ndarray) -> np.ndarray:
         """The shares at which the cuts are the function itself at shapes ``(n_joint, n_time)``."""
         return self.share(shapes) if self.both_ways else np.full(shapes.shape[1], -1.0)
-
-    def group(self, limit: Limit, n_cell: int, n: int) -> Group:
-        """The rows that keep it within its bounds in every mesh cell, by the block of its name, for
-        n variables in all."""
-        return block_group(self.name, *self.bounds(limit), n_cell, n)
 
     def nearer_bounds(self, values: np.ndarray, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
         """Of the bounds on values ``(n,)``, lower and upper, the nearer one; infinite in the place

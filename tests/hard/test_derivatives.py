@@ -5,20 +5,19 @@ Differences are central, of fourth order, with steps in proportion to delta, ove
 changes.
 """
 
+from functools import lru_cache
+
 import casadi as ca
 import numpy as np
 import pytest
 from cases import HARD
 
-from colloc.collocation.point_equations import point_function
-from colloc.collocation.transcription import transcribe
-from colloc.gaits.control_problem import control_problem
-from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import instant
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.search.spaces import program_of
 from tests.shared.laws import coulomb
 
 STENCIL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
@@ -47,46 +46,62 @@ def derivative(function, x, step):
     return np.array(columns).T
 
 
-def check(local, x, delta, step, parameters=None, tolerance=1e-6):
-    """Jacobian and Hessian of a `LocalFunction` at x; `parameters` gives what depends on x (the
-    solved velocity)."""
-    given = parameters or (lambda at: np.zeros((local.n_parameter, 1)))
+def check(function, x, given, delta, step, solved=None, tolerance=1e-6):
+    """Jacobian and Hessian of a `Repeated` at x and given numbers; `solved` gives what it solves
+    for."""
+    more = [] if solved is None else [function.implicit[0]]
+    symbols = [function.local, function.given, function.delta, *more]
+    weight, slope, curvature = function.derivatives()
+    value, jacobian = (
+        ca.Function("f", symbols, [ca.densify(out)]) for out in (function.out, slope)
+    )
+    hessian = ca.Function("h", [*symbols, weight], [ca.densify(curvature)])
 
-    def value(at):
-        return np.array(local.value(at, given(at), delta)).ravel()
+    def at(x):
+        return [x, given, delta, *([] if solved is None else [solved(x)])]
 
-    def jacobian(at):
-        dense = np.zeros((local.n_out, local.n_local))
-        dense[local.jac_row, local.jac_col] = np.array(local.jacobian(at, given(at), delta)).ravel()
-        return dense
-
-    exact, found = jacobian(x), derivative(value, x, step)
+    exact = np.array(jacobian(*at(x)))
+    found = derivative(lambda x: np.array(value(*at(x))).ravel(), x, step)
     np.testing.assert_allclose(found, exact, atol=tolerance * np.abs(exact).max())
-    weight = np.random.default_rng(5).normal(size=local.n_out)
-    hessian = np.zeros((local.n_local, local.n_local))
-    hessian[local.hess_row, local.hess_col] = np.array(
-        local.hessian(x, given(x), delta, weight)
-    ).ravel()
-    hessian += np.triu(hessian, 1).T
-    found = derivative(lambda at: jacobian(at).T @ weight, x, step)
-    np.testing.assert_allclose(found, hessian, atol=tolerance * max(np.abs(hessian).max(), 1e-12))
+    weights = np.random.default_rng(5).normal(size=function.out.shape[0])
+    exact = np.array(hessian(*at(x), weights))
+    found = derivative(lambda x: np.array(jacobian(*at(x))).T @ weights, x, step)
+    np.testing.assert_allclose(found, exact, atol=tolerance * max(np.abs(exact).max(), 1e-12))
 
 
-def balanced_point(body, friction, angles, rates, delta, formulation):
-    """Locals of a point in balance, theta first, and how the solved velocity follows them."""
+@lru_cache
+def functions(body, friction, formulation):
+    """The repeated function of a contact, or of a point with the velocity map."""
+    problem = Problem("p", None, body, friction, formulation=formulation, intervals=8)
+    repeated = program_of(problem).repeated
+    return next(each for each in repeated if each.local.shape[0] >= 7)
+
+
+def check_point(body, friction, angles, rates, delta, formulation, *, rng=None, step, tolerance):
+    """At all links of a point in balance, or at the point; `rng` moves forces off the law."""
     angles, rates = np.atleast_1d(angles)[:, None], np.atleast_1d(rates)[:, None]
-    n = body.n_joint
+    n, function = body.n_joint, functions(body, friction, formulation)
 
     def solved(at):
-        return solve_balance(
-            body, friction, at[1 : 1 + n, None], at[1 + n : 1 + 2 * n, None], delta, tolerance=1e-14
-        ).z
+        q, r = at[1 : 1 + n, None], at[1 + n : 1 + 2 * n, None]
+        return solve_balance(body, friction, q, r, delta, tolerance=1e-14).z
 
     z = solve_balance(body, friction, angles, rates, delta, tolerance=1e-13).require().z
+    if formulation != "full":
+        x = np.concatenate([[0.4], angles.ravel(), rates.ravel(), z.ravel()])
+        check(function, x, np.empty(0), delta, step, solved, tolerance)
+        return
     now = instant(body, friction, angles, rates, z, delta)
-    forces = np.concatenate(now.force).ravel() if formulation == "full" else np.zeros(0)
-    x = np.concatenate([[0.4], angles.ravel(), rates.ravel(), z.ravel(), forces])
-    return x, solved if formulation == "implicit velocity" else None
+    for link in range(body.n_link):
+        phi = 0.4 + np.arctan2(now.posture.sin[link, 0], now.posture.cos[link, 0])
+        vs, vn, w = (part[link, 0] for part in now.velocity)
+        c, s = np.cos(phi), np.sin(phi)
+        forces = [part[link, 0] for part in now.force]
+        x = np.array([phi, w, vs * c - vn * s, vs * s + vn * c, *forces])
+        if rng is not None:
+            x = x + 0.01 * rng.normal(size=x.size)
+        given = function.values[:, function.n_instance // body.n_link * link]
+        check(function, x, given, delta, step, None, tolerance)
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
@@ -94,33 +109,23 @@ def balanced_point(body, friction, angles, rates, delta, formulation):
     ("body", "law"), [(THREE, (1, 1, 1)), (THREE, (1.7, 1, 1.3)), (FOUR, (10, 1, 3))], ids=str
 )
 def test_point_function_at_random_points(formulation, body, law):
-    friction, rng = coulomb(*law), np.random.default_rng(6)
-    local = point_function(formulation, body, friction)
+    rng = np.random.default_rng(6)
     for delta in (0.3, 1e-2):
         for _ in range(2):
             angles, rates = rng.uniform(-2, 2, body.n_joint), rng.normal(size=body.n_joint)
-            x, solved = balanced_point(body, friction, angles, rates, delta, formulation)
-            if formulation == "full":
-                x = x + 0.01 * rng.normal(size=x.size)
-            check(
-                local,
-                x,
-                delta,
-                2e-3 * delta if formulation == "full" else 1e-2 * min(delta, 0.1),
-                solved,
-                2e-5,
-            )
+            step = 2e-3 * delta if formulation == "full" else 1e-2 * min(delta, 0.1)
+            at = body, coulomb(*law), angles, rates, delta, formulation
+            check_point(*at, rng=rng, step=step, tolerance=2e-5)
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
 @pytest.mark.parametrize("names", [STICK, FOLDS, STRAIGHT], ids=["stick", "folds", "straight"])
 def test_point_function_at_hard_points(formulation, names):
     for k, (law, delta) in enumerate((((1, 1, 1), 1e-3), ((1.7, 1, 1), 1e-4))):
-        friction = coulomb(*law)
-        local = point_function(formulation, THREE, friction)
         for name in names[k::2]:
-            x, solved = balanced_point(THREE, friction, *HARD[name], delta, formulation)
-            check(local, x, delta, (0.01 if formulation == "full" else 0.1) * delta, solved, 2e-4)
+            step = (0.01 if formulation == "full" else 0.1) * delta
+            at = THREE, coulomb(*law), *HARD[name], delta, formulation
+            check_point(*at, step=step, tolerance=2e-4)
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
@@ -128,28 +133,8 @@ def test_point_function_where_nothing_moves(formulation):
     """Frozen joints, everything at rest: friction is linear there, with a finite slope mu /
     delta."""
     friction, delta = Friction(mu_t=3, mu_f=1, mu_b=1), 1e-2
-    local = point_function(formulation, THREE, friction)
-    x, solved = balanced_point(THREE, friction, (0.7, -0.4), (0.0, 0.0), delta, formulation)
-    check(local, x, delta, 1e-2 * delta, solved, 1e-5)
-
-
-def other_blocks():
-    """Every block but the point function, by name, from a transcription of three unequal links."""
-    guess = Fourier([0.2, -0.1], [[0.8, 0.1], [-0.5, 0.2]], [[0.1, 0.3], [0.6, -0.2]])
-    problem = Problem("p", guess, body=Chain((0.3, 0.45, 0.25)), gait=Harmonic(2), intervals=8)
-    chain = transcribe(control_problem(problem)).assembly
-    chain_names = ["joint 1", "joint 2", "links (left)", "links (right)", "shape speed"]
-    yield "objective", chain.objective
-    yield from zip(chain_names, chain.blocks[1:], strict=True)
-
-
-@pytest.mark.parametrize(("name", "block"), [pytest.param(n, b, id=n) for n, b in other_blocks()])
-def test_every_other_block(name, block):
-    rng = np.random.default_rng(9)
-    for instance in range(0, block.n_instance, 3):
-        own = block.parameters[:, instance : instance + 1]
-        x = rng.normal(size=block.function.n_local) + (3.0 if "objective" in name else 0.0)
-        check(block.function, x, 1e-3, 1e-3, lambda at, own=own: own, 1e-8)
+    at = THREE, friction, (0.7, -0.4), (0.0, 0.0), delta, formulation
+    check_point(*at, step=1e-2 * delta, tolerance=1e-5)
 
 
 @pytest.mark.parametrize(

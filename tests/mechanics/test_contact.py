@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from colloc.transcription.shape_checks import shape_checks
-from colloc.transcription.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
@@ -22,6 +20,8 @@ from colloc.mechanics.contact import (
     smooth_minimum,
     tangent_of_minimum,
 )
+from colloc.transcription.shape_checks import shape_checks
+from colloc.transcription.worst_instants import check_values, held_shares, worst_instants
 
 AROUND_THE_CORNER = Fourier(np.zeros(2), np.array([[2.877], [0.172]]), np.array([[0.0], [-2.872]]))
 """A gait that rounds the shape (2 pi/3, 2 pi/3), where the first end passes the third link, within

@@ -6,11 +6,10 @@ import pytest
 from shared.instants import random_instants
 
 from colloc import Chain, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscous, replay
-from colloc.collocation.motion_rows import ACTUATORS
-from colloc.collocation.transcription import transcribe
-from colloc.gaits.control_problem import control_problem
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
+from colloc.search.spaces import program_of
+from colloc.transcription.full_program import ACTUATORS
 
 ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
@@ -45,15 +44,13 @@ def test_torques_are_limited_both_ways_and_powers_one_way():
     """In the program's bounds, and in what a replay tells: a gait in a mirror needs the same
     torques the other way round."""
     np.testing.assert_array_equal(ONE.least, [-1.0, -1.0, -np.inf, -np.inf])
-    program = transcribe(
-        control_problem(
-            Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6)
-        )
+    program = program_of(
+        Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6)
     )
     rows = program.groups[ACTUATORS]
-    assert set(program.constraint_upper[rows]) == {1.0}
-    assert sorted(set(program.constraint_lower[rows])) == [-np.inf, -1.0]
-    assert np.mean(program.constraint_lower[rows] == -1.0) == 0.5
+    assert set(program.row_upper[rows]) == {1.0}
+    assert sorted(set(program.row_lower[rows])) == [-np.inf, -1.0]
+    assert np.mean(program.row_lower[rows] == -1.0) == 0.5
     gait = Fourier([0.5, 0.2], [[1.2], [0.3]], [[0.2], [1.0]])
     mirrored = Fourier(-gait.mean, -gait.cos, -gait.sin)
     t = np.arange(400) / 400

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from colloc import Chain, FreePath, Friction, Harmonic, Polygon, Problem, evaluate, replay
-from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
-from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.results.arc import arc
-from colloc.search.spaces import space_near, transcribed
+from colloc.search.spaces import space_near
+from colloc.transcription.full_program import full_program
+from colloc.transcription.layout import RADIANS
 from colloc.verification.inertial_replay import inertial_replay
 from colloc.verification.mesh_error import mesh_error
 
@@ -148,20 +148,14 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     values = program.motion.values(v, delta)
     assert values["rotation"] == pytest.approx(turn, abs=1e-12)
 
-    full = transcribed(problem, space.member(v), space.mesh.edges)
-    x = feasible_point(full, space.full_parameters(v), delta)
-    found = oracles(full.assembly)
-    p = found.parameter_vector(
-        delta / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]])
-    )
-    g = np.array(found.options["jac_g"](x, p)[0]).ravel()
-    assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(
-        -values["distance"] / values["work"], rel=1e-9
-    )
-    for group in ("orientation", "rotation", "distance", "work", "balance"):
-        np.testing.assert_allclose(
-            g[full.groups[group]], full.constraint_lower[full.groups[group]], atol=1e-10
-        )
+    full = full_program(space.control, space.member(v), space.mesh.edges)
+    x, functions = full.feasible(space.full_parameters(v), delta), full.nlp.functions
+    g = np.array(functions["jac_g"](x, delta / RADIANS)[0]).ravel()
+    value = float(functions["grad_f"](x, delta / RADIANS)[0])
+    assert value == pytest.approx(-values["distance"] / values["work"], rel=1e-9)
+    for group in ("orientation", "rotation", "distance", "work"):
+        rows = full.groups[group]
+        np.testing.assert_allclose(g[rows], full.row_lower[rows], atol=1e-10)
 
     gait = space.member(v)
     per_period = delta * gait.delta_unit
@@ -170,7 +164,7 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     fine = run(
         BODY, law, gait, per_period, breaks=gait.corner_phases, tolerance=1e-6, turn=turn, **more
     )
-    error = mesh_error(control_problem(problem), full.phase_mesh(gait), gait, per_period, 1e-7)
+    error = mesh_error(control_problem(problem), full.mesh, gait, per_period, 1e-7)
     assert values["distance"] / values["work"] / fine.efficiency - 1 == pytest.approx(
         error.total, abs=3e-6
     )

@@ -21,13 +21,12 @@ from colloc import (
     replay,
     save,
 )
-from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is, converged
 from colloc.search.effort import FINE
-from colloc.search.spaces import remeshed, space_near, transcribed
+from colloc.search.spaces import remeshed, space_near
 from tests.shared.stages import answer_near
 
 FOUR = {
@@ -129,21 +128,6 @@ def test_no_equation_among_the_rows_is_redundant(case):
     _, v, program = near_start(case)
     equations = program.row_slopes(v)[program.row_lower == program.row_upper]
     assert np.linalg.matrix_rank(equations, tol=1e-6) == len(equations)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_the_full_program_measures_the_same_efficiency_and_rotation(case):
-    space, v, program = near_start(case, shake=0.0)
-    full = transcribed(space.control.problem, space.member(v), space.mesh.edges)
-    x, layout = feasible_point(full, space.full_parameters(v), DELTA), full.layout
-    # an antipodal gait may travel either way along its axis
-    sign = np.sign(x[layout.distance[0, -1]])
-    assert -sign * x[layout.distance[0, -1]] / x[layout.work[0, -1]] == pytest.approx(
-        program.objective(v), rel=1e-9
-    )
-    if "rotation" in full.groups and space.control.admissible.gait.symmetry == "none":
-        turned = x[layout.theta[0, -1]] - x[layout.theta[0, 0]]
-        assert turned == pytest.approx(program.rows(v)[0], abs=1e-9)
 
 
 def test_a_finer_mesh_on_the_same_arcs_has_the_same_parameters_and_a_smaller_error():

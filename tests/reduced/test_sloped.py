@@ -21,11 +21,11 @@ from colloc import (
     Wheel,
     ellipse,
 )
-from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.gait_fields import fields, gait_from
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver
-from colloc.search.spaces import space_near, transcribed
+from colloc.search.spaces import space_near
+from colloc.transcription.full_program import full_program
 from colloc.verification.slope import slope_motion
 
 
@@ -143,9 +143,9 @@ def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towa
     """Every equation but those that the gait has still to be found for: no turn, no way across."""
     program, v = program_at(problem.with_(towards=towards, objective="driven efficiency"), 0.05)
     gait = program.space.member(v)
-    full = transcribed(program.space.control.problem, gait, program.space.phase_mesh(gait).edges)
-    x = feasible_point(full, program.space.full_parameters(v), 0.05)
-    found = Solver(full).measured(x, 0.05, np.zeros_like(x), np.zeros(full.constraint_lower.size))
+    full = full_program(program.space.control, gait, program.space.mesh.edges)
+    x = full.feasible(program.space.full_parameters(v), 0.05)
+    found = Solver(full).measured(x, 0.05, np.zeros_like(x), np.zeros_like(full.row_lower))
     off = {name for name, rows in full.groups.items() if found.excess[rows].max(initial=0.0) > 1e-7}
     assert off == ({"rotation"} if towards is None else {"rotation", "across"})
     assert found.objective == pytest.approx(program.objective(v), abs=1e-12)

@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-from colloc.transcription.shape_checks import shape_checks
-from colloc.collocation.transcription import transcribe
-from colloc.transcription.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.columns import Basis
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
@@ -22,8 +19,11 @@ from colloc.mechanics.contact import (
 )
 from colloc.mechanics.friction import Friction
 from colloc.search.converge import crossing_pairs, last_free
-from colloc.search.ipopt import Solver
+from colloc.search.spaces import program_of
 from colloc.system.errors import ProblemError
+from colloc.transcription.full_program import full_program
+from colloc.transcription.shape_checks import shape_checks
+from colloc.transcription.worst_instants import check_values, held_shares, worst_instants
 from colloc.verification.replay import replay
 
 BODIES = [Chain((0.25,) * 4), Chain((0.1, 0.4, 0.2, 0.3)), Chain((0.2,) * 5), Chain((1 / 8,) * 8)]
@@ -96,7 +96,7 @@ def test_last_free_gait_stops_before_links_cross():
     problem = curl(1.0)
     free = problem.gait.parameters(problem.guess)
     bad = 1.6 * free
-    program = transcribe(control_problem(problem))
+    program = program_of(problem)
     assert (0, 4) in crossing_pairs(program, bad)
     between = last_free(program, free, bad)
     assert not crossing_pairs(program, between)
@@ -106,24 +106,25 @@ def test_last_free_gait_stops_before_links_cross():
 def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell():
     problem = curl(1.1, body=Chain((0.15, 0.25, 0.2, 0.1, 0.3)))
     far = tuple(far_pairs(problem.body))
-    transcription = transcribe(control_problem(problem), far=far)
-    own = transcription.layout.parameters[:, 0]
-    x = np.zeros(transcription.layout.n)
-    x[own] = problem.gait.parameters(problem.guess) + 0.1 * np.random.default_rng(
-        4
-    ).standard_normal(own.size)
-    solver = Solver(transcription)
-    parameters = solver.oracles.parameter_vector(0.01, transcription.block_parameters(x[own]))
-    value = np.array(solver.oracles.options["jac_g"](x, parameters)[0]).ravel()
-    fine = np.linspace(transcription.mesh.edges[:-1], transcription.mesh.edges[1:], 2001)
-    angles = transcription.member(x[transcription.layout.parameters[:, 0]]).angles(fine.T.ravel())
+    p = problem.gait.parameters(problem.guess)
+    p = p + 0.1 * np.random.default_rng(4).standard_normal(p.size)
+    control = control_problem(problem)
+    program = full_program(control, control.admissible.member(p), far=far)
+    x = program.feasible(p, 0.1)
+    value = np.array(program.nlp.functions["jac_g"](x, 0.1)[0]).ravel()
+    fine = np.linspace(program.mesh.edges[:-1], program.mesh.edges[1:], 2001)
+    angles = program.member(x).angles(fine.T.ravel())
+    placed = 0
     for i, j in far:
-        rows = transcription.groups[f"links {i + 1} and {j + 1}"]
-        nearest = (
-            clearance(problem.body, angles, i, j).reshape(transcription.mesh.n, -1).min(axis=1)
-        )
-        np.testing.assert_allclose(-value[rows], nearest, atol=1e-3)
-        assert (transcription.constraint_upper[rows] == 0).all()
+        name = f"links {i + 1} and {j + 1}"
+        rows, cells = program.groups[name], program.cells[name]
+        nearest = clearance(problem.body, angles, i, j).reshape(program.mesh.n, -1).min(axis=1)
+        np.testing.assert_allclose(-value[rows], nearest[cells], atol=1e-3)
+        left_out = np.delete(nearest, cells)
+        assert left_out.min(initial=np.inf) > 0.1
+        assert (program.row_upper[rows] == 0).all()
+        placed += cells.size
+    assert placed > 5
 
 
 def tips_passing(side):

@@ -3,7 +3,6 @@ and what must be reached."""
 
 import numpy as np
 import pytest
-from shared.differences import assert_derivatives_are_differences
 
 from colloc import (
     Chain,
@@ -20,14 +19,12 @@ from colloc import (
     replay,
     save,
 )
-from colloc.collocation.warm_start import feasible_point
 from colloc.commands import verify
 from colloc.gaits.objective import EFFICIENCY, SPEED
 from colloc.mechanics.densities import DRIVEN_WORK, Instants
-from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
-from colloc.search.spaces import space_near, transcribed
+from colloc.search.spaces import space_near
 
 THRIFT = "sqrt(distance) / (work + 0.1 * length)"
 TURNED = "(distance + rotation**2) / (work + length)"
@@ -96,34 +93,6 @@ def test_gradients_of_the_reduced_program_are_those_of_differences(case):
     np.testing.assert_allclose(program.gradient(v), slopes, atol=1e-6)
     rows = np.transpose([(program.rows(v + e) - program.rows(v - e)) / (2 * h) for e in steps])
     np.testing.assert_allclose(program.row_slopes(v), rows, atol=2e-6)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
-    problem = stated(case)
-    space, v = space_near(problem, problem.guess)
-    reduced, delta = ReducedProgram(space, DELTA), DELTA
-    reduced.place_rows(v)
-    full = transcribed(problem, space.member(v), space.mesh.edges)
-    x = feasible_point(full, space.full_parameters(v), delta)
-    found = oracles(full.assembly)
-    p = found.parameter_vector(
-        delta / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]])
-    )
-    assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(reduced.objective(v), rel=1e-9)
-    g = np.array(found.options["jac_g"](x, p)[0]).ravel()
-    if problem.at_least:
-        first = 1 if problem.gait.symmetry == "none" and problem.rotation is not None else 0
-        own = reduced.rows(v)[first : first + len(problem.at_least)]
-        np.testing.assert_allclose(g[full.groups["at least"]], own, atol=1e-11)
-    if problem.path_limits.names:
-        share, point = reduced.actuators.placed
-        shares = g[full.groups["actuators"]].reshape(-1, len(problem.path_limits.names))
-        assert share.size > 10
-        np.testing.assert_allclose(
-            shares[point, share], reduced.actuators.values(v, delta), atol=1e-9
-        )
-    assert_derivatives_are_differences(found, x, p, 3e-5)
 
 
 @pytest.fixture(scope="module")

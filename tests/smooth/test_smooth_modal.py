@@ -4,8 +4,6 @@ and what they beat."""
 import numpy as np
 import pytest
 
-from colloc.transcription.shape_checks import shape_checks
-from colloc.collocation.transcription import transcribe
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
@@ -16,10 +14,12 @@ from colloc.reduced.linear_space import LinearSpace
 from colloc.results.distinct_optima import distance, reversed_in_time, swapped
 from colloc.results.store import load, save
 from colloc.search.solve import solve
+from colloc.search.spaces import program_of
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.motion import Motion, sine_wave
 from colloc.system.errors import ProblemError
+from colloc.transcription.shape_checks import shape_checks
 from scripts.models.period import measured_period
 
 SIDEWAYS = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
@@ -179,7 +179,7 @@ def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_progra
     assert largest.max() > 4 / np.pi
     assert (largest <= gait.largest_parameters(body, 1.0).max() * np.pi / 4).all()
     problem = Problem("modes", body=body, gait=gait, joint_limit=1.0)
-    program = transcribe(control_problem(problem))
+    program = program_of(problem)
     np.testing.assert_allclose(
         program.upper[program.layout.parameters[:, 0]], LinearSpace(control_problem(problem)).upper
     )

@@ -9,16 +9,15 @@ import threading
 import time
 import weakref
 
+import numpy as np
 import pytest
 
-from colloc.collocation.implicit_velocity import ImplicitVelocity
-from colloc.collocation.transcription import transcribe
-from colloc.collocation.warm_start import feasible_point
-from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.search.ipopt import Solver
+from colloc.search.spaces import program_of
 from colloc.system.interruption import heeded, interrupted, interruptible, time_limit
+from colloc.transcription.velocity_map import BalancedVelocity
 
 
 def pressed(times, seen, **options):
@@ -109,18 +108,18 @@ def test_ipopt_stops_between_iterations_and_says_nothing(capfd, monkeypatch):
     problem = Problem(
         "p", ellipse(0.3, 1.0, 0.5), gait=gait, intervals=20, formulation="implicit velocity"
     )
-    solver, calls = Solver(transcribe(control_problem(problem))), []
-    x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
+    program, calls = program_of(problem), []
+    x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
 
-    def pressed(velocity_map, arguments, evaluated=ImplicitVelocity.eval):
+    def pressed(velocity_map, arguments, evaluated=BalancedVelocity.eval):
         calls.append(arguments)
         if len(calls) == 10:
             signal.raise_signal(signal.SIGINT)
         return evaluated(velocity_map, arguments)
 
-    monkeypatch.setattr(ImplicitVelocity, "eval", pressed)
+    monkeypatch.setattr(BalancedVelocity, "eval", pressed)
     with pytest.raises(KeyboardInterrupt):
-        solver.solve(x, 0.1)
+        Solver(program).solve_within(x, 0.1, None, np.inf)
     assert 10 <= len(calls) < 20
     printed = capfd.readouterr()
     assert printed.out + printed.err == ""

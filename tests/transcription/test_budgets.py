@@ -9,54 +9,12 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse, solve_balance
-from colloc.collocation.point_equations import point_function
-from colloc.collocation.transcription import transcribe
-from colloc.collocation.warm_start import feasible_point
-from colloc.gaits.control_problem import control_problem
-from colloc.numerics.blocks import oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers, quasi_definite_factors
 from colloc.search.ipopt import Solver
+from colloc.search.spaces import program_of
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.motion import sine_wave
 from tests.shared.laws import coulomb
-
-
-@pytest.mark.parametrize(
-    ("links", "formulation", "value", "jacobian", "hessian"),
-    [
-        (3, "implicit velocity", 600, 4500, 13600),
-        (3, "full", 700, 4200, 14000),
-        (6, "implicit velocity", 1200, 10700, 46500),
-        (6, "full", 1400, 13100, 44500),
-    ],
-)
-def test_instructions_of_a_point(links, formulation, value, jacobian, hessian):
-    local = point_function(formulation, Chain((1 / links,) * links), Friction())
-    assert local.value.n_instructions() <= value
-    assert local.jacobian.n_instructions() <= jacobian
-    assert local.hessian.n_instructions() <= hessian
-
-
-@pytest.mark.parametrize(
-    ("formulation", "jacobian", "hessian"), [("implicit velocity", 170, 85), ("full", 400, 260)]
-)
-def test_nonzeros_grow_by_so_many_for_every_interval(formulation, jacobian, hessian):
-    """Half a period, three links, three points an interval: sparsity is what keeps a solve linear
-    in the mesh."""
-    counts = []
-    for intervals in (20, 40):
-        problem = Problem(
-            "p",
-            ellipse(0.3, 1, 0.5),
-            gait=Harmonic(1, "bilateral"),
-            intervals=intervals,
-            formulation=formulation,
-        )
-        options = oracles(transcribe(control_problem(problem)).assembly).options
-        counts.append((options["jac_g"].nnz_out(1), options["hess_lag"].nnz_out(0)))
-    growth = np.diff(counts, axis=0)[0] / 20
-    assert growth[0] <= jacobian
-    assert growth[1] <= hessian
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
@@ -67,9 +25,9 @@ def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_m
     fill = []
     for intervals in (20, 40):
         problem = Problem("p", ellipse(0.3, 1, 0.5), intervals=intervals, formulation=formulation)
-        solver = Solver(transcribe(control_problem(problem)))
-        t = solver.transcription
-        x = feasible_point(t, problem.gait.parameters(problem.guess), 0.1)
+        program = program_of(problem)
+        solver = Solver(program)
+        x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
         jacobian, _ = solver.equality_jacobian(x, 0.1)
         gradient = np.random.default_rng(1).normal(size=jacobian.shape[1])
         left = gradient + jacobian.T @ estimated_multipliers(jacobian, gradient)
@@ -117,12 +75,15 @@ def test_effort_of_a_solve(solved, name, iterations, levels):
 
 def test_balance_solves_an_iteration_asks_for():
     """Value, Jacobian and Hessian at one point share one solve of the balance."""
-    from colloc.collocation.warm_start import feasible_point
-    from colloc.search.ipopt import Solver
-
-    problem = Problem("p", ellipse(0.3, 1, 0.5), gait=Harmonic(1, "bilateral"), intervals=12)
-    solver = Solver(transcribe(control_problem(problem)))
-    x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
-    result = solver.solve(x, 0.1, radius=1.0)
+    problem = Problem(
+        "p",
+        ellipse(0.3, 1, 0.5),
+        gait=Harmonic(1, "bilateral"),
+        intervals=12,
+        formulation="implicit velocity",
+    )
+    program = program_of(problem)
+    x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
+    result = Solver(program).solve_within(x, 0.1, None, 1.0)
     assert result.optimal
-    assert solver.transcription.velocity.solves <= 1.5 * result.iterations + 6
+    assert program.velocity.solves <= 1.5 * result.iterations + 6

@@ -1,0 +1,273 @@
+"""The full program: it says what the reduced program says, its derivatives are those of its rows,
+and it grows with the mesh and the links alone."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from colloc import (
+    Chain,
+    Elliptic,
+    Foot,
+    Fourier,
+    Friction,
+    Harmonic,
+    ModalBody,
+    Objective,
+    Pad,
+    Problem,
+    Quantity,
+    Serpenoid,
+    Viscous,
+    Wheel,
+    ellipse,
+)
+from colloc.gaits.bspline import BSpline
+from colloc.gaits.inertia import Free
+from colloc.mechanics.actuators import joint_moments
+from colloc.reduced.program import ReducedProgram
+from colloc.search.ipopt import Solver, solve_in_regions
+from colloc.search.spaces import program_of, space_near
+from colloc.transcription.full_program import ACTUATORS, AT_LEAST, full_program
+from colloc.transcription.layout import RADIANS
+from tests.shared.differences import assert_derivatives_are_differences
+
+SKEW = Chain((0.3, 0.25, 0.45))
+ROUGH = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
+LOOP = ellipse(0.2, 1.3, 0.8)
+HEAT = Quantity("heat", "sum(moment**2)")
+PARTS = (
+    Foot(0),
+    Wheel(1, 0.3, rolling=0.1),
+    Pad(2, 0.2, 0.6),
+    *(Foot(2, 0.9, offset=y) for y in (0.05, -0.05)),
+)
+CASES = {
+    "lying": {"body": SKEW},
+    "symmetric": {"gait": Harmonic(2, "bilateral"), "guess": ellipse(0.0, 1.3, 0.8)},
+    "antipodal": {"body": SKEW, "gait": Harmonic(3, "antipodal"), "guess": ellipse(0, 1.3, 0.8)},
+    "elliptic": {"friction": Elliptic(mu_t=1.7, mu_f=1.0, mu_b=1.3)},
+    "viscous": {"friction": Viscous(normal=2.0, tangential=1.0)},
+    "feet, wheels and pads": {"body": Chain(SKEW.lengths, feet=PARTS)},
+    "width": {"body": Chain(SKEW.lengths, width=0.05)},
+    "weights": {"body": Chain(SKEW.lengths, weights=(0.5, 0.2, 0.3))},
+    "spline": {"gait": BSpline(8)},
+    "serpenoid": {"body": Chain((0.2,) * 5), "gait": Serpenoid(), "guess": None},
+    "uphill": {"grade": 0.1, "towards": 0.4},
+    "uphill, any way": {"grade": 0.1},
+    "inertia": {"froude": 0.3, "body": SKEW},
+    "inertia on feet": {
+        "froude": 0.3,
+        "body": Chain(SKEW.lengths, feet=PARTS, masses=(0.2, 0.3, 0.5)),
+    },
+    "inertia uphill": {"froude": 0.3, "grade": 0.1},
+    "free pace": {"froude": Free(0.01, 1.0), "objective": "distance / (work + 0.1 * period)"},
+    "turning": {"rotation": None, "objective": "turning", "gait": Harmonic(1)},
+    "actuators": {"torque_limit": 0.05, "power_limit": 0.4},
+    "quantities": {"objective": Objective("distance / (work + heat)", quantities=(HEAT,))},
+    "driven": {"objective": "driven efficiency", "grade": 0.1},
+    "at least": {"at_least": {"distance": 0.1, "efficiency": 0.2}},
+    "joint speeds": {"speed_limit": 9.0},
+    "modes": {"body": ModalBody(3), "gait": Harmonic(1, "antipodal"), "guess": None},
+    "velocity map": {"formulation": "implicit velocity", "body": SKEW},
+}
+
+
+def stated(case, **changes):
+    fields = {"guess": LOOP, "friction": ROUGH, "gait": Harmonic(1), "intervals": 8}
+    fields |= CASES[case] | changes
+    return Problem(
+        "p",
+        **{
+            name: value for name, value in fields.items() if value is not None or name == "rotation"
+        },
+    )
+
+
+def at_guess(problem, delta=0.1):
+    """The full program near the member nearest to the guess, its variables there, and the reduced
+    program with its parameters."""
+    space, v = space_near(problem, problem.guess)
+    reduced = ReducedProgram(space, delta)
+    reduced.place_rows(v)
+    full = full_program(space.control, space.member(v))
+    return full, full.feasible(space.full_parameters(v), delta), reduced, v
+
+
+def rows(full, x, delta=0.1):
+    return np.array(full.nlp.functions["jac_g"](x, delta / RADIANS)[0]).ravel()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_it_has_the_value_and_the_rows_of_the_reduced_program(case):
+    """Every equation holds at a gait in balance, but those that the gait has to be found for."""
+    full, x, reduced, v = at_guess(stated(case))
+    value = float(full.nlp.functions["grad_f"](x, 0.1 / RADIANS)[0])
+    assert value == pytest.approx(reduced.objective(v), rel=1e-9)
+    g = rows(full, x)
+    equations = full.row_lower == full.row_upper
+    for name, group in full.groups.items():
+        if name not in ("rotation", "across"):
+            of_group = equations[group]
+            off = (g[group] - full.row_lower[group])[of_group]
+            assert np.abs(off).max(initial=0.0) < 1e-9, name
+    if AT_LEAST in full.groups:
+        number = len(full.control.aims.at_least)
+        start = reduced.row_lower.size - reduced.constraints.lower.size - number
+        np.testing.assert_allclose(
+            g[full.groups[AT_LEAST]], reduced.rows(v)[start : start + number], atol=1e-9
+        )
+    if ACTUATORS in full.groups:
+        share, point = reduced.actuators.placed
+        shares = g[full.groups[ACTUATORS]].reshape(-1, len(full.control.actuators.names))
+        assert share.size > 4
+        np.testing.assert_allclose(
+            shares[point, share], reduced.actuators.values(v, 0.1), atol=1e-9
+        )
+    on_rows = reduced.rows(v)[reduced.row_lower.size - reduced.constraints.lower.size :]
+    start = 0
+    for name, cells in reduced.constraints.kinds.items():
+        np.testing.assert_allclose(
+            g[full.groups[name]], on_rows[start : start + cells.size], atol=1e-9, err_msg=name
+        )
+        start += cells.size
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_jacobian_and_hessian_are_differences_of_its_rows(case):
+    full, x, *_ = at_guess(stated(case, intervals=6), 0.3)
+    assert_derivatives_are_differences(full.nlp, x, 0.3 / RADIANS, 3e-5)
+
+
+@pytest.mark.parametrize("name", ["radau-2", "trapezoid", "hermite-simpson"])
+@pytest.mark.parametrize("case", ["symmetric", "antipodal", "velocity map"])
+def test_a_gait_in_balance_satisfies_every_equation_on_any_scheme(case, name):
+    full, x, *_ = at_guess(stated(case, scheme=name, intervals=12))
+    g = rows(full, x)
+    outside = np.maximum(full.row_lower - g, g - full.row_upper)
+    rotation = full.groups.get("rotation", slice(0, 0))
+    outside[rotation] = 0.0
+    assert outside[full.row_lower == full.row_upper].max() < 1e-9
+
+
+@pytest.mark.parametrize("case", ["lying", "feet, wheels and pads", "uphill"])
+def test_moments_at_the_joints_are_those_that_the_power_of_single_joints_says(case):
+    """Two statements that share nothing: recursion along the chain, and virtual work."""
+    full, x, *_ = at_guess(stated(case))
+    body, law, regime, *_ = full.control.dynamics
+    gait, t = full.member(x), full.mesh.times
+    q, r = gait.angles(t), gait.rates(t) / RADIANS
+    law = law.in_speeds_of(RADIANS)
+    z, theta = full.layout.tail_velocity(body, x), x[full.layout.directions[:1]]
+    forces = body.forces(law, q, r, z, 0.1 / RADIANS)
+    expected = joint_moments(body, law, q, forces, 0.1 / RADIANS, regime.pull(theta))
+    np.testing.assert_allclose(x[full.layout.moments], expected, atol=1e-12)
+
+
+def test_half_a_period_with_a_symmetry_gives_the_same_efficiency_as_the_whole():
+    values = []
+    for symmetry, intervals in (("none", 80), ("bilateral", 40), ("antipodal", 40)):
+        problem = Problem(
+            "p", ellipse(0, 1.5, 0.8), gait=Harmonic(1, symmetry), intervals=intervals
+        )
+        full, x, *_ = at_guess(problem, 0.05)
+        values.append(float(full.nlp.functions["grad_f"](x, 0.05 / RADIANS)[0]))
+    np.testing.assert_allclose(values, values[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "order"), [("trapezoid", 2), ("hermite-simpson", 4), ("gauss-2", 4), ("radau-2", 3)]
+)
+def test_schemes_converge_at_their_order_away_from_stick(name, order):
+    def efficiency(scheme, intervals):
+        gait = Harmonic(1, "bilateral")
+        problem = Problem(
+            "p", ellipse(0.2, 1.1, 0.7), gait=gait, scheme=scheme, intervals=intervals
+        )
+        full, x, *_ = at_guess(problem, 5.0)
+        return -float(full.nlp.functions["grad_f"](x, 5.0 / RADIANS)[0])
+
+    reference = efficiency("gauss-6", 30)
+    coarse, fine = (abs(efficiency(name, n) - reference) for n in (12, 24))
+    assert abs(np.log2(coarse / fine) - order) < 0.5
+    assert fine < 1e-3 * reference
+
+
+@pytest.mark.parametrize("case", ["lying", "symmetric", "antipodal", "inertia", "uphill", "modes"])
+def test_no_equation_is_redundant(case):
+    full, x, *_ = at_guess(stated(case, intervals=6))
+    jacobian = np.array(ca.DM(full.nlp.functions["jac_g"](x, 0.1 / RADIANS)[1]))
+    equations = jacobian[full.row_lower == full.row_upper][:, full.lower < full.upper]
+    singular = np.linalg.svd(equations, compute_uv=False)
+    assert singular.min() > 1e-6 * singular.max()
+
+
+def test_a_symmetry_closes_the_rotation_without_a_row():
+    names = {
+        symmetry: program_of(stated("symmetric", gait=Harmonic(1, symmetry))).groups
+        for symmetry in ("none", "bilateral", "antipodal")
+    }
+    assert {name for name, groups in names.items() if "rotation" in groups} == {"none", "antipodal"}
+
+
+def test_functions_grow_neither_with_the_mesh_nor_with_the_links():
+    """One function of a link, one of a contact, whatever their numbers: lengths are given."""
+
+    def sizes(links, intervals):
+        lengths = np.linspace(1.0, 2.0, links)
+        parts = (*(lengths / lengths.sum())[:-1],)
+        body = Chain((*parts, 1.0 - sum(parts)))
+        guess = Fourier(np.zeros(links - 1), np.full((links - 1, 1), 0.3), np.zeros((links - 1, 1)))
+        full = program_of(Problem("p", guess, body, gait=Harmonic(1), intervals=intervals))
+        return sorted(
+            ca.Function("f", [each.local, each.given, each.delta], [each.out]).n_instructions()
+            for each in full.repeated
+            if each.n_instance > 3 * intervals
+        )
+
+    assert sizes(3, 6) == sizes(3, 20) == sizes(9, 6)
+    assert max(sizes(3, 6)) < 300
+
+
+@pytest.mark.parametrize(
+    ("links", "formulation", "jacobian", "hessian"),
+    [(3, "full", 620, 300), (6, "full", 1300, 600), (3, "implicit velocity", 170, 85)],
+)
+def test_nonzeros_grow_by_so_many_for_every_interval(links, formulation, jacobian, hessian):
+    """Half a period, three points an interval: sparsity is what keeps a solve linear in the
+    mesh."""
+    counts = []
+    for intervals in (20, 40):
+        problem = Problem(
+            "p",
+            body=Chain((1 / links,) * links),
+            gait=Harmonic(1, "antipodal"),
+            intervals=intervals,
+            formulation=formulation,
+        )
+        functions = program_of(problem).nlp.functions
+        counts.append((functions["jac_g"].nnz_out(1), functions["hess_lag"].nnz_out(0)))
+    growth = np.diff(counts, axis=0)[0] / 20
+    assert growth[0] <= jacobian
+    assert growth[1] <= hessian
+
+
+def test_limits_of_the_shape_are_rows_where_they_may_bind_and_follow_the_gait():
+    problem = stated("symmetric", joint_limit=1.8, guess=ellipse(0.0, 1.55, 0.8))
+    full, x, *_ = at_guess(problem)
+    assert 0 < full.cells["joint 1"].size < full.mesh.n
+    parameters = 0.8 * x[full.layout.parameters[:, 0]]
+    moved, y = full.moved_to(full.feasible(parameters, 0.1))
+    assert moved.cells["joint 1"].size < full.cells["joint 1"].size
+    np.testing.assert_allclose(y, moved.feasible(parameters, 0.1), atol=1e-12)
+
+
+def test_ipopt_finds_from_the_guess_what_it_confirms():
+    """On one mesh at one delta, with the literal program alone."""
+    problem = stated("symmetric", gait=Harmonic(1, "bilateral"), intervals=12)
+    full, x, *_ = at_guess(problem)
+    full, first = solve_in_regions(full, x, 0.1, 0.5)
+    assert first.optimal
+    again = Solver(full).solve_within(first.x, 0.1, (first.lam_x, first.lam_g), 0.01)
+    assert again.optimal
+    assert again.objective == pytest.approx(first.objective, rel=1e-9)
