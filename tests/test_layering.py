@@ -25,7 +25,7 @@ ONLY = {
     "matplotlib": {"pictures"},
     "jinja2": {"pictures"},
     "h5py": {"system", "results", "studies"},
-    "casadi": {"numerics", "motion", "collocation", "reduced", "search"},
+    "casadi": {"numerics", "motion", "transcription", "reduced", "search"},
 }
 
 
@@ -198,7 +198,7 @@ def test_the_engine_takes_no_problem_apart():
     """`colloc.gaits.control_problem` does that once; motions, programs and errors of meshes are
     made from its parts."""
     for name, path in modules().items():
-        if name.partition(".")[0] in ("motion", "verification", "collocation", "reduced"):
+        if name.partition(".")[0] in ("motion", "verification", "transcription", "reduced"):
             assert "colloc.gaits.problem" not in set(imported(path)), name
             assert not re.search(
                 r"\.problem\b", path.read_text(encoding="utf-8").replace("colloc.gaits.problem", "")
@@ -233,7 +233,7 @@ def test_a_protocol_has_few_members():
 
 
 COLLOCATED = re.compile(
-    r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|collocation|reduced|search)\b"
+    r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|transcription|reduced|search)\b"
 )
 ADAPTIVE = (
     "played",

@@ -98,7 +98,7 @@ class Problem:
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"full", "implicit velocity"}
-        The nonlinear program whose solution is the answer, see `collocation.point_equations`: with
+        The nonlinear program whose solution is the answer (`colloc.transcription.full_program`): with
         tail velocities and link forces as variables and the balance as constraints, or with the
         velocities tied to those of the balance solver. The first is usual for chains; of smooth
         bodies there is only the second.

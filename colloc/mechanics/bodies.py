@@ -28,7 +28,7 @@ from colloc.numerics.arrays import Array
 from colloc.system.errors import ProblemError
 
 FULL, IMPLICIT = FORMULATIONS = ("full", "implicit velocity")
-"""Nonlinear programs, see `colloc.collocation.point_equations`: with tail velocities and link
+"""Nonlinear programs, see `colloc.transcription.full_program`: with tail velocities and link
 forces as variables and the balance as constraints, or with the velocities tied to those of the
 balance solver."""
 ARROWS = 12

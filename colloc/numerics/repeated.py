@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -67,6 +68,66 @@ class Repeated:
         frame = ca.vertcat(ca.SX.eye(self.local.shape[0]), slope)
         hessian = frame.T @ ca.substitute(inner, nu, at_nu) @ frame
         return weight, ca.jacobian(self.out, self.local) + by_row @ slope, hessian
+
+
+class Rows:
+    """Rows of a program, by name, as sparse matrices over ``[x; y; 1]``, y the outputs of repeated
+    functions."""
+
+    def __init__(self, n: int) -> None:
+        self.n, self.width = n, n
+        self.repeated: list[Repeated] = []
+        self.rows: list[sparse.csr_matrix] = []
+        self.lower: list[np.ndarray] = []
+        self.upper: list[np.ndarray] = []
+        self.groups: dict[str, slice] = {}
+        self._m = 0
+
+    def repeat(
+        self,
+        local: ca.SX,
+        out: ca.SX,
+        gather: np.ndarray,
+        given: ca.SX | None = None,
+        values: np.ndarray | None = None,
+        *,
+        delta: ca.SX,
+        implicit: tuple | None = None,
+    ) -> np.ndarray:
+        """Where the outputs ``(n_out, n_instance)`` of a function at many instances are; see
+        `Repeated`."""
+        given = ca.SX(0, 1) if given is None else given
+        values = np.empty((0, gather.shape[1])) if values is None else values
+        repeated = Repeated(local, given, delta, out, gather, values, implicit)
+        self.repeated.append(repeated)
+        places = self.width + np.arange(repeated.n_out).reshape(gather.shape[1], -1).T
+        self.width += repeated.n_out
+        return places
+
+    def close(self) -> None:
+        """No function is added from here on."""
+        self.width += 1
+
+    def pick(self, places: np.ndarray) -> sparse.csr_matrix:
+        """Variables or outputs, one below the other, as rows."""
+        places = np.asarray(places).ravel()
+        entries = np.ones(places.size), (np.arange(places.size), places)
+        return sparse.csr_matrix(entries, shape=(places.size, self.width))
+
+    def constant(self, values: np.ndarray) -> sparse.csr_matrix:
+        """Numbers ``(n_row,)`` as rows."""
+        last = np.full(values.size, self.width - 1)
+        entries = values, (np.arange(values.size), last)
+        return sparse.csr_matrix(entries, shape=(values.size, self.width))
+
+    def add(self, name: str, rows: sparse.spmatrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
+        """``lower <= rows <= upper``; by default the rows vanish."""
+        m = rows.shape[0]
+        self.rows.append(sparse.csr_matrix(rows))
+        self.lower.append(np.zeros(m) + lower)
+        self.upper.append(np.zeros(m) + upper)
+        self.groups[name] = slice(self._m, self._m + m)
+        self._m += m
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,7 +41,7 @@ class SearchSpace(Shapes, Protocol):
         them as it goes."""
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        """The parameters as the full program has them (see `colloc.collocation.layout`)."""
+        """The parameters as the full program has them (see `colloc.transcription.layout`)."""
 
     def phase_mesh(self, gait: AnyGait) -> Mesh:
         """The mesh in phases of a member."""

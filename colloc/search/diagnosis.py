@@ -67,10 +67,10 @@ def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
         return "the law of friction", _phase(mesh, index)
     if count % mesh.n_point == 0:  # rows of points, part by part
         return _EQUATIONS.get(name, f"the {name}"), _phase(mesh, index)
-    what = {"orientation": "the rotation between nodes"} | {
+    between = {"orientation": "the rotation between nodes"} | {
         way: f"the {way} gained over an interval" for way in ("distance", "work")
     }
-    return what.get(name, f"the {name}"), float(mesh.edges[index * mesh.n // count])
+    return between.get(name, f"the {name}"), float(mesh.edges[index * mesh.n // count])
 
 
 def _phase(mesh: Mesh, index: int) -> float:

@@ -34,7 +34,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 import numpy as np
@@ -45,6 +45,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import widest
 from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL, Pairs
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.inertia import STATES, turning
 from colloc.mechanics.line_integrals import line_integrals
@@ -52,12 +53,11 @@ from colloc.mechanics.link_friction import LinkForce
 from colloc.motion.heading import closing_sign, momenta_image
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.repeated import Nlp, Repeated, nonlinear_program
+from colloc.numerics.repeated import Nlp, Repeated, Rows, nonlinear_program
 from colloc.transcription.layout import RADIANS, Layout, layout_of
-from colloc.transcription.shape_checks import shape_checks
+from colloc.transcription.shape_limits import ShapeLimits
 from colloc.transcription.velocity_map import BalancedVelocity, velocity_map
 from colloc.transcription.warm_start import balanced_variables
-from colloc.transcription.worst_instants import held_shares, near_peaks
 
 ACTUATORS, AT_LEAST, SHAPE_SPEED = "actuators", "at least", "shape speed"
 """Rows of what actuators can do, of what has to be reached, and of the mean square shape speed."""
@@ -172,8 +172,8 @@ def full_program(
     gaits, n_joint, fraction = admissible.gait, admissible.n_joint, admissible.gait.fraction
     turn = control.dynamics.turn
     p = layout.parameters[:, 0]
-    limits = _ShapeLimits(control, mesh, layout, gait, far)
-    program = _Rows(layout.n + limits.n_bend)
+    limits = ShapeLimits(control, mesh, layout, gait, far)
+    program = Rows(layout.n + limits.n_bend)
 
     # the motion: link by link, or by the velocity map
     lifted = control.formulation == FULL
@@ -243,69 +243,9 @@ def full_program(
         lower[total[0, 0]] = upper[total[0, 0]] = 0.0
     return FullProgram(
         control, mesh, gait, far, layout, program.groups, cells, lower, upper,
-        *map(np.concatenate, (program.lower, program.upper)), tuple(program.repeated),
+        np.concatenate(program.lower), np.concatenate(program.upper), tuple(program.repeated),
         sparse.vstack(program.rows).tocsr(), -pick(of_period[0]), limits.bends, motion.velocity,
     )  # fmt: skip
-
-
-class _Rows:
-    """Rows of a program, by name, as sparse matrices over ``[x; y; 1]``, y the outputs of repeated
-    functions."""
-
-    def __init__(self, n: int) -> None:
-        self.n, self.width = n, n
-        self.repeated: list[Repeated] = []
-        self.rows: list[sparse.csr_matrix] = []
-        self.lower: list[np.ndarray] = []
-        self.upper: list[np.ndarray] = []
-        self.groups: dict[str, slice] = {}
-        self._m = 0
-
-    def repeat(
-        self,
-        local: ca.SX,
-        out: ca.SX,
-        gather: np.ndarray,
-        given: ca.SX | None = None,
-        values: np.ndarray | None = None,
-        *,
-        delta: ca.SX,
-        implicit: tuple | None = None,
-    ) -> np.ndarray:
-        """Where the outputs ``(n_out, n_instance)`` of a function at many instances are; see
-        `Repeated`."""
-        given = ca.SX(0, 1) if given is None else given
-        values = np.empty((0, gather.shape[1])) if values is None else values
-        repeated = Repeated(local, given, delta, out, gather, values, implicit)
-        self.repeated.append(repeated)
-        places = self.width + np.arange(repeated.n_out).reshape(gather.shape[1], -1).T
-        self.width += repeated.n_out
-        return places
-
-    def close(self) -> None:
-        """No function is added from here on."""
-        self.width += 1
-
-    def pick(self, places: np.ndarray) -> sparse.csr_matrix:
-        """Variables or outputs, one below the other, as rows."""
-        places = np.asarray(places).ravel()
-        entries = np.ones(places.size), (np.arange(places.size), places)
-        return sparse.csr_matrix(entries, shape=(places.size, self.width))
-
-    def constant(self, values: np.ndarray) -> sparse.csr_matrix:
-        """Numbers ``(n_row,)`` as rows."""
-        last = np.full(values.size, self.width - 1)
-        entries = values, (np.arange(values.size), last)
-        return sparse.csr_matrix(entries, shape=(values.size, self.width))
-
-    def add(self, name: str, rows: sparse.spmatrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
-        """``lower <= rows <= upper``; by default the rows vanish."""
-        m = rows.shape[0]
-        self.rows.append(sparse.csr_matrix(rows))
-        self.lower.append(np.zeros(m) + lower)
-        self.upper.append(np.zeros(m) + upper)
-        self.groups[name] = slice(self._m, self._m + m)
-        self._m += m
 
 
 class _Motion:
@@ -313,7 +253,7 @@ class _Motion:
 
     velocity: BalancedVelocity | None = None
 
-    def __init__(self, program: _Rows, control: ControlProblem, mesh: Mesh, layout: Layout) -> None:
+    def __init__(self, program: Rows, control: ControlProblem, mesh: Mesh, layout: Layout) -> None:
         self.program, self.control, self.mesh, self.layout = program, control, mesh, layout
         self.dynamics = control.dynamics.in_speeds_of(RADIANS)
         self.sites = np.empty(mesh.n_point, dtype=int)
@@ -381,18 +321,18 @@ class _Links(_Motion):
     """A chain, link by link."""
 
     def functions(self) -> None:
-        layout, body = self.layout, self.dynamics.body
-        n_link, inertial = body.n_link, bool(layout.momenta.size)  # type: ignore[attr-defined]
+        self.chain = cast(Chain, self.dynamics.body)
+        inertial = bool(self.layout.momenta.size)
         self.halves = self._halves(inertial)
         self.contacts = [(group.rows, self._contact(group, inertial)) for group in self._groups()]
-        joint = np.arange(n_link - 1)
+        joint = np.arange(self.chain.n_joint)
         if inertial:
             self.swing, self.change = self._swing(), self._change()
         else:
             self.levers = [self._lever(joint, joint + side) for side in (0, 1)]
 
     def _groups(self) -> list[Any]:
-        return self.dynamics.body.contact.groups(self.dynamics.law)  # type: ignore[attr-defined]
+        return self.chain.contact.groups(self.dynamics.law)
 
     def _instances(self, rows: Sequence[np.ndarray], parts: Any) -> np.ndarray:
         """Where local variables are, ``(n_local, n_part * n_point)``, part by part."""
@@ -414,8 +354,8 @@ class _Links(_Motion):
 
     def _halves(self, inertial: bool) -> np.ndarray:
         """l/2 w sin phi, l/2 w cos phi; with inertia l/2 cos phi, l/2 sin phi, too."""
-        body, local = self.dynamics.body, ca.SX.sym("link", 2)
-        (length,), given, values = self._given(length=body.length_column())  # type: ignore[attr-defined]
+        local = ca.SX.sym("link", 2)
+        (length,), given, values = self._given(length=self.chain.length_column())
         phi, w = ca.vertsplit(local)
         half = 0.5 * length * ca.vertcat(ca.sin(phi), ca.cos(phi))
         out = ca.vertcat(half * w, half[[1, 0]]) if inertial else half * w
@@ -426,7 +366,7 @@ class _Links(_Motion):
         """Of parts under one law: laws of friction, scaled like velocities, force in the axes of
         the plane, moment about the link's midpoint, or with inertia about the centre of mass, and
         power."""
-        layout, contact = self.layout, self.dynamics.body.contact  # type: ignore[attr-defined]
+        layout, contact = self.layout, self.chain.contact
         law, rows, links = group.law, group.rows, np.array(contact.links)[group.rows]
         (along, offset, cos, sin, length, pressure), given, values = self._given(
             along=contact.along[rows],
@@ -471,7 +411,7 @@ class _Links(_Motion):
     def _lever(self, joint: np.ndarray, link: np.ndarray) -> np.ndarray:
         """l/2 e x N of the forces at joints on one of their links."""
         layout, local = self.layout, ca.SX.sym("joint", 3)
-        lengths = self.dynamics.body.length_column()[link]  # type: ignore[attr-defined]
+        lengths = self.chain.length_column()[link]
         (length,), given, values = self._given(length=lengths)
         phi, nx, ny = ca.vertsplit(local)
         gather = np.concatenate(
@@ -485,10 +425,10 @@ class _Links(_Motion):
 
     def _swing(self) -> np.ndarray:
         """J w + m x cross v of every link."""
-        layout, body, local = self.layout, self.dynamics.body, ca.SX.sym("link", 5)
+        layout, local = self.layout, ca.SX.sym("link", 5)
         (mass, inertia), given, values = self._given(
-            mass=body.mass_column(),  # type: ignore[attr-defined]
-            inertia=body.inertia_column(),  # type: ignore[attr-defined]
+            mass=self.chain.mass_column(),
+            inertia=self.chain.inertia_column(),
         )
         w, vx, vy, x, y = ca.vertsplit(local)
         rows = [layout.spins, layout.vx, layout.vy, layout.x, layout.y]
@@ -521,7 +461,7 @@ class _Links(_Motion):
         return self.program.repeat(local, out, gather, delta=self.delta)
 
     def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
-        layout, n = self.layout, self.dynamics.body.n_joint
+        layout, n = self.layout, self.chain.n_joint
         rows = [layout.directions, layout.spins, *([layout.moments] if with_moments else [])]
         gather = np.concatenate(rows)
         local = ca.SX.sym("point", gather.shape[0])
@@ -530,8 +470,8 @@ class _Links(_Motion):
 
     def _on_links(self, output: int) -> sparse.csr_matrix:
         """The sum over the contacts of each link of one of their outputs."""
-        n_link = self.dynamics.body.n_link  # type: ignore[attr-defined]
-        links, total = np.array(self.dynamics.body.contact.links), 0  # type: ignore[attr-defined]
+        n_link = self.chain.n_link
+        links, total = np.array(self.chain.contact.links), 0
         for rows, outputs in self.contacts:
             to_links = 1.0 * (links[rows] == np.arange(n_link)[:, None])
             total = total + self.spread(to_links) @ self.program.pick(outputs[output])
@@ -539,8 +479,7 @@ class _Links(_Motion):
 
     def add_rows(self, state: Any, rate: Any) -> None:
         program, layout, pick = self.program, self.layout, self.program.pick
-        body = self.dynamics.body
-        n_link = body.n_link  # type: ignore[attr-defined]
+        n_link = self.chain.n_link
         p, theta = pick(layout.parameters), pick(layout.theta[0, self.sites])
         phi, w, vx, vy = map(pick, (layout.directions, layout.spins, layout.vx, layout.vy))
         diff = np.diff(np.eye(n_link), axis=0)
@@ -555,7 +494,7 @@ class _Links(_Motion):
         for k, (_, outputs) in enumerate(self.contacts):
             program.add(f"force law {k + 1}", pick(outputs[4:]))
         pull = self.dynamics.regime.pull(np.zeros((1, 1)))
-        weight = np.repeat(body.mass_column(), self.mesh.n_point)  # type: ignore[attr-defined]
+        weight = np.repeat(self.chain.mass_column(), self.mesh.n_point)
         self.pull = np.zeros(2) if pull is None else pull[:, 0]
         loads = [self._on_links(k) + program.constant(weight * self.pull[k]) for k in range(2)]
         moment = self._on_links(2)
@@ -576,9 +515,8 @@ class _Links(_Motion):
         self, loads: list[sparse.csr_matrix], moment: sparse.csr_matrix, state: Any, rate: Any
     ) -> None:
         program, layout, pick = self.program, self.layout, self.program.pick
-        body = self.dynamics.body
-        n_link = body.n_link  # type: ignore[attr-defined]
-        mass, every = self.spread(body.mass_column().T), self.of_points(n_link)  # type: ignore[attr-defined]
+        n_link = self.chain.n_link
+        mass, every = self.spread(self.chain.mass_column().T), self.of_points(n_link)
         diff = np.diff(np.eye(n_link), axis=0)
         d, both = self.spread(diff), self.spread(np.abs(diff))
         for axis, place, half in (("x", layout.x, 2), ("y", layout.y, 3)):
@@ -603,11 +541,11 @@ class _Links(_Motion):
 
     def ways(self) -> tuple[Any, Any, Any]:
         """Velocities of the centre of mass ahead and aside, and power, at every point."""
-        pick, layout, body = self.program.pick, self.layout, self.dynamics.body
-        mass, angle = self.spread(body.mass_column().T), self.dynamics.regime.ahead  # type: ignore[attr-defined]
+        pick, layout = self.program.pick, self.layout
+        mass, angle = self.spread(self.chain.mass_column().T), self.dynamics.regime.ahead
         vx, vy = mass @ pick(layout.vx), mass @ pick(layout.vy)
         c, s = np.cos(angle), np.sin(angle)
-        power = self.of_points(body.n_link) @ self._on_links(3)  # type: ignore[attr-defined]
+        power = self.of_points(self.chain.n_link) @ self._on_links(3)
         climb = self.pull[0] * vx + self.pull[1] * vy
         return c * vx + s * vy, c * vy - s * vx, power - climb
 
@@ -639,63 +577,4 @@ class _Mapped(_Motion):
         self.add_orientation(layout.z[2], state, rate)
 
     def ways(self) -> tuple[Any, Any, Any]:
-        return tuple(self.program.pick(self.point[k]) for k in (3, 4, 5))  # type: ignore[return-value]
-
-
-class _ShapeLimits:
-    """Shape checks of a program, at the worst instants of a gait in the cells in which they may
-    bind. Those that are linear are rows in p; others are functions of the angles between their
-    links, which are variables."""
-
-    def __init__(
-        self, control: ControlProblem, mesh: Mesh, layout: Layout, gait: AnyGait, far: Pairs
-    ) -> None:
-        admissible = control.admissible
-        checks = shape_checks(admissible.body, far, admissible.largest_speeds)
-        peaks = near_peaks(gait, mesh, checks, admissible.joint_limit)
-        self.limit, self.p = admissible.joint_limit, layout.parameters[:, 0]
-        self.placed, bends, start = [], [], layout.n
-        for check, (cells, times) in zip(checks, peaks, strict=True):
-            matrix = check.matrix(admissible.gait, times, admissible.n_joint)
-            joints = check.joints
-            places = np.empty((0, times.size), dtype=int)
-            if not check.linear and times.size:
-                places = start + np.arange(joints.size * times.size).reshape(-1, times.size)
-                bends.append(matrix[:, joints].transpose(1, 0, 2).reshape(-1, self.p.size))
-                start += places.size
-            self.placed.append((check, cells, held_shares(check, gait, times), matrix, places))
-        self.n_bend = start - layout.n
-        self.first = layout.n
-        self.bends = sparse.csr_matrix(np.concatenate([np.empty((0, self.p.size)), *bends]))
-
-    def repeat(self, program: _Rows) -> dict[str, np.ndarray]:
-        """Where the values of the checks that are not linear are, by their names."""
-        delta, share, found = ca.SX.sym("delta"), ca.SX.sym("share"), {}
-        for check, _, shares, _, places in self.placed:
-            if places.size:
-                local = ca.SX.sym("bend", check.joints.size)
-                angles = ca.SX.zeros(check.n_joint)
-                angles[check.joints.tolist()] = local
-                out = check.cut(angles, share)
-                found[check.name] = program.repeat(
-                    local, out, places, share, shares[None], delta=delta
-                )
-        return found
-
-    def add_rows(self, program: _Rows, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Cells in which each check has its rows, by its name."""
-        pick, cells = program.pick, {}
-        if self.n_bend:
-            bends = pick(self.first + np.arange(self.n_bend))
-            program.add("bends", bends - self.bends @ pick(self.p))
-        for check, where, shares, matrix, _ in self.placed:
-            cells[check.name] = where
-            if check.name in values:
-                rows = pick(values[check.name])
-            elif not where.size:
-                rows = pick(where)
-            else:
-                slopes = check.slopes(shares)
-                rows = sparse.csr_matrix(np.einsum("tj,tjp->tp", slopes, matrix)) @ pick(self.p)
-            program.add(check.name, rows, *check.bounds(self.limit))
-        return cells
+        return tuple(self.program.pick(self.point[k]) for k in (3, 4, 5))

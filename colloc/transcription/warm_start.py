@@ -84,7 +84,7 @@ def _lift(
     axes = np.exp(1j * theta)
     along = axes * (posture.cos + 1j * posture.sin)  # directions of the links, complex
     velocity, place = (link.vs + 1j * link.vn) * along, axes * (posture.x + 1j * posture.y)
-    friction = body.forces(law, shapes.angles, shapes.rates, z, shapes.delta)  # type: ignore[attr-defined]
+    friction = body.forces(law, shapes.angles, shapes.rates, z, shapes.delta)
     on_link = body.contact.on_links(friction)
     mass = body.mass_column()
     force = (on_link.tangential + 1j * on_link.normal) * along + mass * pull
