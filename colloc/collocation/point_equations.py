@@ -16,6 +16,7 @@ constraint. Two cures, the *formulations* of a point:
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import casadi as ca
@@ -136,12 +137,13 @@ def _map_point(body: Body, friction: Law) -> LocalFunction:
     return implicit_function("point", local, ca.SX(0, 1), solved, delta, balanced.force, out)
 
 
-def gait_check(check: ShapeCheck, n_joint: int, n_parameter: int) -> LocalFunction:
-    """A shape check as a function of gait parameters; given: the gait's angle matrix, by columns,
-    and the share of the cut."""
+def gait_check(check: ShapeCheck, offset: np.ndarray, n_parameter: int) -> LocalFunction:
+    """A shape check as a function of gait parameters, of shapes with an offset ``(n_joint, 1)``;
+    given: the gait's angle matrix, by columns, and the share of the cut."""
+    n_joint = len(offset)
     p = ca.SX.sym("p", n_parameter)
     matrix, share = ca.SX.sym("Phi", n_joint * n_parameter), ca.SX.sym("share")
-    angles = ca.reshape(matrix, n_joint, n_parameter) @ p
+    angles = ca.reshape(matrix, n_joint, n_parameter) @ p + offset
     return local_function(
         "check", p, ca.vertcat(matrix, share), ca.SX.sym("delta"), check.cut(angles, share)
     )
@@ -174,7 +176,8 @@ def density_point(quantity: Quantity, dynamics: Dynamics, unit: float) -> LocalF
     the locals of `with_forces`, per period divided by `unit`."""
     theta, angles, rates, _, delta = _symbols(dynamics.body)
     if not quantity.needs_forces:
-        out = quantity.at(Instants(dynamics.body, dynamics.law, angles, rates, delta, unit=unit))
+        now = Instants(dynamics.body, dynamics.law, angles, rates, delta, unit=unit)
+        out = quantity.at(replace(now, joint_map=dynamics.joint_map))
         return local_function(quantity.name, ca.vertcat(angles, rates), ca.SX(0, 1), delta, out)
     local, now = with_forces(dynamics, theta, angles, rates, delta, unit)
     return local_function(quantity.name, local, ca.SX(0, 1), delta, quantity.at(now))
@@ -187,7 +190,10 @@ def with_forces(
     instant as formulas see it."""
     body, law = dynamics.body, dynamics.law
     forces, load = ca.SX.sym("forces", len(body.force_names)), dynamics.regime.pull(theta)
-    now = Instants(body, law, angles, rates, delta, forces=forces, unit=unit, load=load)
+    now = Instants(
+        body, law, angles, rates, delta, forces=forces, unit=unit, load=load,
+        joint_map=dynamics.joint_map,
+    )  # fmt: skip
     return ca.vertcat(theta, angles, rates, forces), now
 
 

@@ -94,7 +94,8 @@ def transcribe(
     moved = dynamics.in_speeds_of(RADIANS)
     body, friction = moved.body, moved.law
     gait, n_joint = admissible.gait, body.n_joint
-    series = _Series(admissible, mesh, shape_checks(body, far, admissible.largest_speeds))
+    checks = shape_checks(body, far, admissible.largest_speeds, dynamics.joint_map)
+    series = _Series(admissible, mesh, checks)
     point = point_function(control.formulation, body, friction, dynamics.regime, RADIANS)
     n_parameter = layout.parameters.shape[0]
 
@@ -107,7 +108,7 @@ def transcribe(
     )
     blocks = {"point": (point, np.concatenate([own, paces]), none)}
     for check in series.checks:
-        function = gait_check(check, n_joint, n_parameter)
+        function = gait_check(check, check.offset(gait, n_joint), n_parameter)
         middles = np.vstack(
             [
                 series.placed(check, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]), mesh),
@@ -129,6 +130,7 @@ def transcribe(
             layout.parameters,
             gait.angle_matrix(mesh.times, n_joint),
             layout.n,
+            np.tile(gait.offset(n_joint)[:, 0], mesh.n_point),
         ),
         gait_group("rates", layout.rates, layout.parameters, rates, layout.n),
         *_point_groups(control, point.n_out, mesh, layout),

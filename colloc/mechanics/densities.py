@@ -18,6 +18,7 @@ import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.expression import FUNCTIONS, Formula, formula
@@ -61,6 +62,8 @@ class Instants:
     unit : float
     load : (2, n_time), optional
         An outside force on its centre of mass, in its axes.
+    joint_map : JointMap, optional
+        Where joints hang on fewer motors: formulas then speak of these.
     """
 
     body: Body
@@ -72,6 +75,7 @@ class Instants:
     forces: Array = None
     unit: float = 1.0
     load: Array = None
+    joint_map: JointMap | None = None
 
     def chosen(self, which: np.ndarray) -> Instants:
         """Some of them."""
@@ -84,18 +88,20 @@ class Instants:
 
     @property
     def angle(self) -> Array:
-        return self.angles
+        return self.joint_map.motor_angles(self.angles) if self.joint_map else self.angles
 
     @property
     def rate(self) -> Array:
-        return self.unit * self.rates
+        rates = self.joint_map.motor_rates(self.rates) if self.joint_map else self.rates
+        return self.unit * rates
 
     @cached_property
     def moment(self) -> Array:
         body, friction, forces = self.body, self.friction, self.forces
         if forces is None:
             forces = body.forces(friction, self.angles, self.rates, self.z, self.delta)
-        return joint_moments(body, friction, self.angles, forces, self.delta, self.load)
+        moments = joint_moments(body, friction, self.angles, forces, self.delta, self.load)
+        return self.joint_map.motor_moments(moments) if self.joint_map else moments
 
     @property
     def power(self) -> Array:

@@ -62,17 +62,24 @@ def equalities(
 
 
 def gait_group(
-    name: str, variables: np.ndarray, parameters: np.ndarray, matrix: np.ndarray, n: int
+    name: str,
+    variables: np.ndarray,
+    parameters: np.ndarray,
+    matrix: np.ndarray,
+    n: int,
+    given: np.ndarray | float = 0.0,
 ) -> Group:
-    """``variables - matrix p = 0`` at every point, for variables ``(n_shape, n_point)`` that are
-    linear in a gait's p.
+    """``variables - matrix p = given`` at every point, for variables ``(n_shape, n_point)`` that
+    are linear in a gait's p.
 
     `variables` and `parameters` are index arrays; the matrix is ``(n_point, n_shape,
     n_parameter)``.
     """
     rows = sparse.csr_matrix(matrix.reshape(-1, matrix.shape[-1]))
     return equalities(
-        name, selector(variables.ravel(order="F"), n) - rows @ selector(parameters[:, 0], n)
+        name,
+        selector(variables.ravel(order="F"), n) - rows @ selector(parameters[:, 0], n),
+        given=given,
     )
 
 
