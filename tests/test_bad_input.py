@@ -41,7 +41,7 @@ NEEDED = {
     },
     "Axis": {"name": "mu_t", "values": (1, 2)},
     "Basis": {"columns": (np.sin(np.arange(64) * np.pi / 32),)},
-    "Corners": {"corners": np.array([[1, 0, -1.0], [0, 1, 0]])}, "Coupled": {"chain": Chain(),
+    "Corners": {"corners": np.array([[1, 0, -1.0], [0, 1, 0]])}, "Coupled": {
     "gears": ((1.0,), (1.0,))},
     "Foot": {"link": 0}, "Fourier": {"mean": [0, 0], "cos": [[1.0], [0]], "sin": [[0], [1.0]]},
     "Pad": {"link": 0},

@@ -26,6 +26,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.regime import Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimits, Quantity
+from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
@@ -42,6 +43,7 @@ class Dynamics(NamedTuple):
     turn: float = 0.0
     """By which a period is asked to turn the body [rad]: the way is seen from axes that turn evenly
     (`colloc.gaits.period`)."""
+    joint_map: JointMap | None = None
 
     def in_speeds_of(self, unit: float) -> Dynamics:
         """The same for speeds that are divided by a unit."""
@@ -172,6 +174,7 @@ def control_problem(problem: Problem) -> ControlProblem:
             regime.in_units_of(unit),
             gait.motion_symmetry,
             problem.rotation or 0.0,
+            problem.joint_map,
         ),
         Admissible(
             gait, body, problem.joint_limit, problem.largest_speeds, problem.smallest_shape_speed

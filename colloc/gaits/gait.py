@@ -8,12 +8,14 @@ where its angles are not linear in its parameters, is registered in `colloc.sear
 from __future__ import annotations
 
 import copy
+import dataclasses
 from typing import Any
 
 import numpy as np
 
 from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced, symmetric_samples
 from colloc.mechanics.inertia import GRAVITY
+from colloc.mechanics.joint_map import JointMap
 from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
 
@@ -49,6 +51,10 @@ class GaitFunction:
     (`colloc.gaits.inertia`)."""
     coordinate = "joint"
     """What the gait's body calls a shape coordinate."""
+    joint_map: JointMap | None = None
+    """Of joints that hang on fewer motors."""
+    rest: np.ndarray | float = 0.0
+    """What of the angles stays where the gait is scaled."""
 
     @property
     def n_joint(self) -> int:
@@ -65,6 +71,11 @@ class GaitFunction:
     def mapped(self, matrix: np.ndarray) -> Any:
         """The gait, or a polygon near it, with shapes multiplied by a matrix ``(m, n_joint)``."""
         raise NotImplementedError
+
+    @property
+    def driven(self) -> Any:
+        """The gait of what has motors: the gait itself, unless several joints share one."""
+        return self
 
     @property
     def mirrored(self) -> Any:
@@ -223,6 +234,10 @@ class ClassOfGaits:
                 f"gait.symmetry must be one of {', '.join(self.symmetries)}, not {self.symmetry!r}."
             )
 
+    def with_symmetry(self, symmetry: str) -> Any:
+        """The same class with another symmetry."""
+        return dataclasses.replace(self, symmetry=symmetry)  # type: ignore[type-var]
+
     def check_joints(self, n_joint: int) -> None:
         """A `ProblemError` if bodies with so many shape coordinates have no gaits of the class."""
         if self.unit_speed and n_joint < 2:
@@ -230,6 +245,10 @@ class ClassOfGaits:
                 f"the class {type(self).__name__} needs a body of at least three links, or two "
                 f"modes."
             )
+
+    def joint_map(self, n_joint: int) -> JointMap | None:
+        """The map from motors to so many joints, where several hang on one or some are stuck."""
+        return None
 
     def retraces(self, n_joint: int) -> bool:
         """Whether every member goes back the way it came, in as many shape coordinates."""

@@ -39,19 +39,22 @@ _AT_THE_BOUND = 1e-2
 although sampling cuts its corners and makes it a little shorter."""
 
 
-def largest_factor(body: Body, joint_limit: Limit, angles: np.ndarray) -> float:
-    """The largest factor by which shapes ``(n_joint, n)`` can be multiplied and stay admissible;
-    inf for straight ones."""
+def largest_factor(
+    body: Body, joint_limit: Limit, angles: np.ndarray, rest: np.ndarray | float = 0.0
+) -> float:
+    """The largest factor by which shapes ``(n_joint, n)``, but for what is at rest of them, can be
+    multiplied and stay admissible; inf for straight ones."""
+    angles = angles - rest
     stretched, joint_limit = under_one_limit(angles, joint_limit)
     peak = body.largest_angles(stretched).max()
     if peak == 0:
         return np.inf
     low, high = 0.0, joint_limit / peak
-    if not body.crossing_depth(high * angles).any():
+    if not body.crossing_depth(high * angles + rest).any():
         return high * SAFE
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        crossing = bool(body.crossing_depth(middle * angles).any())
+        crossing = bool(body.crossing_depth(middle * angles + rest).any())
         low, high = (low, middle) if crossing else (middle, high)
     return low * SAFE
 
@@ -87,7 +90,9 @@ def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
     """Of the largest speeds of the joints [rad per period], that a gait moves at; 0 where there are
     none."""
     return (
-        float((np.abs(gait.rates(_PHASES)).max(axis=1) / np.array(speeds)).max()) if speeds else 0.0
+        float((np.abs(gait.driven.rates(_PHASES)).max(axis=1) / np.array(speeds)).max())
+        if speeds
+        else 0.0
     )
 
 
@@ -101,6 +106,9 @@ def usual_guess(
     """A wave laid into a class, no joint of it faster than allowed. `ProblemError` if it hardly
     moves."""
     gait = gait_class.first_guess(travelling_wave(body, joint_limit, least=smallest_shape_speed))
+    if gait.joint_map is not None:
+        most = largest_factor(body, joint_limit, gait.angles(_PHASES), gait.rest)
+        gait = gait.scaled(min(1.0, most))
     if (share := largest_share(gait, speeds)) > 1:
         gait = gait.scaled(1 / share)
     _, rms = gait_class.guessed(gait)

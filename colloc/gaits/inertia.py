@@ -134,6 +134,11 @@ class Paced(Regime):
                 f"{problem.objective.name!r}."
             )
         checked_mass(problem.body)
+        if problem.joint_map is not None:
+            raise ProblemError(
+                "searches with inertia are for chains whose joints all have motors: leave froude "
+                "or gears and stuck joints out."
+            )
         if not problem.gait.free:
             raise ProblemError(
                 "a prescribed motion is played with inertia by colloc.inertial_motion: leave "

@@ -179,6 +179,10 @@ class LinearClass(ClassOfGaits):
             edges[0], edges[-1], max(int(_COARSE * self.fraction), 2 * self.harmonics) + 1
         )
 
+    def offset(self, n_joint: int) -> np.ndarray:
+        """Joint angles ``(n_joint, 1)`` that all members have besides."""
+        return np.zeros((n_joint, 1))
+
     def _basis(self, n_joint: int) -> np.ndarray:
         """``(n_joint * n_function, n_parameter)``: parameters to the tables that the class
         allows."""

@@ -16,7 +16,6 @@ from typing import Any
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.feet import Foot
 from colloc.mechanics.law import Law
 from colloc.system.arguments import is_number
@@ -121,20 +120,15 @@ def _with_friction_of_feet(problem: Problem, law: Law, field: str, by: float) ->
 
 
 def _chain(problem: Problem) -> Chain | None:
-    """The chain that the body is, or that its motors move; None for smooth ones."""
-    body = problem.body
-    return body.chain if isinstance(body, Coupled) else body if isinstance(body, Chain) else None
+    """The chain that the body is; None for smooth ones."""
+    return problem.body if isinstance(problem.body, Chain) else None
 
 
 def _with_chain(problem: Problem, **changes: Any) -> Problem:
     """The problem with some fields of that chain changed."""
     chain = _chain(problem)
     assert chain is not None  # whoever asks has looked
-    chain = replace(chain, **changes)
-    return _with(
-        problem,
-        body=replace(problem.body, chain=chain) if isinstance(problem.body, Coupled) else chain,
-    )
+    return _with(problem, body=replace(chain, **changes))
 
 
 def _feet(problem: Problem) -> tuple[Foot, ...]:

@@ -30,6 +30,7 @@ from colloc.mechanics.densities import (
     torque_and_power,
 )
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import (
@@ -98,8 +99,8 @@ class Problem:
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"full", "implicit velocity"}
-        The nonlinear program whose solution is the answer (`colloc.transcription.full_program`): with
-        tail velocities and link forces as variables and the balance as constraints, or with the
+        The program whose solution is the answer (`colloc.transcription.full_program`): with
+        link velocities and forces as variables and the balance as constraints, or with the
         velocities tied to those of the balance solver. The first is usual for chains; of smooth
         bodies there is only the second.
     mesh_tolerance : float
@@ -322,7 +323,7 @@ class Problem:
     def _check_actuators(self) -> None:
         for name in ("torque_limit", "power_limit", "speed_limit"):
             object.__setattr__(
-                self, name, checked_actuator_limit(name, getattr(self, name), self.body.n_joint)
+                self, name, checked_actuator_limit(name, getattr(self, name), self.n_motor)
             )
         given = self.limits if isinstance(self.limits, Iterable) else (self.limits,)
         object.__setattr__(self, "limits", tuple(stated_limit(each) for each in given))
@@ -337,7 +338,7 @@ class Problem:
                 f"{FULL!r}."
             )
         most = (
-            float(np.linalg.norm(of_each(self.speed_limit, self.body.n_joint)))
+            float(np.linalg.norm(of_each(self.speed_limit, self.n_motor)))
             if self.speed_limit
             else np.inf
         )
@@ -352,17 +353,35 @@ class Problem:
     @property
     def path_limits(self) -> PathLimits:
         """What motors can do, joint by joint, and the other `limits`."""
-        n_joint = self.body.n_joint
-        motors = torque_and_power(
-            of_each(self.torque_limit, n_joint), of_each(self.power_limit, n_joint)
-        )
-        return PathLimits((*motors, *(each.on(n_joint) for each in self.limits)))
+        n = self.n_motor
+        motors = torque_and_power(of_each(self.torque_limit, n), of_each(self.power_limit, n))
+        return PathLimits((*motors, *(each.on(n) for each in self.limits)))
 
     @property
     def largest_speeds(self) -> tuple[float, ...]:
         """Of the joints at any instant [rad per period], joint by joint; nothing where there is no
         limit."""
-        return of_each(self.speed_limit, self.body.n_joint)
+        return of_each(self.speed_limit, self.n_motor)
+
+    @property
+    def joint_map(self) -> JointMap | None:
+        """From motors to joints, where several hang on one or some are stuck."""
+        return self.gait.joint_map(self.body.n_joint)
+
+    @property
+    def n_motor(self) -> int:
+        return self.body.n_joint if self.joint_map is None else self.joint_map.n_motor
+
+    def of_motors(self, moments: np.ndarray) -> np.ndarray:
+        """Moments of the motors, from those of the joints."""
+        return moments if self.joint_map is None else self.joint_map.motor_moments(moments)
+
+    def joint_path(self, angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angles and rates of the joints, from those of the motors."""
+        joints = self.joint_map
+        if joints is None:
+            return angles, rates
+        return joints.joint_angles(angles), joints.joint_rates(rates)
 
     @property
     def law(self) -> Law:
@@ -437,6 +456,13 @@ class Problem:
     def _check_gaits(self) -> None:
         """That the body has gaits of the class."""
         check_symmetric(self)
+        if self.joint_map is not None:
+            if not isinstance(self.body, Chain):
+                raise ProblemError(
+                    f"Coupled is for the joints of a Chain, not of a {type(self.body).__name__}."
+                )
+            if self.body.crossing_depth(self.joint_map.offset).any():
+                raise ProblemError("links cross where joints are stuck.")
         self.gait.check_joints(self.body.n_joint)
         if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"

@@ -51,7 +51,7 @@ def largest_amplitude(problem: Problem, gait: AnyGait) -> float:
     """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for
     the straight body."""
     largest = largest_factor(
-        problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES)
+        problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES), gait.rest
     )
     share = largest_share(gait, problem.largest_speeds)
     return min(largest, 1 / share) if share else largest
@@ -182,7 +182,8 @@ def laid_into(
         near = near.grown(growth)
     if near is gait or not near.is_series:
         return near
-    return near.scaled(min(1.0, largest_factor(body, joint_limit, near.angles(_PERIOD))))
+    largest = largest_factor(body, joint_limit, near.angles(_PERIOD), near.rest)
+    return near.scaled(min(1.0, largest))
 
 
 def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float:

@@ -5,7 +5,7 @@ A body is described by n_joint *shape coordinates* (joint angles of a chain, amp
 of a smooth body), in axes that move with it. The *tail velocity* ``z = (u, v, omega)`` is that of
 its tail in those axes, and their rotation rate. All that lies above `mechanics` and `smooth` is
 written for a `Body`; `colloc.mechanics.chain.Chain` and `colloc.smooth.modal_body.ModalBody` are
-two; `colloc.mechanics.coupled.Coupled` shows what little a third has to say.
+two.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.expression import FUNCTIONS, Formula, formula
@@ -55,12 +56,13 @@ class Instants:
     delta
     z : (3, n_time), optional
         Tail velocities that balance the body; or
-    forces : (n_force, n_time), optional
-        Forces on its parts (`colloc.mechanics.bodies.Moved.forces`). Neither is needed where nobody
-        asks for moments.
+    moments : (n_joint, n_time), optional
+        Moments at its joints. Neither is needed where nobody asks for moments.
     unit : float
     load : (2, n_time), optional
         An outside force on its centre of mass, in its axes.
+    joint_map : JointMap, optional
+        Where joints hang on fewer motors: formulas then speak of these.
     """
 
     body: Body
@@ -69,36 +71,36 @@ class Instants:
     rates: Array
     delta: Array
     z: Array = None
-    forces: Array = None
+    moments: Array = None
     unit: float = 1.0
     load: Array = None
-    moments: Array = None
+    joint_map: JointMap | None = None
 
     def chosen(self, which: np.ndarray) -> Instants:
         """Some of them."""
         some = (
             None if row is None else row[:, which]
-            for row in (self.angles, self.rates, self.z, self.forces, self.load)
+            for row in (self.angles, self.rates, self.z, self.moments, self.load)
         )
-        angles, rates, z, forces, load = some
-        return replace(self, angles=angles, rates=rates, z=z, forces=forces, load=load)
+        angles, rates, z, moments, load = some
+        return replace(self, angles=angles, rates=rates, z=z, moments=moments, load=load)
 
     @property
     def angle(self) -> Array:
-        return self.angles
+        return self.joint_map.motor_angles(self.angles) if self.joint_map else self.angles
 
     @property
     def rate(self) -> Array:
-        return self.unit * self.rates
+        rates = self.joint_map.motor_rates(self.rates) if self.joint_map else self.rates
+        return self.unit * rates
 
     @cached_property
     def moment(self) -> Array:
-        if self.moments is not None:
-            return self.moments
-        body, friction, forces = self.body, self.friction, self.forces
-        if forces is None:
+        body, friction, moments = self.body, self.friction, self.moments
+        if moments is None:
             forces = body.forces(friction, self.angles, self.rates, self.z, self.delta)
-        return joint_moments(body, friction, self.angles, forces, self.delta, self.load)
+            moments = joint_moments(body, friction, self.angles, forces, self.delta, self.load)
+        return self.joint_map.motor_moments(moments) if self.joint_map else moments
 
     @property
     def power(self) -> Array:

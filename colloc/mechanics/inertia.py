@@ -14,13 +14,12 @@ by default its links are uniform rods, as heavy as they press on the floor.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.coupled import Coupled, JointPath
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
@@ -159,14 +158,3 @@ def checked_mass(body: Body) -> Chain:
             f"inertia is known of a Chain, whose links have masses, not of a {type(body).__name__}."
         )
     return body
-
-
-def checked_inertia(body: Body, gait: Callable[..., Any]) -> tuple[Chain, JointPath]:
-    """The chain and its joint angles and rates, if the body can play the gait with inertia; else a
-    `ProblemError` that says why not."""
-    chain, joints = (
-        (body.chain, body.joint_path(gait))
-        if isinstance(body, Coupled)
-        else (checked_mass(body), gait)
-    )
-    return chain, joints

@@ -18,6 +18,7 @@ import numpy as np
 from colloc.mechanics.balance_results import Branches
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
+from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
 
@@ -48,6 +49,7 @@ def followed_motion(
     before: np.ndarray | None = None,
     sense: int = FORWARDS,
     quantities: Sequence[Quantity] = (),
+    joint_map: JointMap | None = None,
 ) -> FollowedMotion | None:
     """The motion of a gait where its law may allow several; None for a body whose other motions are
     not looked for.
@@ -66,6 +68,8 @@ def followed_motion(
         Which neighbour: the branches are followed with or against time.
     quantities : sequence of Quantity
         Of which it is asked how far they lie apart.
+    joint_map : JointMap, optional
+        From the motors, of which quantities speak, to the joints.
     """
     found = body.all_velocities(friction, angles, rates, delta)
     if found is None:
@@ -82,7 +86,9 @@ def followed_motion(
         return FollowedMotion(found.z[0], apart)
     chosen = Branches(found.z[:, :, several], found.sign[:, several])
     apart[:, several] = _ranges(
-        Instants(body, friction, angles[:, several], rates[:, several], delta), chosen, quantities
+        Instants(body, friction, angles[:, several], rates[:, several], delta, joint_map=joint_map),
+        chosen,
+        quantities,
     )
     z = found.z[0].copy()
     for now, previous in _order(found.number > 1, sense):

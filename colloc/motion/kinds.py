@@ -33,6 +33,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
+from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import kernel_repeating, native_kernel
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
@@ -186,8 +187,16 @@ class SlowOnLevel:
     followed: bool = False
     lack: str = "no velocity balances the body; give another guess"
 
-    def __init__(self, body: Body, friction: Law, symmetry: str, turn: float = 0.0) -> None:
+    def __init__(
+        self,
+        body: Body,
+        friction: Law,
+        symmetry: str,
+        turn: float = 0.0,
+        joint_map: JointMap | None = None,
+    ) -> None:
         self.body, self.friction, self._symmetry, self.turn = body, friction, symmetry, turn
+        self._joint_map = joint_map
         self.periods = 1.0 / fraction(symmetry)
         self._chords = self.periods * chord_per_way(turn)
 
@@ -221,8 +230,9 @@ class SlowOnLevel:
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
         at = self.friction, shapes.angles, shapes.rates, shapes.delta
         return Instants(
-            self.body, *at, z=self.body.solve(*at).z if z is None else z, unit=shapes.unit
-        )
+            self.body, *at, z=self.body.solve(*at).z if z is None else z, unit=shapes.unit,
+            joint_map=self._joint_map,
+        )  # fmt: skip
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         assert along.solved is not None
@@ -567,7 +577,7 @@ def through_motion(
 @singledispatch
 def kind_in(regime: Regime, of: Dynamics) -> Kind:
     """How a body moves in a regime; that of another is registered with ``kind_in.register``."""
-    return SlowOnLevel(of.body, of.law, of.symmetry, of.turn)
+    return SlowOnLevel(of.body, of.law, of.symmetry, of.turn, of.joint_map)
 
 
 @kind_in.register

@@ -13,7 +13,7 @@ from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.inertia import Path, checked_inertia
+from colloc.mechanics.inertia import Path, checked_mass
 from colloc.mechanics.law import Law, rate_independent
 from colloc.motion.collocated import CollocatedPose, point_weights
 from colloc.motion.kinds import OMEGA, Shapes, SlowOnLevel, WithInertia
@@ -102,7 +102,7 @@ def slow_enough(
 
     Parameters
     ----------
-    body : Chain or Coupled
+    body : Chain
         With the masses of its links.
     friction : Law
     gait : callable
@@ -131,7 +131,7 @@ def slow_enough(
     check_finite(positive=True, loss=loss, delta=delta)
     if loss > 0.5:
         raise ProblemError(f"loss must be at most 0.5, not {loss!r}.")
-    (chain, joints), accurate = checked_inertia(body, gait), _ACCURACY
+    chain, accurate = checked_mass(body), _ACCURACY
     law = chain.law(friction)
     if not rate_independent(law):
         raise ProblemError(
@@ -141,7 +141,7 @@ def slow_enough(
     return _refined(
         chain,
         law,
-        joints,
+        gait,
         breaks,
         lambda on_mesh: _froude(on_mesh, law, delta, loss),
         lambda froude: accurate * froude,

@@ -126,7 +126,7 @@ def write_export(
         return _written_model(Robot(solution, length, mass, period, gravity), path)
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
     trajectory = timed(
-        solution.gait, rate, period, limits, keep_pace=bool(solution.problem.paced_by)
+        solution.gait.driven, rate, period, limits, keep_pace=bool(solution.problem.paced_by)
     )
     facts = _about(solution, trajectory, rate, limits) | _pace(solution, trajectory.period, gravity)
     series = {"rad": trajectory.angles, "rad_per_s": trajectory.speeds}
@@ -154,9 +154,8 @@ def write_export(
             facts["torques"] = "those of slow motion, as the pace is not the gait's own"
         if way is not None:
             pull = _pull(solution, way.time.size)
-            torques = robot.torque_unit * slow_torques(
-                solution, way.angles, trajectory.period * way.speeds, pull
-            )
+            joints = solution.problem.joint_path(way.angles, trajectory.period * way.speeds)
+            torques = robot.torque_unit * slow_torques(solution, *joints, pull)
             before |= {"N_m": torques, "W": torques * way.speeds}
             robot = robot if own_pace else None
     if periods * trajectory.time.size > MOST_SAMPLES:
@@ -170,7 +169,9 @@ def write_export(
         facts |= _end(solution, trajectory, limits, periods, robot)
         time = np.append(way.time, time)
         series = {unit: np.append(before[unit], rows, axis=1) for unit, rows in series.items()}
-    text = (_csv if path.suffix == ".csv" else _json)(facts, time, series, solution.gait.coordinate)
+    text = (_csv if path.suffix == ".csv" else _json)(
+        facts, time, series, solution.gait.driven.coordinate
+    )
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
     return facts
@@ -180,15 +181,16 @@ def _approach(
     solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None
 ) -> Approach:
     """From the straight body, which every range of joints allows."""
-    problem, n, fastest = solution.problem, solution.gait.n_joint, np.abs(trajectory.speeds).max()
+    problem, n, fastest = solution.problem, len(trajectory.speeds), np.abs(trajectory.speeds).max()
     if limits is None:
         stated = np.array(problem.largest_speeds) / trajectory.period
         limits = (
             np.maximum(stated, np.abs(trajectory.speeds).max(axis=1)) if stated.size else fastest
         )
     way = approach(trajectory, rate, one_each(limits, n, "joint speed limit"))
+    angles, _ = problem.joint_path(way.angles, way.speeds)
     depth = max(
-        float(problem.body.crossing_depth(way.angles).max()), problem.body.passing_depth(way.angles)
+        float(problem.body.crossing_depth(angles).max()), problem.body.passing_depth(angles)
     )
     if depth > _CROSSES:
         raise ProblemError(
@@ -223,6 +225,7 @@ def _end(
     time = np.append(way.time, 0.0) / period
     angles = np.append(way.angles, trajectory.angles[:, :1], axis=1)
     rates = period * np.append(way.speeds, trajectory.speeds[:, :1], axis=1)
+    angles, rates = problem.joint_path(angles, rates)
     froude, moved = solution.froude or (robot.froude if robot else 0.0), None
     with suppress(ProblemError, NotConvergedError):
         if froude:

@@ -10,7 +10,6 @@ import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.feet import FOOT, PAD, WHEEL
 from colloc.results.motion import RigidMotion, SampledMotion, turned
 from colloc.results.solution import Solution
@@ -64,9 +63,8 @@ class Frames:
 def foot_kinds(body: Body) -> tuple[str, ...]:
     """What the feet of a body are, in the order of `lab_feet`
     (`colloc.mechanics.feet.Foot.kind`)."""
-    chain = body.chain if isinstance(body, Coupled) else body
-    if isinstance(chain, Chain):
-        return tuple(foot.kind for foot in chain.standing_on)
+    if isinstance(body, Chain):
+        return tuple(foot.kind for foot in body.standing_on)
     return (FOOT,) * body.footprints(np.zeros((body.n_joint, 1))).shape[2]
 
 

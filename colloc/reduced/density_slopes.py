@@ -15,16 +15,25 @@ import numpy as np
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, PathLimits, Quantity
+from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 
 
 @lru_cache(maxsize=32)
-def _function(body: Body, friction: Law, of: Quantity | PathLimits, *, pulled: bool) -> ca.Function:
+def _function(
+    body: Body,
+    friction: Law,
+    joint_map: JointMap | None,
+    of: Quantity | PathLimits,
+    *,
+    pulled: bool,
+) -> ca.Function:
     """(y, z, delta) to the total derivatives along y."""
     sizes = {"q": body.n_joint, "r": body.n_joint, "z": 3, "delta": 1, "load": 2 * pulled}
     angles, rates, z, delta, load = (ca.SX.sym(*each) for each in sizes.items())
     y = ca.vertcat(angles, rates, load)
-    out = of.at(Instants(body, friction, angles, rates, delta, z=z, load=load if pulled else None))
+    pull = load if pulled else None
+    out = of.at(Instants(body, friction, angles, rates, delta, z=z, load=pull, joint_map=joint_map))
     slope = ca.jacobian(out, y).T
     if of.needs_forces:
         balance = body.sliding(friction, angles, rates, z, delta).force
@@ -42,7 +51,7 @@ def density_slopes(of: Quantity | PathLimits, now: Instants) -> np.ndarray:
     pulled, n, n_time = now.load is not None, 2 * len(now.angles), now.angles.shape[1]
     y = np.concatenate([now.angles, now.rates, now.load if pulled else np.empty((0, n_time))])
     slope = (
-        _function(now.body, now.friction, of, pulled=pulled)(y, now.z, now.delta)
+        _function(now.body, now.friction, now.joint_map, of, pulled=pulled)(y, now.z, now.delta)
         .full()
         .reshape(-1, len(y), n_time)
     )

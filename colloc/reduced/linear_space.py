@@ -44,7 +44,9 @@ class LinearSpace:
         self.control, self.given = control, Given(None, edges, scheme, far)
         self.mesh, self._admissible = control.mesh(edges, scheme), control.admissible
         gait, body, limit, speeds, _ = control.admissible
-        self.checks, n_joint = shape_checks(body, far, speeds), body.n_joint
+        self.checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
+        n_joint = body.n_joint
+        self._offset = gait.offset(n_joint)
         angles, rates = (
             gait.angle_matrix(self.mesh.times, n_joint),
             gait.rate_matrix(self.mesh.times, n_joint),
@@ -79,7 +81,7 @@ class LinearSpace:
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
         shapes, n_joint = (self._matrix @ v).T, self._matrix.shape[1] // 2
-        return shapes[:n_joint], shapes[n_joint:], self._pace
+        return shapes[:n_joint] + self._offset, shapes[n_joint:], self._pace
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         return np.asarray(
@@ -106,7 +108,15 @@ class LinearSpace:
             )
             may_move = moving(values, check, limit, times, self.mesh, cells)
             placed.append(
-                _Placed(check, held_shares(check, gait, times), matrix, times, cells, may_move)
+                _Placed(
+                    check,
+                    held_shares(check, gait, times),
+                    matrix,
+                    times,
+                    cells,
+                    may_move,
+                    check.offset(self._admissible.gait, n_joint),
+                )
             )
             excess, (lower, upper) = (
                 max(excess, float(check.excess(values, limit).max())),
@@ -201,8 +211,8 @@ class SerpenoidSpace(LinearSpace):
 
 class _Placed(NamedTuple):
     """A check at instants, one in each of some mesh cells: the shares that its cuts hold, what the
-    shapes there are of the parameters, ``(n, n_joint, n_parameter)``, and which instants move with
-    the gait."""
+    shapes there are of the parameters, ``(n, n_joint, n_parameter)``, which instants move with the
+    gait, and what is added to the shapes."""
 
     check: ShapeCheck
     shares: np.ndarray
@@ -210,15 +220,19 @@ class _Placed(NamedTuple):
     times: np.ndarray
     cells: np.ndarray
     moving: np.ndarray
+    offset: np.ndarray
+
+    def shapes(self, v: np.ndarray) -> np.ndarray:
+        return np.asarray((self.matrix @ v).T + self.offset)
 
     def value(self, v: np.ndarray) -> np.ndarray:
-        return self.check.cut((self.matrix @ v).T, self.shares)[0]
+        return self.check.cut(self.shapes(v), self.shares)[0]
 
     def slope(self, v: np.ndarray) -> np.ndarray:
         if self.check.row is not None:
             return self.check.row @ self.matrix
         return np.einsum(
             "jt,tjp->tp",
-            self.check.slope((self.matrix @ v).T, self.shares[None]).full(),
+            self.check.slope(self.shapes(v), self.shares[None]).full(),
             self.matrix,
         )

@@ -47,7 +47,9 @@ def shares(solution: Solution) -> dict[str, float]:
     }
     if problem.largest_speeds:
         found["joint speed"] = float(
-            (np.abs(motion.rates).max(axis=1) / problem.largest_speeds).max()
+            (
+                np.abs(solution.gait.driven.rates(_INSTANTS)).max(axis=1) / problem.largest_speeds
+            ).max()
         )
     if limits.each:
         z, load = (
@@ -56,8 +58,9 @@ def shares(solution: Solution) -> dict[str, float]:
             else (None, None)
         )
         now = Instants(
-            body, problem.law, motion.angles, motion.rates, solution.delta_per_period, z, load=load
-        )
+            body, problem.law, motion.angles, motion.rates, solution.delta_per_period, z, load=load,
+            joint_map=problem.joint_map,
+        )  # fmt: skip
         used = iter(limits.sizes(limits.at(now)).max(axis=1))
         found |= {each.name: max(float(next(used)) for _ in each.names) for each in limits.each}
     return found
@@ -92,6 +95,8 @@ def _beyond_any_gait(problem: Problem) -> Iterator[str]:
     derivative of a Fourier series, and powers by both."""
     n, gait = problem.body.n_joint, problem.gait
     torque, speed = np.full(n, np.inf), np.full(n, np.inf)
+    if problem.joint_map is not None:  # motors share what their joints need
+        return
     if isinstance(problem.body, Chain) and rate_independent(problem.law):
         torque = largest_moments(problem.body, problem.friction, problem.grade)
     if isinstance(gait.level, Harmonic) and problem.body.limited.shape == (n, n):
@@ -114,7 +119,7 @@ def _beyond_any_gait(problem: Problem) -> Iterator[str]:
 def _short_swings(problem: Problem, used: dict[str, float]) -> Iterator[str]:
     """Speeds that decide how far joints swing: to and fro within a period, by half of what they
     could cover."""
-    if used.get("joint speed", 0.0) > _BINDS:
+    if used.get("joint speed", 0.0) > _BINDS and problem.joint_map is None:
         most, whole = np.array(problem.largest_speeds) / 2, 2 * _half_ranges(problem)
         joint = int(np.argmin(most / whole))
         if most[joint] < whole[joint]:

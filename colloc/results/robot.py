@@ -19,11 +19,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
-from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import (
     GRAVITY,
-    checked_inertia,
+    checked_mass,
     inertial_moments,
     momenta,
     momentum_rates,
@@ -119,9 +118,8 @@ def _of_friction(
 ) -> np.ndarray:
     """Torques of the motors against friction and pull, with tail velocities z."""
     body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
-    return np.asarray(
-        joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta, load)
-    )
+    forces = body.forces(law, angles, rates, z, delta)
+    return solution.problem.of_motors(joint_moments(body, law, angles, forces, delta, load))
 
 
 def _of_inertia(
@@ -129,7 +127,7 @@ def _of_inertia(
 ) -> np.ndarray:
     """Torques of the motors that change how the links move, at phases with tail velocities z."""
     problem = solution.problem
-    body, joints = checked_inertia(problem.body, solution.gait)
+    body, joints = checked_mass(problem.body), solution.gait
     angles, rates = joints(t)
     link = body.velocity(body.posture(angles), rates, z)
     states = momenta(body, body.posture(angles), link)
@@ -151,10 +149,7 @@ def _of_inertia(
             for before, after in zip(later(-_MOMENT), later(_MOMENT), strict=True)
         )
     )
-    moments = froude * inertial_moments(body, angles, link, growth)
-    return (
-        np.array(problem.body.gears).T @ moments if isinstance(problem.body, Coupled) else moments
-    )
+    return problem.of_motors(froude * inertial_moments(body, angles, link, growth))
 
 
 class _Played:
@@ -204,10 +199,9 @@ class _Played:
     def sample(self, t: np.ndarray) -> SampledMotion:
         """At ascending phases in [0, 1], in the axes of `Solution.sample`."""
         states, (angles, rates) = self._course.at(t), self._gait(t)
-        chain, joints = checked_inertia(self._body, self._gait)
         theta, centre = states[3] - self._ahead, turned(states[4:6], -self._ahead)
-        z = tail_velocity(chain, *joints(t), states[:3])
-        tail = centre - turned(np.array(chain.centre(joints(t)[0])), theta)
+        z = tail_velocity(checked_mass(self._body), angles, rates, states[:3])
+        tail = centre - turned(np.array(self._body.centre(angles)), theta)
         return SampledMotion(t, angles, rates, z, theta, centre, tail)
 
 
@@ -267,7 +261,7 @@ class Robot:
                     f"{name} must lie between {1 / _LARGEST:g} and {_LARGEST:g} in SI units, not "
                     f"{value:g}."
                 )
-        problem, n = self.solution.problem, self.solution.gait.n_joint
+        problem, n = self.solution.problem, self.solution.problem.n_motor
         if (own := self.solution.froude) and abs(self.froude / own - 1.0) > _PACE:
             needed = math.sqrt(self.length / (self.pressing * own))
             raise ProblemError(
@@ -322,10 +316,11 @@ class Robot:
         n = max(_INSTANTS, _A_SIDE * (len(self.solution.gait.corner_phases) + 1))
         t = np.arange(n + 1) / n
         motion = (self._played or self.solution).sample(t)
-        torques, speeds = self.torques(t), motion.rates / self.period
+        angles, rates = self.solution.gait.driven(t)
+        torques, speeds = self.torques(t), rates / self.period
         return {
             "t": Column(t * self.period, "s", ("t",)),
-            "joint_angles": Column(motion.angles, "rad", ("joint", "t")),
+            "joint_angles": Column(angles, "rad", ("joint", "t")),
             "joint_speeds": Column(speeds, "rad/s", ("joint", "t")),
             "joint_torques": Column(torques, "N m", ("joint", "t")),
             "joint_powers": Column(torques * speeds, "W", ("joint", "t")),
@@ -409,7 +404,7 @@ class Robot:
         """What the motors' data say; nothing of what is not given."""
         found: dict[str, Any] = {}
         if self.max_speed is not None:
-            gait, limits = self.solution.gait, np.asarray(self.max_speed)
+            gait, limits = self.solution.gait.driven, np.asarray(self.max_speed)
             found["max_speed_rad_per_s"] = limits.tolist()
             found["shortest_period_s"] = shortest = shortest_period(gait, limits, keep_pace=True)
             with suppress(ProblemError, NotConvergedError):
@@ -441,7 +436,7 @@ class Robot:
             "             torque [N m]      speed [rad/s]     power [W]",
             "             peak     r.m.s.   peak     r.m.s.   peak",
         ]
-        coordinate = self.solution.problem.body.coordinate
+        coordinate = self.solution.gait.driven.coordinate
         names = (
             "peak_torque_N_m",
             "rms_torque_N_m",

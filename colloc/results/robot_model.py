@@ -277,6 +277,11 @@ FORMATS = {".xml": mjcf, ".urdf": urdf}
 
 def _chain(robot: Robot) -> Chain:
     body = robot.solution.problem.body
+    if robot.solution.problem.joint_map is not None:
+        raise ProblemError(
+            "models for simulators are of a Chain with a motor in every joint: leave gears and "
+            "stuck joints out."
+        )
     if type(body) is not Chain:
         raise ProblemError(
             f"models for simulators are of a Chain with a motor in every joint, not of a "

@@ -311,10 +311,12 @@ def _speeds(problem: Problem, rates: np.ndarray) -> list[Check]:
     """The fastest joint, against what its motor can do."""
     if not problem.largest_speeds:
         return []
-    share = np.abs(rates).max(axis=1) / np.array(problem.largest_speeds)
+    joints = problem.joint_map
+    motors = rates if joints is None else joints.motor_rates(rates)
+    share = np.abs(motors).max(axis=1) / np.array(problem.largest_speeds)
     excess, fastest = (
         max(float(share.max()) - 1.0, 0.0),
-        f"{problem.body.coordinate} {int(share.argmax()) + 1}",
+        f"{'motor' if joints else problem.body.coordinate} {int(share.argmax()) + 1}",
     )
     return [
         Check(

@@ -11,10 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.gaits.control_problem import control_problem
+from colloc.gaits.coupled import Coupled
 from colloc.gaits.fitted_gait import FittedGait, Given, Uncertainty, coefficients, fitted_gait
+from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.mechanics.joint_map import JointMap
 from colloc.motion.kinds import kind_of_motion
 from colloc.reduced.motion import ReducedMotion
 from colloc.results.answer import Answer
@@ -85,7 +88,11 @@ def evaluate(
     if problem.body.schedule:
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")
     fitted = fitted_gait(
-        gait, problem.body.n_joint, period=period, harmonics=harmonics, degrees=degrees
+        getattr(gait, "driven", gait),
+        problem.n_motor,
+        period=period,
+        harmonics=harmonics,
+        degrees=degrees,
     )
     if fitted.centre:
         _check_centre(problem, fitted, gait)
@@ -100,7 +107,8 @@ def _check_centre(problem: Problem, fitted: FittedGait, given: Given) -> None:
     """A `ProblemError` if all joints are bent about one right angle and links cross: so look servos
     without negative angles."""
     phases = np.arange(_PHASES) / _PHASES
-    if float(problem.body.crossing_depth(fitted.gait.angles(phases)).max()) > EXACT:
+    angles, _ = problem.joint_path(*fitted.gait(phases))
+    if float(problem.body.crossing_depth(angles).max()) > EXACT:
         raise ProblemError(
             f"{given}: all joints move about {fitted.centre}°, where links cross: if servos stand "
             f"so when the body is "
@@ -109,10 +117,15 @@ def _check_centre(problem: Problem, fitted: FittedGait, given: Given) -> None:
 
 
 def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
-    gait_class, length = Harmonic(fitted.gait.n_harmonic), 2 * math.pi * fitted.gait.shape_speed
-    if fitted.gait.shape_speed < problem.smallest_shape_speed:
+    gait_class: AnyClass = Harmonic(fitted.gait.n_harmonic)
+    gait: AnyGait = fitted.gait
+    if isinstance(problem.gait, Coupled):
+        gait_class = replace(problem.gait, gait=gait_class)
+        gait = gait_class.driven_by(gait, problem.body.n_joint)
+    length = 2 * math.pi * gait.shape_speed
+    if gait.shape_speed < problem.smallest_shape_speed:
         raise ProblemError(
-            f"the gait hardly moves: its shape speed {fitted.gait.shape_speed:.3g} is below "
+            f"the gait hardly moves: its shape speed {gait.shape_speed:.3g} is below "
             f"smallest_shape_speed "
             f"{problem.smallest_shape_speed:g}, where friction is viscous."
         )
@@ -120,7 +133,7 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
     delta = problem.delta * (length if problem.gait.unit_speed else 1.0)
     usual = {"guess": None, "delta_start": None, "intervals": None}
     stated = problem.with_(gait=gait_class, rotation=None, delta=delta, **usual)
-    answer = evaluated_answer(stated, fitted.gait)
+    answer = evaluated_answer(stated, gait)
     turned = answer.motion.rotation
     if abs(turned) < GAP * answer.distance:
         if not problem.uses("rotation"):  # which then may be anything
@@ -128,7 +141,7 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
             answer = replace(answer, problem=stated)
     else:  # how far it goes is then the chord of its arc
         stated = stated.with_(rotation=turned)
-        answer = evaluated_answer(stated, fitted.gait)
+        answer = evaluated_answer(stated, gait)
     if goes_nowhere(answer):
         said = (
             "It goes nowhere for its work, so there is no value to certify: is it one that "
@@ -175,7 +188,9 @@ def _errors_of_samples(
     # where the gait of the answer begins
     later = math.atan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * math.pi)
     phases, wide = answer.mesh.times + later, Harmonic(highest)
-    series = _Series(np.stack([wide.functions(phases), wide.functions(phases, 1)]))
+    series = _Series(
+        np.stack([wide.functions(phases), wide.functions(phases, 1)]), answer.problem.joint_map
+    )
     aims, delta = control.aims, answer.problem.delta * answer.gait.delta_unit
     motion = ReducedMotion(kind_of_motion(control.dynamics), answer.mesh, series, aims.integrals)
     scale = np.array([control.stated(1.0), 1 / control.unit, 1.0, control.unit])
@@ -217,11 +232,16 @@ class _Series(NamedTuple):
 
     functions: np.ndarray
     """``(2, 2 K + 1, n_point)``: with their derivatives."""
+    joint_map: JointMap | None = None
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         angles, rates = v.reshape(-1, self.functions.shape[1]) @ self.functions
+        if self.joint_map is not None:
+            angles, rates = self.joint_map.joint_angles(angles), self.joint_map.joint_rates(rates)
         return angles, rates, np.ones(self.functions.shape[2])
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         both = on_shape.reshape(*on_shape.shape[:2], 2, -1)
+        if self.joint_map is not None:
+            both = both @ self.joint_map.matrix
         return np.einsum("ktdj,dwt->kjw", both, self.functions).reshape(len(both), -1)

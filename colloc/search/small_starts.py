@@ -73,9 +73,10 @@ def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
     """The best small gait at every shape that was drawn, with the shape, best first; of equally
     good ones one."""
     body, friction, shapes = problem.body, problem.law, _drawn_shapes(problem)
-    directions = np.hstack(
-        [one_joint(body.n_joint, half=False), unit_directions(body.n_joint, _DRAWN, half=False)]
-    )
+    n, joints = problem.n_motor, problem.joint_map
+    directions = np.hstack([one_joint(n, half=False), unit_directions(n, _DRAWN, half=False)])
+    if joints is not None:
+        directions = joints.joint_rates(directions)
     count, delta = directions.shape[1], _DRY * problem.delta_start
     angles, rates = np.repeat(shapes, count, axis=1), np.tile(directions, shapes.shape[1])
     solved = body.solve(friction, angles, rates, delta)
@@ -110,7 +111,7 @@ def _drawn_shapes(problem: Problem) -> np.ndarray:
     drawn = np.random.default_rng(2).choice(_LEVELS, (_DRAWN, n_joint)) * widest(
         problem.joint_limit
     )
-    none = np.zeros((n_joint, 1))
+    none, rest = np.zeros((n_joint, 1)), own.offset(n_joint)[:, 0]
     means = np.array(
         [own.member(own.parameters(Fourier(mean, none, none)), n_joint).mean for mean in drawn]
     )
@@ -119,7 +120,9 @@ def _drawn_shapes(problem: Problem) -> np.ndarray:
     means = np.unique(np.where(first < 0, -means, means) + 0.0, axis=0)
     return np.array(
         [
-            mean * min(1.0, largest_factor(body, problem.joint_limit, mean[:, None]))
+            rest
+            + (mean - rest)
+            * min(1.0, largest_factor(body, problem.joint_limit, mean[:, None], rest[:, None]))
             for mean in means
         ]
     ).T

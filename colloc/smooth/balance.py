@@ -1,29 +1,146 @@
-"""NumPy solver of the balance of smooth bodies, batched over instants, on panels that adapt to the
-solution.
+"""The balance of smooth bodies on panels: on fixed ones by `colloc.smooth.panel_body`, on such that
+adapt to the solution by `solve_smooth`.
 
 The velocity of the body at stick changes over lengths ~ delta / (rotation rate), and shapes may be
 sharp. So after every solve each panel's integrals are compared with those over its two halves;
 panels that differ by more than the tolerance are halved and the instant is solved again. The
 iteration itself is that of `colloc.mechanics.damped_newton`; its references are the panel edges.
+
+Velocities ``z = (u, v, omega)``, ``(3, n_time)``, are those of the tail, in the axes in which Theta
+is measured, and the rotation rate of those axes. A batch's omega, and that of an anchor, is the
+rotation rate of the tangent there.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.damped_newton import groups, relative_delta, solve, starting_state
+from colloc.mechanics.damped_newton import (
+    Evaluated,
+    MakeBatch,
+    State,
+    groups,
+    relative_delta,
+    solve,
+    starting_state,
+)
 from colloc.mechanics.law import Law
-from colloc.smooth.batch import PanelBatch, PanelFields
-from colloc.smooth.curve import Curve, PanelGrid, bending_power, mean_velocity, node_velocity
+from colloc.smooth.curve import (
+    Curve,
+    PanelGrid,
+    bending_power,
+    curve,
+    mean_velocity,
+    node_velocity,
+    pulled_back,
+    resultant,
+)
 from colloc.smooth.motion import Motion
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
 
+TAIL, ANCHOR_MOVES = 0, 5
 _MOST_PANELS, _REFINEMENTS = 600, 40
 """Of an instant, and halvings of a panel."""
 _ROUNDING = 1e-15
+
+
+class PanelFields(NamedTuple):
+    """Tangent angle and its rate at the nodes ``(n_node, n_time)``, and the rate at the edges
+    ``(n_panel + 1, n_time)``."""
+
+    panels: PanelGrid
+    angle: np.ndarray
+    rate: np.ndarray
+    edge_rate: np.ndarray
+
+    def take(self, members: np.ndarray) -> PanelFields:
+        panels = PanelGrid(self.panels.edges[:, members], self.panels.order)
+        return PanelFields(panels, *(row[:, members] for row in self[1:]))
+
+
+class PanelBatch:
+    """Instants that share a reference edge, as `colloc.mechanics.damped_newton.Batch`."""
+
+    def __init__(
+        self, fields: PanelFields, friction: Law, members: np.ndarray, reference: int
+    ) -> None:
+        self.fields, self.friction, self.reference = fields.take(members), friction, reference
+        panels, angle, rate, edge_rate = self.fields
+        self.curve = np.stack(
+            curve(panels, angle, rate, reference, edge_rate[reference : reference + 1])
+        )
+
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+        """Nodes ``(9, n_node, n)``, curve, then velocity; net force and potential at z."""
+        body, friction = Curve(*self.curve[:, :, select]), self.friction
+        vs, vn = node_velocity(body, z)
+        force = resultant(body, *friction.density(vs, vn, delta))
+        potential = (
+            (body.weight * friction.density_potential(vs, vn, delta)).sum(axis=0)
+            if friction.associated
+            else None
+        )
+        return np.stack([*body, vs, vn]), force, potential
+
+    def matrix(self, nodes: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
+        vs, vn = nodes[7:]
+        law = self.friction.density_jacobian if newton else self.friction.density_secant
+        return pulled_back(Curve(*nodes[:7]), law(vs, vn, delta))
+
+    def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        anchor = np.argmin(self.panel_speed(z), axis=0)
+        return anchor, np.take_along_axis(self.edge_velocity(z), anchor[None, None], 1)[:, 0]
+
+    def edge_velocity(self, z: np.ndarray) -> np.ndarray:
+        """Velocity and rotation rate of every edge, ``(3, n_edge, n)``, in the axes of Theta."""
+        panels, angle, rate, edge_rate = self.fields
+        path, anchor_rate = panels.edge_path(self.reference), edge_rate[self.reference]
+        turning = panels.widths * (rate - anchor_rate + z[2])
+        return np.stack(
+            [
+                z[0] - path @ (turning * np.sin(angle)),
+                z[1] + path @ (turning * np.cos(angle)),
+                z[2] + edge_rate - anchor_rate,
+            ]
+        )
+
+    def tail_velocity(self, z: np.ndarray) -> np.ndarray:
+        tail = self.edge_velocity(z)[:, TAIL]
+        tail[2] -= self.fields.edge_rate[TAIL]
+        return tail
+
+    def node_speed(self, z: np.ndarray) -> np.ndarray:
+        return np.hypot(*node_velocity(Curve(*self.curve), z))
+
+    def panel_speed(self, z: np.ndarray) -> np.ndarray:
+        """Largest speed of a node in each panel, ``(n_panel, n)``; infinite for panels of width
+        zero."""
+        panels = self.fields.panels
+        speed = self.node_speed(z).reshape(panels.n, -1, z.shape[1]).max(axis=1)
+        return np.where(np.diff(panels.edges, axis=0) > 0, speed, np.inf)
+
+    def forces(self, z: np.ndarray, delta: np.ndarray | float) -> tuple[np.ndarray, ...]:
+        """Tangential and normal velocity of the nodes, and force per length there."""
+        vs, vn = node_velocity(Curve(*self.curve), z)
+        return vs, vn, *self.friction.density(vs, vn, delta)
+
+    def panel_sums(
+        self, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray, fn: np.ndarray
+    ) -> np.ndarray:
+        """Force, torque about the reference and power of every panel, ``(4, n_panel, n)``."""
+        body = Curve(*self.curve)
+        densities = (
+            fs * body.cos - fn * body.sin,
+            fs * body.sin + fn * body.cos,
+            fs * body.arm_s + fn * body.arm_n,
+            -(fs * vs + fn * vn),
+        )
+        return np.stack([self.fields.panels.panel_sums(density) for density in densities])
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +151,6 @@ class SmoothSolution:
     ----------
     t : phases
     z : (3, n_time)
-        Velocity of the tail in the axes of the frame in which Theta is measured, and the rotation
-        rate of that frame.
     power : rate of work against friction
     centre : (2, n_time)
         Velocity of the centre of mass, in the same axes.
@@ -76,44 +191,6 @@ class SmoothSolution:
                 f"larger delta."
             )
         return self
-
-
-def _motion_fields(
-    motion: Motion, t: np.ndarray, panels: PanelGrid, speed: np.ndarray | None = None
-) -> tuple[PanelFields, np.ndarray]:
-    """Theta and its rate on the panels of some instants, rates in units of the returned `speed`
-    ``(n_time,)``."""
-    nodes = panels.nodes
-    angle, rate = motion.angle(nodes, t), motion.rate(nodes, t)
-    if not (np.isfinite(rate).all() and np.isfinite(angle).all()):
-        raise ProblemError("the motion's tangent angle and rate must be finite.")
-    if speed is None:
-        speed = np.abs(rate).max(axis=0)
-        speed[speed == 0] = 1.0
-    return PanelFields(panels, angle, rate / speed, motion.rate(panels.edges, t) / speed), speed
-
-
-def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """The chosen panels ``(n_panel, n_time)`` cut in two; columns that need fewer edges end in
-    panels of width zero."""
-    middle = np.where(chosen, 0.5 * (edges[1:] + edges[:-1]), 1.0)
-    fine = np.sort(np.concatenate([edges, middle]), axis=0)
-    keep = 1 + int(np.max(np.sum(fine < 1.0, axis=0)))
-    return fine[:keep]
-
-
-def _panel_integrals(
-    body: Curve, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray, fn: np.ndarray, panels: PanelGrid
-) -> np.ndarray:
-    """Force, torque about the reference and power of every panel, ``(4, n_panel, n_time)``, from
-    its nodes' velocities and forces per length."""
-    densities = (
-        fs * body.cos - fn * body.sin,
-        fs * body.sin + fn * body.cos,
-        fs * body.arm_s + fn * body.arm_n,
-        -(fs * vs + fn * vn),
-    )
-    return np.stack([panels.panel_sums(density) for density in densities])
 
 
 def solve_smooth(
@@ -164,112 +241,122 @@ def solve_smooth(
     check_finite(positive=True, delta=delta)
     t = np.atleast_1d(np.asarray(t, dtype=float))
     n = t.size
-    out = {
-        name: np.zeros(n)
-        for name in (
-            "power",
-            "bending_power",
-            "power_inside",
-            "slowest",
-            "residual",
-            "quadrature_error",
-        )
-    }
-    out["centre"], out["force"] = np.zeros((2, n)), np.zeros((3, n))
-    z_tail, n_panel, iterations = np.zeros((3, n)), np.zeros(n, dtype=int), np.zeros(n, dtype=int)
-
+    z, centre, force = np.zeros((3, n)), np.zeros((2, n)), np.zeros((3, n))
+    power, bending, inside, slowest, residual, error = np.zeros((6, n))
+    used, steps = np.zeros((2, n), dtype=int)
+    found = SmoothSolution(
+        t, z, power, centre, force, bending, inside, slowest, residual, error, used, steps,
+        tolerance,
+    )  # fmt: skip
     active, edges = np.arange(n), motion.first_edges(t, panels)
     anchor, velocity = np.full(n, len(edges) // 2), np.zeros((3, n))
     if slide is not None:
-        anchor, velocity = np.zeros(n, dtype=int), slide.copy()
+        anchor, velocity = np.full(n, TAIL), slide.copy()
         velocity[2] += motion.rate(np.zeros((1, n)), t)[0]
     for level in range(_REFINEMENTS + 1):
-        grid = PanelGrid(edges, order)
         # work in units of the largest rate: the law is homogeneous once delta scales along
         unit = np.ones(active.size) if friction.degree is None else None
-        fields, speed = _motion_fields(motion, t[active], grid, unit)
-        d, spent = relative_delta(delta, speed), speed ** (1.0 + (friction.degree or 0.0))
-
-        def make(members: np.ndarray, reference: int, fields: PanelFields = fields) -> PanelBatch:
-            return PanelBatch(fields, friction, members, reference)
-
+        fields, speed = _motion_fields(motion, t[active], PanelGrid(edges, order), unit)
+        d, make = relative_delta(delta, speed), partial(PanelBatch, fields, friction)
+        state = starting_state(anchor, velocity / speed)
         if slide is not None:
-            state = starting_state(anchor, velocity / speed)
             state.residual[:] = 0.0
-        elif level == 0:
-            # one cheap pass finds what rests, so that the anchor is right before anything is judged
-            state = starting_state(anchor, velocity / speed)
-            solve(state, make, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
-            for reference, members in groups(state.anchor):
-                batch = make(members, reference)
-                state.anchor[members], state.velocity[:, members] = batch.slowest(
-                    state.velocity[:, members], d[:, members]
-                )
-            state = starting_state(state.anchor, state.velocity)
         else:
-            state = starting_state(anchor, velocity / speed)
-        if slide is None:
-            solve(state, make, 5, d, tolerance, max_iterations, method)
-        iterations[active] += state.iterations
-        velocity = state.velocity * speed
-
-        split = np.zeros((grid.n, active.size), dtype=bool)
+            if level == 0:
+                state = _with_slowest_anchors(state, make, d, max_iterations, method)
+            solve(state, make, ANCHOR_MOVES, d, tolerance, max_iterations, method)
+        velocity, split = state.velocity * speed, np.zeros((len(edges) - 1, active.size), bool)
         for reference, members in groups(state.anchor):
-            batch = make(members, reference)
-            chosen, z = active[members], state.velocity[:, members]
-            own, body = PanelGrid(edges[:, members], order), Curve(*batch.curve)
-            vs, vn = node_velocity(body, z)
-            fs, fn = friction.density(vs, vn, d[:, members])
-            whole = _panel_integrals(body, vs, vn, fs, fn, own)
-            out["centre"][:, chosen] = mean_velocity(body, vs, vn) * speed[members]
-            out["bending_power"][chosen] = (
-                bending_power(own, body, fs, fn, fields.rate[:, members]) * spent[members]
-            )
-            middle = 0.5 * (edges[1:, members] + edges[:-1, members])
-            inside = sum(
-                ((middle > a) & (middle < b) for a, b in regions),
-                np.zeros(middle.shape, dtype=bool),
-            )
-            out["force"][:, chosen] = whole[:3].sum(axis=1) * (spent / speed)[members]
-            out["power"][chosen] = whole[3].sum(axis=0) * spent[members]
-            out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * spent[members]
-            out["slowest"][chosen] = batch.panel_speed(z).min(axis=0) * speed[members]
-            tail = batch.edge_velocity(z)[:, 0]
-            tail[2] -= fields.edge_rate[0, members]
-            z_tail[:, chosen] = tail * speed[members]
-            error = _panel_error(
-                motion, friction, t[chosen], batch, z, d[:, members], speed[members]
-            )
-            out["quadrature_error"][chosen] = error.max(axis=0)
-            # two stretches at rest know each other's velocity to rounding only: no refinement beats
-            # that
-            floor = (
-                _ROUNDING
-                * batch.largest_speed(z)
-                / (d[0, members] + batch.panel_speed(z).min(axis=0))
-            )
-            split[:, members] = error > quadrature_tolerance + floor
-        out["residual"][active] = state.residual
-        n_panel[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
+            batch, moved = make(members, reference), state.velocity[:, members]
+            chosen, dry, fast = active[members], d[:, members], speed[members]
+            _record(found, chosen, batch, moved, dry, fast, regions)
+            missed = _panel_error(motion, t[chosen], batch, moved, dry, fast)
+            error[chosen] = missed.max(axis=0)
+            # two stretches at rest know each other's velocity to rounding only: no refinement
+            # beats that
+            slow = dry[0] + batch.panel_speed(moved).min(axis=0)
+            floor = _ROUNDING * batch.node_speed(moved).max(axis=0) / slow
+            split[:, members] = missed > quadrature_tolerance + floor
+        steps[active] += state.iterations
+        residual[active] = state.residual
+        used[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
 
-        more = split.any(axis=0) & (n_panel[active] < _MOST_PANELS) & (state.residual <= tolerance)
+        more = split.any(axis=0) & (used[active] < _MOST_PANELS)
+        more &= state.residual <= tolerance
         if quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
             break
         anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
-        active, velocity, edges = (
-            active[more],
-            velocity[:, more],
-            _split(edges[:, more], split[:, more]),
-        )
+        active, velocity = active[more], velocity[:, more]
+        edges = _split(edges[:, more], split[:, more])
         anchor = np.argmax(edges == anchor_at, axis=0)
-    return SmoothSolution(
-        t, z_tail, **out, panels=n_panel, iterations=iterations, tolerance=tolerance
-    )
+    return found
+
+
+def _with_slowest_anchors(
+    state: State, make: MakeBatch, delta: np.ndarray, max_iterations: int, method: str
+) -> State:
+    """One cheap pass finds what rests, so that the anchor is right before anything is judged."""
+    solve(state, make, 1, np.maximum(delta, 1e-3), 1e-6, max_iterations, method)
+    for reference, members in groups(state.anchor):
+        state.anchor[members], state.velocity[:, members] = make(members, reference).slowest(
+            state.velocity[:, members], delta[:, members]
+        )
+    return starting_state(state.anchor, state.velocity)
+
+
+def _motion_fields(
+    motion: Motion, t: np.ndarray, panels: PanelGrid, speed: np.ndarray | None = None
+) -> tuple[PanelFields, np.ndarray]:
+    """Theta and its rate on the panels of some instants, rates in units of the returned `speed`
+    ``(n_time,)``."""
+    nodes = panels.nodes
+    angle, rate = motion.angle(nodes, t), motion.rate(nodes, t)
+    if not (np.isfinite(rate).all() and np.isfinite(angle).all()):
+        raise ProblemError("the motion's tangent angle and rate must be finite.")
+    if speed is None:
+        speed = np.abs(rate).max(axis=0)
+        speed[speed == 0] = 1.0
+    return PanelFields(panels, angle, rate / speed, motion.rate(panels.edges, t) / speed), speed
+
+
+def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """The chosen panels ``(n_panel, n_time)`` cut in two; columns that need fewer edges end in
+    panels of width zero."""
+    middle = np.where(chosen, 0.5 * (edges[1:] + edges[:-1]), 1.0)
+    fine = np.sort(np.concatenate([edges, middle]), axis=0)
+    keep = 1 + int(np.max(np.sum(fine < 1.0, axis=0)))
+    return fine[:keep]
+
+
+def _record(
+    found: SmoothSolution,
+    chosen: np.ndarray,
+    batch: PanelBatch,
+    z: np.ndarray,
+    delta: np.ndarray,
+    speed: np.ndarray,
+    regions: tuple[tuple[float, float], ...],
+) -> None:
+    """Write what follows from velocities z, in units of `speed`, at the chosen instants."""
+    now, fields = Curve(*batch.curve), batch.fields
+    spent = speed ** (1.0 + (batch.friction.degree or 0.0))
+    vs, vn, fs, fn = batch.forces(z, delta)
+    sums = batch.panel_sums(vs, vn, fs, fn)
+    middle = 0.5 * (fields.panels.edges[1:] + fields.panels.edges[:-1])
+    inside = np.zeros(middle.shape, dtype=bool)
+    for low, high in regions:
+        inside |= (middle > low) & (middle < high)
+    found.z[:, chosen] = batch.tail_velocity(z) * speed
+    found.centre[:, chosen] = mean_velocity(now, vs, vn) * speed
+    found.force[:, chosen] = sums[:3].sum(axis=1) * spent / speed
+    found.power[chosen] = sums[3].sum(axis=0) * spent
+    found.power_inside[chosen] = (sums[3] * inside).sum(axis=0) * spent
+    found.bending_power[chosen] = bending_power(fields.panels, now, fs, fn, fields.rate) * spent
+    found.slowest[chosen] = batch.panel_speed(z).min(axis=0) * speed
 
 
 def _panel_error(
     motion: Motion,
-    friction: Law,
     t: np.ndarray,
     batch: PanelBatch,
     z: np.ndarray,
@@ -283,26 +370,18 @@ def _panel_error(
     handed on to the right end in units of the speed of the slowest panel, because that is what
     decides the friction there.
     """
-    edges = batch.fields.panels.edges[:, batch.members]
+    friction, edges = batch.friction, batch.fields.panels.edges
     left, right = edges[:-1].ravel(), edges[1:].ravel()
-    n_panel = len(edges) - 1
-    many = (
-        np.tile(a, n_panel)
-        for a in (t, speed, delta[0], delta[0] + batch.panel_speed(z).min(axis=0))
-    )
-    t_many, speed_many, delta_many, slow_many = many
+    slow = delta[0] + batch.panel_speed(z).min(axis=0)
+    t, speed, dry, slow = (np.tile(a, len(edges) - 1) for a in (t, speed, delta[0], slow))
     start = batch.edge_velocity(z)[:, :-1].reshape(3, -1)
     results = []
     for cuts in ([left, right], [left, 0.5 * (left + right), right]):
-        fields, _ = _motion_fields(
-            motion, t_many, PanelGrid(np.stack(cuts), batch.fields.panels.order), speed_many
+        grid = PanelGrid(np.stack(cuts), batch.fields.panels.order)
+        fields, _ = _motion_fields(motion, t, grid, speed)
+        one = PanelBatch(fields, friction, np.arange(t.size), 0)
+        sums = one.panel_sums(*one.forces(start, dry)).sum(axis=1)
+        results.append(
+            np.concatenate([sums / friction.largest, one.edge_velocity(start)[:2, -1] / slow])
         )
-        one = PanelBatch(fields, friction, np.arange(t_many.size), 0)
-        velocity = node_velocity(Curve(*one.curve), start)
-        force = friction.density(*velocity, delta_many)
-        integrals = _panel_integrals(Curve(*one.curve), *velocity, *force, fields.panels).sum(
-            axis=1
-        )
-        end = one.edge_velocity(start)[:2, -1] / slow_many
-        results.append(np.concatenate([integrals / friction.largest, end]))
-    return np.abs(results[1] - results[0]).max(axis=0).reshape(n_panel, t.size)
+    return np.abs(results[1] - results[0]).max(axis=0).reshape(len(edges) - 1, -1)

@@ -138,9 +138,6 @@ class Concertina(PrescribedBody):
             )
         return float(2 * self.width * np.sum(weight * np.sin(self.amplitude * even_profile(x))))
 
-    def prescribed(self) -> Motion:
-        return _one_bump(self) if self.bumps == 1 else _two_bumps(self)
-
     def describe(self) -> str:
         bumps = "one bump" if self.bumps == 1 else "two bumps"
         return (
@@ -148,51 +145,75 @@ class Concertina(PrescribedBody):
             f"regions of {2 * self.epsilon:g}"
         )
 
+    def prescribed(self) -> Motion:
+        w, (low, high), one = self.width, self.regions[0], self.bumps == 1
+        bump = self._one_bump if one else self._two_bumps
+
+        def mirrored(s: np.ndarray, rear: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+            """The rear half's function of arc length, and minus that of its image in the front."""
+            value = rear(np.minimum(s, 1 - s))
+            return np.where(s > 0.5, -value, value)
+
+        def angle(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+            a, b, centre, *_ = bump(t)
+
+            def theta(s: np.ndarray) -> np.ndarray:
+                x = 2 * (s - centre) / w
+                return a * odd_profile(x) + b * even_profile(x)
+
+            return theta(s) if one else mirrored(s, theta)
+
+        def rate(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+            a, b, centre, a_rate, b_rate, centre_rate = bump(t)
+
+            def turning(s: np.ndarray) -> np.ndarray:
+                x = 2 * (s - centre) / w
+                moving = (a * odd_slope(x) + b * even_slope(x)) * 2 * centre_rate / w
+                return a_rate * odd_profile(x) + b_rate * even_profile(x) - moving
+
+            return turning(s) if one else mirrored(s, turning)
+
+        def breaks(t: np.ndarray) -> np.ndarray:
+            rear, front = bump(t)[2] + np.array([[-w / 2], [w / 2]])
+            quarters = [rear + (front - rear) * k / 4 for k in range(5)]
+            ends = np.stack([np.full_like(t, low), *quarters, np.full_like(t, high)])
+            return ends if one else np.concatenate([ends, 1 - ends])
+
+        stages = (0.0, 1 / 6, 1 / 3, 0.5) if one else (0.0, 0.25, 0.5, 0.75, 1.0)
+        return Motion(angle, rate, breaks, stages, antipodal=one)
+
+    def _one_bump(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Coefficients a, b and centre of the bump, and their rates."""
+        travel = (2 * self.epsilon - self.width) * (-1 if self.backwards else 1)
+        scale = np.where(t < 0.5, self.amplitude, -self.amplitude)
+        t = np.where(t < 0.5, t, t - 0.5)
+        (up, up_rate), (on, on_rate), (down, down_rate) = (
+            _ramp(t, k / 6, (k + 1) / 6) for k in range(3)
+        )
+        none = np.zeros_like(t)
+        centre, centre_rate = 0.5 + travel * (on - 0.5), travel * on_rate
+        return scale * (up - down), none, centre, scale * (up_rate - down_rate), none, centre_rate
+
+    def _two_bumps(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The same of the rear bump."""
+        travel = 2 * self.epsilon - self.width
+        # a solver asks for the same phases panel by panel
+        t, places = np.unique(t, return_inverse=True)
+        legs = [_ramp(t % 1.0, k / 4, (k + 1) / 4) for k in range(4)]
+        phi, phi_rate = (np.pi * (legs[0][i] - legs[2][i]) for i in range(2))
+        centre = 0.25 + travel * (0.5 - legs[1][0] + legs[3][0])
+        centre_rate = travel * (legs[3][1] - legs[1][1])
+        A, dA = _constant_chord(self.amplitude, phi)
+        a, b = A * np.sin(phi), A * np.cos(phi)
+        a_rate = (dA * np.sin(phi) + A * np.cos(phi)) * phi_rate
+        b_rate = (dA * np.cos(phi) - A * np.sin(phi)) * phi_rate
+        return tuple(part[places] for part in (a, b, centre, a_rate, b_rate, centre_rate))
+
 
 def _ramp(t: np.ndarray, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
     """Goes from 0 to 1 between start and stop; its value and rate."""
     inside = (t >= start) & (t < stop)
     return np.clip((t - start) / (stop - start), 0.0, 1.0), inside / (stop - start)
-
-
-def _one_bump(crawler: Concertina) -> Motion:
-    w = crawler.width
-    travel = w - 2 * crawler.epsilon if crawler.backwards else 2 * crawler.epsilon - w
-
-    def state(t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Amplitude and centre of the bump, with their rates."""
-        scale = np.where(t < 0.5, crawler.amplitude, -crawler.amplitude)
-        t = np.where(t < 0.5, t, t - 0.5)
-        (up, up_rate), (on, on_rate), (down, down_rate) = (
-            _ramp(t, k / 6, (k + 1) / 6) for k in range(3)
-        )
-        centre, centre_rate = 0.5 + travel * (on - 0.5), travel * on_rate
-        return scale * (up - down), scale * (up_rate - down_rate), centre, centre_rate
-
-    def angle(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-        a, _, centre, _ = state(t)
-        return a * odd_profile(2 * (s - centre) / w)
-
-    def rate(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-        a, a_rate, centre, centre_rate = state(t)
-        x = 2 * (s - centre) / w
-        return a_rate * odd_profile(x) - a * odd_slope(x) * 2 * centre_rate / w
-
-    def breaks(t: np.ndarray) -> np.ndarray:
-        centre = state(t)[2]
-        (low, high) = crawler.regions[0]
-        ends = [
-            np.full_like(t, low),
-            *_quarters(centre - w / 2, centre + w / 2),
-            np.full_like(t, high),
-        ]
-        return np.stack(ends)
-
-    return Motion(angle, rate, breaks, stages=(0.0, 1 / 6, 1 / 3, 0.5), antipodal=True)
-
-
-def _quarters(a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
-    return [a + (b - a) * k / 4 for k in range(5)]
 
 
 def _constant_chord(amplitude: float, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -209,59 +230,3 @@ def _constant_chord(amplitude: float, phi: np.ndarray) -> tuple[np.ndarray, np.n
         A = A - (np.sum(weight * np.cos(A * shape), axis=0) - goal) / gradient
     sine = np.sin(A * shape)
     return A, -A * np.sum(weight * sine * turned, axis=0) / np.sum(weight * sine * shape, axis=0)
-
-
-def _two_bumps(crawler: Concertina) -> Motion:
-    w = crawler.width
-    travel = 2 * crawler.epsilon - w
-
-    def state(t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Coefficients a, b and centre of the rear bump, with their rates."""
-        # a solver asks for the same phases panel by panel
-        t, places = np.unique(t, return_inverse=True)
-        legs = [_ramp(t % 1.0, k / 4, (k + 1) / 4) for k in range(4)]
-        phi, phi_rate = np.pi * (legs[0][0] - legs[2][0]), np.pi * (legs[0][1] - legs[2][1])
-        centre = 0.25 + travel * (0.5 - legs[1][0] + legs[3][0])
-        centre_rate = travel * (legs[3][1] - legs[1][1])
-        A, dA = _constant_chord(crawler.amplitude, phi)
-        a, b = A * np.sin(phi), A * np.cos(phi)
-        a_rate = (dA * np.sin(phi) + A * np.cos(phi)) * phi_rate
-        b_rate = (dA * np.cos(phi) - A * np.sin(phi)) * phi_rate
-        return tuple(part[places] for part in (a, b, centre, a_rate, b_rate, centre_rate))
-
-    def mirrored(s: np.ndarray, of_rear: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """The rear half's function of arc length, and minus that of the mirror image in the front
-        half."""
-        value = of_rear(np.minimum(s, 1 - s))
-        return np.where(s > 0.5, -value, value)
-
-    def angle(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-        a, b, centre, *_ = state(t)
-
-        def of_rear(s: np.ndarray) -> np.ndarray:
-            x = 2 * (s - centre) / w
-            return a * odd_profile(x) + b * even_profile(x)
-
-        return mirrored(s, of_rear)
-
-    def rate(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-        a, b, centre, a_rate, b_rate, centre_rate = state(t)
-
-        def of_rear(s: np.ndarray) -> np.ndarray:
-            x = 2 * (s - centre) / w
-            moving = (a * odd_slope(x) + b * even_slope(x)) * 2 * centre_rate / w
-            return a_rate * odd_profile(x) + b_rate * even_profile(x) - moving
-
-        return mirrored(s, of_rear)
-
-    def breaks(t: np.ndarray) -> np.ndarray:
-        centre = state(t)[2]
-        low, high = crawler.regions[0]
-        ends = [
-            np.full_like(t, low),
-            *_quarters(centre - w / 2, centre + w / 2),
-            np.full_like(t, high),
-        ]
-        return np.stack([*ends, *(1 - end for end in ends)])
-
-    return Motion(angle, rate, breaks, stages=(0.0, 0.25, 0.5, 0.75, 1.0))

@@ -142,7 +142,8 @@ class CrawlerBody(PanelBody):
         return y**3 * slopes[1] - 12 * x * y**2 * slopes[0] + (24 * x * x * y - 6 * y**2) * p
 
     def _x(self, s: np.ndarray, centre: Array) -> Array:
-        return 2 * (s - 0.5) / self.width - 2 * centre
+        places: Array = s if isinstance(centre, np.ndarray) else type(centre)(s)
+        return 2 * (places - 0.5) / self.width - 2 * centre
 
     def tangent(self, s: np.ndarray, angles: Array) -> Array:
         return self._profile(self._x(s, self._place(angles[0:1, :])[0]), angles[1:, :])
@@ -154,17 +155,11 @@ class CrawlerBody(PanelBody):
             x, angles[1:, :], 1
         )
 
-    def angle(self, s: np.ndarray, q: Array) -> Array:
-        return self.tangent(_column(s, q), q)
-
-    def angle_rate(self, s: np.ndarray, q: Array, rates: Array) -> Array:
-        return self.turning(_column(s, q), q, rates)
-
     def angle_slopes(
         self, s: np.ndarray, q: np.ndarray, rates: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         centre, pace, bent = self._place(q[0:1])
-        x, dp = self._x(s[:, None], centre), rates[0:1]
+        x, dp = self._x(s, centre), rates[0:1]
         slope, curvature = (self._profile(x, q[1:], order) for order in (1, 2))
         turned = self._profile(x, rates[1:], 1)
         one = np.eye(self.modes)[:, :, None]
@@ -256,11 +251,6 @@ class CrawlerBody(PanelBody):
         stairs = np.tril(np.ones((len(lengths), len(lengths) - 1)), -1)[link]
         profile = np.linalg.lstsq(self.modes_at(x), stairs - stairs.mean(axis=0), rcond=None)[0]
         return np.concatenate([np.zeros((1, len(lengths) - 1)), profile])
-
-
-def _column(s: np.ndarray, q: Array) -> Array:
-    """Places ``(n,)`` as a column beside shapes."""
-    return s[:, None] if isinstance(q, np.ndarray) else type(q)(s[:, None])
 
 
 def _polynomial(powers: np.ndarray, b: Array, x: Array) -> Array:

@@ -108,26 +108,20 @@ class ModalBody(PanelBody):
     def describe(self) -> str:
         return f"smooth, {self.modes} {self.basis} modes of its tangent angle, {self.panels} panels"
 
-    def tangent(self, s: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    def tangent(self, s: np.ndarray, angles: Array) -> Array:
+        if s.shape[1] == 1:
+            return namespace(angles).matmul(self.modes_at(s[:, 0]), angles)
         return np.einsum("itm,mt->it", self.modes_at(s), angles)
 
-    def turning(self, s: np.ndarray, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    def turning(self, s: np.ndarray, angles: Array, rates: Array) -> Array:
         return self.tangent(s, rates)
-
-    def angle(self, s: np.ndarray, q: Array) -> Array:
-        return namespace(q).matmul(self.modes_at(s), q)
-
-    def angle_rate(self, s: np.ndarray, q: Array, rates: Array) -> Array:
-        return self.angle(s, rates)
 
     def angle_slopes(
         self, s: np.ndarray, q: np.ndarray, rates: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        modes = self.modes_at(s)
+        modes = self.modes_at(s[:, 0])[..., None]
         none = np.zeros_like(modes)
-        return np.concatenate([modes, none], axis=1)[..., None], np.concatenate(
-            [none, modes], axis=1
-        )[..., None]
+        return np.concatenate([modes, none], axis=1), np.concatenate([none, modes], axis=1)
 
     @property
     def limited(self) -> np.ndarray:
@@ -155,12 +149,8 @@ class ModalBody(PanelBody):
         return np.abs(self.modes_at(np.linspace(0.0, 1.0, 401)) @ angles).max(axis=0)
 
     def laid(self, lengths: np.ndarray) -> np.ndarray:
-        """``(modes, n_joint)``: amplitudes of the smooth shape nearest (in the mean square) to a
-        chain of given joint angles.
-
-        The chain's tangent angle is a staircase; only its mean direction, which is a rigid
-        rotation, is left out.
-        """
+        """Nearest in the mean square to the chain's staircase of a tangent angle, whose mean
+        direction, a rigid rotation, is left out."""
         lengths = np.asarray(lengths, dtype=float)
         ends = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
         steps = np.tril(np.ones((lengths.size, lengths.size - 1)), -1)
@@ -171,8 +161,7 @@ class ModalBody(PanelBody):
         return np.linalg.solve(_gram(self), moments)
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
-        """``sin(2 pi t - 2 pi waves (s - 1/2))`` as nearly as the modes can: factors ``(modes,)``
-        of the cosine and the sine of the phase."""
+        """``sin(2 pi t - 2 pi waves (s - 1/2))`` as nearly as the modes can."""
         grid = _FINE
         s, w = grid.nodes[:, 0], grid.weights[:, 0]
         project = np.linalg.solve(_gram(self), self.modes_at(s).T * w)

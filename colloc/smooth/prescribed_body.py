@@ -103,9 +103,6 @@ class PrescribedBody(SmoothBody):
     ) -> np.ndarray:
         raise NotImplementedError("a prescribed motion has nothing to differentiate by.")
 
-    def swapped(self, shape: np.ndarray) -> np.ndarray:
-        raise NotImplementedError("a prescribed motion is not named from its other end.")
-
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         return np.array([1.0, 0.0]), np.array([0.0, 1.0])
 

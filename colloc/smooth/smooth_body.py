@@ -8,10 +8,10 @@ import numpy as np
 from colloc.mechanics.balance_results import BalancedMotion
 from colloc.mechanics.bodies import ARROWS, Body
 from colloc.mechanics.law import Law
-from colloc.smooth.balance import SmoothSolution, solve_smooth
+from colloc.numerics.arrays import Array
+from colloc.smooth.balance import TAIL, SmoothSolution, solve_smooth
 from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity
 from colloc.smooth.motion import Motion
-from colloc.smooth.panel_balance import TAIL
 
 _OUTLINE, _NODES = 96, 3
 _SHOWN = 5
@@ -29,12 +29,12 @@ class SmoothBody(Body):
 
     first_panels = 16
 
-    def tangent(self, s: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        """Theta ``(n_node, n_time)`` at arc lengths s ``(n_node, n_time)`` of shapes ``(n_joint,
-        n_time)``."""
+    def tangent(self, s: np.ndarray, angles: Array) -> Array:
+        """Theta ``(n_node, n_time)`` at arc lengths s ``(n_node, 1 or n_time)`` of shapes
+        ``(n_joint, n_time)``."""
         raise NotImplementedError
 
-    def turning(self, s: np.ndarray, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    def turning(self, s: np.ndarray, angles: Array, rates: Array) -> Array:
         """Its rate."""
         raise NotImplementedError
 
@@ -43,28 +43,22 @@ class SmoothBody(Body):
         so."""
         return np.empty((0, angles.shape[1]))
 
-    def _motion_of(self, angles: np.ndarray, rates: np.ndarray) -> Motion:
-        """Shapes in a row as a motion whose phase counts them."""
-
-        def at(t: np.ndarray) -> np.ndarray:
-            return t.astype(int)
-
-        return Motion(
-            lambda s, t: self.tangent(np.broadcast_to(s, (len(s), t.size)), angles[:, at(t)]),
-            lambda s, t: self.turning(
-                np.broadcast_to(s, (len(s), t.size)), angles[:, at(t)], rates[:, at(t)]
-            ),
-            lambda t: self.breaks(angles[:, at(t)]),
-        )
-
     def on_adaptive_panels(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, **settings
     ) -> SmoothSolution:
         """The balance on panels that are halved until they resolve it; settings as for
         `solve_smooth`."""
-        phases = np.arange(angles.shape[1])
+
+        def at(t: np.ndarray) -> np.ndarray:  # the phase counts the shapes
+            return t.astype(int)
+
+        motion = Motion(
+            lambda s, t: self.tangent(s, angles[:, at(t)]),
+            lambda s, t: self.turning(s, angles[:, at(t)], rates[:, at(t)]),
+            lambda t: self.breaks(angles[:, at(t)]),
+        )
         settings = {"panels": self.first_panels, "quadrature_tolerance": _REPLAYED} | settings
-        return solve_smooth(self._motion_of(angles, rates), friction, phases, delta, **settings)
+        return solve_smooth(motion, friction, np.arange(angles.shape[1]), delta, **settings)
 
     def replayed(
         self,
@@ -81,8 +75,8 @@ class SmoothBody(Body):
         ), solved.residual
 
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
-        places = np.repeat(np.linspace(0.0, 1.0, _FINE_PLACES)[:, None], angles.shape[1], axis=1)
-        return np.abs(self.tangent(places, angles)).max(axis=0)
+        places = np.linspace(0.0, 1.0, _FINE_PLACES)[:, None]
+        return np.asarray(np.abs(self.tangent(places, angles)).max(axis=0))
 
     def _curve(
         self, n: int, order: int, angles: np.ndarray, rates: np.ndarray

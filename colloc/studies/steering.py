@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -107,8 +107,8 @@ class Steering:
             "work_per_period_weight_times_length": [point.work for point in self.points],
             "status": [point.status for point in self.points],
             "phase": t.tolist(),
-            f"{self.problem.body.coordinate}_angles_rad": [
-                point.gait.angles(t + begin).T.tolist()
+            f"{self.points[0].gait.driven.coordinate}_angles_rad": [
+                point.gait.driven.angles(t + begin).T.tolist()
                 for point, begin in zip(self.points, self.begins, strict=True)
             ],
         }
@@ -194,9 +194,12 @@ def steer(
         raise ProblemError(
             f"the straight gait is not certified, so there is nothing to steer: {straight.message}"
         )
-    free = {"gait": replace(problem.gait, symmetry=NONE)}
+    free = {"gait": problem.gait.with_symmetry(NONE)}
     from_neighbour = free | {"delta_start": problem.delta}
-    mirrors = ANTIPODAL in problem.body.symmetries and not one_sided(problem.joint_limit)
+    bent = problem.joint_map is not None and any(problem.joint_map.rest)
+    mirrors = (
+        ANTIPODAL in problem.body.symmetries and not one_sided(problem.joint_limit) and not bent
+    )
 
     def turned(
         stated: Problem, wanted: Sequence[float], known: dict[float, Solution]

@@ -87,8 +87,8 @@ class FullProgram:
     rows : (m, n + n_out + 1)
         Sparse, of the variables, the outputs of the repeated functions, and 1.
     objective : (1, n + n_out + 1)
-    bends : (n_bend, n_parameter)
-        Sparse: the variables of shape checks from the parameters.
+    limits : ShapeLimits
+        How the variables of shape checks follow from the parameters.
     """
 
     control: ControlProblem
@@ -105,7 +105,7 @@ class FullProgram:
     repeated: tuple[Repeated, ...]
     rows: sparse.csr_matrix
     objective: sparse.csr_matrix
-    bends: sparse.csr_matrix
+    limits: ShapeLimits
     velocity: BalancedVelocity | None = None
     """Kept alive here for the functions that call it."""
 
@@ -132,7 +132,7 @@ class FullProgram:
                 rows = self.groups[name]
                 program = program.with_bounds(name, self.row_lower[rows], self.row_upper[rows])
         p = self.layout.parameters[:, 0]
-        return program, np.concatenate([x[: self.layout.n], program.bends @ x[p]])
+        return program, np.concatenate([x[: self.layout.n], program.limits.bends(x[p])])
 
     def with_bounds(self, name: str, lower: np.ndarray, upper: np.ndarray) -> FullProgram:
         """The program with other bounds of the rows of a name."""
@@ -145,7 +145,7 @@ class FullProgram:
         equation but the closure of the net rotation; delta per period."""
         gait = self.control.admissible.member(parameters)
         motion = balanced_variables(self.control, self.layout, self.mesh, gait, parameters, delta)
-        return np.concatenate([motion, self.bends @ parameters])
+        return np.concatenate([motion, self.limits.bends(parameters)])
 
 
 def full_program(
@@ -244,7 +244,7 @@ def full_program(
     return FullProgram(
         control, mesh, gait, far, layout, program.groups, cells, lower, upper,
         np.concatenate(program.lower), np.concatenate(program.upper), tuple(program.repeated),
-        sparse.vstack(program.rows).tocsr(), -pick(of_period[0]), limits.bends, motion.velocity,
+        sparse.vstack(program.rows).tocsr(), -pick(of_period[0]), limits, motion.velocity,
     )  # fmt: skip
 
 
@@ -267,6 +267,7 @@ class _Motion:
                 gait.rate_matrix(mesh.times, n_joint) / RADIANS,
             )
         )
+        self.offset = np.repeat(gait.offset(n_joint)[:, 0], mesh.n_point)
         self.delta = ca.SX.sym("delta")
         self.functions()
 
@@ -286,7 +287,10 @@ class _Motion:
         """Where the values of formulas of an instant are at every point, ``(n_value, n_point)``."""
         body, law = self.dynamics.body, self.dynamics.law
         local, gather, q, r, moment = self.joints(any(each.needs_forces for each in formulas))
-        now = Instants(body, law, q, r, self.delta, unit=RADIANS, moments=moment)
+        now = Instants(
+            body, law, q, r, self.delta, unit=RADIANS, moments=moment,
+            joint_map=self.dynamics.joint_map,
+        )  # fmt: skip
         out = ca.vertcat(*(each.at(now) for each in formulas))
         return self.program.repeat(local, out, gather, delta=self.delta)
 
@@ -487,7 +491,7 @@ class _Links(_Motion):
         # outputs are ordered instance by instance, instances part by part
         sin, cos = (pick(row) for row in self.halves[:2])
         program.add("tail", phi[: self.mesh.n_point] - theta)
-        program.add("angles", d @ phi - self.Phi @ p)
+        program.add("angles", d @ phi - self.Phi @ p, self.offset, self.offset)
         program.add("rates", d @ w - self.Phi_t @ p)
         program.add("velocity x", d @ vx + both @ sin)
         program.add("velocity y", d @ vy - both @ cos)
@@ -571,7 +575,7 @@ class _Mapped(_Motion):
     def add_rows(self, state: Any, rate: Any) -> None:
         program, layout, pick = self.program, self.layout, self.program.pick
         p = pick(layout.parameters)
-        program.add("angles", pick(layout.angles) - self.Phi @ p)
+        program.add("angles", pick(layout.angles) - self.Phi @ p, self.offset, self.offset)
         program.add("rates", pick(layout.rates) - self.Phi_t @ p)
         program.add("balance", pick(self.point[:3]))
         self.add_orientation(layout.z[2], state, rate)

@@ -14,6 +14,7 @@ import numpy as np
 from colloc.gaits.limits import Limit, range_of
 from colloc.mechanics.bodies import Body, Pairs, Stretch
 from colloc.mechanics.contact import Contact, smooth_minimum, tangent_of_minimum
+from colloc.mechanics.joint_map import JointMap
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.peaks import vertex
 
@@ -87,6 +88,10 @@ class ShapeCheck:
         matrix = gait_class.rate_matrix if self.derivative else gait_class.angle_matrix
         return np.asarray(matrix(times, n_joint))
 
+    def offset(self, gait_class: Any, n_joint: int) -> np.ndarray:
+        """What is added to it, ``(n_joint, 1)``."""
+        return np.zeros((n_joint, 1)) if self.derivative else np.asarray(gait_class.offset(n_joint))
+
     def magnitudes(self, shapes: np.ndarray, limit: Limit) -> np.ndarray:
         """What a bound from above is laid on, ``(n_time,)``: an angle is bounded both ways, by as
         much from their middle."""
@@ -115,13 +120,17 @@ class ShapeCheck:
 
 
 @lru_cache(maxsize=64)
-def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) -> list[ShapeCheck]:
+def shape_checks(
+    body: Body,
+    far: Pairs = (),
+    speeds: tuple[float, ...] = (),
+    joint_map: JointMap | None = None,
+) -> list[ShapeCheck]:
     """Functions of the shape, or of its rates, that admissibility bounds.
 
     Angles to be kept within the limit of the problem; then functions that must not be positive: for
     parts that might cross, and for the pairs `far` of parts farther apart; then rates over the
-    largest
-    allowed, `speeds` [rad per period] of each shape coordinate.
+    largest allowed, `speeds` [rad per period] of each motor.
     """
     angles = ca.SX.sym("q", body.n_joint)
     names, stretches = enumerate(body.limit_names), body.stretches
@@ -140,9 +149,11 @@ def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) ->
         known.get(each.name) or known.setdefault(each.name, _minimum_check(each, angles))
         for each in body.contacts(far)
     ]
-    unit = np.eye(body.n_joint)
+    each, name = (
+        (joint_map.inverse, "motor") if joint_map else (np.eye(body.n_joint), body.coordinate)
+    )
     rates = (
-        _angle_check(f"speed of {body.coordinate} {j + 1}", angles, unit[j] / most, -1)
+        _angle_check(f"speed of {name} {j + 1}", angles, each[j] / most, -1)
         for j, most in enumerate(speeds)
     )
     return checks + [replace(rate, fixed=(-1.0, 1.0), derivative=1) for rate in rates]

@@ -3,6 +3,8 @@ bind."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import casadi as ca
 import numpy as np
 from scipy import sparse
@@ -13,64 +15,87 @@ from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.repeated import Rows
 from colloc.transcription.layout import Layout
-from colloc.transcription.shape_checks import shape_checks
+from colloc.transcription.shape_checks import ShapeCheck, shape_checks
 from colloc.transcription.worst_instants import held_shares, near_peaks
+
+
+class _Placed(NamedTuple):
+    """A shape check at its worst instants."""
+
+    check: ShapeCheck
+    cells: np.ndarray
+    """In which it may bind, ``(n,)`` int."""
+    shares: np.ndarray
+    """Of its cuts, ``(n,)``."""
+    matrix: np.ndarray
+    """From parameters to shapes, ``(n, n_joint, n_parameter)``."""
+    offset: np.ndarray
+    """Shape with all parameters 0, ``(n_joint,)``."""
+    bends: np.ndarray
+    """Where the shape coordinates of which it is a function are among the variables, ``(k, n)``;
+    none for one that is linear."""
 
 
 class ShapeLimits:
     """Shape checks of a program, at the worst instants of a gait in the cells in which they may
-    bind. Those that are linear are rows in p; others are functions of the angles between their
-    links, which are variables."""
+    bind. Those that are linear are rows in the parameters p; others are functions of the angles
+    between their links, which are variables."""
 
     def __init__(
         self, control: ControlProblem, mesh: Mesh, layout: Layout, gait: AnyGait, far: Pairs
     ) -> None:
-        admissible = control.admissible
-        checks = shape_checks(admissible.body, far, admissible.largest_speeds)
+        admissible, joint_map = control.admissible, control.dynamics.joint_map
+        gaits, n_joint = admissible.gait, admissible.n_joint
+        checks = shape_checks(admissible.body, far, admissible.largest_speeds, joint_map)
         peaks = near_peaks(gait, mesh, checks, admissible.joint_limit)
-        self.limit, self.p = admissible.joint_limit, layout.parameters[:, 0]
-        self.placed, bends, start = [], [], layout.n
+        self._limit, self._p, self._first = (
+            admissible.joint_limit,
+            layout.parameters[:, 0],
+            layout.n,
+        )
+        self._placed, self.n_bend = list[_Placed](), 0
+        bends, offsets = [np.empty((0, self._p.size))], [np.empty(0)]
         for check, (cells, times) in zip(checks, peaks, strict=True):
-            matrix = check.matrix(admissible.gait, times, admissible.n_joint)
-            joints = check.joints
-            places = np.empty((0, times.size), dtype=int)
-            if not check.linear and times.size:
-                places = start + np.arange(joints.size * times.size).reshape(-1, times.size)
-                bends.append(matrix[:, joints].transpose(1, 0, 2).reshape(-1, self.p.size))
-                start += places.size
-            self.placed.append((check, cells, held_shares(check, gait, times), matrix, places))
-        self.n_bend = start - layout.n
-        self.first = layout.n
-        self.bends = sparse.csr_matrix(np.concatenate([np.empty((0, self.p.size)), *bends]))
+            matrix, offset = check.matrix(gaits, times, n_joint), check.offset(gaits, n_joint)[:, 0]
+            joints = check.joints[: 0 if check.linear else None]
+            places = np.arange(joints.size * cells.size).reshape(joints.size, cells.size)
+            at = self._first + self.n_bend + places
+            shares = held_shares(check, gait, times)
+            self._placed.append(_Placed(check, cells, shares, matrix, offset, at))
+            bends.append(matrix[:, joints].transpose(1, 0, 2).reshape(-1, self._p.size))
+            offsets.append(np.repeat(offset[joints], cells.size))
+            self.n_bend += places.size
+        self._matrix = sparse.csr_matrix(np.concatenate(bends))
+        self._offset = np.concatenate(offsets)
+
+    def bends(self, parameters: np.ndarray) -> np.ndarray:
+        """The angles ``(n_bend,)`` that are variables, from the parameters of a gait."""
+        return np.asarray(self._matrix @ parameters + self._offset)
 
     def repeat(self, program: Rows) -> dict[str, np.ndarray]:
         """Where the values of the checks that are not linear are, by their names."""
-        delta, share, found = ca.SX.sym("delta"), ca.SX.sym("share"), {}
-        for check, _, shares, _, places in self.placed:
-            if places.size:
-                local = ca.SX.sym("bend", check.joints.size)
-                angles = ca.SX.zeros(check.n_joint)
-                angles[check.joints.tolist()] = local
-                out = check.cut(angles, share)
-                found[check.name] = program.repeat(
-                    local, out, places, share, shares[None], delta=delta
+        delta, share, values = ca.SX.sym("delta"), ca.SX.sym("share"), {}
+        for check, _, shares, _, _, bends in self._placed:
+            if bends.size:
+                local, shape = ca.SX.sym("bend", len(bends)), ca.SX.zeros(check.n_joint)
+                shape[check.joints.tolist()] = local
+                values[check.name] = program.repeat(
+                    local, check.cut(shape, share), bends, share, shares[None], delta=delta
                 )
-        return found
+        return values
 
     def add_rows(self, program: Rows, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Cells in which each check has its rows, by its name."""
-        pick, cells = program.pick, {}
+        """Add the rows; the cells in which each check has its own, by its name."""
+        p = program.pick(self._p)
         if self.n_bend:
-            bends = pick(self.first + np.arange(self.n_bend))
-            program.add("bends", bends - self.bends @ pick(self.p))
-        for check, where, shares, matrix, _ in self.placed:
-            cells[check.name] = where
-            if check.name in values:
-                rows = pick(values[check.name])
-            elif not where.size:
-                rows = pick(where)
-            else:
+            bends = program.pick(self._first + np.arange(self.n_bend))
+            program.add("bends", bends - self._matrix @ p, self._offset, self._offset)
+        for check, cells, shares, matrix, offset, _ in self._placed:
+            if check.linear and cells.size:
                 slopes = check.slopes(shares)
-                rows = sparse.csr_matrix(np.einsum("tj,tjp->tp", slopes, matrix)) @ pick(self.p)
-            program.add(check.name, rows, *check.bounds(self.limit))
-        return cells
+                linear = sparse.csr_matrix(np.einsum("tj,tjp->tp", slopes, matrix))
+                rows = linear @ p + program.constant(slopes @ offset)
+            else:
+                rows = program.pick(values.get(check.name, cells))
+            program.add(check.name, rows, *check.bounds(self._limit))
+        return {placed.check.name: placed.cells for placed in self._placed}

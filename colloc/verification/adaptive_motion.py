@@ -80,7 +80,9 @@ def rates_at(
         start = near.reshape(3, -1)
     solved = body.solve(friction, angles, rates, delta, start=start).require()
     now = body.motion(friction, angles, rates, delta, solved)
-    at = Instants(body, friction, angles, rates, delta, z=now.z)
+    at = Instants(
+        body, friction, angles, rates, delta, z=now.z, joint_map=getattr(path, "joint_map", None)
+    )
     gained = np.stack([now.power, *(quantity.at(at)[0] for quantity in quantities)])
     rows = now.z, (now.centre[0] + 1j * now.centre[1]) * np.exp(-1j * turn * t.ravel()), gained
     return Rates(*(row.reshape(*row.shape[:-1], *t.shape) for row in rows))
@@ -98,7 +100,9 @@ def totals_along(
     h = (right - left) / pieces
     starts = left[:, None] + h[:, None] * np.arange(pieces)
     t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
-    return h * (quantity.of_shapes(*path(t.ravel()))[0].reshape(t.shape) @ PANEL_RULE.b).sum(axis=1)
+    driven = getattr(path, "driven", path)
+    densities = quantity.of_shapes(*driven(t.ravel()))[0].reshape(t.shape)
+    return h * (densities @ PANEL_RULE.b).sum(axis=1)
 
 
 def whole_totals(

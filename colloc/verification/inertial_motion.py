@@ -29,7 +29,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import LENGTH, Quantity, quantities_of
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import checked_inertia, momenta
+from colloc.mechanics.inertia import checked_mass, momenta
 from colloc.mechanics.law import Law
 from colloc.motion.compiled_momenta import MomentaAt
 from colloc.motion.follow import ONE_SIDED, STEP, Course, followed
@@ -327,7 +327,7 @@ def gait_with_inertia(
     regime: Regime = LEVEL,
 ) -> GaitWithInertia:
     """A gait of a body, or a `ProblemError` that says why it cannot be played with inertia."""
-    (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
+    chain, at = checked_mass(body), tuple(sorted(float(t) for t in breaks))
     theta = float(getattr(gait, "theta", None) or 0.0)
     how: Any = {
         "froude": float(froude),
@@ -336,7 +336,7 @@ def gait_with_inertia(
         "regime": regime,
         "theta": theta,
     }
-    return GaitWithInertia(chain, friction, joints, delta, **how)
+    return GaitWithInertia(chain, friction, gait, delta, **how)
 
 
 def inertial_motion(
@@ -359,7 +359,7 @@ def inertial_motion(
 
     Parameters
     ----------
-    body : Chain or Coupled
+    body : Chain
         With the masses of its links.
     friction : Law
     gait : callable

@@ -76,16 +76,18 @@ def _evaluated(
     the branch in time.
     """
     (angles, rates), start, apart = path(t.ravel()), near, np.zeros((3 + len(quantities), t.size))
+    joint_map = getattr(path, "joint_map", None)
     if not friction.associated:
         before = None if whole else near
         followed = followed_motion(
-            body, friction, angles, rates, delta, before=before, sense=sense, quantities=quantities
-        )
+            body, friction, angles, rates, delta, before=before, sense=sense,
+            quantities=quantities, joint_map=joint_map,
+        )  # fmt: skip
         if followed is not None:
             start, apart = np.nan_to_num(followed.z), followed.apart
     motion, residual = body.replayed(friction, angles, rates, delta, start)
     now, z, centre = (
-        Instants(body, friction, angles, rates, delta, z=motion.z),
+        Instants(body, friction, angles, rates, delta, z=motion.z, joint_map=joint_map),
         motion.z,
         motion.centre,
     )
@@ -214,7 +216,8 @@ def replay(
     start = None if near is None else near.tail_velocity(t.ravel())
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     names = "rotation", "distance", "work", *(each.name for each in asked)
-    limits = limits_of(limits, body.n_joint)
+    joint_map = getattr(path, "joint_map", None)
+    limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)
     at = partial(
         _evaluated,
         body,

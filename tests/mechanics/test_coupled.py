@@ -5,133 +5,111 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Chain, Coupled, Foot, Friction, Harmonic, Problem, ProblemError
-from colloc.gaits.gait_fields import body_from, fields
-from colloc.mechanics.bodies import Body
+from colloc import Chain, Coupled, Friction, Harmonic, Problem, ProblemError
+from colloc.gaits.gait_fields import class_from, fields, gait_from
+from colloc.mechanics.joint_map import JointMap
+from colloc.results.robot import joint_torques
 
 LAW = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5)
-BELTS = Coupled(Chain((0.2,) * 5), gears=((1, 0), (0.5, 0), (0, 0.5), (0, 1)))
-BROKEN = Coupled(Chain((0.25,) * 4), stuck={1: 0.4})
+FIVE, FOUR = Chain((0.2,) * 5), Chain((0.25,) * 4)
+GEARS = ((1, 0), (0.5, 0), (0, 0.5), (0, 1))
+BELTS, BROKEN = Coupled(Harmonic(1), gears=GEARS), Coupled(Harmonic(1), stuck={1: 0.4})
 
 
-def solved(body, **changes):
-    return colloc.solve(
-        Problem("c", body=body, friction=LAW, gait=Harmonic(1), delta=1e-3, **changes), starts=2
-    )
+def stated(body, gait, **changes):
+    return Problem("c", body=body, friction=LAW, gait=gait, delta=1e-3, **changes)
+
+
+def solved(body, gait, **changes):
+    return colloc.solve(stated(body, gait, **changes), starts=2)
 
 
 @pytest.fixture(scope="module")
 def broken():
-    return solved(BROKEN)
+    return solved(FOUR, BROKEN)
 
 
 def test_a_stuck_joint_of_a_straight_body_makes_two_links_one():
-    stuck, whole = (
-        solved(Coupled(Chain((0.25,) * 4), stuck={1: 0.0})),
-        solved(Chain((0.25, 0.5, 0.25))),
-    )
+    stuck = solved(FOUR, Coupled(Harmonic(1), stuck={1: 0.0}))
+    whole = solved(Chain((0.25, 0.5, 0.25)), Harmonic(1))
     assert stuck.status == whole.status == "solved"
     assert stuck.efficiency == pytest.approx(whole.efficiency, rel=1e-7)
 
 
-def test_a_motor_for_every_joint_is_the_chain():
-    chain, y = Chain((0.2, 0.5, 0.3)), np.random.default_rng(0).normal(size=(4, 20))
-    own = Coupled(chain)
-    a, b = (body.solve(LAW, y[:2], y[2:], 1e-3) for body in (own, chain))
-    np.testing.assert_array_equal(a.z, b.z)
-    np.testing.assert_array_equal(
-        own.slopes(LAW, y[:2], y[2:], 1e-3, a), chain.slopes(LAW, y[:2], y[2:], 1e-3, b)
-    )
-    assert own.symmetries == chain.symmetries
+def test_a_motor_for_every_joint_is_the_class_of_the_motors():
+    chain, t = Chain((0.2, 0.5, 0.3)), np.linspace(0, 1, 20)
+    p = np.random.default_rng(0).normal(size=Harmonic(2).size(2))
+    own = Coupled(Harmonic(2)).member(p, chain.n_joint)
+    np.testing.assert_array_equal(own.angles(t), Harmonic(2).member(p, 2).angles(t))
+    np.testing.assert_allclose(Coupled(Harmonic(2)).parameters(own), p)
 
 
 def test_the_chain_plays_the_joint_angles_to_the_same_distance_and_work(broken):
     assert broken.status == "solved"
-    joints = BROKEN.joint_path(broken.gait)
-    np.testing.assert_allclose(joints(np.linspace(0, 1, 9))[0][1], 0.4)
-    played = colloc.replay(BROKEN.chain, LAW, joints, broken.answer.delta_per_period)
+    np.testing.assert_allclose(broken.gait.angles(np.linspace(0, 1, 9))[1], 0.4)
+    played = colloc.replay(FOUR, LAW, broken.gait, broken.answer.delta_per_period)
     assert (played.distance, played.work) == pytest.approx((broken.distance, broken.work), rel=1e-6)
+    text = str(broken.gait)
+    assert "motor 2: " in text
+    assert "joint 2: +0.4000" in text
 
 
 def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_backwards():
-    body, gait = (
-        Coupled(Chain((0.2,) * 5), gears=((1, 0), (-0.5, 0), (0.3, -1), (0, 1))),
-        colloc.ellipse(0.1, 0.7, 0.6),
-    )
-    joints, t, h = body.joint_path(gait), np.linspace(0.0, 1.0, 20), 1e-5
-    np.testing.assert_allclose(
-        joints(t)[1], (joints(t + h)[0] - joints(t - h)[0]) / (2 * h), atol=1e-7
-    )
-    np.testing.assert_allclose(joints(t)[0][1], -0.5 * gait(t)[0][0], atol=1e-12)
-
-
-def test_slopes_are_those_of_differences():
-    body, h = (
-        Coupled(Chain((0.2,) * 5), gears=((1, 0), (0.5, 0), (0, 0), (0.3, 1)), stuck={2: -0.3}),
-        1e-6,
-    )
-    y = np.array([0.7, -0.4, 1.0, 2.0])[:, None]
-
-    def motion(y):
-        found = body.solve(LAW, y[:2], y[2:], 1e-2, tolerance=1e-13)
-        now = body.motion(LAW, y[:2], y[2:], 1e-2, found)
-        return found, np.concatenate([now.z, now.centre, now.power[None]])
-
-    slopes = body.slopes(LAW, y[:2], y[2:], 1e-2, motion(y)[0])
-    for j, step in enumerate(h * np.eye(4)[:, :, None]):
-        numeric = (motion(y + step)[1] - motion(y - step)[1]) / (2 * h)
-        np.testing.assert_allclose(slopes[:, j], numeric, atol=1e-6)
+    gears = ((1, 0), (-0.5, 0), (0.3, -1), (0, 1))
+    motors, t, h = colloc.ellipse(0.1, 0.7, 0.6), np.linspace(0.0, 1.0, 20), 1e-5
+    joints = Coupled(Harmonic(1), gears=gears).driven_by(motors, FIVE.n_joint)
+    slopes = (joints.angles(t + h) - joints.angles(t - h)) / (2 * h)
+    np.testing.assert_allclose(joints.rates(t), slopes, atol=1e-7)
+    np.testing.assert_allclose(joints.angles(t)[1], -0.5 * motors.angles(t)[0], atol=1e-12)
+    np.testing.assert_allclose(joints.joint_map.motor_angles(joints.angles(t)), motors.angles(t))
 
 
 @pytest.mark.parametrize("symmetry", ["bilateral", "antipodal"])
 def test_what_is_the_same_from_both_ends_has_both_symmetries(symmetry):
-    found = colloc.solve(
-        Problem("belts", body=BELTS, friction=LAW, gait=Harmonic(1, symmetry), delta=1e-3), starts=2
-    )
+    found = solved(FIVE, Coupled(Harmonic(1, symmetry), gears=GEARS))
     assert found.status == "solved"
-    (motors,) = (found.gait.angles(np.linspace(0, 1, 9)),)
-    image = -motors[::-1, ::-1] if symmetry == "bilateral" else -np.roll(motors[:, :-1], 4, axis=1)
-    np.testing.assert_allclose(image, motors[:, : image.shape[1]], atol=1e-9)
+    joints = found.gait.angles(np.linspace(0, 1, 9))
+    image = -joints[::-1, ::-1] if symmetry == "bilateral" else -np.roll(joints[:, :-1], 4, axis=1)
+    np.testing.assert_allclose(image, joints[:, : image.shape[1]], atol=1e-9)
 
 
 def test_symmetries_that_gears_or_stuck_joints_break_are_refused():
-    uneven = Coupled(Chain((0.2,) * 5), gears=((1, 0), (0.5, 0), (0, 1), (0, 1)))
-    assert (uneven.symmetries, BROKEN.symmetries) == (("none", "antipodal"), ("none",))
-    assert not uneven.symmetric
-    assert not BROKEN.symmetric  # though its gears are
-    assert BELTS.symmetric
-    with pytest.raises(ProblemError, match="may have the symmetry none"):
-        Problem("no", body=BROKEN, gait=Harmonic(1, "antipodal"))
+    uneven = ((1, 0), (0.5, 0), (0, 1), (0, 1))
+    stated(FIVE, Coupled(Harmonic(1, "antipodal"), gears=uneven))
+    with pytest.raises(ProblemError, match="symmetry none or antipodal"):
+        stated(FIVE, Coupled(Harmonic(1, "bilateral"), gears=uneven))
+    for symmetry in ("bilateral", "antipodal"):
+        with pytest.raises(ProblemError, match="may have the symmetry none"):
+            stated(FOUR, Coupled(Harmonic(1, symmetry), stuck={1: 0.4}))
 
 
 def test_limits_are_those_of_the_joints_that_move():
-    narrow = solved(BELTS, joint_limit=0.5)
-    joints = BELTS.joint_angles(narrow.gait.angles(np.linspace(0, 1, 2001)))
+    narrow = solved(FIVE, BELTS, joint_limit=0.5)
+    joints = narrow.gait.angles(np.linspace(0, 1, 2001))
     assert narrow.status == "solved"
     assert np.abs(joints).max() == pytest.approx(0.5, abs=1e-6)
-    assert BROKEN.limit_names == ("joint 1", "joint 3")
-    assert solved(BROKEN, joint_limit=0.6).status == "solved"
+    assert solved(FOUR, BROKEN, joint_limit=0.6).status == "solved"
 
 
 def test_torque_and_power_are_those_of_the_motors(broken):
     """A motor that turns several joints does the work of all of them; with its share of each
     joint's torque."""
-    from colloc.mechanics.actuators import joint_moments
-
-    rng = np.random.default_rng(2)
-    angles, rates = 0.8 * rng.normal(size=(2, 10)), rng.normal(size=(2, 10))
-    z = BELTS.solve(LAW, angles, rates, 1e-2).z
-    both = [
-        joint_moments(body, LAW, q, body.forces(LAW, q, r, z, 1e-2), 1e-2)
-        for body, q, r in (
-            (BELTS, angles, rates),
-            (BELTS.chain, BELTS.joint_angles(angles), BELTS.joint_rates(rates)),
-        )
-    ]
-    np.testing.assert_allclose(both[0], np.array(BELTS.gears).T @ both[1], atol=1e-12)
+    torques = np.random.default_rng(2).normal(size=(4, 10))
+    joints, motors = JointMap(GEARS, (0.0,) * 4), np.random.default_rng(3).normal(size=(2, 10))
+    powers = joints.motor_moments(torques) * motors
+    np.testing.assert_allclose(
+        powers.sum(axis=0), (torques * joints.joint_rates(motors)).sum(axis=0), atol=1e-12
+    )
     sheet = broken.robot(length=1.0, mass=1.0, period=10.0)
     assert "motor 2" in str(sheet)
     assert sheet.facts["slow_enough_period_s"] > 0
+    limited = solved(FOUR, BROKEN, torque_limit=(0.12, 0.1), speed_limit=9.0)
+    assert limited.status == "solved"
+    assert limited.efficiency < broken.efficiency
+    t = np.linspace(0, 1, 401)
+    torque = np.abs(joint_torques(limited, t)).max(axis=1)
+    assert (torque <= np.array([0.12, 0.1]) * (1 + 1e-4)).all()
+    assert np.abs(limited.gait.driven.rates(t)).max() <= 9.0 * (1 + 1e-6)
 
 
 def test_its_sensitivity_is_to_the_chain_that_it_moves(broken):
@@ -142,22 +120,24 @@ def test_its_sensitivity_is_to_the_chain_that_it_moves(broken):
     assert found["length of link 4"].slope != 0
 
 
-def test_it_is_kept_in_files_with_what_it_stands_on(tmp_path, broken):
-    feet = (Foot(link=0), Foot(link=1), Foot(link=2))
-    for body in (BELTS, BROKEN, Coupled(Chain((0.3, 0.4, 0.3), feet=feet), stuck={0: 0.1})):
-        assert isinstance(body, Body)
-        assert body_from(fields(body)) == body
+def test_it_is_kept_in_files(tmp_path, broken):
+    for gait in (BELTS, BROKEN):
+        assert class_from(fields(gait)) == gait
+    t = np.linspace(0, 1, 9)
+    read = gait_from(fields(broken.gait))
+    np.testing.assert_array_equal(read.angles(t), broken.gait.angles(t))
     read = colloc.load(colloc.save(broken, tmp_path / "b.h5"))
-    assert (read.problem.body, read.problem.hash) == (BROKEN, broken.problem.hash)
+    assert (read.problem.gait, read.problem.hash) == (BROKEN, broken.problem.hash)
+    np.testing.assert_array_equal(read.gait.angles(t), broken.gait.angles(t))
 
 
 @pytest.mark.parametrize(
-    ("stated", "words"),
+    ("said", "words"),
     [
         ({"stuck": {5: 0.1}}, "joint 5: the chain has joints 0 to 2"),
         ({"stuck": {0: 4.0}}, "between -pi and pi"),
         ({"stuck": {0: 0.0, 1: 0.0, 2: 0.0}}, "all joints are stuck"),
-        ({"stuck": {0: 3.0, 1: 3.0}}, "links cross where joints are stuck"),
+        ({"stuck": {0: 3.0, 1: 3.0}, "gears": ((0,), (0,), (1,))}, "links cross"),
         ({"gears": ((1, 0), (0, 1))}, "2 rows, and the chain has 3 joints"),
         ({"gears": ((1, 0), (0, 1), (0, 0))}, "joint 2 .* hangs on no motor"),
         ({"gears": ((1, 0), (0, 1), (1, 1)), "stuck": {2: 0.0}}, "is stuck, and hangs on a motor"),
@@ -169,19 +149,19 @@ def test_it_is_kept_in_files_with_what_it_stands_on(tmp_path, broken):
         ({"stuck": [(1, 0.1), (1, 0.2)]}, "names a joint twice"),
     ],
 )
-def test_what_cannot_be_is_refused_in_a_sentence(stated, words):
+def test_what_cannot_be_is_refused_in_a_sentence(said, words):
     with pytest.raises(ProblemError, match=words):
-        Coupled(Chain((0.25,) * 4), **stated)
+        stated(FOUR, Coupled(Harmonic(1), **said))
 
 
-def test_other_bodies_and_inertia_are_refused_in_a_sentence():
+def test_other_bodies_slopes_and_inertia_are_refused_in_a_sentence():
+    with pytest.raises(ProblemError, match=r"gait=Coupled\(Harmonic\(1\), stuck="):
+        Coupled(FOUR, stuck={1: 0.4})
     with pytest.raises(ProblemError, match="joints of a Chain"):
-        Coupled(colloc.ModalBody(3))
-    with pytest.raises(ProblemError, match="inertia is known of a Chain"):
-        Problem("fast", body=BROKEN, gait=Harmonic(1), froude=0.05)
-    with pytest.raises(ProblemError, match="only a Chain"):
-        Problem("up", body=BROKEN, gait=Harmonic(1), grade=0.05)
-    with pytest.raises(
-        ProblemError, match=r"a body with one motor .* Give the body a second motor"
-    ):
-        Problem("scallop", body=Coupled(Chain((0.2,) * 5), gears=((1,),) * 4))
+        stated(colloc.ModalBody(3), Coupled(Harmonic(1)))
+    with pytest.raises(ProblemError, match="joints all have motors"):
+        stated(FOUR, BROKEN, froude=0.05)
+    with pytest.raises(ProblemError, match="slope"):
+        stated(FOUR, BROKEN, grade=0.05)
+    with pytest.raises(ProblemError, match=r"on 1 motor.* goes anywhere"):
+        Problem("scallop", body=FIVE, gait=Coupled(Harmonic(1), gears=((1,),) * 4))

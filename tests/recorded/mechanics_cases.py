@@ -223,7 +223,6 @@ def every_motion():
 
 def actuators():
     angles, rates, z = shapes(FIVE, 5, 13, 2.0)
-    forces = FIVE.forces(UNEQUAL, angles, rates, z, 1e-2)
     limits = PathLimits(torque_and_power((0.1, 0.2, 0.3, 0.4), (0.4, 0.3, 0.2, 0.1)))
-    now = Instants(FIVE, UNEQUAL, angles, rates, 1e-2, forces=forces)
+    now = Instants(FIVE, UNEQUAL, angles, rates, 1e-2, z=z)
     return now.power, DRIVEN_WORK.at(now), limits.at(now), limits.names, limits.least

@@ -6,7 +6,6 @@ from colloc import Concertina, CrawlerBody, Friction, ModalBody, Wave
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.concertina import even_profile, even_slope, odd_profile, odd_slope
 from colloc.smooth.curve import PanelGrid, curve, node_velocity, pulled_back, resultant
-from colloc.smooth.panel_balance import solved_on_panels
 from tests.recorded.bodies import form, mechanics, shapes
 
 PRECISION, FLOOR = 1e-6, 1e-10
@@ -102,8 +101,8 @@ def fixed_panels():
     """Velocities from anywhere and from near, where an anchor moves, where nothing does."""
     angles, rates, z = shapes(LEGENDRE, 24, 8, 0.8)
     rates[:, 0] = 0.0
-    first = solved_on_panels(LEGENDRE, UNEQUAL, angles, rates, 1e-2, None, 1e-11)
-    near = solved_on_panels(LEGENDRE, UNEQUAL, angles, rates, 1e-4, first.z + 0.01 * z, 1e-11)
+    first = LEGENDRE.solve(UNEQUAL, angles, rates, 1e-2)
+    near = LEGENDRE.solve(UNEQUAL, angles, rates, 1e-4, start=first.z + 0.01 * z)
     return [
         (found.z, found.anchor, {"iterations": np.log1p(found.iterations)})
         for found in (first, near)

@@ -177,10 +177,10 @@ def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
 
 def test_motors_share_what_inertia_asks_of_coupled_joints():
     """Power is that of the joints: over a period the work against friction."""
-    body = colloc.Coupled(colloc.Chain((0.25,) * 4), gears=((1, 0), (0.5, 0.5), (0, 1)))
+    coupled = colloc.Coupled(colloc.Harmonic(1), gears=((1, 0), (0.5, 0.5), (0, 1)))
     gait = colloc.ellipse(0.1, 0.7, 0.6)
     robot = colloc.evaluate(
-        colloc.Problem("belts", body=body, gait=colloc.Harmonic(1), delta=1e-2), gait
+        colloc.Problem("belts", body=colloc.Chain((0.25,) * 4), gait=coupled, delta=1e-2), gait
     ).robot(1.0, 1.0, 1.0)
     powers = robot.columns["joint_powers"].values.sum(axis=0)
     assert abs(robot.facts["inertia_takes"]) > 0.05

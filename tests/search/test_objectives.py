@@ -219,7 +219,7 @@ def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
     solved = body.solve(friction, angles, rates, delta)
     motion = body.motion(friction, angles, rates, delta, solved)
     forces = body.forces(friction, angles, rates, motion.z, delta)
-    now = Instants(body, friction, angles, rates, delta, forces=forces)
+    now = Instants(body, friction, angles, rates, delta, z=motion.z)
     powers = now.power
     np.testing.assert_allclose(powers.sum(axis=0), motion.actuator_power, atol=1e-12)
     # the head link's normal force acts half its length from the joint, its tangential force has no

@@ -57,14 +57,14 @@ def test_the_mirrored_half_is_the_negative_shape():
 
 
 def test_angle_rate_and_slopes_are_those_of_finite_differences():
-    (q, rates), s, n = shapes(4), np.linspace(0.44, 0.56, 25), BODY.n_joint
+    (q, rates), s, n = shapes(4), np.linspace(0.44, 0.56, 25)[:, None], BODY.n_joint
     h, at = 1e-6, np.concatenate([q, rates])
-    moved = (BODY.angle(s, q + h * rates) - BODY.angle(s, q - h * rates)) / (2 * h)
-    np.testing.assert_allclose(BODY.angle_rate(s, q, rates), moved, atol=1e-6)
+    moved = (BODY.tangent(s, q + h * rates) - BODY.tangent(s, q - h * rates)) / (2 * h)
+    np.testing.assert_allclose(BODY.turning(s, q, rates), moved, atol=1e-6)
     angle, rate = BODY.angle_slopes(s, q, rates)
-    np.testing.assert_allclose(angle, differences(lambda y: BODY.angle(s, y[:n]), at), atol=1e-7)
+    np.testing.assert_allclose(angle, differences(lambda y: BODY.tangent(s, y[:n]), at), atol=1e-7)
     np.testing.assert_allclose(
-        rate, differences(lambda y: BODY.angle_rate(s, y[:n], y[n:]), at), atol=1e-5
+        rate, differences(lambda y: BODY.turning(s, y[:n], y[n:]), at), atol=1e-5
     )
 
 

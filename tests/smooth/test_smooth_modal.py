@@ -254,7 +254,7 @@ def test_more_modes_never_do_worse():
         ({"joint_limit": 2.0}, r"\(0, pi/2\]"),
         ({"formulation": "full"}, "must be one of implicit velocity"),
         ({"intervals": 1}, "mesh is too small"),
-        ({"body": ModalBody}, "body must be a Chain or Coupled or ModalBody"),
+        ({"body": ModalBody}, "body must be a Chain or ModalBody"),
     ],
 )
 def test_unusable_problems_are_refused(changes, message):

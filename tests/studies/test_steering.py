@@ -83,10 +83,9 @@ def test_gaits_of_every_class_have_a_mirror_image(kind):
 
 
 def test_a_body_that_is_not_its_mirror_image_turns_to_both_sides():
-    bent = Coupled(Chain((0.2,) * 5), stuck={1: 0.5})
-    problem = Problem(
-        "stuck", body=bent, friction=Friction(mu_t=2, mu_f=1, mu_b=1), gait=Harmonic(1), delta=1e-2
-    )
+    body, friction = Chain((0.2,) * 5), Friction(mu_t=2, mu_f=1, mu_b=1)
+    bent = Coupled(Harmonic(1), stuck={1: 0.5})
+    problem = Problem("stuck", body=body, friction=friction, gait=bent, delta=1e-2)
     assert steer(problem, [-0.2, 0.2], starts=2).certified
 
 

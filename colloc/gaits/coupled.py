@@ -1,0 +1,278 @@
+"""Gaits of a chain some of whose joints hang on one motor, or are stuck: a class of gaits of the
+motors, and a linear map from their angles to those of the joints (`colloc.mechanics.joint_map`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.gait import GaitFunction
+from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.linear import LinearClass
+from colloc.gaits.symmetry import BILATERAL, NONE
+from colloc.mechanics.joint_map import JointMap
+from colloc.system.arguments import is_number, is_whole, named_arguments
+from colloc.system.errors import ProblemError
+
+_PHASES = np.arange(2000) / 2000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CoupledGait(GaitFunction):
+    """Joint angles that follow from a gait of the motors."""
+
+    motors: Any
+    joint_map: JointMap
+
+    is_series = True
+
+    @property
+    def n_joint(self) -> int:
+        return len(self.joint_map.rest)
+
+    @property
+    def driven(self) -> Any:
+        return self.motors.named("motor")
+
+    @property
+    def rest(self) -> np.ndarray:  # type: ignore[override]
+        return self.joint_map.offset
+
+    @property
+    def mean(self) -> np.ndarray:
+        return self.angles(_PHASES).mean(axis=1)
+
+    @property
+    def shape_speed(self) -> float:
+        return float(np.sqrt((self.rates(_PHASES) ** 2).sum(axis=0).mean()) / (2 * np.pi))
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        return np.asarray(self.joint_map.joint_angles(self.motors.angles(t)))
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        return np.asarray(self.joint_map.joint_rates(self.motors.rates(t)))
+
+    def lines(self) -> list[str]:
+        joints = enumerate(zip(self.joint_map.gears, self.joint_map.rest, strict=True), 1)
+        stuck = [f"joint {j}: {angle:+.4f}" for j, (row, angle) in joints if not any(row)]
+        return [*self.driven.lines(), *stuck]
+
+    def mapped(self, matrix: np.ndarray) -> Any:
+        """The gait of the joints that move, multiplied by a matrix."""
+        return self.motors.mapped(matrix @ self.joint_map.matrix)
+
+    def scaled(self, factor: float) -> CoupledGait:
+        return replace(self, motors=self.motors.scaled(factor))
+
+    def grown(self, factor: float) -> CoupledGait:
+        return replace(self, motors=self.motors.grown(factor))
+
+
+@named_arguments
+@dataclass(frozen=True)
+class Coupled(LinearClass):
+    """The gaits of a chain some of whose joints hang on one motor, or are stuck.
+
+    Parameters
+    ----------
+    gait : Harmonic, BSpline or Basis
+        The class of gaits of the motors.
+    gears : sequence of sequence of float, optional
+        For each joint from the tail, how far each motor turns it; 0 where it does not. By default
+        every joint that is not stuck has a motor of its own.
+    stuck : mapping from int to float, optional
+        Joints that do not move, counted from 0 at the tail, and the angles at which they are [rad].
+        They hang on no motor.
+
+    Raises
+    ------
+    ProblemError
+        If a joint neither hangs on a motor nor is stuck, or two motors do the same.
+
+    Examples
+    --------
+    Five links on two motors, and four links whose middle joint is broken:
+
+    >>> from colloc import Coupled, Harmonic
+    >>> belts = Coupled(Harmonic(1), gears=((1, 0), (0.5, 0), (0, 0.5), (0, 1)))
+    >>> broken = Coupled(Harmonic(1), stuck={1: 0.4})
+    >>> belts.describe()
+    '1 harmonic, symmetry none, on 2 motors'
+    >>> broken.joint_map(n_joint=3).n_motor
+    2
+    """
+
+    gait: LinearClass = Harmonic()
+    gears: tuple[tuple[float, ...], ...] = ()
+    stuck: tuple[tuple[int, float], ...] = ()
+
+    may_tell = False
+
+    def __post_init__(self) -> None:
+        kind = self.gait
+        if not isinstance(kind, LinearClass) or isinstance(kind, Coupled) or not kind.linear:
+            raise ProblemError(
+                "Coupled takes the class of gaits of the motors, linear in its parameters: "
+                "Problem(body=Chain(...), gait=Coupled(Harmonic(1), stuck={1: 0.4})), not a "
+                f"{type(kind).__name__}."
+            )
+        object.__setattr__(self, "stuck", _checked_stuck(self.stuck))
+        usual = isinstance(self.gears, (tuple, list)) and not self.gears
+        object.__setattr__(self, "gears", () if usual else _checked_gears(self.gears))
+
+    def joint_map(self, n_joint: int) -> JointMap:
+        return _joint_map(self, n_joint)
+
+    def check_joints(self, n_joint: int) -> None:
+        joints = self.joint_map(n_joint)
+        gears = joints.matrix
+        if self.symmetry != NONE and any(joints.rest):  # no mirror image of such a shape is one
+            raise ProblemError(
+                f"gaits with a joint that is stuck bent may have the symmetry none, not "
+                f"{self.symmetry}."
+            )
+        if self.symmetry == BILATERAL and (gears != gears[::-1, ::-1]).any():
+            raise ProblemError(
+                "gaits of symmetry bilateral need gears that read the same from both ends; with "
+                "these they may have the symmetry none or antipodal."
+            )
+        self.gait.check_joints(joints.n_motor)
+
+    def with_symmetry(self, symmetry: str) -> Any:
+        return replace(self, gait=self.gait.with_symmetry(symmetry))
+
+    @property
+    def symmetry(self) -> str:  # type: ignore[override]
+        return self.gait.symmetry
+
+    @property
+    def harmonics(self) -> int:  # type: ignore[override]
+        return self.gait.harmonics
+
+    @property
+    def instants(self) -> np.ndarray:
+        return self.gait.instants
+
+    def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
+        return self.gait.functions(t, derivative)
+
+    def series(self, harmonics: int) -> Any:
+        return self.gait.series(harmonics)
+
+    def describe(self) -> str:
+        n_motor = len(self.gears[0]) if self.gears else 0
+        motors = f", on {n_motor} motor{'s' * (n_motor > 1)}" if n_motor else ""
+        stuck = "".join(f", joint {j + 1} stuck at {angle:.4g} rad" for j, angle in self.stuck)
+        return f"{self.gait.describe()}{motors}{stuck}"
+
+    def offset(self, n_joint: int) -> np.ndarray:
+        return self.joint_map(n_joint).offset
+
+    def _basis(self, n_joint: int) -> np.ndarray:
+        joints = self.joint_map(n_joint)
+        of_motors = self.gait._basis(joints.n_motor)
+        return np.asarray(
+            np.tensordot(
+                joints.matrix, of_motors.reshape(joints.n_motor, -1, of_motors.shape[1]), 1
+            )
+        ).reshape(-1, of_motors.shape[1])
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
+        joints = self.joint_map(n_joint)
+        return CoupledGait(self.gait.member(parameters, joints.n_motor), joints)
+
+    def driven_by(self, motors: Any, n_joint: int) -> CoupledGait:
+        """The gait of so many joints that follows from one of the motors."""
+        return CoupledGait(motors, self.joint_map(n_joint))
+
+    def _motors(self, gait: Any) -> Any:
+        """The gait of the motors that comes nearest to one of the joints."""
+        joints = self.joint_map(gait.n_joint)
+        near = gait.motors if gait.joint_map == joints else gait.mapped(joints.inverse)
+        return self.gait.through(near)
+
+    def parameters(self, gait: Any) -> np.ndarray:
+        return self.gait.parameters(self._motors(gait))
+
+    def nearest(self, gait: Any) -> np.ndarray:
+        return self.gait.nearest(self._motors(gait))
+
+    def in_phase(self, gait: Any) -> bool:
+        return self.gait.in_phase(self._motors(gait))
+
+    def dimension(self, n_joint: int) -> int:
+        return self.gait.dimension(self.joint_map(n_joint).n_motor)
+
+    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
+        return self.driven_by(self.gait.drawn(unit, self.joint_map(n_joint).n_motor), n_joint)
+
+    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
+        return self.driven_by(self.gait.moved(self._motors(gait), step, fall, rng), gait.n_joint)
+
+
+@lru_cache(maxsize=32)
+def _joint_map(kind: Coupled, n_joint: int) -> JointMap:
+    """The map of a class for so many joints, or a `ProblemError`."""
+    for joint, _ in kind.stuck:
+        if joint >= n_joint:
+            raise ProblemError(
+                f"stuck names joint {joint}: the chain has joints 0 to {n_joint - 1}, from the "
+                f"tail."
+            )
+    if len(kind.stuck) == n_joint:
+        raise ProblemError("all joints are stuck: nothing would move.")
+    rest = np.zeros(n_joint)
+    broken = [joint for joint, _ in kind.stuck]
+    rest[broken] = [angle for _, angle in kind.stuck]
+    gears = np.array(kind.gears) if kind.gears else np.delete(np.eye(n_joint), broken, axis=1)
+    if len(gears) != n_joint:
+        raise ProblemError(f"gears have {len(gears)} rows, and the chain has {n_joint} joints.")
+    for joint, row in enumerate(gears):
+        if row.any() == (joint in broken):
+            what = (
+                "is stuck, and hangs on a motor"
+                if row.any()
+                else "hangs on no motor: give its angle in stuck"
+            )
+            raise ProblemError(f"joint {joint} (counted from 0 at the tail) {what}.")
+    if np.linalg.matrix_rank(gears) < gears.shape[1]:
+        raise ProblemError("two motors do the same, or one moves nothing: leave it out of gears.")
+    return JointMap(tuple(map(tuple, gears.tolist())), tuple(rest.tolist()))
+
+
+def _checked_stuck(
+    stuck: Mapping[int, float] | Sequence[Sequence[float]],
+) -> tuple[tuple[int, float], ...]:
+    try:
+        pairs = [
+            (joint, angle)
+            for joint, angle in (stuck.items() if isinstance(stuck, Mapping) else stuck)
+        ]
+    except (TypeError, ValueError):
+        raise ProblemError(
+            f"stuck gives joints and their angles, as {{1: 0.4}}, not {stuck!r}."
+        ) from None
+    for joint, angle in pairs:
+        if not is_whole(joint, 0):
+            raise ProblemError(f"stuck names joint {joint!r}: they count from 0 at the tail.")
+        if not (is_number(angle) and abs(angle) < np.pi):
+            raise ProblemError(
+                f"joint {joint} is stuck at {angle!r}: give an angle between -pi and pi [rad]."
+            )
+    if len({joint for joint, _ in pairs}) < len(pairs):
+        raise ProblemError("stuck names a joint twice.")
+    return tuple(sorted((int(joint), float(angle)) for joint, angle in pairs))
+
+
+def _checked_gears(gears: Any) -> tuple[tuple[float, ...], ...]:
+    try:
+        table = np.array(gears, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        table = np.empty(0)
+    if table.ndim != 2 or not table.shape[1] or not np.isfinite(table).all():
+        raise ProblemError("gears must be a row of numbers for each joint, one for each motor.")
+    return tuple(tuple(row) for row in table.tolist())
