@@ -8,8 +8,9 @@ long to build and to evaluate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -18,48 +19,42 @@ from scipy import sparse
 
 
 @dataclass(frozen=True, eq=False)
-class Repeated:
-    """A function of local variables, given numbers and delta, at many instances.
+class LocalFunction:
+    """A function of local variables, given numbers and delta, with its derivatives.
 
     Parameters
     ----------
     local, given, delta, out : casadi.SX
         Symbols ``(n_local, 1)``, ``(n_given, 1)``, ``(1, 1)``, and the expression ``(n_out, 1)``.
-    gather : (n_local, n_instance) int
-        Which variables of the program are the local ones of each instance.
-    values : (n_given, n_instance)
-        The given numbers.
-    implicit : tuple, optional
-        Symbols ``(n_solved, 1)`` of which `out` is also a function, equations ``(n_solved, 1)``
-        that they solve, and a function of local variables ``(n_local, n_instance)`` and delta, MX
-        both, that returns their values: derivatives are those of the implicit function theorem.
+    solved, equations : casadi.SX, optional
+        Symbols ``(n_solved, 1)`` of which `out` is also a function, and equations that they solve:
+        derivatives are those of the implicit function theorem.
     """
 
     local: ca.SX
     given: ca.SX
     delta: ca.SX
     out: ca.SX
-    gather: np.ndarray
-    values: np.ndarray
-    implicit: tuple | None = None
-
-    @property
-    def n_instance(self) -> int:
-        return self.gather.shape[1]
+    solved: ca.SX | None = None
+    equations: ca.SX | None = None
 
     @property
     def n_out(self) -> int:
-        return self.out.shape[0] * self.n_instance
+        return int(self.out.shape[0])
 
+    @cached_property
     def derivatives(self) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Weights ``(n_out, 1)``, Jacobian of the outputs, and Hessian of their weighted sum."""
-        weight = ca.SX.sym("weight", self.out.shape[0])
+        """Weights ``(n_out, 1)``, sparse Jacobian of the outputs, and the upper triangle of the
+        Hessian of their weighted sum."""
+        weight = ca.SX.sym("weight", self.n_out)
         total = ca.dot(weight, self.out)
-        if self.implicit is None:
-            return weight, ca.jacobian(self.out, self.local), ca.hessian(total, self.local)[0]
+        jacobian = ca.jacobian(self.out, self.local)
+        if self.solved is None or self.equations is None:
+            hessian = ca.hessian(total, self.local)[0]
+            return weight, ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
         # R(z, y) = 0: dz/dy = -R_z^-1 R_y; the Hessian of L is that of L + nu.R along (I, dz/dy),
         # nu = -R_z^-T L_z
-        z, equations, _ = self.implicit
+        z, equations = self.solved, self.equations
         R_z, R_y = ca.jacobian(equations, z), ca.jacobian(equations, self.local)
         slope, nu = -ca.solve(R_z, ca.densify(R_y)), ca.SX.sym("nu", z.shape[0])
         by_row = ca.vertcat(*(ca.jacobian(row, z) for row in ca.vertsplit(self.out)))
@@ -67,7 +62,50 @@ class Repeated:
         at_nu = -ca.solve(R_z.T, ca.densify(ca.jacobian(total, z).T))
         frame = ca.vertcat(ca.SX.eye(self.local.shape[0]), slope)
         hessian = frame.T @ ca.substitute(inner, nu, at_nu) @ frame
-        return weight, ca.jacobian(self.out, self.local) + by_row @ slope, hessian
+        return weight, ca.sparsify(jacobian + by_row @ slope), ca.sparsify(ca.triu(hessian))
+
+    @cached_property
+    def functions(self) -> tuple[ca.Function, ca.Function, ca.Function]:
+        """Outputs, nonzeros of the Jacobian, and nonzeros of the Hessian for weights."""
+        weight, jacobian, upper = self.derivatives
+        symbols = [self.local, self.given, self.delta]
+        symbols += [] if self.solved is None else [self.solved]
+        nonzeros = [ca.densify(ca.vertcat(*part.nonzeros())) for part in (jacobian, upper)]
+        return (
+            ca.Function("local", symbols, [ca.densify(self.out)]),
+            ca.Function("jacobian", symbols, nonzeros[:1]),
+            ca.Function("hessian", [*symbols, weight], nonzeros[1:]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """A local function at many instances.
+
+    Parameters
+    ----------
+    function : LocalFunction
+    gather : (n_local, n_instance) int
+        Which variables of the program are the local ones of each instance.
+    values : (n_given, n_instance)
+        The given numbers.
+    solve : callable, optional
+        From local variables ``(n_local, n_instance)`` and delta, MX both, to what the function is
+        solved for, ``(n_solved, n_instance)``.
+    """
+
+    function: LocalFunction
+    gather: np.ndarray
+    values: np.ndarray
+    solve: Callable[[ca.MX, ca.MX], ca.MX] | None = None
+
+    @property
+    def n_instance(self) -> int:
+        return self.gather.shape[1]
+
+    @property
+    def n_out(self) -> int:
+        return self.function.n_out * self.n_instance
 
 
 class Rows:
@@ -92,15 +130,17 @@ class Rows:
         values: np.ndarray | None = None,
         *,
         delta: ca.SX,
-        implicit: tuple | None = None,
     ) -> np.ndarray:
         """Where the outputs ``(n_out, n_instance)`` of a function at many instances are; see
-        `Repeated`."""
+        `LocalFunction` and `Repeated`."""
         given = ca.SX(0, 1) if given is None else given
         values = np.empty((0, gather.shape[1])) if values is None else values
-        repeated = Repeated(local, given, delta, out, gather, values, implicit)
+        return self.add_repeated(Repeated(LocalFunction(local, given, delta, out), gather, values))
+
+    def add_repeated(self, repeated: Repeated) -> np.ndarray:
+        """Where the outputs ``(n_out, n_instance)`` of a repeated function are."""
         self.repeated.append(repeated)
-        places = self.width + np.arange(repeated.n_out).reshape(gather.shape[1], -1).T
+        places = self.width + np.arange(repeated.n_out).reshape(repeated.n_instance, -1).T
         self.width += repeated.n_out
         return places
 
@@ -161,30 +201,26 @@ def nonlinear_program(
     weights = _dm(on_y.T) @ ca.vertcat(lam_f, lam_g)
     outputs, slopes, curvatures = [], [], []
     jac_places, hess_places, start = [], [], 0
-    for f in repeated:
-        local = ca.reshape(x[f.gather.ravel(order="F").tolist()], *f.gather.shape)
-        arguments = [local, ca.DM(f.values), ca.repmat(delta, 1, f.n_instance)]
-        symbols = [f.local, f.given, f.delta]
-        if f.implicit is not None:
-            arguments.append(f.implicit[2](local, delta))
-            symbols.append(f.implicit[0])
-        weight, jacobian, hessian = f.derivatives()
-        jacobian, upper = ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
-        outputs.append(_mapped([*symbols], f.out, arguments))
-        slopes.append(_mapped(symbols, ca.vertcat(*jacobian.nonzeros()), arguments))
-        own = ca.reshape(weights[start : start + f.n_out], f.out.shape[0], f.n_instance)
-        curvatures.append(
-            _mapped([*symbols, weight], ca.vertcat(*upper.nonzeros()), [*arguments, own])
-        )
+    for part in repeated:
+        n_out, n_instance = part.function.n_out, part.n_instance
+        local = ca.reshape(x[part.gather.ravel(order="F").tolist()], *part.gather.shape)
+        arguments = [local, ca.DM(part.values), ca.repmat(delta, 1, n_instance)]
+        arguments += [] if part.solve is None else [part.solve(local, delta)]
+        own = ca.reshape(weights[start : start + part.n_out], n_out, n_instance)
+        value, slope, curvature = part.function.functions
+        outputs.append(ca.vec(value.map(n_instance)(*arguments)))
+        slopes.append(ca.vec(slope.map(n_instance)(*arguments)))
+        curvatures.append(ca.vec(curvature.map(n_instance)(*arguments, own)))
+        _, jacobian, upper = part.function.derivatives
         row, column = (np.array(k, dtype=int) for k in jacobian.sparsity().get_triplet())
-        out = start + row[:, None] + f.out.shape[0] * np.arange(f.n_instance)
-        jac_places.append((out, f.gather[column], np.ones(out.shape)))
+        out = start + row[:, None] + n_out * np.arange(n_instance)
+        jac_places.append((out, part.gather[column], np.ones(out.shape)))
         row, column = (np.array(k, dtype=int) for k in upper.sparsity().get_triplet())
-        a, b = f.gather[row], f.gather[column]
+        a, b = part.gather[row], part.gather[column]
         # one variable in the place of two local ones has both of their mixed derivatives
         twice = np.where((a == b) & (row != column)[:, None], 2.0, 1.0)
         hess_places.append((np.minimum(a, b), np.maximum(a, b), twice))
-        start += f.n_out
+        start += part.n_out
     y = ca.vertcat(*outputs)
     values = _dm(on_x) @ x + _dm(on_y) @ y + _dm(constant)
     whole = _dm(on_x) + _dm(on_y) @ _matrix((start, n), jac_places, ca.vertcat(*slopes))
@@ -212,11 +248,6 @@ def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
     """A CasADi matrix as a SciPy one."""
     parts = matrix.nonzeros(), matrix.row(), matrix.colind()
     return sparse.csc_matrix(parts, shape=matrix.shape).tocsr()
-
-
-def _mapped(symbols: list[ca.SX], out: ca.SX, arguments: list[ca.MX]) -> ca.MX:
-    function = ca.Function("local", symbols, [ca.densify(out)])
-    return ca.vec(function.map(arguments[0].shape[1])(*arguments))
 
 
 def _matrix(shape: tuple[int, int], places: list, values: ca.MX) -> ca.MX:

@@ -109,10 +109,9 @@ def confirm(optimum: Optimum) -> Answer:
 def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity) -> _Outcome:
     space, delta = optimum.space, optimum.delta
     mesh = space.mesh
-    program = full_program(
-        space.control, optimum.gait, mesh.edges, mesh.scheme.name, space.given.far
-    )
-    x = program.feasible(space.full_parameters(optimum.v), delta)
+    parameters = space.full_parameters(optimum.v)
+    program = full_program(space.control, parameters, mesh.edges, mesh.scheme.name, space.given.far)
+    x = program.feasible(parameters, delta)
     program = heading(program, x)
     if reduced.actuators is not None:
         program = program.with_bounds(ACTUATORS, *reduced.actuators.every_bound())

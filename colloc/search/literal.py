@@ -42,7 +42,7 @@ def literal_answer(problem: Problem) -> Answer:
         Its message says what failed.
     """
     program, history = program_of(problem), tuple[Step, ...]()
-    parameters = _parameters(problem, program.gait)
+    parameters = _parameters(problem, problem.guess)
     below = levels(problem, problem.delta_start)
     for done, delta in enumerate(below):
         this_run().told("descend", done, len(below))
@@ -51,7 +51,7 @@ def literal_answer(problem: Problem) -> Answer:
         if not answer.optimal:
             return replace(answer, history=history)
         parameters = answer.x[program.layout.parameters[:, 0]]
-        program = full_program(program.control, answer.gait)
+        program = full_program(program.control, parameters)
     kept = np.empty(0)
     for done in range(MESHES if problem.mesh_tolerance > 0 else 0):
         this_run().told("refine", done, MESHES)
@@ -60,8 +60,9 @@ def literal_answer(problem: Problem) -> Answer:
         if plan is None:
             break
         kept = np.concatenate([kept, plan.kept])
-        program = full_program(program.control, gait, plan.edges, plan.scheme)
-        answer = _solved(program, _parameters(problem, gait), delta)
+        parameters = _parameters(problem, gait)
+        program = full_program(program.control, parameters, plan.edges, plan.scheme)
+        answer = _solved(program, parameters, delta)
         history = (*history, answer.step)
         if not answer.optimal:
             return replace(answer, history=history)

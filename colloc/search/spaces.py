@@ -39,7 +39,7 @@ def program_of(problem: Problem, gait: AnyGait | None = None) -> FullProgram:
     """The full program of a problem on its first mesh, in units of friction, with the limits of
     the shape at the worst instants of the member nearest to a gait, by default its guess."""
     space, v = space_near(problem, problem.guess if gait is None else gait)
-    return full_program(space.control, space.member(v))
+    return full_program(space.control, space.full_parameters(v))
 
 
 def heading(program: FullProgram, x: np.ndarray) -> FullProgram:

@@ -71,8 +71,6 @@ class FullProgram:
     ----------
     control : ControlProblem
     mesh : Mesh
-    gait : AnyGait
-        At whose worst instants the limits of the shape are constrained.
     far : tuple of pairs of int
         Links more than two apart that are kept from crossing.
     layout : Layout
@@ -93,7 +91,6 @@ class FullProgram:
 
     control: ControlProblem
     mesh: Mesh
-    gait: AnyGait
     far: Pairs
     layout: Layout
     groups: dict[str, slice]
@@ -125,13 +122,12 @@ class FullProgram:
     def moved_to(self, x: np.ndarray) -> tuple[FullProgram, np.ndarray]:
         """The program with the limits of the shape at the worst instants of the gait of variables
         x, and its variables there."""
-        edges, scheme = self.mesh.edges, self.mesh.scheme.name
-        program = full_program(self.control, self.member(x), edges, scheme, self.far)
+        p, edges, scheme = self.layout.parameters[:, 0], self.mesh.edges, self.mesh.scheme.name
+        program = full_program(self.control, x[p], edges, scheme, self.far)
         for name in ("rotation", ACTUATORS):
             if name in self.groups:
                 rows = self.groups[name]
                 program = program.with_bounds(name, self.row_lower[rows], self.row_upper[rows])
-        p = self.layout.parameters[:, 0]
         return program, np.concatenate([x[: self.layout.n], program.limits.bends(x[p])])
 
     def with_bounds(self, name: str, lower: np.ndarray, upper: np.ndarray) -> FullProgram:
@@ -150,7 +146,7 @@ class FullProgram:
 
 def full_program(
     control: ControlProblem,
-    gait: AnyGait,
+    parameters: np.ndarray,
     edges: np.ndarray | None = None,
     scheme: str = "",
     far: Pairs = (),
@@ -160,8 +156,8 @@ def full_program(
     Parameters
     ----------
     control : ControlProblem
-    gait : AnyGait
-        At whose worst instants the limits of the shape are constrained.
+    parameters : (n_parameter,)
+        Those of a gait at whose worst instants the limits of the shape are constrained.
     edges : (n + 1,), optional
     scheme : str
     far : tuple of pairs of int
@@ -172,7 +168,7 @@ def full_program(
     gaits, n_joint, fraction = admissible.gait, admissible.n_joint, admissible.gait.fraction
     turn = control.dynamics.turn
     p = layout.parameters[:, 0]
-    limits = ShapeLimits(control, mesh, layout, gait, far)
+    limits = ShapeLimits(control, mesh, layout, parameters, far)
     program = Rows(layout.n + limits.n_bend)
 
     # the motion: link by link, or by the velocity map
@@ -242,7 +238,7 @@ def full_program(
     for total in (layout.distance, layout.work):
         lower[total[0, 0]] = upper[total[0, 0]] = 0.0
     return FullProgram(
-        control, mesh, gait, far, layout, program.groups, cells, lower, upper,
+        control, mesh, far, layout, program.groups, cells, lower, upper,
         np.concatenate(program.lower), np.concatenate(program.upper), tuple(program.repeated),
         sparse.vstack(program.rows).tocsr(), -pick(of_period[0]), limits, motion.velocity,
     )  # fmt: skip
@@ -560,11 +556,12 @@ class _Mapped(_Motion):
     def functions(self) -> None:
         layout, body, law = self.layout, self.dynamics.body, self.dynamics.law
         self.velocity = BalancedVelocity(body, law, self.mesh.n_point)
-        local, out, implicit = velocity_map(body, law, self.delta, self.velocity)
         gather = np.concatenate(
             [layout.theta[:, self.sites], layout.angles, layout.rates, layout.z]
         )
-        self.point = self.program.repeat(local, out, gather, delta=self.delta, implicit=implicit)
+        values, solve = np.empty((0, self.mesh.n_point)), self.velocity.of_local
+        point = Repeated(velocity_map(body, law), gather, values, solve)
+        self.point = self.program.add_repeated(point)
 
     def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
         n = self.dynamics.body.n_joint

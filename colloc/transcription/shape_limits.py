@@ -10,7 +10,6 @@ import numpy as np
 from scipy import sparse
 
 from colloc.gaits.control_problem import ControlProblem
-from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.repeated import Rows
@@ -42,10 +41,16 @@ class ShapeLimits:
     between their links, which are variables."""
 
     def __init__(
-        self, control: ControlProblem, mesh: Mesh, layout: Layout, gait: AnyGait, far: Pairs
+        self,
+        control: ControlProblem,
+        mesh: Mesh,
+        layout: Layout,
+        parameters: np.ndarray,
+        far: Pairs,
     ) -> None:
         admissible, joint_map = control.admissible, control.dynamics.joint_map
         gaits, n_joint = admissible.gait, admissible.n_joint
+        gait = admissible.member(parameters)
         checks = shape_checks(admissible.body, far, admissible.largest_speeds, joint_map)
         peaks = near_peaks(gait, mesh, checks, admissible.joint_limit)
         self._limit, self._p, self._first = (

@@ -7,39 +7,33 @@ constraint; the velocity map is mild where the balance is not.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.numerics.repeated import LocalFunction
 
 _TOLERANCE, ACCEPTED = 1e-12, 1e3
 """Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance
 will do."""
 
 
-def velocity_map(
-    body: Body, law: Law, delta: ca.SX, velocity: BalancedVelocity
-) -> tuple[ca.SX, ca.SX, tuple[ca.SX, ca.SX, Callable[[ca.MX, ca.MX], ca.MX]]]:
-    """Local variables (theta, q, r, z); what vanishes, z - Z, then the velocities of the centre of
-    mass ahead and aside and the power at Z; and how Z follows, as a
-    `colloc.numerics.repeated.Repeated` takes it."""
-    sizes = (("theta", 1), ("q", body.n_joint), ("r", body.n_joint), ("z", 3))
-    theta, q, r, z = (ca.SX.sym(name, size) for name, size in sizes)
+@lru_cache(maxsize=32)
+def velocity_map(body: Body, law: Law) -> LocalFunction:
+    """Of local variables (theta, q, r, z): what vanishes, z - Z, then the velocities of the centre
+    of mass ahead and aside, and the power at Z."""
+    sizes = (("theta", 1), ("q", body.n_joint), ("r", body.n_joint), ("z", 3), ("delta", 1))
+    theta, q, r, z, delta = (ca.SX.sym(name, size) for name, size in sizes)
     solved = ca.SX.sym("Z", 3)
     balanced = body.sliding(law, q, r, solved, delta)
     centre, c, s = body.sliding(law, q, r, z, delta).centre, ca.cos(theta), ca.sin(theta)
     ahead, aside = c * centre[0] - s * centre[1], s * centre[0] + c * centre[1]
-
-    def solve(local: ca.MX, delta: ca.MX) -> ca.MX:
-        ends = np.cumsum([1, body.n_joint, body.n_joint]).tolist()
-        _, q, r, start = ca.vertsplit(local, [0, *ends, local.shape[0]])
-        return velocity(q, r, start, delta)
-
     out = ca.vertcat(z - solved, ahead, aside, balanced.power)
-    return ca.vertcat(theta, q, r, z), out, (solved, balanced.force, solve)
+    local = ca.vertcat(theta, q, r, z)
+    return LocalFunction(local, ca.SX(0, 1), delta, out, solved, balanced.force)
 
 
 class BalancedVelocity(ca.Callback):
@@ -58,6 +52,12 @@ class BalancedVelocity(ca.Callback):
         self._z: np.ndarray | None = None
         self.solves = 0
         self.construct("velocity_map", {"enable_fd": False})
+
+    def of_local(self, local: ca.MX, delta: ca.MX) -> ca.MX:
+        """Z of the local variables of `velocity_map`, ``(3, n_time)``."""
+        ends = np.cumsum([1, self._body.n_joint, self._body.n_joint]).tolist()
+        _, q, r, start = ca.vertsplit(local, [0, *ends, local.shape[0]])
+        return self(q, r, start, delta)
 
     def get_n_in(self) -> int:
         return 4

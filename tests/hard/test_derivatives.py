@@ -47,15 +47,15 @@ def derivative(function, x, step):
 
 
 def check(function, x, given, delta, step, solved=None, tolerance=1e-6):
-    """Jacobian and Hessian of a `Repeated` at x and given numbers; `solved` gives what it solves
-    for."""
-    more = [] if solved is None else [function.implicit[0]]
+    """Jacobian and Hessian of a `LocalFunction` at x and given numbers; `solved` gives what it is
+    solved for."""
+    more = [] if solved is None else [function.solved]
     symbols = [function.local, function.given, function.delta, *more]
-    weight, slope, curvature = function.derivatives()
+    weight, slope, upper = function.derivatives
     value, jacobian = (
         ca.Function("f", symbols, [ca.densify(out)]) for out in (function.out, slope)
     )
-    hessian = ca.Function("h", [*symbols, weight], [ca.densify(curvature)])
+    hessian = ca.Function("h", [*symbols, weight], [ca.densify(ca.triu2symm(upper))])
 
     def at(x):
         return [x, given, delta, *([] if solved is None else [solved(x)])]
@@ -74,13 +74,14 @@ def functions(body, friction, formulation):
     """The repeated function of a contact, or of a point with the velocity map."""
     problem = Problem("p", None, body, friction, formulation=formulation, intervals=8)
     repeated = program_of(problem).repeated
-    return next(each for each in repeated if each.local.shape[0] >= 7)
+    return next(each for each in repeated if each.function.local.shape[0] >= 7)
 
 
 def check_point(body, friction, angles, rates, delta, formulation, *, rng=None, step, tolerance):
     """At all links of a point in balance, or at the point; `rng` moves forces off the law."""
     angles, rates = np.atleast_1d(angles)[:, None], np.atleast_1d(rates)[:, None]
-    n, function = body.n_joint, functions(body, friction, formulation)
+    n, repeated = body.n_joint, functions(body, friction, formulation)
+    function = repeated.function
 
     def solved(at):
         q, r = at[1 : 1 + n, None], at[1 + n : 1 + 2 * n, None]
@@ -100,7 +101,7 @@ def check_point(body, friction, angles, rates, delta, formulation, *, rng=None, 
         x = np.array([phi, w, vs * c - vn * s, vs * s + vn * c, *forces])
         if rng is not None:
             x = x + 0.01 * rng.normal(size=x.size)
-        given = function.values[:, function.n_instance // body.n_link * link]
+        given = repeated.values[:, repeated.n_instance // body.n_link * link]
         check(function, x, given, delta, step, None, tolerance)
 
 

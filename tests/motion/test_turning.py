@@ -148,7 +148,7 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     values = program.motion.values(v, delta)
     assert values["rotation"] == pytest.approx(turn, abs=1e-12)
 
-    full = full_program(space.control, space.member(v), space.mesh.edges)
+    full = full_program(space.control, space.full_parameters(v), space.mesh.edges)
     x, functions = full.feasible(space.full_parameters(v), delta), full.nlp.functions
     g = np.array(functions["jac_g"](x, delta / RADIANS)[0]).ravel()
     value = float(functions["grad_f"](x, delta / RADIANS)[0])

@@ -142,8 +142,9 @@ def test_gradients_are_the_limit_of_differences(problem, asked):
 def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towards):
     """Every equation but those that the gait has still to be found for: no turn, no way across."""
     program, v = program_at(problem.with_(towards=towards, objective="driven efficiency"), 0.05)
-    gait = program.space.member(v)
-    full = full_program(program.space.control, gait, program.space.mesh.edges)
+    full = full_program(
+        program.space.control, program.space.full_parameters(v), program.space.mesh.edges
+    )
     x = full.feasible(program.space.full_parameters(v), 0.05)
     found = Solver(full).measured(x, 0.05, np.zeros_like(x), np.zeros_like(full.row_lower))
     off = {name for name, rows in full.groups.items() if found.excess[rows].max(initial=0.0) > 1e-7}

@@ -90,7 +90,7 @@ def at_guess(problem, delta=0.1):
     space, v = space_near(problem, problem.guess)
     reduced = ReducedProgram(space, delta)
     reduced.place_rows(v)
-    full = full_program(space.control, space.member(v))
+    full = full_program(space.control, space.full_parameters(v))
     return full, full.feasible(space.full_parameters(v), delta), reduced, v
 
 
@@ -220,7 +220,7 @@ def test_functions_grow_neither_with_the_mesh_nor_with_the_links():
         guess = Fourier(np.zeros(links - 1), np.full((links - 1, 1), 0.3), np.zeros((links - 1, 1)))
         full = program_of(Problem("p", guess, body, gait=Harmonic(1), intervals=intervals))
         return sorted(
-            ca.Function("f", [each.local, each.given, each.delta], [each.out]).n_instructions()
+            each.function.functions[0].n_instructions()
             for each in full.repeated
             if each.n_instance > 3 * intervals
         )
