@@ -51,7 +51,10 @@ class CollocatedMotion:
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates and tail velocities per period at the collocation points."""
         angles, rates = self.gait(self.mesh.times)
-        return angles, rates, RADIANS * self.layout.tail_velocity(self.problem.body, self.x)
+        unit: float | np.ndarray = RADIANS
+        if self.problem.gait.relative_delta:  # the gait has another pace than the variables
+            unit = self.gait.length / self.layout.shape_speed(self.x)
+        return angles, rates, unit * self.layout.tail_velocity(self.problem.body, self.x)
 
     @cached_property
     def at_points(self) -> Sliding:

@@ -188,7 +188,7 @@ def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
         program.control.problem,
         gait,
         delta,
-        edges=program.mesh.edges,
+        edges=program.control.in_phases(program.mesh, gait).edges,
         scheme=program.mesh.scheme.name,
         x=result.x[:n],
         lam_x=result.lam_x[:n],
@@ -214,13 +214,13 @@ def unconfirmed(optimum: Optimum) -> Answer:
     space, control = optimum.space, optimum.space.control
     mesh, layout = space.mesh, layout_of(control, space.mesh)
     parameters = space.full_parameters(optimum.v)
-    x = balanced_variables(control, layout, mesh, optimum.gait, parameters, optimum.delta)
+    x = balanced_variables(control, layout, mesh, parameters, optimum.delta)
     distance, work = distance_and_work(control, layout, x)
     return Answer(
         optimum.problem,
         optimum.gait,
         optimum.delta,
-        edges=mesh.edges,
+        edges=control.in_phases(mesh, optimum.gait).edges,
         scheme=mesh.scheme.name,
         x=x,
         lam_x=np.zeros_like(x),

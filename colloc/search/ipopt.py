@@ -18,7 +18,6 @@ from colloc.numerics.sqp import remembered
 from colloc.search.certify import EXACT
 from colloc.system.interruption import interrupted, interruptible
 from colloc.transcription.full_program import FullProgram
-from colloc.transcription.layout import RADIANS
 
 _PUSHED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
 IPOPT_OPTIONS: dict[str, object] = {
@@ -142,7 +141,7 @@ class Solver:
         duals = {"lam_x0": lam_x, "lam_g0": lam_g}
         start = time.perf_counter()
         with interruptible():
-            solution = self._solver(x0=x, p=delta / RADIANS, **limits, **duals)
+            solution = self._solver(x0=x, p=delta / self.program.delta_unit, **limits, **duals)
         seconds = time.perf_counter() - start
         stats = self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
@@ -151,7 +150,7 @@ class Solver:
     def _evaluated(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
         """Objective, its gradient ``(n,)``, rows ``(m,)`` and their Jacobian ``(m, n)`` at
         variables, then delta per period."""
-        x, delta = at[:-1], at[-1] / RADIANS
+        x, delta = at[:-1], at[-1] / self.program.delta_unit
         f, gradient = self._nlp.functions["grad_f"](x, delta)
         g, jacobian = self._nlp.functions["jac_g"](x, delta)
         return float(f), gradient.full().ravel(), g.full().ravel(), as_sparse(jacobian)

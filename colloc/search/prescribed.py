@@ -101,7 +101,7 @@ def as_it_is(
     """A gait with everything else following from its balance."""
     control = control_problem(problem)
     layout, aim = layout_of(control, mesh), control.aims.objective
-    x = balanced_variables(control, layout, mesh, gait, parameters, problem.delta)
+    x = balanced_variables(control, layout, mesh, parameters, problem.delta, gait)
     distance, work = distance_and_work(control, layout, x)
     motion = ReducedMotion(
         kind_of_motion(control.dynamics), mesh, _Given(gait, mesh), aim.integrals

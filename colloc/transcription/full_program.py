@@ -33,7 +33,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, cast
 
 import casadi as ca
@@ -41,7 +41,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.gaits.control_problem import ControlProblem
-from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import widest
 from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL, Pairs
@@ -110,6 +110,11 @@ class FullProgram:
     def n(self) -> int:
         return self.lower.size
 
+    @property
+    def delta_unit(self) -> float:
+        """What delta is divided by before the functions see it."""
+        return 1.0 if self.control.admissible.gait.relative_delta else RADIANS
+
     @cached_property
     def nlp(self) -> Nlp:
         """Its functions and their derivatives."""
@@ -138,9 +143,8 @@ class FullProgram:
 
     def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
         """Variables ``(n,)`` of a gait, by its parameters ``(n_parameter,)``, that satisfy every
-        equation but the closure of the net rotation; delta per period."""
-        gait = self.control.admissible.member(parameters)
-        motion = balanced_variables(self.control, self.layout, self.mesh, gait, parameters, delta)
+        equation but the closure of the net rotation; delta in the units of the class."""
+        motion = balanced_variables(self.control, self.layout, self.mesh, parameters, delta)
         return np.concatenate([motion, self.limits.bends(parameters)])
 
 
@@ -192,8 +196,7 @@ def full_program(
         ca.vertcat(*parts.values()), values, layout.of_period(names), delta=delta
     )
     w = ca.SX.sym("p", p.size)
-    square = ca.bilin(ca.DM(gaits.mean_square_rate(n_joint) / RADIANS**2), w, w)
-    speed = program.repeat(w, square, p[:, None], delta=delta)
+    speed = program.repeat(w, _square_of_speed(gaits, w, n_joint), p[:, None], delta=delta)
     if not gaits.linear:
         given = ca.vertcat(*(a for row in gaits.coefficients(w, n_joint) for a in row))
         left = w[gaits.n_own : gaits.n_own + given.numel()] - given
@@ -260,11 +263,13 @@ class _Motion:
             sparse.csr_matrix(matrix.transpose(1, 0, 2).reshape(-1, matrix.shape[2]))
             for matrix in (
                 gait.angle_matrix(mesh.times, n_joint),
-                gait.rate_matrix(mesh.times, n_joint) / RADIANS,
+                gait.rates_on(mesh, n_joint) / RADIANS,
             )
         )
         self.offset = np.repeat(gait.offset(n_joint)[:, 0], mesh.n_point)
-        self.delta = ca.SX.sym("delta")
+        self.delta, self.relative = ca.SX.sym("delta"), gait.relative_delta
+        if self.relative and self.dynamics.turn:
+            self.lengths = self._lengths_of_sides()
         self.functions()
 
     def functions(self) -> None:
@@ -283,8 +288,9 @@ class _Motion:
         """Where the values of formulas of an instant are at every point, ``(n_value, n_point)``."""
         body, law = self.dynamics.body, self.dynamics.law
         local, gather, q, r, moment = self.joints(any(each.needs_forces for each in formulas))
+        slow = self.delta * ca.norm_2(r) if self.relative else self.delta
         now = Instants(
-            body, law, q, r, self.delta, unit=RADIANS, moments=moment,
+            body, law, q, r, slow, unit=RADIANS, moments=moment,
             joint_map=self.dynamics.joint_map,
         )  # fmt: skip
         out = ca.vertcat(*(each.at(now) for each in formulas))
@@ -311,10 +317,37 @@ class _Motion:
     def add_orientation(self, spin: np.ndarray, state: Any, rate: Any) -> None:
         """theta' = w_0, less the turning of the axes."""
         pick, theta = self.program.pick, self.layout.theta[0]
+        rows = state @ pick(theta) - RADIANS * rate @ pick(spin)
+        if self.relative and self.dynamics.turn:  # the axes turn evenly along the path
+            gait, mesh = self.control.admissible.gait, self.mesh
+            corners = gait.corners_in_time
+            side = np.searchsorted(corners, mesh.edges[:-1], side="right") - 1
+            side = np.repeat(side, mesh.scheme.s)
+            share = sparse.diags(self.dynamics.turn * corners[-1] / np.diff(corners)[side])
+            rows = rows + rate @ share @ pick(self.lengths[side])
+            self.program.add("orientation", rows)
+            return
         even = -self.dynamics.turn * np.asarray(rate.sum(axis=1)).ravel()
-        self.program.add(
-            "orientation", state @ pick(theta) - RADIANS * rate @ pick(spin), even, even
-        )
+        self.program.add("orientation", rows, even, even)
+
+    def _lengths_of_sides(self) -> np.ndarray:
+        """Where the length of every side of a polygon over that of all is, ``(n_side, 1)``."""
+        gait, p = self.control.admissible.gait, self.layout.parameters
+        shares, rates = gait.side_rates(self.control.admissible.n_joint)
+        w = ca.SX.sym("p", p.size)
+        sides = zip(shares, rates, strict=True)
+        lengths = ca.vertcat(*(share * ca.norm_2(ca.DM(each) @ w) for share, each in sides))
+        return self.program.repeat(w, lengths / ca.sum1(lengths), p, delta=self.delta)
+
+
+def _square_of_speed(gaits: AnyClass, p: ca.SX, n_joint: int) -> ca.SX:
+    """The square of the root-mean-square shape speed or, where the pace does not matter, of the
+    mean one."""
+    if not gaits.relative_delta:
+        return ca.bilin(ca.DM(gaits.mean_square_rate(n_joint) / RADIANS**2), p, p)
+    shares, rates = gaits.side_rates(n_joint)
+    sides = zip(shares, rates / RADIANS, strict=True)
+    return sum(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides) ** 2
 
 
 class _Links(_Motion):
@@ -324,6 +357,11 @@ class _Links(_Motion):
         self.chain = cast(Chain, self.dynamics.body)
         inertial = bool(self.layout.momenta.size)
         self.halves = self._halves(inertial)
+        if self.relative:
+            w = ca.SX.sym("w", self.chain.n_link)
+            self.speed = self.program.repeat(
+                w, ca.norm_2(ca.diff(w)), self.layout.spins, delta=self.delta
+            )
         self.contacts = [(group.rows, self._contact(group, inertial)) for group in self._groups()]
         joint = np.arange(self.chain.n_joint)
         if inertial:
@@ -382,20 +420,23 @@ class _Links(_Motion):
             places.append(layout.friction[contact.couples(rows)])
         moving = [layout.directions, layout.spins, layout.vx, layout.vy]
         moving += [layout.x, layout.y] if inertial else []
+        if self.relative:
+            places.append(np.repeat(layout.speed, len(links), axis=0))
         gather = np.concatenate(
             [self._instances(moving, links), np.stack([part.ravel() for part in places])]
         )
         local = ca.SX.sym("contact", gather.shape[0])
+        slow = self.delta * local[-1] if self.relative else self.delta
         (phi, w, vx, vy), force = ca.vertsplit(local)[:4], ca.vertsplit(local)[len(moving) :]
         c, s = ca.cos(phi), ca.sin(phi)
         us, un = vx * c + vy * s - offset * w, vy * c - vx * s + along * w
         vs, vn = cos * us + sin * un, cos * un - sin * us
         if group.pads:
-            pressed = LinkForce(*(each / pressure for each in force))
-            laws = line_integrals(law).scaled_laws(vs, vn, w, length, self.delta, pressed)
+            pressed = LinkForce(*(each / pressure for each in force[:3]))
+            laws = line_integrals(law).scaled_laws(vs, vn, w, length, slow, pressed)
         else:
-            density = law.density(vs, vn, self.delta)
-            secant = law.density_secant(vs, vn, self.delta)
+            density = law.density(vs, vn, slow)
+            secant = law.density_secant(vs, vn, slow)
             laws = [(force[k] / pressure - density[k]) / secant[k][k] for k in range(2)]
         couple = force[2] if group.pads else 0.0
         fs, fn = cos * force[0] - sin * force[1], sin * force[0] + cos * force[1]
@@ -489,6 +530,8 @@ class _Links(_Motion):
         program.add("tail", phi[: self.mesh.n_point] - theta)
         program.add("angles", d @ phi - self.Phi @ p, self.offset, self.offset)
         program.add("rates", d @ w - self.Phi_t @ p)
+        if self.relative:
+            program.add("speed", pick(layout.speed) - pick(self.speed))
         program.add("velocity x", d @ vx + both @ sin)
         program.add("velocity y", d @ vy - both @ cos)
         for k, (_, outputs) in enumerate(self.contacts):
@@ -560,7 +603,8 @@ class _Mapped(_Motion):
             [layout.theta[:, self.sites], layout.angles, layout.rates, layout.z]
         )
         values, solve = np.empty((0, self.mesh.n_point)), self.velocity.of_local
-        point = Repeated(velocity_map(body, law), gather, values, solve)
+        solve = partial(solve, relative=self.relative)
+        point = Repeated(velocity_map(body, law, relative=self.relative), gather, values, solve)
         self.point = self.program.add_repeated(point)
 
     def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:

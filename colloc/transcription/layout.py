@@ -27,10 +27,10 @@ class Layout:
 
     At the mesh's sites theta and, with inertia, the momenta; at its edges distance and work. At its
     points of a lifted chain the directions of the links, their rotation rates, the velocities of
-    their midpoints, the friction on what touches the floor, and the force and the moment at each
-    joint or, with inertia, positions of the midpoints from the centre of mass and the velocity of
-    that, force and moment about it; of other bodies shape coordinates, their rates and the tail
-    velocity z.
+    their midpoints, the friction on what touches the floor, the shape speed where delta is relative
+    to it, and the force and the moment at each joint or, with inertia, positions of the midpoints
+    from the centre of mass and the velocity of that, force and moment about it; of other bodies
+    shape coordinates, their rates and the tail velocity z.
     """
 
     parameters: np.ndarray
@@ -44,6 +44,7 @@ class Layout:
     vx: np.ndarray
     vy: np.ndarray
     friction: np.ndarray
+    speed: np.ndarray
     joint_fx: np.ndarray
     joint_fy: np.ndarray
     moments: np.ndarray
@@ -71,6 +72,11 @@ class Layout:
         }
         return np.concatenate([places[name] for name in names])[:, None]
 
+    def shape_speed(self, x: np.ndarray) -> np.ndarray:
+        """Shape speed ``(n_point,)`` that variables x say, where delta is relative to it."""
+        speed: np.ndarray = x[self.speed[0]] if self.speed.size else x[self.rates]
+        return speed if speed.ndim == 1 else np.linalg.norm(speed, axis=0)
+
     def tail_velocity(self, body: Body, x: np.ndarray) -> np.ndarray:
         """z ``(3, n_point)`` that variables x say."""
         if self.z.size:
@@ -96,6 +102,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
         "momenta": (len(STATES) * inertial, mesh.n_site),
         **dict.fromkeys(("directions", "spins", "vx", "vy"), (n_joint + 1, lifted)),
         "friction": (len(body.force_names), lifted),
+        "speed": (1, lifted * gait.relative_delta),
         **dict.fromkeys(("joint_fx", "joint_fy", "moments"), (n_joint, balanced)),
         **dict.fromkeys(("x", "y"), (n_joint + 1, moved)),
         "centre": (5, moved),

@@ -50,7 +50,7 @@ class ShapeLimits:
     ) -> None:
         admissible, joint_map = control.admissible, control.dynamics.joint_map
         gaits, n_joint = admissible.gait, admissible.n_joint
-        gait = admissible.member(parameters)
+        gait = gaits.trajectory(parameters, n_joint)
         checks = shape_checks(admissible.body, far, admissible.largest_speeds, joint_map)
         peaks = near_peaks(gait, mesh, checks, admissible.joint_limit)
         self._limit, self._p, self._first = (

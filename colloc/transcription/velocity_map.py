@@ -22,14 +22,14 @@ will do."""
 
 
 @lru_cache(maxsize=32)
-def velocity_map(body: Body, law: Law) -> LocalFunction:
+def velocity_map(body: Body, law: Law, *, relative: bool = False) -> LocalFunction:
     """Of local variables (theta, q, r, z): what vanishes, z - Z, then the velocities of the centre
-    of mass ahead and aside, and the power at Z."""
+    of mass ahead and aside, and the power at Z. Delta may be relative to the shape speed."""
     sizes = (("theta", 1), ("q", body.n_joint), ("r", body.n_joint), ("z", 3), ("delta", 1))
     theta, q, r, z, delta = (ca.SX.sym(name, size) for name, size in sizes)
-    solved = ca.SX.sym("Z", 3)
-    balanced = body.sliding(law, q, r, solved, delta)
-    centre, c, s = body.sliding(law, q, r, z, delta).centre, ca.cos(theta), ca.sin(theta)
+    solved, slow = ca.SX.sym("Z", 3), delta * ca.norm_2(r) if relative else delta
+    balanced = body.sliding(law, q, r, solved, slow)
+    centre, c, s = body.sliding(law, q, r, z, slow).centre, ca.cos(theta), ca.sin(theta)
     ahead, aside = c * centre[0] - s * centre[1], s * centre[0] + c * centre[1]
     out = ca.vertcat(z - solved, ahead, aside, balanced.power)
     local = ca.vertcat(theta, q, r, z)
@@ -53,11 +53,15 @@ class BalancedVelocity(ca.Callback):
         self.solves = 0
         self.construct("velocity_map", {"enable_fd": False})
 
-    def of_local(self, local: ca.MX, delta: ca.MX) -> ca.MX:
+    def of_local(self, local: ca.MX, delta: ca.MX, *, relative: bool) -> ca.MX:
         """Z of the local variables of `velocity_map`, ``(3, n_time)``."""
         ends = np.cumsum([1, self._body.n_joint, self._body.n_joint]).tolist()
         _, q, r, start = ca.vertsplit(local, [0, *ends, local.shape[0]])
-        return self(q, r, start, delta)
+        if not relative:
+            return self(q, r, start, delta)
+        speed = ca.sqrt(ca.sum1(r * r))  # Z grows like r and delta
+        unit, start = (each / ca.repmat(speed, each.size1(), 1) for each in (r, start))
+        return ca.repmat(speed, 3, 1) * self(q, unit, start, delta)
 
     def get_n_in(self) -> int:
         return 4

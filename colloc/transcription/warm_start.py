@@ -8,7 +8,7 @@ import numpy as np
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.links import Links
-from colloc.motion.collocated import CollocatedPose, stage_weights, sums
+from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights, sums
 from colloc.motion.kinds import OMEGA, Passed, Shapes, begin_of, first_theta, kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.transcription.layout import RADIANS, Layout
@@ -18,29 +18,41 @@ def balanced_variables(
     control: ControlProblem,
     layout: Layout,
     mesh: Mesh,
-    gait: AnyGait,
     parameters: np.ndarray,
     delta: float,
+    gait: AnyGait = None,
 ) -> np.ndarray:
-    """Variables ``(n,)`` that satisfy every equation but the closure of the net rotation, for a
-    gait, its parameters ``(n_parameter,)`` and delta per period."""
+    """Variables ``(n,)`` that satisfy every equation but the closure of the net rotation, for
+    parameters ``(n_parameter,)`` and delta in the units of the class; `gait` is in the time of the
+    mesh, by default that of the parameters."""
+    gaits, n_joint = control.admissible.gait, control.admissible.n_joint
+    kind = kind_of_motion(control.dynamics.in_speeds_of(RADIANS))
+    if gait is None:
+        gait = gaits.trajectory(parameters, n_joint)
+        begin = parameters[parameters.size - len(kind.told) :]
+    else:
+        begin = begin_of(kind, gait)
     x = np.zeros(layout.n)
     x[layout.parameters[:, 0]] = parameters
-    slow = delta / RADIANS
-    shapes = Shapes(gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS, slow, RADIANS)
-    kind = kind_of_motion(control.dynamics.in_speeds_of(RADIANS))
-    begin = begin_of(kind, gait)
+    angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
+    relative, speed = gaits.relative_delta, np.ones(mesh.n_point)
+    if relative:
+        rates = (gaits.rates_on(mesh, n_joint) @ parameters).T / RADIANS
+        speed = np.linalg.norm(rates, axis=0)
+    slow = delta if relative else delta / RADIANS
+    shapes = Shapes(angles, rates / speed, slow, RADIANS, speed)
     along = kind.along(mesh, shapes, begin)
-    now, z = along.now, along.z
+    now, z = along.now, speed * along.z
 
     weight, points = RADIANS * stage_weights(mesh), mesh.points
+    turn = kind.turn * speed / (point_weights(mesh) @ speed) if relative else kind.turn
     pose = CollocatedPose.on_mesh(
         mesh,
-        RADIANS * z[OMEGA] - kind.turn,
-        RADIANS * np.array(now.centre),
+        RADIANS * z[OMEGA] - turn,
+        RADIANS * speed * np.array(now.centre),
         first_theta(kind, begin),
     )
-    power = (weight * now.power[points]).sum(axis=1)
+    power = (weight * (speed * now.power)[points]).sum(axis=1)
     shares = kind.shares(
         Passed(complex(pose.place[-1]), float(pose.rotations.sum()), float(power.sum()), begin)
     )
@@ -53,15 +65,17 @@ def balanced_variables(
     x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
     x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
     x[layout.theta[0, mesh.edge_sites]] = theta_0 + pose.theta
-    at = kind.instants(shapes, pose.theta_on(mesh), z)
+    at = kind.instants(shapes, pose.theta_on(mesh), along.z)
     for quantity, total in zip(layout.integrals, layout.totals, strict=True):
-        x[total] = (weight * quantity.at(at)[0, points]).sum()
+        x[total] = (weight * (speed * quantity.at(at))[0, points]).sum()
     if layout.momenta.size:
         x[layout.momenta[:, mesh.sites]] = along.states[: len(layout.momenta), points]
         x[layout.momenta[:, mesh.edge_sites]] = along.edges
     if layout.z.size:
-        x[layout.angles], x[layout.rates], x[layout.z] = shapes.angles, shapes.rates, z
+        x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     else:
+        x[layout.speed] = speed
+        shapes = shapes._replace(rates=rates, delta=slow * speed if relative else slow)
         _lift(control, layout, x, shapes, z, theta_0 + pose.theta_on(mesh))
     return x
 
