@@ -26,6 +26,7 @@ from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.heading import whole_turns
 from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
+from colloc.reduced.one_gait import OneGait
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
 from colloc.system.errors import ProblemError
@@ -50,12 +51,16 @@ _SERPENOID = Searched(
     _LINEAR.program,
     lambda control, gait, edges, scheme, far: SerpenoidSpace(control, edges, scheme, far),
 )
+_GIVEN = Searched(
+    _LINEAR.program,
+    lambda control, gait, edges, scheme, far: OneGait(control, edges, scheme, far),
+)
 SEARCHED: dict[type, Searched] = {
     FreePath: _ALONG_PATHS,
     Polygon: _ALONG_PATHS,
     Serpenoid: _SERPENOID,
     LinearClass: _LINEAR,
-    Prescribed: _LINEAR,
+    Prescribed: _GIVEN,
 }
 """By class, for it and those that derive from it; the first that fits counts."""
 
