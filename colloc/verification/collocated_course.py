@@ -33,7 +33,7 @@ from colloc.motion.kinds import (
 )
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import totals_along
-from colloc.verification.inertial_motion import amplified, gait_with_inertia
+from colloc.verification.inertial_motion import GaitWithInertia, amplification
 from colloc.verification.played import LEAST
 from colloc.verification.slope import gait_on_slope
 
@@ -92,14 +92,14 @@ def _with_inertia(
 ) -> CourseOfGait:
     dynamics = control.dynamics
     at, regime = (dynamics.body, dynamics.law, gait, delta), regime.at(gait)
-    played = gait_with_inertia(
+    played = GaitWithInertia(
         *at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime
     )
     kind: Any = kind_of_motion(dynamics)
-    begin, _, slopes = played.closed(
+    begin, _, slopes = played.rough_period(
         kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0]
     )
-    times = 1.0 + np.abs(amplified(slopes)).sum(axis=1).max()
+    times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
     ran = played.periodic_run(begin, max(error / times, LEAST), slopes)
     return CourseOfGait(ran.course.at, times * ran.aim, alone=kind.alone)
 
