@@ -80,8 +80,6 @@ class Uncertainty:
 
 @dataclass(frozen=True, eq=False)
 class FittedGait:
-    """A Fourier series near given joint angles."""
-
     gait: Fourier
     rms: float = 0.0  # distance of the joint angles from those given [rad]: root mean square
     largest: float = 0.0  # and the largest of any joint at any sample
@@ -295,7 +293,6 @@ class _Samples(NamedTuple):
             return _best(tried(period, False, most=_ROUGH))
 
         def nearest(low: float, high: float) -> float:
-            """The period between two that fits best."""
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
             return float(minimize_scalar(missed, bounds=(low, high), **how).x)
 

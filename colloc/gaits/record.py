@@ -67,8 +67,6 @@ negative angles."""
 
 
 class Record(NamedTuple):
-    """Joint angles over time."""
-
     time: np.ndarray  # (n_time,), from 0, in the file's unit; it does not fall
     angles: np.ndarray  # (n_joint, n_time) [rad], from tail to head
     degrees: bool  # whether all were given in degrees
@@ -97,7 +95,6 @@ class _Column(NamedTuple):
         return tuple("#" if word.isdecimal() else word for word in words)
 
     def speaks_of(self, what: str) -> bool:
-        """Whether a word of the name is of a kind."""
         return any(re.fullmatch(_WORDS[what], word) for word in self.words)
 
     @property
@@ -225,7 +222,6 @@ def _clock(table: Table, columns: list[_Column]) -> list[int]:
 
 
 def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Column], str]:
-    """The columns of the joints from tail to head, and by what they are known."""
     angles = [column for column in columns if column.kind == "angle"]
     places = [column for column in columns if column.kind == "place"]
     if not angles and places:

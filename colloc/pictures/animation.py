@@ -94,7 +94,6 @@ class _Scene:
             (self.dot,) = plane.plot([], [], "o", color=VERMILION, mec="white", ms=8, zorder=5)
 
     def picture(self, period: int, k: int) -> np.ndarray:
-        """The image at column k of a period."""
         shown, before = self.shown, self.shown.before[period]
         ends = before.of(shown.ends[:, :, k])
         self.body.set_data(*ends)

@@ -26,9 +26,9 @@ from scipy.interpolate import CubicHermiteSpline
 from colloc.gaits.gait_fields import fields
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import rate_independent
+from colloc.pictures.robot_model import FORMATS, floor_of, note_of
 from colloc.results.motion import RigidMotion
 from colloc.results.robot import Robot, joint_torques, pressing, slow_torques
-from colloc.results.robot_model import FORMATS, floor_of, note_of
 from colloc.results.solution import Solution
 from colloc.system.arguments import check_count
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -71,7 +71,7 @@ def write_export(
     solution : Solution
     path : Path
         Ends in ``.csv`` or ``.json``; or in ``.xml`` or ``.urdf`` for the robot as a model of
-        MuJoCo (MJCF) or a URDF (`colloc.results.robot_model`), which takes `period`, `length` and
+        MuJoCo (MJCF) or a URDF (`colloc.pictures.robot_model`), which takes `period`, `length` and
         `mass`.
     period : float, optional
         Seconds a period takes, rounded up to a whole number of samples; by default the shortest
@@ -293,7 +293,6 @@ def _write_model(robot: Robot, path: Path) -> dict[str, Any]:
 
 
 def _distance_on_floor(robot: Robot) -> float:
-    """What colloc says of the robot on the floor of its MJCF [body lengths]."""
     solution, gait = robot.solution, robot.solution.gait
     return inertial_motion(
         *floor_of(robot), gait, solution.delta_per_period, robot.froude, tolerance=1e-3,

@@ -171,7 +171,6 @@ def draw_allowed(
 
 
 def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> None:
-    """All joint angles, or amplitudes of modes, over a period."""
     draw_series(axes, t, angles)
     axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{body.quantity}  [rad]")
     draw_key(axes, body.coordinate)

@@ -49,7 +49,6 @@ class Panel(NamedTuple):
         return axes
 
     def figure(self) -> Figure:
-        """The panel alone."""
         with styled(font_size=8):
             figure = Figure(figsize=(self.width, self.height))
             self.draw(figure.add_subplot())
@@ -93,7 +92,6 @@ def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:
 
 
 def panels(solution: Solution) -> dict[str, Panel]:
-    """Name to panel."""
     t, problem = np.linspace(0.0, 1.0, 1201), solution.problem
     angles = solution.gait.angles(t)
     drawn: dict[str, tuple[float, float, Callable[[Axes], object]]] = {
@@ -118,7 +116,6 @@ def draw_panel(axes: Axes, solution: Solution, panel: str = "gait") -> Axes:
 
 
 def chosen(panels: dict[str, Panel], name: str) -> Panel:
-    """The panel of that name. `ProblemError` if there is none."""
     if name not in panels:
         raise ProblemError(f"there is no panel {name!r}; there are {', '.join(panels)}.")
     return panels[name]

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from colloc.bounds.optimality_gap import gap_line, upper_bound
@@ -23,6 +22,7 @@ from colloc.pictures.motion_frames import Frames, foot_kinds, foot_words, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.robot_figure import robot_panels
 from colloc.pictures.style import INK, styled
+from colloc.pictures.templates import render
 from colloc.results.robot import SLOW_ENOUGH, Robot
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -83,16 +83,6 @@ class Drawn(NamedTuple):
     has_phase: bool
 
 
-def environment() -> Environment:
-    """Templates of this package; they escape whatever is put into them."""
-    templates = Environment(
-        loader=PackageLoader("colloc.pictures", "assets"), autoescape=True,
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    templates.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
-    return templates
-
-
 def report_page(
     solution: Solution,
     reference: Reference | None = None,
@@ -114,8 +104,8 @@ def report_page(
         "power": "power against friction; ticks: mesh",
     }
     replayed = solution.certificate.replayed
-    template = environment().get_template("report.html")
-    return template.render(
+    return render(
+        "report.html",
         solution=solution,
         problem=problem,
         certificate=solution.certificate,

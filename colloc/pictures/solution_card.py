@@ -108,7 +108,6 @@ def _moving_disc(places: np.ndarray, look: str) -> str:
 
 
 def _facts(solution: Solution) -> list[tuple[str, str]]:
-    """Names and values."""
     certificate, best = solution.certificate, solution.problem.objective
     if not certificate.replayed:
         return [(f"{best.name} (not replayed)", f"{solution.value:.5f}")]

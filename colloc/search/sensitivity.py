@@ -385,7 +385,6 @@ def _slope(
 
 
 def _again(solution: Solution, problem: Problem, change: float) -> Again:
-    """What is best where a number differs, and what the gait on file does there."""
     gait, delta = solution.answer.gait, problem.delta
     space, v = space_about(problem, gait)
     found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
@@ -400,7 +399,6 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
 
 
 def _broken(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
-    """What a gait does not keep of a problem, in words."""
     if excess > _EXCESS:
         yield f"{excess:.2g} beyond its limits"
     turned = kept.rotation - (problem.rotation or 0.0)

@@ -184,7 +184,6 @@ def _fit(lines: list[str], delimiter: str) -> tuple[float, float]:
 
 
 def is_blank(cell: str) -> bool:
-    """Whether a cell says that there is no number."""
     return cell.lower() in _BLANK
 
 

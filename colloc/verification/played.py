@@ -87,7 +87,6 @@ class Replay(Period):
 
     @property
     def value(self) -> float:
-        """Of the objective."""
         return self.objective(self.values)
 
     @property

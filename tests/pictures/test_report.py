@@ -23,8 +23,9 @@ from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames, lab_outline
-from colloc.pictures.report_page import PLAIN, environment, motion_data, report_page
+from colloc.pictures.report_page import PLAIN, motion_data, report_page
 from colloc.pictures.style import INK
+from colloc.pictures.templates import environment
 from colloc.results.checks import Check
 from colloc.results.solution import Solution
 from colloc.results.store import save
