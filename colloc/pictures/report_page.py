@@ -14,7 +14,6 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from colloc.bounds.optimality_gap import gap_line, upper_bound
-from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.inertia import GRAVITY
@@ -29,46 +28,7 @@ from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.replaced_file import replaced_file
 
 _MOST_PLANES = 6
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-"""The page may run its own script and nothing else: it can fetch nothing, whatever the file
-held."""
 _ANY_FLOOR = 0.5  # friction of a floor, over the stated one, for which a period is stated
-PLAIN = {
-    "KKT error": "To first order, no small change of the gait within its class is better.",
-    "second order": "To second order none is either: the gait is a best one, and no saddle between "
-    "better ones.",
-    "constraint violation": "Every condition of the problem is met at the solver's own points.",
-    "balance at nodes": "At these points no net force or torque acts on the body.",
-    "balance in replay": "Nor does any act at all the instants in between.",
-    "closure": "The body ends a cycle in the shape in which it began.",
-    "net rotation": "It ends the cycle pointing the same way, so that it crawls straight on.",
-    "joint limits": "No joint bends further than it may, at any instant.",
-    "joint speed": "No joint turns faster than it may, at any instant.",
-    "tangent angle": "The body bends no further from its own direction than it may, so that it "
-    "cannot cross itself.",
-    "self-contact": "No part of the body passes through another, at any instant.",
-    "stability": "After a push the body comes back to this motion, period by period.",
-    "statics": "How far the weights it is given press beside its centre of mass; a real body "
-    "shifts its weight by that.",
-    "actuators": "No joint has to do more than it can, at any instant.",
-    "replay gap": "An independent replay of the motion finds the same value.",
-    "replay error": "The replay itself is as exact as was asked for.",
-    "work = dissipation": "All work of what bends the body goes into friction and, on a slope, the "
-    "climb: energy is conserved.",
-    "mesh error": "More time steps would hardly change the result.",
-    "delta influence": "Friction is smoothed a little at rest; that hardly changes the result.",
-    "direction": "The body goes where it was asked to go.",
-    "one motion": "Friction leaves the body no choice of another motion, or none that changes the "
-    "result.",
-    "joins": "The pieces of the path meet without a jump.",
-    "curvature": "The path bends no more sharply than it may.",
-}
-"""What a check means for a reader who knows nothing of optimisation, by its name."""
-TURNING = {
-    "net rotation": "It ends the cycle turned by the angle that was asked for: it crawls in a "
-    "circle."
-}
-"""The same for gaits that are asked to turn."""
 
 
 class Drawn(NamedTuple):
@@ -110,7 +70,6 @@ def report_page(
         problem=problem,
         certificate=solution.certificate,
         solved=solution.status == SOLVED,
-        headline=_headline(solution),
         pace=_pace(solution),
         dry=_dry(solution),
         floor=_floor(solution),
@@ -118,11 +77,8 @@ def report_page(
         reference=reference.verdict(solution.certificate.efficiency)
         if reference and replayed
         else "",
-        plain=PLAIN | TURNING if problem.rotation else PLAIN,
-        policy=_POLICY,
         degrees=math.degrees,
         fields={name: json.dumps(value) for name, value in problem.to_dict().items()},
-        commands=_commands(solution),
         source=solution.source or problem_file_text(problem),
         motion=motion_data(frames(solution), body),
         errors=float(errors.sum()),
@@ -160,19 +116,9 @@ def write_report(
         bound = upper_bound(solution.problem, known or path.parent, compute=False)
         gap = gap_line(solution.problem, solution.certificate.efficiency, bound)
     with replaced_file(path) as temporary:
-        Path(temporary).write_text(
-            report_page(solution, reference, gap, robot=robot), encoding="utf-8"
-        )
+        page = report_page(solution, reference, gap, robot=robot)
+        Path(temporary).write_text(page, encoding="utf-8")
     return path
-
-
-def _headline(solution: Solution) -> str:
-    measured = solution.measured
-    best = solution.problem.objective
-    other = "" if best == EFFICIENCY else f"; {best.name} {measured.value:.3g}"
-    turns = f" and {solution.turning}" if solution.turning else ""
-    moves = f"moves {measured.distance:.2g} body lengths a cycle{turns}"
-    return f"{moves}; {measured.efficiency:.2g} body lengths per unit of work{other}"
 
 
 def _pace(solution: Solution) -> str:
@@ -210,18 +156,6 @@ def _floor(solution: Solution) -> list[list[str]]:
     except (ProblemError, NotConvergedError):
         return []
     return [[effect.name, f"{effect.now:.4g}", *found.beside(effect)] for effect in found.seen]
-
-
-def _commands(solution: Solution) -> str:
-    p = solution.problem
-    starts = f" --starts {solution.starts}" if solution.starts > 1 else ""
-    return (
-        f"# save the problem source above as {p.name}.py, then\n"
-        f"colloc solve {p.name}.py --delta {p.delta:g} --delta-start {p.delta_start:g} --mesh "
-        f"{p.intervals} --mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme} --formulation "
-        f"'{p.formulation}'{starts}\n"
-        f"colloc verify results/{p.name}.h5"
-    )
 
 
 def _picture(

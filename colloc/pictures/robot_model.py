@@ -27,7 +27,7 @@ import numpy as np
 from colloc.gaits.limits import range_of
 from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.feet import Foot, whole_links
+from colloc.mechanics.feet import whole_links
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.pictures.templates import render
@@ -143,16 +143,24 @@ def mjcf(robot: Robot, *, contacts: bool = True) -> str:
 
 
 def _feet(robot: Robot, parts: _Parts) -> list[dict[str, Any]]:
-    """Small bodies, each on a vertical slide; a spring presses it on the floor with its weight, and
-    it moves as if it had that."""
-    feet = []
-    for number, foot in enumerate(_points(parts.chain, robot.solution.problem.friction), 1):
-        law: Any = _elliptic(foot.friction)  # type: ignore[arg-type]
-        place = (foot.place * parts.lengths[foot.link], foot.offset * robot.length, 0)
-        about = {"number": number, "link": foot.link, "place": place, "angle": foot.angle}
-        about["borne"] = robot.mass * float(foot.weight or 0.0)
-        about["friction"] = (law.mu_f, law.mu_t, 0, 0, 0)  # a contact has no other resistance
-        feet.append(about | {"directed": f"{law.mu_f:.9g}" != f"{law.mu_t:.9g}"})
+    """Points on which it stands: small bodies, each on a vertical slide; a spring presses it on the
+    floor with its weight, and it moves as if it had that."""
+    chain, feet = parts.chain, list[dict[str, Any]]()
+    for foot in chain.standing_on or whole_links(chain.weight_column()[:, 0]):
+        law: Any = _elliptic(foot.friction or robot.solution.problem.friction)
+        rule = np.polynomial.legendre.leggauss(_POINTS) if foot.extent else ([0.0], [2.0])
+        for node, share in zip(*rule, strict=True):
+            along = (foot.place + 0.5 * node * foot.extent) * parts.lengths[foot.link]
+            about = {
+                "number": len(feet) + 1,
+                "link": foot.link,
+                "place": (along, foot.offset * robot.length, 0),
+                "angle": foot.angle,
+                "borne": robot.mass * (0.5 * share * float(foot.weight or 0.0)),
+                "friction": (law.mu_f, law.mu_t, 0, 0, 0),  # a contact has no other resistance
+                "directed": f"{law.mu_f:.9g}" != f"{law.mu_t:.9g}",
+            }
+            feet.append(about)
     return feet
 
 
@@ -163,17 +171,14 @@ def urdf(robot: Robot) -> str:
     A URDF has no friction of contacts, and nothing that spreads the weight over them: a simulator
     chooses both. Parameters and errors are as of `mjcf`.
     """
-    efforts, speeds = (
-        _RESERVE * np.array(robot.facts[name])
-        for name in ("peak_torque_N_m", "peak_speed_rad_per_s")
-    )
+    parts = _parts(robot)
     return _xml(
         "robot.urdf",
         name=robot.solution.problem.name,
-        parts=_parts(robot),
+        parts=parts,
         robot_length=robot.length,
-        efforts=efforts,
-        speeds=speeds,
+        efforts=_RESERVE * np.array(robot.facts["peak_torque_N_m"]),
+        speeds=_RESERVE * np.array(robot.facts["peak_speed_rad_per_s"]),
     )
 
 
@@ -221,16 +226,3 @@ def _elliptic(law: Law) -> Law:
     )
     along = float(np.sqrt(ahead * back))
     return Elliptic(mu_t=aside, mu_f=along, mu_b=along)
-
-
-def _points(chain: Chain, law: Law) -> tuple[Foot, ...]:
-    """On which it stands, each with its weight and its friction."""
-    points = []
-    for foot in chain.standing_on or whole_links(chain.weight_column()[:, 0]):
-        foot = replace(foot, friction=foot.friction or law)
-        rule = np.polynomial.legendre.leggauss(_POINTS) if foot.extent else ([0.0], [2.0])
-        for node, share in zip(*rule, strict=True):
-            place = foot.place + 0.5 * node * foot.extent
-            weight = 0.5 * share * float(foot.weight or 0.0)
-            points.append(replace(foot, place=place, weight=weight, extent=0.0))
-    return tuple(points)
