@@ -12,7 +12,7 @@ from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.results.arc import arc
 from colloc.search.spaces import space_near, transcribed
-from colloc.verification.inertial_replay import inertial_replay
+from colloc.verification.inertial_motion import inertial_replay
 from colloc.verification.mesh_error import mesh_error
 
 DELTA = 0.3
