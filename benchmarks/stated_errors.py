@@ -24,7 +24,7 @@ from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.sloped import Slope
 from colloc.results.measured import measured
-from colloc.verification.inertial_motion import gait_with_inertia
+from colloc.verification.inertial_motion import GaitWithInertia
 from colloc.verification.replayer import replayer
 from colloc.verification.slope import gait_on_slope
 
@@ -96,13 +96,13 @@ def _finer(errors: Any) -> float:
 
 def _true_motion(case: Case, near: np.ndarray, aim: float) -> dict[str, float]:
     """By Newton's method, until rounding hides how its steps become smaller."""
-    played, before = gait_with_inertia(*case[:4], froude=case.froude, breaks=()), np.inf
-    per_start = np.eye(3) - played.mapped(near)[1][:3]
+    played, before = GaitWithInertia(*case[:4], froude=case.froude, breaks=()), np.inf
+    per_start = np.eye(3) - played.period_map(near)[1][:3]
     while True:
         states = played.run(near, aim).states
         step = np.linalg.solve(per_start, states[:3, -1] - near)
         if (size := np.abs(step).max()) < aim or size > 0.5 * before:
-            return played.passed(states)
+            return played.totals(states)
         near, before = near + step, size
 
 
@@ -130,7 +130,7 @@ def certificate(case: Case) -> Row:
     """Measured as a certificate does."""
     level = case._replace(gait=Fourier(case.gait.mean, case.gait.cos, case.gait.sin))
     known = measured(*level[:4], rotation=None, run=replayer(Paced(case.froude)))
-    played = gait_with_inertia(*level[:4], froude=case.froude, breaks=())
+    played = GaitWithInertia(*level[:4], froude=case.froude, breaks=())
     start = played.momenta(known.fine.tail_velocity(np.zeros(1)))
     return _row(
         known.fine.values,

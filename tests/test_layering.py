@@ -241,9 +241,7 @@ ADAPTIVE = (
     "panels",
     "adaptive_motion",
     "slope",
-    "slope_replay",
     "inertial_motion",
-    "inertial_replay",
     "dry_balance",
     "dry_friction",
 )

@@ -28,7 +28,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimits, Quantity
 from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
-from colloc.numerics.mesh import Mesh, uniform_mesh
+from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
 
@@ -136,14 +136,10 @@ class ControlProblem:
     unit: float
 
     def mesh(self, edges: np.ndarray | None = None, of_scheme: str = "") -> Mesh:
-        """The first mesh on the part of the period that is solved: uniform and of the usual scheme;
-        or as given."""
-        rule = scheme(of_scheme or self.scheme)
-        return (
-            uniform_mesh(rule, self.intervals, self.admissible.gait.fraction)
-            if edges is None
-            else Mesh(rule, edges)
-        )
+        """The first mesh on the part of the period that is solved, of the usual scheme; or as
+        given."""
+        first = self.admissible.gait.edges(self.intervals) if edges is None else edges
+        return Mesh(scheme(of_scheme or self.scheme), first)
 
     def stated(self, value: float) -> float:
         """A value of the objective as the problem states it."""

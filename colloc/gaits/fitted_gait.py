@@ -11,7 +11,7 @@ from its last sample to the first one of the next period, or that after which it
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -29,8 +29,7 @@ _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
 _WORTH, _EXACT = 1.05, 1e-16
 """The fewest numbers are taken whose score is the best one's, to a factor and a mean square
 [rad^2]."""
-_PHASES = 1024
-"""At which a function is sampled."""
+_PHASES = 1024  # at which a function is sampled
 _GAP, _GAPS = 5.0, 21
 """The first sample is the next one within so many typical steps after the last; gaps at which that
 is tried at first."""
@@ -51,14 +50,12 @@ and for one that would not close else."""
 _TOLD = 0.5
 """A period longer than this share of a record is told without a drift: a part of a wave and a drift
 are much alike."""
-_ROUGH = 6
-"""Harmonics by which the length of a period is told."""
+_ROUGH = 6  # harmonics by which the length of a period is told
 SEVERAL = 1.1
 """Periods from which a record holds more than one."""
-_STEP, _HIGHEST = 1e-5, 64
-"""Of differences by the period, relative; harmonics of a class at most."""
-_CHANCE = 0.05
-"""That noise alone seems worth more harmonics."""
+_STEP = 1e-5  # of differences by the period, relative
+_HIGHEST = 64  # harmonics of a class at most
+_CHANCE = 0.05  # that noise alone seems worth more harmonics
 _COVERED = 0.97725
 """The probability that the standard normal distribution has up to two standard deviations."""
 
@@ -69,62 +66,31 @@ file; or a function of phases ``(n_time,)``."""
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """By what the coefficients of a series may be off that goes through samples.
-
-    Attributes
-    ----------
-    directions : (n_direction, n_joint, n_coefficient)
-        Changes of (mean, cos 1, sin 1, cos 2, ...), independent of one another, each of a standard
-        deviation; also of harmonics that the series lacks.
-    factor : float
-        Standard deviations within which 95 % of all records lie: two, or Student's for few samples.
-    richer : Fourier, optional
-        A series of more harmonics through the samples, if what smoothing leaves out is more than
-        noise.
-    """
+    """By what the coefficients of a series may be off that goes through samples."""
 
     directions: np.ndarray
+    """Changes of (mean, cos 1, sin 1, cos 2, ...), independent of one another, each of a standard
+    deviation, ``(n_direction, n_joint, n_coefficient)``; also of harmonics beyond the series."""
     factor: float
+    """Standard deviations within which 95 % of all records lie: two, or Student's for few
+    samples."""
     richer: Fourier | None
+    """A series of more harmonics, if what smoothing leaves out is more than noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedGait:
-    """A Fourier series near given joint angles.
-
-    Attributes
-    ----------
-    gait : Fourier
-    rms, largest : float
-        Distance of the joint angles from those given [rad]: root mean square, and largest of any
-        joint at any sample.
-    samples : int
-        How many there are; 0 for a series, which is taken as it is.
-    drift : float
-        The most that any joint was off after a period [rad]; it is taken out evenly.
-    degrees : bool
-        Whether angles were given in degrees, and are told so.
-    periods : float
-        That the samples hold, of the length `period` in the unit of time of a file.
-    uncertainty : Uncertainty, optional
-        None for a series.
-    taken : str
-        What was read from a file, in words.
-    centre : int
-        About what all joints of a file are centred [degrees], if that looks like servos.
-    """
-
     gait: Fourier
-    rms: float = 0.0
-    largest: float = 0.0
-    samples: int = 0
-    drift: float = 0.0
-    degrees: bool = False
-    periods: float = 1.0
-    period: float = 1.0
-    uncertainty: Uncertainty | None = None
-    taken: str = ""
-    centre: int = 0
+    rms: float = 0.0  # distance of the joint angles from those given [rad]: root mean square
+    largest: float = 0.0  # and the largest of any joint at any sample
+    samples: int = 0  # how many there are; 0 for a series, which is taken as it is
+    drift: float = 0.0  # the most that any joint was off after a period [rad]; taken out evenly
+    degrees: bool = False  # whether angles were given in degrees, and are stated so
+    periods: float = 1.0  # that the samples hold, of the length `period`
+    period: float = 1.0  # in the unit of time of a file
+    uncertainty: Uncertainty | None = None  # None for a series
+    taken: str = ""  # what was read from a file, in words
+    centre: int = 0  # about what all joints of a file are centred [degrees], as servos are
 
     def describe(self) -> str:
         """How the gait was made, in words."""
@@ -132,24 +98,15 @@ class FittedGait:
             return "the series as it was given"
         many = f"{self.gait.n_harmonic} harmonic{'s' * (self.gait.n_harmonic > 1)}"
         rms, largest = (_told(a, self.degrees, ".1e") for a in (self.rms, self.largest))
-        drift = (
-            f", a drift of {_told(self.drift, self.degrees)} a period taken out"
-            if self.drift
-            else ""
-        )
-        several = (
-            f" of {self.periods:.3g} periods of {self.period:.4g}" if self.periods > SEVERAL else ""
-        )
-        begin = f"{self.taken}; " if self.taken else ""
-        begin += (
-            f"all joints move about {self.centre}°, which servos may count from; "
-            if self.centre
-            else ""
-        )
-        return (
-            f"{begin}{many} through {self.samples} samples{several}{drift}: off by {rms} "
-            f"r.m.s., {largest} at most"
-        )
+        text = f"{self.taken}; " if self.taken else ""
+        if self.centre:
+            text += f"all joints move about {self.centre}°, which servos may count from; "
+        text += f"{many} through {self.samples} samples"
+        if self.periods > SEVERAL:
+            text += f" of {self.periods:.3g} periods of {self.period:.4g}"
+        if self.drift:
+            text += f", a drift of {_told(self.drift, self.degrees)} a period taken out"
+        return f"{text}: off by {rms} r.m.s., {largest} at most"
 
 
 def _told(angle: float, degrees: bool, digits: str = ".3g") -> str:
@@ -194,46 +151,37 @@ def fitted_gait(
     >>> np.allclose(found.gait.sin, [[0], [0.5]]), found.largest < 1e-12
     (True, True)
     """
-    name = "the gait"
+    name, record = "the gait", None
     if isinstance(given, Fourier):
         _check_joints(name, given.n_joint, n_joint)
         return FittedGait(given)
-    record = None
     if isinstance(given, (str, os.PathLike)):
         name = str(given)
         record = read_record(Path(given), n_joint, degrees=degrees)
         time, angles = record.time, record.angles
-        period = period or record.period
+        period, degrees = period or record.period, record.degrees
     elif callable(given):
         time, period = np.arange(_PHASES) / _PHASES, 1.0
-        angles = _numbers(
-            name, given.angles(time) if isinstance(given, GaitFunction) else given(time)
-        )
+        function = given.angles if isinstance(given, GaitFunction) else given
+        angles = _numbers(name, function(time))
     elif {"joint"} < set(getattr(given, "dims", ())):  # labelled, as `Solution.to_xarray` has them
         labelled = cast(Any, given).transpose("joint", ...)
-        angles, time = (
-            _numbers(name, labelled),
-            np.asarray(labelled[labelled.dims[-1]], dtype=float),
-        )
+        angles = _numbers(name, labelled)
+        time = np.asarray(labelled[labelled.dims[-1]], dtype=float)
     else:
         angles = _numbers(name, given)
         time = np.arange(angles.shape[1], dtype=float)
     _check_joints(name, len(angles), n_joint)
-    if record is not None:
-        fitted = _closed(
-            name, time, angles, _fit(name, time, angles, period, harmonics), record.degrees
-        )
-        return replace(fitted, taken=record.taken, centre=record.centre)
-    largest = np.abs(angles).max()
-    if degrees:
+    if record is None and degrees:
         angles = np.radians(angles)
-    elif largest > _LARGEST:
+    elif record is None and (largest := np.abs(angles).max()) > _LARGEST:
         raise ProblemError(
             f"{name} has an angle of {largest:.4g} rad: if angles are degrees, say so "
             f"(degrees=True, --degrees)."
         )
-    time = time - time[0]
-    return _closed(name, time, angles, _fit(name, time, angles, period, harmonics), degrees)
+    samples = _Samples(name, time - time[0], angles, degrees)
+    fitted = samples.gait(samples.best_fit(period, harmonics))
+    return replace(fitted, taken=record.taken, centre=record.centre) if record else fitted
 
 
 def _check_joints(name: str, count: int, n_joint: int) -> None:
@@ -266,280 +214,237 @@ class _Fit(NamedTuple):
     """Which series is to go through angles at times from 0."""
 
     harmonics: int
-    drifts: bool
-    """Whether the record drifts."""
-    score: float
-    """Mean square distance over the square of the share of numbers that are left."""
+    drifts: bool  # whether the record drifts
+    score: float  # mean square distance over the square of the share of numbers that are left
     period: float
-    chosen: bool = False
-    """Whether the period was told from the samples."""
+    chosen: bool = False  # whether the period was told from the samples
+
+    def columns(self, time: np.ndarray) -> np.ndarray:
+        """The drift, if there is one, then 1, the first cosine and sine, the second ...: ``(n_time,
+        n_number)``."""
+        phases = time / self.period
+        turns = 2 * np.pi * phases[:, None] * np.arange(1, self.harmonics + 1)
+        waves = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(phases.size, -1)
+        drift = [phases - phases.mean()] if self.drifts else []
+        return np.column_stack([*drift, np.ones(phases.size), waves])
 
 
-def _columns(time: np.ndarray, fit: _Fit) -> np.ndarray:
-    """The drift, if there is one, then 1, the first cosine and sine, the second ...: ``(n_time,
-    n_number)``."""
-    phases = time / fit.period
-    turns = 2 * np.pi * phases[:, None] * np.arange(1, fit.harmonics + 1)
-    waves = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(phases.size, -1)
-    columns = np.concatenate(
-        [(phases - phases.mean())[:, None], np.ones((phases.size, 1)), waves], axis=1
-    )
-    return columns if fit.drifts else columns[:, 1:]
+class _Samples(NamedTuple):
+    name: str
+    time: np.ndarray
+    angles: np.ndarray  # (n_joint, n_time)
+    degrees: bool  # for messages
 
+    @property
+    def step(self) -> float:
+        """Between samples; of many at one instant, as where stamps are rounded, the mean."""
+        time = self.time
+        return float(np.median(np.diff(time))) or float(time[-1] - time[0]) / (time.size - 1)
 
-def _tried(time: np.ndarray, angles: np.ndarray, fit: _Fit, chosen: int = 0) -> list[_Fit]:
-    """Fits of up to as many harmonics, by one factorisation; so many numbers were `chosen`
-    besides."""
-    q = np.linalg.qr(_columns(time, fit))[0]
-    parts = q.T @ angles.T
-    gains, left = (parts**2).sum(axis=1), ((angles.T - q @ parts) ** 2).sum()
-    missed = left + np.append(np.cumsum(gains[::-1])[::-1], 0.0)
-    numbers = 1 + fit.drifts + 2 * np.arange(1, fit.harmonics + 1)
-    scores = missed[numbers] / angles.size / (1 - (numbers + chosen) / time.size) ** 2
-    return [
-        fit._replace(harmonics=k, score=float(score), chosen=chosen > 0)
-        for k, score in enumerate(scores, 1)
-    ]
-
-
-def _fit(
-    name: str, time: np.ndarray, angles: np.ndarray, period: float | None, harmonics: int | None
-) -> _Fit:
-    count, step = time.size, _typical_step(time)
-    if period is not None:
-        if not np.isfinite(period) or period <= 0:
-            raise ProblemError(f"the period must be positive, not {period:g}.")
-        if time[-1] < 0.5 * period:
-            raise ProblemError(
-                f"{name} holds {time[-1]:.4g} of a period of {period:.4g}: record at least one."
-            )
-        if period < FEWEST * step:
-            raise ProblemError(
-                f"{name} has a sample every {step:.4g}, fewer than {FEWEST} in a period of "
-                f"{period:.4g}: give the period in "
-                "the file's unit of time."
-            )
-    if harmonics is not None and not 1 <= harmonics <= (count - 3) // 2:
-        raise ProblemError(
-            f"{count} samples determine 1 to {(count - 3) // 2} harmonics, not {harmonics}."
-        )
-
-    def tried(
-        period: float, drifts: bool, chosen: int = 0, most: int = _MOST_HARMONICS
-    ) -> list[_Fit]:
-        many = min(count, int(period / step))  # samples of a period
-        most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
-        return _tried(time, angles, _Fit(most, drifts, np.inf, period), chosen)[
-            (harmonics or 1) - 1 :
-        ]
-
-    def missed(period: float) -> float:
-        return min(fit.score for fit in tried(period, False, most=_ROUGH))
-
-    def nearest(low: float, high: float) -> float:
-        """The period between two that fits best."""
-        return float(
-            minimize_scalar(
-                missed, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high}
-            ).x
-        )
-
-    def both(periods: Iterable[float], chosen: int) -> list[_Fit]:
+    def fits(self, fit: _Fit, fewest: int = 1, chosen: int = 0) -> list[_Fit]:
+        """By one factorisation those of up to as many harmonics; so many numbers were `chosen`
+        besides."""
+        q = np.linalg.qr(fit.columns(self.time))[0]
+        parts = q.T @ self.angles.T
+        gains, left = (parts**2).sum(axis=1), ((self.angles.T - q @ parts) ** 2).sum()
+        missed = left + np.append(np.cumsum(gains[::-1])[::-1], 0.0)
+        numbers = 1 + fit.drifts + 2 * np.arange(1, fit.harmonics + 1)
+        free = 1 - (numbers + chosen) / self.time.size
+        scores = (missed[numbers] / self.angles.size / free**2).tolist()
         return [
-            fit
-            for period in periods
-            for drifts in (False, True)
-            for fit in tried(period, drifts, chosen)
-        ]
+            fit._replace(harmonics=k, score=score, chosen=chosen > 0)
+            for k, score in enumerate(scores, 1)
+        ][fewest - 1 :]
 
-    found = both([period] if period else time[-1] + np.array([0.0, step]), 0)
-    if period is None:
-        grid = time[-1] + step * np.linspace(0.0, _GAP, _GAPS)
-        near = min(grid, key=missed)
-        around = max(near - grid[1] + grid[0], grid[0]), near + grid[1] - grid[0]
-        repeats = [nearest(low, high) for low, high in _repeats(time, angles, step)]
-        found += both([nearest(*around)], 1)
-        found += [
-            fit for each in repeats if each > _TOLD * time[-1] for fit in tried(each, False, 1)
+    def check(self, period: float | None, harmonics: int | None) -> None:
+        """A `ProblemError` if the samples cannot tell so many harmonics of such a period."""
+        step, most = self.step, (self.time.size - 3) // 2
+        if period is not None:
+            if not np.isfinite(period) or period <= 0:
+                raise ProblemError(f"the period must be positive, not {period:g}.")
+            if self.time[-1] < 0.5 * period:
+                raise ProblemError(
+                    f"{self.name} holds {self.time[-1]:.4g} of a period of {period:.4g}: record at "
+                    f"least one."
+                )
+            if period < FEWEST * step:
+                raise ProblemError(
+                    f"{self.name} has a sample every {step:.4g}, fewer than {FEWEST} in a period "
+                    f"of {period:.4g}: give the period in the file's unit of time."
+                )
+        if harmonics is not None and not 1 <= harmonics <= most:
+            raise ProblemError(
+                f"{self.time.size} samples determine 1 to {most} harmonics, not {harmonics}."
+            )
+
+    def best_fit(self, period: float | None, harmonics: int | None) -> _Fit:
+        """The fit of the fewest numbers that does about as well as any."""
+        self.check(period, harmonics)
+        time, step = self.time, self.step
+
+        def tried(
+            period: float, drifts: bool, chosen: int = 0, most: int = _MOST_HARMONICS
+        ) -> list[_Fit]:
+            many = min(time.size, int(period / step))  # samples of a period
+            most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
+            return self.fits(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
+
+        def missed(period: float) -> float:
+            return _best(tried(period, False, most=_ROUGH))
+
+        def nearest(low: float, high: float) -> float:
+            how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
+            return float(minimize_scalar(missed, bounds=(low, high), **how).x)
+
+        def both(period: float, chosen: int) -> list[_Fit]:
+            return [*tried(period, False, chosen), *tried(period, True, chosen)]
+
+        found = both(period, 0) if period else [*both(time[-1], 0), *both(time[-1] + step, 0)]
+        if period is None:
+            grid = time[-1] + step * np.linspace(0.0, _GAP, _GAPS)
+            near = min(grid, key=missed)
+            around = max(near - grid[1] + grid[0], grid[0]), near + grid[1] - grid[0]
+            repeats = [nearest(low, high) for low, high in self.repeats()]
+            found += both(nearest(*around), 1)
+            for each in repeats:
+                found += tried(each, False, 1) if each > _TOLD * time[-1] else []
+            several = [both(each, 1) for each in sorted(repeats) if each <= _TOLD * time[-1]]
+            best = min(map(_best, (found, *several)))
+            slow = min(_SLOW * best, _SMALL * float(self.angles.var(axis=1).mean()))
+            enough = max(_REPEATED * best, slow) + _EXACT
+            found = next((fits for fits in several if _best(fits) <= enough), found)
+        closed = [fit for fit in found if not fit.drifts]
+        if _best(closed) <= _DRIFTS * _best(found) + _EXACT:
+            found = closed
+        fit = _cheapest(found)
+        open_ended = fit.drifts and not _closes(*self.coefficients(fit)[1:])
+        return _cheapest(closed) if open_ended and _best(closed) <= _OPEN * fit.score else fit
+
+    def coefficients(self, fit: _Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The numbers of every joint, how much it drifts in a period, and through what angle it
+        moves, ``(n_joint, ...)``."""
+        table = np.linalg.lstsq(fit.columns(self.time), self.angles.T, rcond=None)[0].T
+        waves = _series(table[:, int(fit.drifts) :]).angles(np.arange(_PHASES) / _PHASES)
+        return table, np.abs(table[:, 0]) * fit.drifts, np.ptp(waves, axis=1)
+
+    def repeats(self) -> list[tuple[float, float]]:
+        """Between what lengths of time a record may repeat itself, the likeliest ones: where it
+        differs least from itself that much later. Of many periods a length is told by as many as
+        there are."""
+        step = self.step
+        even = np.arange(0.0, self.time[-1], step)
+        moved = np.array([np.interp(even, self.time, row - row.mean()) for row in self.angles])
+        n = even.size
+        spectrum = np.abs(np.fft.rfft(moved, 2 * n, axis=1)) ** 2
+        alike = np.fft.irfft(spectrum.sum(axis=0), 2 * n)[:n]
+        squares = np.append(0.0, np.cumsum((moved**2).sum(axis=0)))
+        later = np.arange(n)
+        differs = squares[n - later] + squares[n] - squares[later] - 2 * alike
+        differs = (differs / (n - later) / (2 * squares[n] / n + 1e-300))[: n - 1]
+        inner = np.arange(FEWEST, differs.size - 1)
+        least = inner[
+            (differs[inner] <= differs[inner - 1]) & (differs[inner] < differs[inner + 1])
         ]
-        several = [both([each], 1) for each in sorted(repeats) if each <= _TOLD * time[-1]]
-        best = min(fit.score for fits in (found, *several) for fit in fits)
-        enough = (
-            max(_REPEATED * best, min(_SLOW * best, _SMALL * float(angles.var(axis=1).mean())))
-            + _EXACT
+        found = set()
+        for more in _ALIKE if least.size else ():
+            first = least[np.argmax(differs[least] <= 1.5 * differs[least].min() + more)]
+            around, length, times = 0.25 * first, float(first), 1
+            while 2 * times * length + around < n - 2:
+                times *= 2
+                low, high = (round(times * length + side * around) for side in (-1, 1))
+                length = float(low + np.argmin(differs[low : high + 1])) / times
+            low, high = length - 2.0 / times, length + 2.0 / times
+            # what a gap in the record may hide
+            found |= {(low * step / k, high * step / k) for k in (1, 2, 3) if low > k * FEWEST}
+        return sorted(found)
+
+    def gait(self, fit: _Fit) -> FittedGait:
+        """A gait without the drift of its record. `ProblemError` if that is no small one."""
+        table, drift, moves = self.coefficients(fit)
+        gait, joint = _series(table[:, int(fit.drifts) :]), int(drift.argmax())
+        if not _closes(drift, moves):
+            raise ProblemError(
+                f"{self.name} does not close: after a period joint {joint + 1} is off by "
+                f"{_told(drift[joint], self.degrees)}, and it moves through "
+                f"{_told(moves[joint], self.degrees)}. Give one whole period, or say how long it "
+                f"is (period=, --period)."
+            )
+        off = gait.angles(self.time / fit.period) - self.angles
+        return FittedGait(
+            gait,
+            rms=float(np.sqrt((off**2).mean())),
+            largest=float(np.abs(off).max()),
+            samples=self.time.size,
+            drift=float(drift.max()),
+            degrees=self.degrees,
+            periods=self.time[-1] / fit.period,
+            period=fit.period,
+            uncertainty=self.uncertainty(fit, table),
         )
-        found = next((fits for fits in several if min(fit.score for fit in fits) <= enough), found)
-    closed = [fit for fit in found if not fit.drifts]
-    if min(fit.score for fit in closed) <= _DRIFTS * min(fit.score for fit in found) + _EXACT:
-        found = closed
-    told = _cheapest(found)
-    left_open = told.drifts and not _closes(*_coefficients(time, angles, told)[1:])
-    return (
-        _cheapest(closed)
-        if left_open and min(fit.score for fit in closed) <= _OPEN * told.score
-        else told
-    )
+
+    def uncertainty(self, fit: _Fit, table: np.ndarray) -> Uncertainty:
+        """By what a least-squares fit may be off: the covariance of its numbers, and of the period
+        where samples told it.
+
+        So large harmonics may be that the samples do not show: those up to twice the highest are in
+        the covariance, too. Where they hold more of the residuals than their share, noise is slower
+        than the samples, and there is as much of it in the others.
+        """
+        time, first = self.time, int(fit.drifts)
+        most = min(time.size - first, round(fit.period / self.step))
+        most = min(max((most - 1) // 2, fit.harmonics), _HIGHEST)
+        near, far = (fit._replace(harmonics=min(most, k * fit.harmonics + 1)) for k in (2, 4))
+        richer, used = self.richer(fit, table, far), table
+        residuals = self.angles - table @ fit.columns(time).T
+        if richer is not None:  # what is left of the residuals is noise
+            residuals, used = self.angles - richer @ far.columns(time).T, richer
+        columns, left = near.columns(time), (residuals**2).sum(axis=1)
+        freedom = max(time.size - used.shape[1], 1)
+        u, s, v = np.linalg.svd(columns, full_matrices=False)
+        seen = ((residuals @ u) ** 2).sum() / (left.sum() + 1e-300)
+        share = seen * freedom / max(columns.shape[1] - table.shape[1], 1)
+        deviation = np.sqrt(left / freedom * max(share, _correlation_time(residuals))) + 1e-300
+        root = (v.T / s)[first:].T  # a row for each direction
+        shape = -1, len(table), root.shape[1]
+        directions = np.einsum("j,jk,ri->jrki", deviation, np.eye(len(table)), root).reshape(shape)
+        if fit.chosen:
+            longer, shorter = (
+                fit._replace(period=fit.period * (1 + by)).columns(time) for by in (_STEP, -_STEP)
+            )
+            by_period = table @ (longer - shorter).T / (2 * _STEP)
+            along = by_period @ u
+            beside = ((by_period - along @ u.T) / deviation[:, None]) ** 2
+            change = -((along / s) @ v)[None, :, first:] / np.sqrt(beside.sum() + 1e-300)
+            directions = np.concatenate([directions, change])
+        more = None if richer is None else _series(richer[:, first:])
+        return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), more)
+
+    def richer(self, fit: _Fit, table: np.ndarray, far: _Fit) -> np.ndarray | None:
+        """The numbers of a fit of more harmonics, if these are worth more than noise would be (F
+        test)."""
+        columns, joints = far.columns(self.time), len(table)
+        more, left = columns.shape[1] - table.shape[1], self.time.size - columns.shape[1]
+        richer = np.linalg.lstsq(columns, self.angles.T, rcond=None)[0].T
+        missed = ((self.angles - table @ fit.columns(self.time).T) ** 2).sum()
+        still = ((self.angles - richer @ columns.T) ** 2).sum()
+        worth = (missed / (still + 1e-300) - 1) * left / max(more, 1)
+        if more < 1 or (left > 0 and fdtrc(joints * more, joints * left, worth) > _CHANCE):
+            return None
+        return np.asarray(richer)
+
+
+def _best(fits: list[_Fit]) -> float:
+    return min(fit.score for fit in fits)
 
 
 def _cheapest(fits: list[_Fit]) -> _Fit:
     """The fit of the fewest numbers whose score is about the best."""
-    enough = max(_WORTH * min(fit.score for fit in fits), _EXACT)
+    enough = max(_WORTH * _best(fits), _EXACT)
     return min(fit for fit in fits if fit.score <= enough)
-
-
-def _coefficients(
-    time: np.ndarray, angles: np.ndarray, fit: _Fit
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The numbers of every joint, how much it drifts in a period, and through what angle it moves,
-    ``(n_joint, ...)``."""
-    table = np.linalg.lstsq(_columns(time, fit), angles.T, rcond=None)[0].T
-    moves = np.ptp(
-        _series(table[:, int(fit.drifts) :]).angles(np.arange(_PHASES) / _PHASES), axis=1
-    )
-    return table, np.abs(table[:, 0]) * fit.drifts, moves
 
 
 def _closes(drift: np.ndarray, moves: np.ndarray) -> bool:
     return bool(drift.max() <= _DRIFT * moves.max())
-
-
-def _typical_step(time: np.ndarray) -> float:
-    """Between samples; of many at one instant, as where stamps are rounded, the mean."""
-    return float(np.median(np.diff(time))) or float(time[-1] - time[0]) / (time.size - 1)
-
-
-def _repeats(time: np.ndarray, angles: np.ndarray, step: float) -> list[tuple[float, float]]:
-    """Between what lengths of time a record may repeat itself, the likeliest ones: where it differs
-    least from itself that much later. Of many periods a length is told by as many as there are."""
-    even = np.arange(0.0, time[-1], step)
-    moved = np.array([np.interp(even, time, row - row.mean()) for row in angles])
-    n = even.size
-    spectrum = np.abs(np.fft.rfft(moved, 2 * n, axis=1)) ** 2
-    alike = np.fft.irfft(spectrum.sum(axis=0), 2 * n)[:n]
-    squares = np.append(0.0, np.cumsum((moved**2).sum(axis=0)))
-    later = np.arange(n)
-    differs = (
-        (squares[n - later] + squares[n] - squares[later] - 2 * alike)
-        / (n - later)
-        / (2 * squares[n] / n + 1e-300)
-    )
-    differs = differs[: n - 1]
-    if n <= FEWEST:
-        return []
-    inner = np.arange(FEWEST, differs.size - 1)
-    least = inner[(differs[inner] <= differs[inner - 1]) & (differs[inner] < differs[inner + 1])]
-    if not least.size:
-        return []
-    found = set()
-    for more in _ALIKE:
-        first = least[np.argmax(differs[least] <= 1.5 * differs[least].min() + more)]
-        around, length, times = 0.25 * first, float(first), 1
-        while 2 * times * length + around < n - 2:
-            times *= 2
-            window = np.arange(round(times * length - around), round(times * length + around) + 1)
-            length = float(window[np.argmin(differs[window])]) / times
-        for part in (1, 2, 3):  # what a gap in the record may hide
-            if length - 2.0 / times > part * FEWEST:
-                found.add(
-                    ((length - 2.0 / times) * step / part, (length + 2.0 / times) * step / part)
-                )
-    return sorted(found)
-
-
-def _closed(
-    name: str, time: np.ndarray, angles: np.ndarray, fit: _Fit, degrees: bool
-) -> FittedGait:
-    """A gait without the drift of its record. `ProblemError` if that is no small one."""
-    table, drift, moves = _coefficients(time, angles, fit)
-    gait, joint = _series(table[:, int(fit.drifts) :]), int(drift.argmax())
-    if not _closes(drift, moves):
-        raise ProblemError(
-            f"{name} does not close: after a period joint {joint + 1} is off by "
-            f"{_told(drift[joint], degrees)}, and it moves "
-            f"through {_told(moves[joint], degrees)}. Give one whole period, or say how long it is "
-            f"(period=, --period)."
-        )
-    off = gait.angles(time / fit.period) - angles
-    uncertainty = _uncertainty(time, angles, fit, table)
-    return FittedGait(
-        gait,
-        float(np.sqrt((off**2).mean())),
-        float(np.abs(off).max()),
-        time.size,
-        float(drift.max()),
-        degrees,
-        time[-1] / fit.period,
-        fit.period,
-        uncertainty,
-    )
-
-
-def _uncertainty(time: np.ndarray, angles: np.ndarray, fit: _Fit, table: np.ndarray) -> Uncertainty:
-    """By what a least-squares fit may be off: the covariance of its numbers, and of the period
-    where samples told it.
-
-    So large harmonics may be that the samples do not show: those up to twice the highest are in the
-    covariance, too. Where they hold more of the residuals than their share, noise is slower than
-    the samples, and there is as much of it in the others.
-    """
-    first, samples = int(fit.drifts), round(fit.period / _typical_step(time))
-    most = min(max((min(time.size - first, samples) - 1) // 2, fit.harmonics), _HIGHEST)
-    near, far = (fit._replace(harmonics=min(most, many * fit.harmonics + 1)) for many in (2, 4))
-    residuals, size, richer = (
-        angles - table @ _columns(time, fit).T,
-        table.shape[1],
-        _richer(time, angles, table, fit, far),
-    )
-    if richer is not None:  # what is left of the residuals is noise
-        size = richer.shape[1]
-        residuals = angles - richer @ _columns(time, far).T
-    columns, left, freedom = (
-        _columns(time, near),
-        (residuals**2).sum(axis=1),
-        max(time.size - size, 1),
-    )
-    u, s, v = np.linalg.svd(columns, full_matrices=False)
-    share = (
-        ((residuals @ u) ** 2).sum()
-        / (left.sum() + 1e-300)
-        * freedom
-        / max(columns.shape[1] - table.shape[1], 1)
-    )
-    deviation = np.sqrt(left / freedom * max(share, _correlation_time(residuals))) + 1e-300
-    root = (v.T / s)[first:].T  # a row for each direction
-    directions = np.einsum("j,jk,ri->jrki", deviation, np.eye(len(table)), root).reshape(
-        -1, len(table), root.shape[1]
-    )
-    if fit.chosen:
-        later, sooner = (
-            _columns(time, fit._replace(period=fit.period * (1 + step))) for step in (_STEP, -_STEP)
-        )
-        by_period = table @ (later - sooner).T / (2 * _STEP)
-        along = by_period @ u
-        beside = ((by_period - along @ u.T) / deviation[:, None]) ** 2
-        directions = np.concatenate(
-            [directions, -((along / s) @ v)[None, :, first:] / np.sqrt(beside.sum() + 1e-300)]
-        )
-    more = None if richer is None else _series(richer[:, first:])
-    return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), more)
-
-
-def _richer(
-    time: np.ndarray, angles: np.ndarray, table: np.ndarray, fit: _Fit, far: _Fit
-) -> np.ndarray | None:
-    """The numbers of a fit of more harmonics, if these are worth more than noise would be (F
-    test)."""
-    columns = _columns(time, far)
-    more, left = columns.shape[1] - table.shape[1], time.size - columns.shape[1]
-    richer = np.linalg.lstsq(columns, angles.T, rcond=None)[0].T
-    missed, still = (
-        ((angles - x @ y.T) ** 2).sum()
-        for x, y in ((table, _columns(time, fit)), (richer, columns))
-    )
-    worth = (missed / (still + 1e-300) - 1) * left / max(more, 1)
-    if more < 1 or (left > 0 and fdtrc(len(angles) * more, len(angles) * left, worth) > _CHANCE):
-        return None
-    return np.asarray(richer)
 
 
 def _correlation_time(residuals: np.ndarray) -> float:

@@ -212,6 +212,8 @@ class ClassOfGaits:
     """Those that it may have."""
     free = True
     """Whether it has more than one member."""
+    stages: tuple[float, ...] = ()
+    """Phases that every mesh has to have as knots."""
     unit_speed = False
     """Whether delta and rates are those at unit shape speed, so that the pace does not matter."""
     delta_start: float | None = None
@@ -316,6 +318,10 @@ class ClassOfGaits:
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         """Intervals that a mesh with so many points on each needs at least, and for what."""
         return 4, "a path"
+
+    def edges(self, n: int) -> np.ndarray:
+        """A mesh of about n intervals on the part of the period that is solved."""
+        return np.linspace(0.0, self.fraction, n + 1)
 
     def first_edges(self, edges: np.ndarray) -> np.ndarray:
         """The mesh from which a finer one is grown: by default its own, whose edges mean

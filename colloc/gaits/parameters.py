@@ -8,10 +8,10 @@ the same from both ends, mirrored links and feet change together.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL
@@ -28,6 +28,7 @@ _COEFFICIENTS = {
     "tangential": "drag along",
     "power": "power of the speed in friction",
 }
+_SHARES = {"lengths": "length", "weights": "weight", "masses": "mass"}
 _NUMBERS = {
     "joint_limit": "joint limit",
     "speed_limit": "speed limit",
@@ -76,126 +77,124 @@ def parameters(problem: Problem) -> list[Parameter]:
     friction backwards 1.0
     length of links 1 and 3 0.333
     """
-    return [*_of_friction(problem), *_of_body(problem), *_of_limits(problem)]
+    chain = problem.body if isinstance(problem.body, Chain) else None
+    numbers = [*_of_floor(problem, chain.standing_on if chain else ())]
+    if chain:
+        numbers += _of_chain(chain, problem.gait.symmetry == BILATERAL)
+    numbers += _of_limits(problem)
+    return [
+        Parameter(x.name, x.value, partial(_with, problem, x.path, x.new), x.relative)
+        for x in numbers
+    ]
 
 
-def _with(problem: Problem, **changes: Any) -> Problem:
-    """The problem with some fields changed; its guess need not fit them."""
-    return problem.with_(guess=None, **changes)
+class _Number(NamedTuple):
+    """A number, the fields that lead to where it stands, and what stands there if it differs by so
+    much."""
+
+    name: str
+    value: float
+    path: tuple[str, ...]
+    new: Callable[[float], Any]
+    relative: bool = True
 
 
-def _of_friction(problem: Problem) -> Iterator[Parameter]:
-    feet = _feet(problem)
+def _with(part: Any, path: tuple[str, ...], new: Callable[[float], Any], by: float) -> Any:
+    """A part of a problem with another value in a field, or in a field of a field; a guess need not
+    fit it."""
+    if not path:
+        return new(by)
+    field, *deeper = path
+    value = {field: _with(getattr(part, field), tuple(deeper), new, by)}
+    return part.with_(guess=None, **value) if isinstance(part, Problem) else replace(part, **value)
+
+
+def _grown(stated: Any, by: float) -> Any:
+    """A limit may be one number, one for each joint, or a least and a largest angle of each."""
+    if isinstance(stated, tuple):
+        return tuple(_grown(each, by) for each in stated)
+    return stated * (1 + by)
+
+
+def _first(stated: Any) -> float:
+    return _first(stated[0]) if isinstance(stated, tuple) else abs(float(stated))
+
+
+def _of_floor(problem: Problem, feet: tuple[Foot, ...]) -> Iterator[_Number]:
     if not feet or any(foot.friction is None for foot in feet):
         for field, value in _coefficients(problem.friction):
-            yield Parameter(_COEFFICIENTS[field], value, partial(_with_friction, problem, field))
+            path = ("friction", field)
+            yield _Number(_COEFFICIENTS[field], value, path, partial(_grown, value))
     for law in dict.fromkeys(foot.friction for foot in feet if foot.friction is not None):
         standing = [k for k, foot in enumerate(feet) if foot.friction == law]
         for field, value in _coefficients(law):
+
+            def on_other(by: float, law: Law = law, field: str = field, v: float = value) -> Any:
+                other = replace(law, **{field: _grown(v, by)})  # type: ignore[type-var]
+                changed = (replace(x, friction=other) if x.friction == law else x for x in feet)
+                return tuple(changed)
+
             name = f"{_COEFFICIENTS[field]} of {_counted('foot', standing)}"
-            yield Parameter(name, value, partial(_with_friction_of_feet, problem, law, field))
+            yield _Number(name, value, ("body", "feet"), on_other)
 
 
 def _coefficients(law: Law) -> list[tuple[str, float]]:
     """Fields of a law that are coefficients, with their values; those of a law of formulas may bear
     the same names."""
-    own = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
-    return [(field, float(own[field])) for field in _COEFFICIENTS if is_number(own.get(field))]
-
-
-def _scaled(part: Any, field: str, by: float) -> Any:
-    return replace(part, **{field: getattr(part, field) * (1 + by)})
-
-
-def _with_friction(problem: Problem, field: str, by: float) -> Problem:
-    return _with(problem, friction=_scaled(problem.friction, field, by))
-
-
-def _with_friction_of_feet(problem: Problem, law: Law, field: str, by: float) -> Problem:
-    feet = [
-        replace(foot, friction=_scaled(law, field, by)) if foot.friction == law else foot
-        for foot in _feet(problem)
+    stated = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
+    return [
+        (field, float(stated[field])) for field in _COEFFICIENTS if is_number(stated.get(field))
     ]
-    return _with_chain(problem, feet=tuple(feet))
 
 
-def _chain(problem: Problem) -> Chain | None:
-    """The chain that the body is; None for smooth ones."""
-    return problem.body if isinstance(problem.body, Chain) else None
-
-
-def _with_chain(problem: Problem, **changes: Any) -> Problem:
-    """The problem with some fields of that chain changed."""
-    chain = _chain(problem)
-    assert chain is not None  # whoever asks has looked
-    return _with(problem, body=replace(chain, **changes))
-
-
-def _feet(problem: Problem) -> tuple[Foot, ...]:
-    chain = _chain(problem)
-    return chain.standing_on if chain else ()
-
-
-def _of_body(problem: Problem) -> Iterator[Parameter]:
-    body = _chain(problem)
-    if body is None:
-        return
-    mirrored = problem.gait.symmetry == BILATERAL
-    for field, words in (("lengths", "length"), ("weights", "weight"), ("masses", "mass")):
-        own = getattr(body, field)
-        for links in _mirror_sets(len(own), mirrored):
-            if len(links) < len(own):
+def _of_chain(chain: Chain, mirrored: bool) -> Iterator[_Number]:
+    for field, words in _SHARES.items():
+        shares = getattr(chain, field)
+        count = len(shares)
+        for k in range((count + 1) // 2 if mirrored else count):
+            links = sorted({k, count - 1 - k}) if mirrored else [k]
+            if len(links) < count:
                 name = f"{words} of {_counted('link', links)}"
-                yield Parameter(name, own[links[0]], partial(_with_shares, problem, field, links))
-    if body.width:
-        yield Parameter(
-            "width", body.width, lambda by: _with_chain(problem, width=body.width * (1 + by))
-        )
-    feet = body.standing_on
-    for group in _feet_alike(feet, body.n_link, mirrored):
-        which = _counted("foot", sorted(group))
+                changed = partial(_changed_shares, shares, links)
+                yield _Number(name, shares[k], ("body", field), changed)
+    if chain.width:
+        yield _Number("width", chain.width, ("body", "width"), partial(_grown, chain.width))
+    feet = chain.standing_on
+    weights = [foot.weight or 0.0 for foot in feet]
+
+    def moved(group: dict[int, float], by: float) -> tuple[Foot, ...]:
+        places = (foot.place + by * group.get(k, 0.0) for k, foot in enumerate(feet))
+        return _with_each(feet, "place", places)
+
+    def reweighted(group: dict[int, float], by: float) -> tuple[Foot, ...]:
+        return _with_each(feet, "weight", _changed_shares(weights, [*group], by))
+
+    for group in _feet_alike(feet, chain.n_link, mirrored):
+        which, first = _counted("foot", sorted(group)), min(group)
+        at = ("body", "feet")
         if any(group.values()):
-            yield Parameter(
-                f"place of {which}",
-                feet[min(group)].place,
-                partial(_with_places, problem, group),
-                relative=False,
-            )
+            place = feet[first].place
+            yield _Number(f"place of {which}", place, at, partial(moved, group), relative=False)
         if len(group) < len(feet):
-            weight = feet[min(group)].weight
-            assert weight is not None  # a body's feet have their weights
-            yield Parameter(f"weight of {which}", weight, partial(_with_weights, problem, group))
+            yield _Number(f"weight of {which}", weights[first], at, partial(reweighted, group))
 
 
-def _mirror_sets(count: int, mirrored: bool) -> list[list[int]]:
-    """Links that change together."""
-    if not mirrored:
-        return [[k] for k in range(count)]
-    return [sorted({k, count - 1 - k}) for k in range((count + 1) // 2)]
+def _with_each(feet: tuple[Foot, ...], field: str, values: Iterable[Any]) -> tuple[Foot, ...]:
+    return tuple(replace(foot, **{field: x}) for foot, x in zip(feet, values, strict=True))
 
 
 def _counted(what: str, which: Sequence[int]) -> str:
     """ "link 2" or "links 1 and 3", counted from 1 at the tail."""
-    numbers = [str(k + 1) for k in which]
+    *others, last = (str(k + 1) for k in which)
     many = {"foot": "feet"}.get(what, f"{what}s")
-    return (
-        f"{what} {numbers[0]}"
-        if len(numbers) == 1
-        else f"{many} {', '.join(numbers[:-1])} and {numbers[-1]}"
-    )
+    return f"{many} {', '.join(others)} and {last}" if others else f"{what} {last}"
 
 
 def _changed_shares(shares: Sequence[float], which: Sequence[int], by: float) -> tuple[float, ...]:
     """Parts of 1, some of them larger by a part of themselves, the others smaller in proportion."""
-    kept = sum(shares[k] for k in which)
-    factor = (1 - kept * (1 + by)) / (1 - kept)
+    whole = sum(shares[k] for k in which)
+    factor = (1 - whole * (1 + by)) / (1 - whole)
     return tuple(share * (1 + by if k in which else factor) for k, share in enumerate(shares))
-
-
-def _with_shares(problem: Problem, field: str, which: list[int], by: float) -> Problem:
-    return _with_chain(
-        problem, **{field: _changed_shares(getattr(_chain(problem), field), which, by)}
-    )
 
 
 def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dict[int, float]]:
@@ -206,76 +205,32 @@ def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dic
     for k, foot in enumerate(feet):
         if any(k in group for group in groups):
             continue
-        turned = foot.from_head(n_link)
-        ahead, back = ([foot, foot.mirrored], [turned, turned.mirrored] if mirrored else [])
-        group = {}
+        turned, group = foot.from_head(n_link), {}
         for j, other in enumerate(feet):
-            side = any(other.is_like(one) for one in ahead) - any(
-                other.is_like(one) for one in back
-            )
-            if side or any(other.is_like(one) for one in ahead):
-                group[j] = float(side)
+            ahead = any(map(other.is_like, (foot, foot.mirrored)))
+            back = mirrored and any(map(other.is_like, (turned, turned.mirrored)))
+            if ahead or back:
+                group[j] = float(ahead - back)
         groups.append(group)
     return groups
 
 
-def _with_places(problem: Problem, group: dict[int, float], by: float) -> Problem:
-    feet = [
-        replace(foot, place=foot.place + by * group.get(k, 0.0))
-        for k, foot in enumerate(_feet(problem))
-    ]
-    return _with_chain(problem, feet=tuple(feet))
-
-
-def _with_weights(problem: Problem, group: dict[int, float], by: float) -> Problem:
-    feet = _feet(problem)
-    weights = _changed_shares([foot.weight or 0.0 for foot in feet], list(group), by)
-    borne = tuple(replace(foot, weight=weight) for foot, weight in zip(feet, weights, strict=True))
-    return _with_chain(problem, feet=borne)
-
-
-def _of_limits(problem: Problem) -> Iterator[Parameter]:
+def _of_limits(problem: Problem) -> Iterator[_Number]:
     for field, words in _NUMBERS.items():
-        stated = getattr(problem, field)
-        if stated:
-            yield Parameter(words, _first(stated), partial(_with_number, problem, field))
+        if stated := getattr(problem, field):
+            yield _Number(words, _first(stated), (field,), partial(_grown, stated))
     for k, (aim, least) in enumerate(problem.at_least):
         if least:
-            yield Parameter(f"least {aim.name}", least, partial(_with_least, problem, k))
+            before, after = problem.at_least[:k], problem.at_least[k + 1 :]
+
+            def changed(
+                by: float, x: Any = (aim, least), before: Any = before, after: Any = after
+            ) -> Any:
+                return (*before, (x[0], _grown(x[1], by)), *after)
+
+            yield _Number(f"least {aim.name}", least, ("at_least",), changed)
     if problem.rotation:
-        yield Parameter(
-            "net rotation", problem.rotation, partial(_with_number, problem, "rotation")
-        )
-    if hasattr(problem.gait, "curvature"):
-        bent = problem.gait.curvature
-        yield Parameter(
-            "curvature of paths",
-            bent,
-            lambda by: _with(problem, gait=_scaled(problem.gait, "curvature", by)),
-        )
-
-
-def _first(stated: Any) -> float:
-    """The first number of a limit, which may be one for all joints, one each, or a least and a
-    largest angle of each."""
-    return _first(stated[0]) if isinstance(stated, tuple) else abs(float(stated))
-
-
-def _grown(stated: Any, by: float) -> Any:
-    return (
-        tuple(_grown(each, by) for each in stated)
-        if isinstance(stated, tuple)
-        else stated * (1 + by)
-    )
-
-
-def _with_number(problem: Problem, field: str, by: float) -> Problem:
-    return _with(problem, **{field: _grown(getattr(problem, field), by)})
-
-
-def _with_least(problem: Problem, which: int, by: float) -> Problem:
-    least = [
-        (aim, value * (1 + by) if k == which else value)
-        for k, (aim, value) in enumerate(problem.at_least)
-    ]
-    return _with(problem, at_least=tuple(least))
+        turned = partial(_grown, problem.rotation)
+        yield _Number("net rotation", problem.rotation, ("rotation",), turned)
+    if bent := getattr(problem.gait, "curvature", None):
+        yield _Number("curvature of paths", bent, ("gait", "curvature"), partial(_grown, bent))

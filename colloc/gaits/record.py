@@ -20,33 +20,30 @@ FEWEST = 6
 """Samples of a gait, and of each of its periods."""
 _LARGEST = 2 * np.pi
 """An angle beyond it is taken for one in degrees."""
-_ANGLES = {
-    "rad": 1.0, "rads": 1.0, "radian": 1.0, "radians": 1.0, "mrad": 1e-3, "deg": np.pi / 180,
-    "degs": np.pi / 180,
-    "degree": np.pi / 180, "degrees": np.pi / 180, "grad": np.pi / 180, "°": np.pi / 180,
-}  # fmt: skip
-"""Units of angles [rad]; Grad is German for degrees."""
-_NOT_READ = {
-    "rev",
-    "revs",
-    "revolutions",
-    "turn",
-    "turns",
-    "gon",
-    "gons",
-    "tick",
-    "ticks",
-    "counts",
-}
-"""Words of names that say another unit."""
-_TIMES = {
-    "s": 1.0, "sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3,
-    "millis": 1e-3,
-    "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "usec": 1e-6, "micros": 1e-6,
-    "microseconds": 1e-6, "ns": 1e-9, "nsec": 1e-9,
-    "nsecs": 1e-9, "nanosec": 1e-9, "nanosecs": 1e-9, "nanoseconds": 1e-9, "min": 60.0,
-}  # fmt: skip
-"""Units of time [s]."""
+
+
+def _units(table: dict[str, float]) -> dict[str, float]:
+    return {word: unit for words, unit in table.items() for word in words.split()}
+
+
+_ANGLES = _units(
+    {
+        "rad rads radian radians": 1.0,
+        "mrad": 1e-3,
+        "deg degs degree degrees grad °": np.pi / 180,  # Grad is German for degrees
+    }
+)
+_NOT_READ = _units({"rev revs revolutions turn turns gon gons tick ticks counts": 0.0})
+"""Words of names that say another unit of angles."""
+_TIMES = _units(
+    {
+        "s sec secs second seconds": 1.0,
+        "ms msec millis milliseconds": 1e-3,
+        "us µs usec micros microseconds": 1e-6,
+        "ns nsec nsecs nanosec nanosecs nanoseconds": 1e-9,
+        "min": 60.0,
+    }
+)
 _WORDS = {
     "time": "t|time|timestamp|stamp|zeit|temps|tiempo|tempo|clock|elapsed|datetime|date|uptime|n?secs|nanosecs?",  # noqa: E501
     "other": "vel.*|speeds?|rate|dot|qd|dq|omega|effort|torques?|tau|load|volt.*|temp.*|power|acc.*|pwm|force|currents?|err.*|"  # noqa: E501
@@ -63,26 +60,18 @@ _CALLED = "call columns of joints joint_1 (at the tail), joint_2 and so on"
 """What makes an order plain."""
 _ROUNDED = 0.15
 """Share of steps of time that differ from the usual one, from which equal steps were rounded."""
-_MOST = 5_000
-"""Samples; of more, every second, third ... is taken."""
+_MOST = 5_000  # samples; of more, every second, third ... is taken
 _CENTRED = np.radians(20)
 """All joints are centred within it of a right angle, or a straight one: so are servos that know no
 negative angles."""
 
 
 class Record(NamedTuple):
-    """Joint angles over time."""
-
-    time: np.ndarray
-    """``(n_time,)``, from 0, in the file's unit; it does not fall."""
-    angles: np.ndarray
-    """``(n_joint, n_time)`` [rad], from tail to head."""
-    degrees: bool
-    """Whether all were given in degrees."""
-    period: float | None
-    """That the file states, in its unit of time."""
-    taken: str
-    """What was read, and what was left out, in one sentence without its full stop."""
+    time: np.ndarray  # (n_time,), from 0, in the file's unit; it does not fall
+    angles: np.ndarray  # (n_joint, n_time) [rad], from tail to head
+    degrees: bool  # whether all were given in degrees
+    period: float | None  # that the file states, in its unit of time
+    taken: str  # what was read, and what was left out, in one sentence without its full stop
     centre: int
     """About what servos are centred, to the next right angle [degrees]; 0 where that is nothing to
     be asked about."""
@@ -102,12 +91,10 @@ class _Column(NamedTuple):
     @property
     def skeleton(self) -> tuple[str, ...]:
         """What names of one set of columns have in common."""
-        return tuple(
-            "#" if word.isdecimal() else word for word in self.words if word not in _ANGLES
-        )
+        words = (word for word in self.words if word not in _ANGLES)
+        return tuple("#" if word.isdecimal() else word for word in words)
 
     def speaks_of(self, what: str) -> bool:
-        """Whether a word of the name is of a kind."""
         return any(re.fullmatch(_WORDS[what], word) for word in self.words)
 
     @property
@@ -119,90 +106,56 @@ class _Column(NamedTuple):
             return "time"
         after_number = len(unit) > 1 and unit[0].isdecimal() and unit[1] in ("w", "a", "v", "c")
         rate = re.search(r"(rad|deg|°|rev)\w*\s*/\s*s|n·m", self.name, re.I)
-        if (
-            self.speaks_of("other")
-            or self.words[:1] == ("v",)
-            or unit == ("n", "m")
-            or after_number
-            or rate
-        ):
-            return (
-                "angle" if self.speaks_of("angle") and "current" in words and not rate else "other"
-            )
+        force = self.words[:1] == ("v",) or unit == ("n", "m")
+        if self.speaks_of("other") or force or after_number or rate:
+            current = self.speaks_of("angle") and "current" in words and not rate
+            return "angle" if current else "other"
         if not words or (self.speaks_of("count") and not self.speaks_of("angle")):
             return "count"
         return "place" if words & {"x", "y", "z"} and not words & {"joint", "angle"} else "angle"
 
 
 def _column(at: int, name: str, unit: str) -> _Column:
-    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", f"{name} {unit}")
-    return _Column(
-        at, f"{name} {unit}".strip(), tuple(re.findall(r"[^\W\d_]+|\d+|°", text.lower()))
-    )
+    name = f"{name} {unit}"
+    words = re.findall(r"[^\W\d_]+|\d+|°", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
+    return _Column(at, name.strip(), tuple(words))
 
 
 def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
-    """Joint angles over time of a file, with what was taken in words.
+    """Joint angles over time of a text file with a line for each instant, for a body of so many
+    joints; with `degrees` angles are degrees where the file does not say what they are.
 
-    Parameters
-    ----------
-    path : Path
-        Of a text file with a line for each instant.
-    n_joint : int
-        That the body has.
-    degrees : bool
-        Whether angles are degrees of which the file does not say what they are.
-
-    Raises
-    ------
-    ProblemError
-        If the file is no such record, or one that could be read in several ways; it names line,
-        column and cure.
+    `ProblemError` if the file is no such record, or one that could be read in several ways; it
+    names line, column and cure.
     """
     table = read_table(path)
     check_size(path, table, FEWEST)
-    numeric = np.isfinite(table.values).any(axis=0)
-    columns = (
-        [_column(j, *both) for j, both in enumerate(zip(table.names, table.units, strict=True))]
-        if table.names
-        else []
-    )
+    numeric, width = np.isfinite(table.values).any(axis=0), table.values.shape[1]
+    named = enumerate(zip(table.names, table.units, strict=True)) if table.names else ()
+    columns = [_column(j, *both) for j, both in named]
     if columns:
         clock = _clock(table, columns)
-        joints, how = _joints(
-            path,
-            [column for column in columns if numeric[column.at] and column.at not in clock],
-            n_joint,
-        )
-        left = [
-            c.name
-            for c in columns
-            if c.at not in clock and c.at not in {j.at for j in joints} and c.name
-        ]
+        others = [column for column in columns if column.at not in clock]
+        joints, how = _joints(path, [column for column in others if numeric[column.at]], n_joint)
+        left = [column.name for column in others if column not in joints and column.name]
     else:
-        width = table.values.shape[1]
         clock, how, left = [0] * (width != n_joint), "in the file's order, as it has no names", []
         if width not in (n_joint, n_joint + 1):
             raise ProblemError(_count(path, width - 1, n_joint))
         joints = [_Column(j, f"column {j + 1}", ()) for j in range(width - n_joint, width)]
     time, unit = _times(path, table, columns, clock)
-    rows, said = _rows(
-        path,
-        table,
-        [time, *(table.values[:, c.at] for c in joints)],
-        [*clock[:1], *(c.at for c in joints)],
-    )
+    at = [column.at for column in joints]
+    rows, notes = _rows(path, table, [time, *table.values[:, at].T], [*clock[:1], *at])
     if re.search(r"^#\s*ramp_s:", table.preamble, re.M):
         rows = rows[time[rows] >= 0]
-        said.append("the way into the gait, before time 0, left out")
+        notes.append("the way into the gait, before time 0, left out")
     time = time[rows]
     falls = np.flatnonzero(np.diff(time) < 0)
     if falls.size:
-        where = (
-            f"the times{' in the first column' * (not columns)} fall after line "
-            f"{table.lines[rows[falls[0]]]}"
+        raise ProblemError(
+            f"{path}: the times{' in the first column' * (not columns)} fall after line "
+            f"{table.lines[rows[falls[0]]]}: give one record, its lines in the order of time."
         )
-        raise ProblemError(f"{path}: {where}: give one record, its lines in the order of time.")
     if time[-1] == time[0]:
         raise ProblemError(
             f"{path}: all times are {time[0]:g}: give a column of times that rise, or none for "
@@ -211,44 +164,34 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
     time, even = _even_steps(time)
     if (every := -(-rows.size // _MOST)) > 1:
         time, rows = time[::every], rows[::every]
-        said.append(f"of {len(table.lines)} rows, one in {every} taken")
+        notes.append(f"of {len(table.lines)} rows, one in {every} taken")
     angles, in_degrees = _radians(path, table, joints, rows, degrees)
     unwrapped = np.unwrap(angles, discont=1.5 * np.pi, axis=1)
     unwrapped -= 2 * np.pi * np.round(unwrapped.mean(axis=1, keepdims=True) / (2 * np.pi))
-    turned = [joints[j].name for j in np.flatnonzero(np.abs(unwrapped - angles).max(axis=1) > 1.0)]
-    mixed = (
-        ", ".join(joints[j].name for j in np.flatnonzero(in_degrees))
-        if not in_degrees.all()
-        else ""
-    )
-    in_words = (
-        "degrees" if in_degrees.all() else f"radians (but {mixed} degrees)" if mixed else "radians"
-    )
+    turned = _names(joints, np.abs(unwrapped - angles).max(axis=1) > 1.0)
+    in_words = "degrees"
+    if not in_degrees.all():
+        mixed = _names(joints, in_degrees)
+        in_words = f"radians (but {mixed} degrees)" if mixed else "radians"
+    if turned:
+        notes.append(f"whole turns taken out of {turned}")
+    if left:
+        more = f" and {len(left) - 3} more" if len(left) > 3 else ""
+        notes.append(f"left out: {', '.join(left[:3])}{more}")
     facts = [
         f"read {n_joint} joint{'s' * (n_joint > 1)} {how} from {_listed(joints)}, {in_words}",
         f"time {unit}{even}",
         *table.notes,
-        *said,
-        *([f"whole turns taken out of {', '.join(turned)}"] if turned else []),
-        *(
-            [
-                f"left out: {', '.join(left[:3])}"
-                + (f" and {len(left) - 3} more" if len(left) > 3 else "")
-            ]
-            if left
-            else []
-        ),
+        *notes,
     ]
     stated = re.search(r"^#\s*period_s:\s*([\d.eE+-]+)\s*$", table.preamble, re.M)
-    period = float(stated[1]) if stated and unit == "in s" else None
-    return Record(
-        time - time[0],
-        unwrapped,
-        bool(in_degrees.all()),
-        period,
-        "; ".join(facts),
-        _centre(unwrapped),
-    )
+    period, taken = float(stated[1]) if stated and unit == "in s" else None, "; ".join(facts)
+    all_degrees, centre = bool(in_degrees.all()), _centre(unwrapped)
+    return Record(time - time[0], unwrapped, all_degrees, period, taken, centre)
+
+
+def _names(columns: list[_Column], which: np.ndarray) -> str:
+    return ", ".join(columns[j].name for j in np.flatnonzero(which))
 
 
 def _count(path: Path, found: int, n_joint: int) -> str:
@@ -279,14 +222,13 @@ def _clock(table: Table, columns: list[_Column]) -> list[int]:
 
 
 def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Column], str]:
-    """The columns of the joints from tail to head, and by what they are known."""
     angles = [column for column in columns if column.kind == "angle"]
     places = [column for column in columns if column.kind == "place"]
     if not angles and places:
         raise ProblemError(
             f"{path}: its columns {_listed(places)} look like positions of points of the body: "
-            f"turn them into joint angles "
-            "first, each the direction of a link less that of the link behind it."
+            f"turn them into joint angles first, each the direction of a link less that of the "
+            f"link behind it."
         )
     if len(angles) > n_joint:
         measured = [column for column in angles if not column.speaks_of("commanded")]
@@ -294,9 +236,8 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
     sets: dict[tuple[str, ...], list[_Column]] = {}
     for column in angles:
         sets.setdefault(column.skeleton, []).append(column)
-    if len({column.skeleton[:-1] for column in angles}) == 1 and all(
-        len(column.skeleton[-1]) == 1 for column in angles
-    ):
+    same = len({column.skeleton[:-1] for column in angles}) == 1
+    if same and all(len(column.skeleton[-1]) == 1 for column in angles):
         sets = {(): angles}  # known by a letter
     numbered = [each for key, each in sets.items() if "#" in key or (not key and n_joint > 1)]
     for each in numbered:
@@ -311,17 +252,14 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
             f"them out."
         )
     beyond = next((each for each in numbered if len(each) == n_joint + 1), None)
-    links = (
-        full[0]
-        if full and full[0][0].speaks_of("link") and "joint" not in full[0][0].words
-        else None
-    )
-    links = links or (None if full else beyond)
-    if links:
+    if full:
+        of_links = full[0][0].speaks_of("link") and "joint" not in full[0][0].words
+        beyond = full[0] if of_links else None
+    if beyond:
         raise ProblemError(
-            f"{path}: {_listed(links)} are {len(links)} columns of angles, and the body has "
-            f"{n_joint} joints: if they are "
-            f"directions of links, write what each has beyond the one behind it; {_CALLED}."
+            f"{path}: {_listed(beyond)} are {len(beyond)} columns of angles, and the body has "
+            f"{n_joint} joints: if they are directions of links, write what each has beyond the "
+            f"one behind it; {_CALLED}."
         )
     if full:
         return full[0], "by name"
@@ -342,9 +280,8 @@ def _times(
 ) -> tuple[np.ndarray, str]:
     """Times of all rows, from a first one, and their unit in words."""
     if not clock:
-        return np.arange(
-            len(table.lines), dtype=float
-        ), "in equal steps, a sample each, as no column holds it"
+        samples = np.arange(len(table.lines), dtype=float)
+        return samples, "in equal steps, a sample each, as no column holds it"
     if len(clock) > 1:
         whole, part = table.values[:, clock].T
         return whole - whole[0] + 1e-9 * part, "in s"
@@ -354,12 +291,10 @@ def _times(
         if stamps[0] is None:
             raise ProblemError(
                 f"{path}, line {table.lines[0]}: the time {table.cells[0][clock[0]]!r} is no "
-                f"number, and no date and time as "
-                "2026-01-31T12:00:00.05: write seconds."
+                f"number, and no date and time as 2026-01-31T12:00:00.05: write seconds."
             )
-        return np.array(
-            [np.nan if stamp is None else stamp - stamps[0] for stamp in stamps]
-        ), "of day, in s"
+        first = stamps[0]
+        return np.array([np.nan if x is None else x - first for x in stamps]), "of day, in s"
     if not columns:
         return time, "in the first column"
     column = columns[clock[0]]
@@ -400,8 +335,8 @@ def _rows(
         first = table.lines[int(np.flatnonzero(~whole)[0])]
         raise ProblemError(
             f"{path}: only {rows.size} of {whole.size} lines have a number in each of the columns "
-            f"that are needed (line "
-            f"{first} has not), and at least {FEWEST} are: write all joints in every line."
+            f"that are needed (line {first} has not), and at least {FEWEST} are: write all joints "
+            f"in every line."
         )
     blank = int((~whole).sum())
     said = [f"{blank} row{'s' * (blank > 1)} with blank cells left out"] if blank else []
@@ -433,13 +368,12 @@ def _radians(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Angles in radians ``(n_joint, n_time)``, and which were degrees. `ProblemError` if they are
     something else."""
-    for name, word in (
-        (column.name, word) for column in joints for word in column.words if word in _NOT_READ
-    ):
-        raise ProblemError(
-            f"{path}: the column {name} holds {word}: write degrees or radians, and say so in "
-            f"its name."
-        )
+    for column in joints:
+        if unread := next((word for word in column.words if word in _NOT_READ), None):
+            raise ProblemError(
+                f"{path}: the column {column.name} holds {unread}: write degrees or radians, and "
+                f"say so in its name."
+            )
     stated = [
         next((_ANGLES[word] for word in reversed(c.words) if word in _ANGLES), 0.0) for c in joints
     ]
@@ -460,26 +394,21 @@ def _radians(
     raw = table.values[rows][:, [column.at for column in joints]].T
     largest, of = np.abs(raw).max(axis=1), np.isclose(units, np.pi / 180)
     worst = int((largest * units).argmax())
-    if largest[worst] > 360 and raw.min() >= 0:
+    name, most = joints[worst].name, largest[worst]
+    if most > 360 and raw.min() >= 0:
         raise ProblemError(
-            f"{path}: {joints[worst].name} goes up to {largest[worst]:.4g}, like ticks or pulses "
-            f"of a servo: write "
-            "degrees, such as (ticks - 512) * 300 / 1023 or (ticks - 2048) * 360 / 4096 for "
-            "Dynamixel, and "
-            "(microseconds - 1500) * 0.09 for pulses."
+            f"{path}: {name} goes up to {most:.4g}, like ticks or pulses of a servo: write "
+            f"degrees, such as (ticks - 512) * 300 / 1023 or (ticks - 2048) * 360 / 4096 for "
+            f"Dynamixel, and (microseconds - 1500) * 0.09 for pulses."
         )
-    if largest[worst] * units[worst] > _LARGEST:
-        if of[worst]:
-            if largest[worst] <= 720:
-                return raw * units[:, None], of
-            raise ProblemError(
-                f"{path}: {joints[worst].name} has an angle of {largest[worst]:.4g} degrees: is it "
-                f"the right column?"
-            )
+    if most * units[worst] > _LARGEST and not of[worst]:
         raise ProblemError(
-            f"{path} has an angle of {largest[worst]:.4g} rad ({joints[worst].name}): if angles "
-            f"are degrees, say so "
-            "(degrees=True, --degrees)."
+            f"{path} has an angle of {most:.4g} rad ({name}): if angles are degrees, say so "
+            f"(degrees=True, --degrees)."
+        )
+    if most * units[worst] > _LARGEST and most > 720:
+        raise ProblemError(
+            f"{path}: {name} has an angle of {most:.4g} degrees: is it the right column?"
         )
     return raw * units[:, None], of
 
@@ -489,8 +418,5 @@ def _centre(angles: np.ndarray) -> int:
     [degrees]."""
     centres = 0.5 * (angles.max(axis=1) + angles.min(axis=1))
     near = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
-    return (
-        int(np.degrees(near).round())
-        if centres.size > 1 and np.abs(centres - near).max() < _CENTRED
-        else 0
-    )
+    centred = centres.size > 1 and np.abs(centres - near).max() < _CENTRED
+    return int(np.degrees(near).round()) if centred else 0

@@ -89,7 +89,9 @@ def binding(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
     """Measure the first-order conditions at v, with the non-negative multipliers that minimise the
-    Lagrangian's gradient."""
+    Lagrangian's gradient; where there are no variables they hold."""
+    if not v.size:
+        return Stationarity(0.0, 0.0, 0.0, np.zeros(program.row_lower.size), np.empty(0))
     gradient, values = program.gradient(v), np.concatenate([program.rows(v), v])
     lower, upper = (
         np.concatenate([program.row_lower, program.lower]),
@@ -172,6 +174,8 @@ def minimised(
     curvature : (n, n), optional
         Of the first model; by default 1. Where a model leads nowhere, it begins anew with that.
     """
+    if not v.size:
+        return SqpResult(v, program.objective(v), 0, 1, False, np.empty((0, 0)))
     v = np.clip(v, program.lower, program.upper)
     lower, upper = np.maximum(program.lower, v - radius), np.minimum(program.upper, v + radius)
     here, fresh = _Point.at(program, v), curvature is None

@@ -26,14 +26,14 @@ from scipy.interpolate import CubicHermiteSpline
 from colloc.gaits.gait_fields import fields
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import rate_independent
+from colloc.pictures.robot_model import FORMATS, floor_of, note_of
 from colloc.results.motion import RigidMotion
 from colloc.results.robot import Robot, joint_torques, pressing, slow_torques
-from colloc.results.robot_model import FORMATS, floor_of, note_of
 from colloc.results.solution import Solution
 from colloc.system.arguments import check_count
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.replaced_file import replaced_file
-from colloc.verification.inertial_motion import gait_with_inertia, inertial_motion
+from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion
 from colloc.verification.trajectory import (
     MOST_SAMPLES,
     Approach,
@@ -44,11 +44,11 @@ from colloc.verification.trajectory import (
 )
 
 KINDS = ".csv", ".json", *FORMATS
-_CROSSES = 1e-8
-"""Depth of links in each other that is more than rounding [body lengths]."""
-_FINE, _ACCURACY, _SETTLED = 2000, 1e-5, 10
-"""Samples a period, and the error, with which it is computed where the body ends; periods after
-which all are alike."""
+_CROSSES = 1e-8  # depth of links in each other that is more than rounding [body lengths]
+_FINE, _ACCURACY = 2000, 1e-5
+"""Samples a period, and the error, with which it is computed where the body ends."""
+_SETTLED = 10  # periods after which all are alike
+_UNITS = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
 
 
 def write_export(
@@ -71,7 +71,7 @@ def write_export(
     solution : Solution
     path : Path
         Ends in ``.csv`` or ``.json``; or in ``.xml`` or ``.urdf`` for the robot as a model of
-        MuJoCo (MJCF) or a URDF (`colloc.results.robot_model`), which takes `period`, `length` and
+        MuJoCo (MJCF) or a URDF (`colloc.pictures.robot_model`), which takes `period`, `length` and
         `mass`.
     period : float, optional
         Seconds a period takes, rounded up to a whole number of samples; by default the shortest
@@ -105,107 +105,104 @@ def write_export(
         one of `length` and `mass` is given, or the way from the straight body crosses itself.
     """
     check_count(periods=periods)
+    problem, is_model = solution.problem, path.suffix in FORMATS
     if path.suffix not in KINDS:
         raise ProblemError(f"{path} should end in {' or '.join(KINDS)}.")
-    if not solution.problem.gait.free:
+    if not problem.gait.free:
         raise ProblemError(
-            f"{solution.problem.name} is a prescribed motion of a smooth body: it has no joints to "
-            f"export."
+            f"{problem.name} is a prescribed motion of a smooth body: it has no joints to export."
         )
-    if path.suffix in FORMATS:
-        if period is None or length is None or mass is None:
-            raise ProblemError(
-                "a model for simulators needs the period [s], the length [m] and the mass [kg] of "
-                "the robot."
-            )
-        if max_speed is not None:
-            raise ProblemError(
-                "a model for simulators holds no motion: leave max_speed out, and write the angles "
-                "as CSV."
-            )
-        return _written_model(Robot(solution, length, mass, period, gravity), path)
+    if is_model and (period is None or length is None or mass is None):
+        raise ProblemError(
+            "a model for simulators needs the period [s], the length [m] and the mass [kg] of "
+            "the robot."
+        )
+    if is_model and max_speed is not None:
+        raise ProblemError(
+            "a model for simulators holds no motion: leave max_speed out, and write the angles as "
+            "CSV."
+        )
+    if is_model:
+        return _write_model(Robot(solution, length, mass, period, gravity), path)  # type: ignore[arg-type]
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
-    trajectory = timed(
-        solution.gait.driven, rate, period, limits, keep_pace=bool(solution.problem.paced_by)
-    )
+    gait = solution.gait.driven
+    trajectory = timed(gait, rate, period, limits, keep_pace=bool(problem.paced_by))
     facts = _about(solution, trajectory, rate, limits) | _pace(solution, trajectory.period, gravity)
-    series = {"rad": trajectory.angles, "rad_per_s": trajectory.speeds}
     way = _approach(solution, trajectory, rate, limits) if ramp else None
-    before = {} if way is None else {"rad": way.angles, "rad_per_s": way.speeds}
-    robot = None
+    parts: list[Approach | Trajectory] = [trajectory] if way is None else [way, trajectory]
+    rows = [[part.angles, part.speeds] for part in parts]
+    at_pace = None  # the robot, if the pace is the gait's own
     if length is not None or mass is not None:
         if length is None or mass is None:
             raise ProblemError("torques need both the length and the mass of the robot.")
         # the period as it is asked for: that of whole samples may be another pace
         robot = Robot(solution, length, mass, period or trajectory.period, gravity)
-        own_pace = limits is None or bool(solution.problem.paced_by)
-        if own_pace:
-            torques = robot.torques(trajectory.phase)
-        else:  # what inertia does at another pace is not known
-            torques = robot.torque_unit * joint_torques(
-                solution, trajectory.phase, froude=solution.froude
-            )
-        series |= {"N_m": torques, "W": torques * trajectory.speeds}
+        at_pace = robot if limits is None or problem.paced_by else None
+        torques = [_torques(robot, trajectory, at_pace is not None)]
+        if way is not None:
+            joints = problem.joint_path(way.angles, trajectory.period * way.speeds)
+            slow = slow_torques(solution, *joints, _pull(solution, way.time.size))
+            torques.insert(0, robot.torque_unit * slow)
+        for part, row, torque in zip(parts, rows, torques, strict=True):
+            row += [torque, torque * part.speeds]
         facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
-        if own_pace:
+        facts["torques"] = "those of slow motion, as the pace is not the gait's own"
+        if at_pace is not None:
             facts["torques"] = "those of this pace; of slow motion before time 0"
             facts["distance_at_this_pace_m"] = robot.facts["speed_m_per_s"] * robot.period
-        else:
-            facts["torques"] = "those of slow motion, as the pace is not the gait's own"
-        if way is not None:
-            pull = _pull(solution, way.time.size)
-            joints = solution.problem.joint_path(way.angles, trajectory.period * way.speeds)
-            torques = robot.torque_unit * slow_torques(solution, *joints, pull)
-            before |= {"N_m": torques, "W": torques * way.speeds}
-            robot = robot if own_pace else None
     if periods * trajectory.time.size > MOST_SAMPLES:
         raise ProblemError(
             f"{periods} periods have too many samples: a file holds at most {MOST_SAMPLES}."
         )
     time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
-    series = {unit: np.tile(rows, periods) for unit, rows in series.items()}
+    table = np.tile(rows[-1], periods)  # of units, joints and times
     if way is not None:
         facts["ramp_s"] = -float(way.time[0])
-        facts |= _end(solution, trajectory, limits, periods, robot)
+        facts |= _end(solution, trajectory, limits, periods, at_pace)
         time = np.append(way.time, time)
-        series = {unit: np.append(before[unit], rows, axis=1) for unit, rows in series.items()}
-    text = (_csv if path.suffix == ".csv" else _json)(
-        facts, time, series, solution.gait.driven.coordinate
-    )
+        table = np.append(np.array(rows[0]), table, axis=2)
+    write = _csv if path.suffix == ".csv" else _json
+    _write(path, write(facts, time, table, gait.coordinate))
+    return facts
+
+
+def _torques(robot: Robot, trajectory: Trajectory, own_pace: bool) -> np.ndarray:
+    """What inertia does at another pace than the gait's own is not known."""
+    if own_pace:
+        return robot.torques(trajectory.phase)
+    froude = robot.solution.froude
+    return robot.torque_unit * joint_torques(robot.solution, trajectory.phase, froude=froude)
+
+
+def _write(path: Path, text: str) -> None:
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
-    return facts
 
 
 def _approach(
     solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None
 ) -> Approach:
     """From the straight body, which every range of joints allows."""
-    problem, n, fastest = solution.problem, len(trajectory.speeds), np.abs(trajectory.speeds).max()
+    problem, speeds = solution.problem, np.abs(trajectory.speeds)
+    most: Any = limits
     if limits is None:
         stated = np.array(problem.largest_speeds) / trajectory.period
-        limits = (
-            np.maximum(stated, np.abs(trajectory.speeds).max(axis=1)) if stated.size else fastest
-        )
-    way = approach(trajectory, rate, one_each(limits, n, "joint speed limit"))
+        most = np.maximum(stated, speeds.max(axis=1)) if stated.size else speeds.max()
+    way = approach(trajectory, rate, one_each(most, problem.n_motor, "joint speed limit"))
     angles, _ = problem.joint_path(way.angles, way.speeds)
-    depth = max(
-        float(problem.body.crossing_depth(angles).max()), problem.body.passing_depth(angles)
-    )
-    if depth > _CROSSES:
+    crossing = float(problem.body.crossing_depth(angles).max())
+    if max(crossing, problem.body.passing_depth(angles)) > _CROSSES:
         raise ProblemError(
             "the body crosses itself on the way from straight into the gait: leave it out "
-            "(ramp=False, --no-ramp), and bring "
-            "the robot to the first sample by hand."
+            "(ramp=False, --no-ramp), and bring the robot to the first sample by hand."
         )
     return way
 
 
 def _pull(solution: Solution, count: int) -> np.ndarray | None:
     """Of the weight while the tail link points as it does at first."""
-    return solution.problem.regime.pull(
-        np.full((1, count), getattr(solution.gait, "theta", None) or 0.0)
-    )
+    theta = getattr(solution.gait, "theta", None) or 0.0
+    return solution.problem.regime.pull(np.full((1, count), theta))
 
 
 def _end(
@@ -218,109 +215,91 @@ def _end(
     """Where the centre of mass is after the periods, from where it is in the straight body that
     points along +x, and by how much the tail link has turned; with inertia where the pace is known.
     Nothing on slopes."""
-    problem, delta, period = solution.problem, solution.delta_per_period, trajectory.period
-    if problem.regime.slides:
+    if solution.problem.regime.slides:
         return {}
+    period = trajectory.period
     way = _approach(solution, trajectory, _FINE / period, limits)
     time = np.append(way.time, 0.0) / period
     angles = np.append(way.angles, trajectory.angles[:, :1], axis=1)
     rates = period * np.append(way.speeds, trajectory.speeds[:, :1], axis=1)
-    angles, rates = problem.joint_path(angles, rates)
-    froude, moved = solution.froude or (robot.froude if robot else 0.0), None
+    angles, rates = solution.problem.joint_path(angles, rates)
+    froude, end = solution.froude or (robot.froude if robot else 0.0), None
     with suppress(ProblemError, NotConvergedError):
         if froude:
-            moved = _from_rest(solution, froude, (time, angles, rates), periods)
-    if moved is None:
-        z = problem.body.solve(problem.law, angles, rates, delta).z
-        theta = cumulative_trapezoid(z[2], time, initial=0.0)
-        tail = trapezoid(np.exp(1j * theta) * (z[0] + 1j * z[1]), time)
-        start, end = (complex(*place) for place in problem.body.centre(angles[:, [0, -1]]).T)
-        then = solution.sample(np.array([0.0, float(periods)]))
-        turn = float(theta[-1] - then.theta[0])
-        along = complex(*(then.centre[:, 1] - then.centre[:, 0])) * np.exp(1j * turn)
-        moved = tail + np.exp(1j * theta[-1]) * end - start + along, turn + float(then.theta[1])
-        froude = 0.0
-    place, turn = moved
-    end_of = {
+            end = _end_with_inertia(solution, froude, (time, angles, rates), periods)
+    place, turn = end or _end_slowly(solution, (time, angles, rates), periods)
+    return {
         "end_body_lengths": [float(place.real), float(place.imag)],
         "end_turned_deg": math.degrees(turn),
+        "end_includes_inertia": end is not None,
     }
-    return end_of | {"end_includes_inertia": bool(froude)}
 
 
-def _from_rest(
-    solution: Solution, froude: float, way: tuple[np.ndarray, np.ndarray, np.ndarray], periods: int
+_Way = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Times in periods, up to 0, angles and rates."""
+
+
+def _end_slowly(solution: Solution, way: _Way, periods: int) -> tuple[complex, float]:
+    (time, angles, rates), body = way, solution.problem.body
+    z = body.solve(solution.problem.law, angles, rates, solution.delta_per_period).z
+    theta = cumulative_trapezoid(z[2], time, initial=0.0)
+    tail = trapezoid(np.exp(1j * theta) * (z[0] + 1j * z[1]), time)
+    start, end = (complex(*place) for place in body.centre(angles[:, [0, -1]]).T)
+    then = solution.sample(np.array([0.0, float(periods)]))
+    turn = float(theta[-1] - then.theta[0])
+    along = complex(*(then.centre[:, 1] - then.centre[:, 0])) * np.exp(1j * turn)
+    return tail + np.exp(1j * theta[-1]) * end - start + along, turn + float(then.theta[1])
+
+
+def _end_with_inertia(
+    solution: Solution, froude: float, way: _Way, periods: int
 ) -> tuple[complex, float]:
-    """How far the centre of mass comes, and the angle by which the tail link turns, with inertia,
-    on a way to phase 0, given by times in periods, angles and rates, and through periods after it;
-    after some these are alike."""
-    problem, delta, long = solution.problem, solution.delta_per_period, -float(way[0][0])
+    """How far the centre of mass comes, and the angle by which the tail link turns, on a way to
+    phase 0, and through periods after it; after some these are alike."""
+    body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
+    long, gait = -float(way[0][0]), solution.gait
     spline = CubicHermiteSpline(1.0 + way[0] / long, way[1], long * way[2], axis=1)
 
-    def path(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def approaching(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return spline(t), spline(t, 1)
 
-    how: dict[str, Any] = {"froude": froude / long**2, "breaks": ()}
-    state = (
-        gait_with_inertia(problem.body, problem.law, path, delta * long, **how)
-        .run(np.zeros(3), _ACCURACY)
-        .states[:, -1]
-    )
+    pace = froude / long**2
+    begin = GaitWithInertia(body, law, approaching, delta * long, froude=pace, breaks=())
+    cycle = GaitWithInertia(body, law, gait, delta, froude=froude, breaks=gait.corner_phases)
+    state = begin.run(np.zeros(3), _ACCURACY).states[:, -1]
     state[:3] /= long
-    cycle = gait_with_inertia(
-        problem.body,
-        problem.law,
-        solution.gait,
-        delta,
-        froude=froude,
-        breaks=solution.gait.corner_phases,
-    )
     before = state
     for _ in range(min(periods, _SETTLED)):
         before, state = state, cycle.run(state, _ACCURACY).states[:, -1]
-    (theta, x, y), turn = state[3:6], state[3] - before[3]
-    last = complex(x, y) - complex(*before[4:6]) * np.exp(1j * turn)
+    place, turn = complex(*state[4:6]), state[3] - before[3]
+    last = place - complex(*before[4:6]) * np.exp(1j * turn)
     more = RigidMotion(turn, last).repeated(periods - min(periods, _SETTLED))
-    return complex(np.exp(1j * more.rotation) * complex(x, y) + more.shift), float(
-        theta + more.rotation
+    return complex(np.exp(1j * more.rotation) * place + more.shift), float(state[3] + more.rotation)
+
+
+def _write_model(robot: Robot, path: Path) -> dict[str, Any]:
+    _write(path, FORMATS[path.suffix](robot))
+    names = ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")
+    facts = {name: robot.facts[name] for name in names}
+    facts |= {"length_m": robot.length, "mass_kg": robot.mass, "period_s": robot.period}
+    note = (
+        "a URDF says nothing of friction, nor of how the weight is spread over what touches the "
+        "floor"
     )
+    if path.suffix != ".urdf":
+        note = note_of(robot)
+        if rate_independent(robot.solution.problem.law):
+            with suppress(ProblemError, NotConvergedError):
+                facts["moves_body_lengths_per_period"] = _distance_on_floor(robot)
+    return facts | ({"note": note} if note else {})
 
 
-def _written_model(robot: Robot, path: Path) -> dict[str, Any]:
-    """Write the robot as a model for simulators."""
-    text, size = (
-        FORMATS[path.suffix](robot),
-        {"length_m": robot.length, "mass_kg": robot.mass, "period_s": robot.period},
-    )
-    with replaced_file(path) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8")
-    facts = {
-        name: robot.facts[name]
-        for name in ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")
-    } | size
-    if path.suffix == ".urdf":
-        return facts | {
-            "note": "a URDF says nothing of friction, nor of how the weight is spread over what "
-            "touches the floor"
-        }
-    if rate_independent(robot.solution.problem.law):
-        with suppress(ProblemError, NotConvergedError):
-            facts["moves_body_lengths_per_period"] = _moves(robot)
-    return facts | ({"note": note} if (note := note_of(robot)) else {})
-
-
-def _moves(robot: Robot) -> float:
-    """What colloc says of the robot on the floor of its MJCF [body lengths]."""
-    body, law = floor_of(robot)
-    problem, gait = robot.solution.problem, robot.solution.gait
-    how: dict[str, Any] = {
-        "turn": robot.solution.rotation,
-        "breaks": gait.corner_phases,
-        "regime": problem.regime,
-    }
+def _distance_on_floor(robot: Robot) -> float:
+    solution, gait = robot.solution, robot.solution.gait
     return inertial_motion(
-        body, law, gait, robot.solution.delta_per_period, robot.froude, tolerance=1e-3, **how
-    ).distance
+        *floor_of(robot), gait, solution.delta_per_period, robot.froude, tolerance=1e-3,
+        turn=solution.rotation, breaks=gait.corner_phases, regime=solution.problem.regime,
+    ).distance  # fmt: skip
 
 
 def _about(
@@ -367,28 +346,20 @@ def _pace(solution: Solution, period: float, gravity: float) -> dict[str, Any]:
     }
 
 
-def _csv(
-    facts: dict[str, Any], time: np.ndarray, series: dict[str, np.ndarray], coordinate: str
-) -> str:
+def _csv(facts: dict[str, Any], time: np.ndarray, table: np.ndarray, coordinate: str) -> str:
     """Comma-separated values, with the facts in '#' lines; of every unit a column for each
     joint."""
-    names = [
-        f"{coordinate}_{j}_{unit}" for unit, rows in series.items() for j in range(1, len(rows) + 1)
-    ]
+    units = list(_UNITS)[: len(table)]
+    names = [f"{coordinate}_{j}_{unit}" for unit in units for j in range(1, table.shape[1] + 1)]
     text = io.StringIO()
     for key, value in facts.items():
         text.write(f"# {key}: {json.dumps(value)}\n")
     text.write(",".join(["time_s", *names]) + "\n")
-    np.savetxt(text, np.concatenate([time[None], *series.values()]).T, fmt="%.9g", delimiter=",")
+    np.savetxt(text, np.vstack([time, *table]).T, fmt="%.9g", delimiter=",")
     return text.getvalue()
 
 
-_WHAT = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
-
-
-def _json(
-    facts: dict[str, Any], time: np.ndarray, series: dict[str, np.ndarray], coordinate: str
-) -> str:
-    """One JSON object."""
-    arrays = {f"{_WHAT[unit]}_{unit}": rows.tolist() for unit, rows in series.items()}
+def _json(facts: dict[str, Any], time: np.ndarray, table: np.ndarray, coordinate: str) -> str:
+    units = zip(_UNITS.items(), table, strict=False)
+    arrays = {f"{what}_{unit}": rows.tolist() for (unit, what), rows in units}
     return json.dumps({**facts, "coordinate": coordinate, "time_s": time.tolist(), **arrays}) + "\n"

@@ -33,64 +33,46 @@ _GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08
 """Between snapshots, the room for the words below one, and above and below [body lengths]."""
 _FLAT, _SEEN = 0.12, 0.3
 """A motion that rises by less than the first [body lengths] is drawn higher, by the second."""
-_SMALL = 1.6
-"""Extent [rad] below which a path in shape space is shown from closer than the whole plane."""
-_MOST_PERIODS, _NAMED = 3, 5
-"""Drawn in the lab, at most; and lines that a legend names where there are too many for all of
-them."""
+_SMALL = 1.6  # extent [rad] below which a path in shape space is shown from closer
+_MOST_PERIODS = 3  # drawn in the lab
+_NAMED = 5  # lines that a legend names where there are too many for all of them
 _CELLS = 180
-_ROUND = 9
-"""Vertices of the round end of a link."""
+_ROUND = 9  # vertices of the round end of a link
 _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     """The body at equal steps of a period, side by side and apart; below, the phase and how far its
     centre has come."""
-    t = np.linspace(0.0, 1.0, count)
-    motion = solution.sample(t)
-    x, y = lab_outline(solution.problem.body, motion.angles, motion.theta, motion.tail)
-    feet = lab_feet(solution.problem.body, motion.angles, motion.theta, motion.tail)
-    held, rise = solution.holding(motion), float(np.ptp(y))
+    body, motion = solution.problem.body, solution.sample(np.linspace(0.0, 1.0, count))
+    at = (body, motion.angles, motion.theta, motion.tail)
+    x, y = lab_outline(*at)
+    feet, held, rise = lab_feet(*at), solution.holding(motion), float(np.ptp(y))
     higher = max(1, round(_SEEN / rise)) if 0 < rise < _FLAT else 1
     y = higher * y
-    width = np.ptp(x, axis=0)
-    room = np.maximum(width, _NARROWEST) + _GAP
+    room = np.maximum(np.ptp(x, axis=0), _NARROWEST) + _GAP
     middle = np.cumsum(room) - 0.5 * room
     shift = middle - 0.5 * (x.min(axis=0) + x.max(axis=0))
     low = float(y.min()) - _MARGIN
     for k, colour in enumerate(snapshot_colours(count)):
-        draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body)
-        marks = FootMarks(axes, foot_kinds(solution.problem.body), 4.5)
+        draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, body)
+        marks = FootMarks(axes, foot_kinds(body), 4.5)
         marks.place(feet[..., k] * [[[1]], [[higher]]] + [[[shift[k]]], [[0]]], held[:, k])
-        axes.plot(
-            motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6
-        )
-        below: Any = {
-            "xycoords": "data",
-            "textcoords": "offset points",
-            "ha": "center",
-            "va": "top",
-            "fontsize": 7,
-        }
-        axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, -3), color=GREY, **below)
-        axes.annotate(
-            f"{round(float(motion.centre[0, k]), 2) + 0.0:.2f}".replace("-", "−"),
-            (middle[k], low),
-            (0, -13),
-            color=VERMILION,
-            **below,
-        )
+        centre = motion.centre[:, k]
+        axes.plot(centre[0] + shift[k], higher * centre[1], "+", color=VERMILION, ms=6)
+        come = f"{round(float(centre[0]), 2) + 0.0:.2f}".replace("-", "−")
+        for text, colour, line in ((f"{motion.t[k]:.2g}", GREY, -3), (come, VERMILION, -13)):
+            axes.annotate(
+                text, (middle[k], low), (0, line), xycoords="data", textcoords="offset points",
+                ha="center", va="top", fontsize=7, color=colour,
+            )  # fmt: skip
     axes.set(xlim=(0, float(room.sum())), ylim=(low, float(y.max()) + _MARGIN), aspect="equal")
     axes.set_axis_off()
     if higher > 1:
-        above: Any = {
-            "xycoords": "axes fraction",
-            "textcoords": "offset points",
-            "color": GREY,
-            "fontsize": 7,
-        }
-        axes.annotate(f"heights drawn {higher} times as large", (0, 1), (4, 4), **above)
+        axes.annotate(
+            f"heights drawn {higher} times as large", (0, 1), (4, 4), xycoords="axes fraction",
+            textcoords="offset points", color=GREY, fontsize=7,
+        )  # fmt: skip
 
 
 def strips(ends: np.ndarray, width: float) -> np.ndarray:
@@ -124,19 +106,15 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     As many periods as it takes for the body to leave the place where it began, and one body if that
     takes too many.
     """
-    start = solution.sample(0.0)
-    begin = lab_outline(solution.problem.body, start.angles, start.theta, start.tail)[:, :, 0]
+    body, start = solution.problem.body, solution.sample(0.0)
+    begin = lab_outline(body, start.angles, start.theta, start.tail)[:, :, 0]
     step = solution.sample(1.0).centre[:, 0] - start.centre[:, 0]
-    distance = float(np.hypot(*step))
-    needed = 1.05 * float(np.ptp(step @ begin)) / max(distance**2, 1e-300)
+    needed = 1.05 * float(np.ptp(step @ begin)) / max(float(np.hypot(*step)) ** 2, 1e-300)
     apart = needed <= _MOST_PERIODS
     periods = max(1, int(np.ceil(needed))) if apart else 1
     fine = solution.sample(np.linspace(0.0, periods, 600 * periods + 1))
-    ends = lab_outline(solution.problem.body, fine.angles, fine.theta, fine.tail)
-    feet, held = (
-        lab_feet(solution.problem.body, fine.angles, fine.theta, fine.tail),
-        solution.holding(fine),
-    )
+    at = (body, fine.angles, fine.theta, fine.tail)
+    ends, feet, held = lab_outline(*at), lab_feet(*at), solution.holding(fine)
     for path, colour, name in (
         (ends[:, 0], BLUE, "tail"),
         (ends[:, -1], ORANGE, "head"),
@@ -144,8 +122,8 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     ):
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
-        draw_body(axes, ends[:, :, k], shade, solution.problem.body)
-        marks = FootMarks(axes, foot_kinds(solution.problem.body), 6.0)
+        draw_body(axes, ends[:, :, k], shade, body)
+        marks = FootMarks(axes, foot_kinds(body), 6.0)
         marks.place(feet[..., k], held[:, k])
         axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
     axes.set_aspect("equal", "datalim")
@@ -193,7 +171,6 @@ def draw_allowed(
 
 
 def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> None:
-    """All joint angles, or amplitudes of modes, over a period."""
     draw_series(axes, t, angles)
     axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{body.quantity}  [rad]")
     draw_key(axes, body.coordinate)
@@ -256,15 +233,8 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
 
 def draw_mesh_ticks(axes: Axes, edges: np.ndarray) -> None:
     """Strokes on the time axis where mesh intervals meet."""
-    axes.plot(
-        edges,
-        np.zeros_like(edges),
-        "|",
-        color=GREY,
-        ms=7,
-        transform=axes.get_xaxis_transform(),
-        clip_on=False,
-    )
+    at_axis = axes.get_xaxis_transform()
+    axes.plot(edges, 0.0 * edges, "|", color=GREY, ms=7, transform=at_axis, clip_on=False)
 
 
 def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
@@ -296,6 +266,6 @@ def draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) ->
         labels[0] = f"{of} {labels[0]}"
     axes.legend(
         handles, labels, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(labels), fontsize=7,
-        handlelength=1,
-        columnspacing=0.8, handletextpad=0.8 if more else 0.3, borderpad=0, borderaxespad=0.3,
+        handlelength=1, columnspacing=0.8, handletextpad=0.8 if more else 0.3, borderpad=0,
+        borderaxespad=0.3,
     )  # fmt: skip

@@ -34,15 +34,8 @@ def draw_front(axes: Axes, front: ParetoFront) -> Axes:
     axes.plot(whole[:, 1], whole[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
     for k in after:
         label = "nothing found between" if k == after[0] else None
-        axes.plot(
-            values[k - 1 : k + 1, 1],
-            values[k - 1 : k + 1, 0],
-            ":",
-            color=VERMILION,
-            lw=0.8,
-            zorder=1,
-            label=label,
-        )
+        ends = values[k - 1 : k + 1].T[::-1]
+        axes.plot(*ends, ":", color=VERMILION, lw=0.8, zorder=1, label=label)
     axes.scatter(values[:, 1], values[:, 0], c=snapshot_colours(len(front.points)), s=28, zorder=2)
     axes.set(xlabel=second.label, ylabel=first.label)
     axes.set_title(front.problem.name)

@@ -14,10 +14,8 @@ from colloc.mechanics.feet import FOOT, PAD, WHEEL
 from colloc.results.motion import RigidMotion, SampledMotion, turned
 from colloc.results.solution import Solution
 
-_ARROW = 0.12
-"""Length [body lengths] of the arrow of the largest friction."""
-_WHEEL = 0.25
-"""Length of a wheel over that of its link, as it is drawn."""
+_ARROW = 0.12  # length of the arrow of the largest friction [body lengths]
+_WHEEL = 0.25  # drawn length of a wheel over that of its link
 _WORDS = {
     FOOT: "Squares: feet.",
     WHEEL: "Green bars: wheels, along their rolling direction.",
@@ -27,25 +25,35 @@ _WORDS = {
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """One period of a motion, from phase 0 to 1, both included; or several, from rest."""
+    """One period of a motion, from phase 0 to 1, both included; or several, from rest.
 
-    t: np.ndarray  # (n_time,)
-    angles: np.ndarray  # (n_joint, n_time)
+    Attributes
+    ----------
+    t : (n_time,)
+    angles : (n_joint, n_time)
+    ends : (2, n_point, n_time)
+        Lab positions of the body's outline (the ends of links), tail first.
+    centre : (2, n_time)
+        Of mass.
+    arrow_base, arrow : (2, n_arrow, n_time)
+        Where friction is shown, and the force per length there, in lab axes.
+    holding : (n_foot, n_time)
+        Feet that hold; no rows for a body without.
+    feet : (2, 2, n_foot, n_time)
+        Lab positions of their two ends, one of a point.
+    before : tuple of RigidMotion
+        What the periods before do to each one that is shown, the first of which has none before.
+    """
+
+    t: np.ndarray
+    angles: np.ndarray
     ends: np.ndarray
-    """Lab positions of the body's outline (the ends of links), tail first, ``(2, n_point,
-    n_time)``."""
     centre: np.ndarray
-    """Of mass, ``(2, n_time)``."""
     arrow_base: np.ndarray
     arrow: np.ndarray
-    """Where friction is shown, and the force per length there, in lab axes, ``(2, n_arrow,
-    n_time)`` each."""
     holding: np.ndarray
-    """Of feet: those that hold, ``(n_foot, n_time)``; no rows for a body without."""
     feet: np.ndarray
-    """Lab positions of their two ends, one of a point, ``(2, 2, n_foot, n_time)``."""
     before: tuple[RigidMotion, ...]
-    """What the periods before do to each one that is shown, the first of which has none before."""
 
     @property
     def window(self) -> tuple[np.ndarray, np.ndarray]:
@@ -61,7 +69,7 @@ class Frames:
 
 
 def foot_kinds(body: Body) -> tuple[str, ...]:
-    """What the feet of a body are, in the order of `lab_feet`
+    """Kinds of the feet of a body, in the order of `lab_feet`
     (`colloc.mechanics.feet.Foot.kind`)."""
     if isinstance(body, Chain):
         return tuple(foot.kind for foot in body.standing_on)
@@ -69,13 +77,9 @@ def foot_kinds(body: Body) -> tuple[str, ...]:
 
 
 def foot_words(kinds: Sequence[str]) -> str:
-    """What the marks of such feet mean, in words; empty for a body that lies on the floor."""
-    return " ".join(
-        [
-            *(_WORDS[kind] for kind in dict.fromkeys(kinds)),
-            *(["Filled: it holds."] if kinds else []),
-        ]
-    )
+    """The meaning of the marks of such feet; empty for a body that lies on the floor."""
+    words = [_WORDS[kind] for kind in dict.fromkeys(kinds)]
+    return " ".join([*words, "Filled: it holds."] if words else [])
 
 
 def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
@@ -99,23 +103,22 @@ def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: 
 def frames_of(
     solution: Solution, motion: SampledMotion, arrows: int = ARROWS, periods: int = 1
 ) -> Frames:
-    """The same of any motion of a solution's gait, which is repeated so many times."""
-    problem = solution.problem
-    body, delta = problem.body, solution.delta_per_period
-    ends = lab_outline(body, motion.angles, motion.theta, motion.tail)
-    places, forces = body.rubbing(problem.law, motion.angles, motion.rates, delta, motion.z, arrows)
-    period = RigidMotion(
-        float(motion.theta[-1] - motion.theta[0]),
-        complex(*(motion.centre[:, -1] - motion.centre[:, 0])),
+    """Frames of any motion of a solution's gait, which is repeated so many times."""
+    body, delta = solution.problem.body, solution.delta_per_period
+    at = (body, motion.angles, motion.theta, motion.tail)
+    places, forces = body.rubbing(
+        solution.problem.law, motion.angles, motion.rates, delta, motion.z, arrows
     )
+    way = motion.centre[:, -1] - motion.centre[:, 0]
+    period = RigidMotion(float(motion.theta[-1] - motion.theta[0]), complex(*way))
     return Frames(
         motion.t,
         motion.angles,
-        ends,
+        lab_outline(*at),
         motion.centre,
         motion.tail[:, None] + turned(places, motion.theta),
         turned(forces, motion.theta),
         solution.holding(motion),
-        lab_feet(body, motion.angles, motion.theta, motion.tail),
+        lab_feet(*at),
         tuple(period.repeated(k) for k in range(periods)),
     )

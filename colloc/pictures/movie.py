@@ -28,17 +28,11 @@ def write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
     images = [Image.fromarray(picture) for picture in pictures]
     sample = np.concatenate([np.asarray(image) for image in images[:: max(1, len(images) // 4)]])
     palette = Image.fromarray(sample).quantize(_COLOURS)
-    flat = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    first, *others = (image.quantize(palette=palette, dither=0) for image in images)
     duration = max(20, 10 * round(100 / fps))  # the format counts hundredths of a second
     with replaced_file(path) as temporary:
-        flat[0].save(
-            temporary,
-            format="GIF",
-            save_all=True,
-            append_images=flat[1:],
-            duration=duration,
-            loop=0,
-        )
+        how = {"save_all": True, "append_images": others, "duration": duration, "loop": 0}
+        first.save(temporary, format="GIF", **how)
 
 
 def _ffmpeg() -> str:
@@ -54,23 +48,11 @@ def _ffmpeg() -> str:
 def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
     """Write pictures as H.264 video through ffmpeg. `ProblemError` if ffmpeg is not installed, or
     fails."""
-    ffmpeg = _ffmpeg()
     first = next(pictures)
-    size = f"{first.shape[1]}x{first.shape[0]}"
-    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", f"{fps:g}", "-i", "-"]
-    coded = [
-        "-an",
-        "-c:v",
-        "libx264",
-        "-pix_fmt",
-        "yuv420p",
-        "-movflags",
-        "+faststart",
-        "-f",
-        "mp4",
-    ]
+    raw = f"-f rawvideo -pix_fmt rgb24 -s {first.shape[1]}x{first.shape[0]} -r {fps:g} -i -"
+    coded = "-an -c:v libx264 -pix_fmt yuv420p -movflags +faststart -f mp4"
     with replaced_file(path) as temporary:
-        command = [ffmpeg, "-y", "-loglevel", "error", *raw, *coded, temporary]
+        command = [_ffmpeg(), "-y", "-loglevel", "error", *f"{raw} {coded}".split(), temporary]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             assert process.stdin is not None
             assert process.stderr is not None
@@ -137,7 +119,8 @@ def write_movie(
         )
     if not 200 <= width <= 4000:
         raise ProblemError(f"width must lie between 200 and 4000, not {width}.")
-    if path.suffix not in (".gif", ".mp4"):
+    writers = {".gif": write_gif, ".mp4": write_mp4}
+    if path.suffix not in writers:
         raise ProblemError(f"{path} should end in .gif or .mp4.")
     solution.gait  # noqa: B018  raises where there is none
     if path.suffix == ".mp4":
@@ -146,12 +129,13 @@ def write_movie(
         solution, count, periods, arrows=arrows, width=2 * (width // 2), from_rest=from_rest
     )
     with StatusLine(enabled=not quiet) as line:
-        counted = _counted(drawn, periods * count, line)
-        (write_mp4 if path.suffix == ".mp4" else write_gif)(path, counted, fps)
+        writers[path.suffix](path, _announced(drawn, periods * count, line), fps)
     return path
 
 
-def _counted(pictures: Iterator[np.ndarray], total: int, line: StatusLine) -> Iterator[np.ndarray]:
+def _announced(
+    pictures: Iterator[np.ndarray], total: int, line: StatusLine
+) -> Iterator[np.ndarray]:
     begin = time.monotonic()
     for done, picture in enumerate(pictures, 1):
         line.say(f"picture {done} of {total}", (time.monotonic() - begin) / done * (total - done))

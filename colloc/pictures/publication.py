@@ -49,7 +49,6 @@ class Panel(NamedTuple):
         return axes
 
     def figure(self) -> Figure:
-        """The panel alone."""
         with styled(font_size=8):
             figure = Figure(figsize=(self.width, self.height))
             self.draw(figure.add_subplot())
@@ -58,17 +57,14 @@ class Panel(NamedTuple):
 
 def draw_convergence(axes: Axes, solution: Solution) -> None:
     """The objective at every step of the search against its delta; crosses did not converge."""
-    good = [step for step in solution.history if step.optimal]
-    bad = [step for step in solution.history if not step.optimal]
-    deltas = np.array([step.delta for step in solution.history])
-    axes.plot(
-        [step.delta for step in good], [step.value for step in good], "o-", color=BLUE, ms=4, lw=1.2
-    )
-    if good:
+    deltas, values, good = np.array(
+        [(step.delta, step.value, step.optimal) for step in solution.history]
+    ).T
+    good = good > 0
+    axes.plot(deltas[good], values[good], "o-", color=BLUE, ms=4, lw=1.2)
+    if good.any():
         axes.set_ylim(*axes.get_ylim())
-    axes.plot(
-        [step.delta for step in bad], [step.value for step in bad], "x", color=VERMILION, ms=5
-    )
+    axes.plot(deltas[~good], values[~good], "x", color=VERMILION, ms=5)
     axes.set(xlabel="δ  [length/period]", ylabel=solution.problem.objective.label)
     axes.ticklabel_format(axis="y", useOffset=False)
     set_log(axes, "x", (deltas.min() / 2, deltas.max() * 2))
@@ -77,22 +73,17 @@ def draw_convergence(axes: Axes, solution: Solution) -> None:
 def mesh_errors(solution: Solution) -> np.ndarray:
     """Estimated error of the objective from every mesh interval, ``(n,)``, magnitudes."""
     control = control_problem(solution.answer.problem)
-    return np.abs(
-        mesh_error(control, solution.mesh, solution.gait, solution.delta_per_period).value
-    )
+    at = (solution.mesh, solution.gait, solution.delta_per_period)
+    return np.abs(mesh_error(control, *at).value)
 
 
 def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:
     """Estimated error of the objective from every mesh interval, `mesh_errors`, and what is allowed
     in all."""
-    edges, shown, tolerance = (
-        solution.mesh.edges,
-        np.maximum(errors, 1e-12),
-        solution.problem.mesh_tolerance,
-    )
+    edges, shown = solution.mesh.edges, np.maximum(errors, 1e-12)
+    tolerance, high = solution.problem.mesh_tolerance, float(shown.max())
     axes.stairs(shown, edges, color=ORANGE, lw=1.2, baseline=None)
     draw_mesh_ticks(axes, edges)
-    high = float(shown.max())
     if tolerance > 0:
         axes.axhline(tolerance, color=GREY, lw=1, ls=":")
         high = max(high, tolerance)
@@ -101,46 +92,38 @@ def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:
 
 
 def panels(solution: Solution) -> dict[str, Panel]:
-    """Name to panel."""
-    t = np.linspace(0.0, 1.0, 1201)
+    t, problem = np.linspace(0.0, 1.0, 1201), solution.problem
     angles = solution.gait.angles(t)
-    found = {
-        "filmstrip": Panel(PAGE, 1.9, lambda axes: draw_filmstrip(axes, solution, count=6)),
-        "lab": Panel(PAGE, 3.0, lambda axes: draw_lab(axes, solution)),
-        "angles": Panel(
-            COLUMN, 2.2, lambda axes: draw_angles(axes, t, angles, solution.problem.body)
-        ),
-        "speeds": Panel(COLUMN, 2.4, lambda axes: draw_speeds(axes, solution, t)),
-        "power": Panel(COLUMN, 2.4, lambda axes: draw_power(axes, solution, t)),
-        "convergence": Panel(COLUMN, 2.2, lambda axes: draw_convergence(axes, solution)),
-        "mesh": Panel(COLUMN, 2.2, lambda axes: draw_mesh(axes, solution, mesh_errors(solution))),
+    drawn: dict[str, tuple[float, float, Callable[[Axes], object]]] = {
+        "filmstrip": (PAGE, 1.9, lambda axes: draw_filmstrip(axes, solution, count=6)),
+        "lab": (PAGE, 3.0, lambda axes: draw_lab(axes, solution)),
+        "angles": (COLUMN, 2.2, lambda axes: draw_angles(axes, t, angles, problem.body)),
+        "speeds": (COLUMN, 2.4, lambda axes: draw_speeds(axes, solution, t)),
+        "power": (COLUMN, 2.4, lambda axes: draw_power(axes, solution, t)),
+        "convergence": (COLUMN, 2.2, lambda axes: draw_convergence(axes, solution)),
+        "mesh": (COLUMN, 2.2, lambda axes: draw_mesh(axes, solution, mesh_errors(solution))),
     }
-    for j in range(len(angles) - 1 if solution.problem.gait.free else 0):
-        drawn = partial(
-            draw_shape_path, problem=solution.problem, angles=angles, first=j, second=j + 1
-        )
-        found[f"shape-{j + 1}-{j + 2}"] = Panel(COLUMN, 3.2, drawn)
-    return found
+    for j in range(len(angles) - 1 if problem.gait.free else 0):
+        draw = partial(draw_shape_path, problem=problem, angles=angles, first=j, second=j + 1)
+        drawn[f"shape-{j + 1}-{j + 2}"] = (COLUMN, 3.2, draw)
+    return {name: Panel(*panel) for name, panel in drawn.items()}
 
 
 def draw_panel(axes: Axes, solution: Solution, panel: str = "gait") -> Axes:
     """Draw the panel of that name, and return the axes. `ProblemError` if there is none."""
-    found = {"gait": Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))} | panels(
-        solution
-    )
-    return chosen(found, panel).draw_on(axes)
+    gait = Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))
+    return chosen({"gait": gait} | panels(solution), panel).draw_on(axes)
 
 
-def chosen(found: dict[str, Panel], name: str) -> Panel:
-    """The panel of that name. `ProblemError` if there is none."""
-    if name not in found:
-        raise ProblemError(f"there is no panel {name!r}; there are {', '.join(found)}.")
-    return found[name]
+def chosen(panels: dict[str, Panel], name: str) -> Panel:
+    if name not in panels:
+        raise ProblemError(f"there is no panel {name!r}; there are {', '.join(panels)}.")
+    return panels[name]
 
 
 def save_panels(solution: Solution, stem: Path) -> list[Path]:
     """Write ``STEM-PANEL.pdf`` and ``.png`` for every panel; returns the PDFs."""
-    named = (
-        (stem.with_name(f"{stem.name}-{name}"), panel) for name, panel in panels(solution).items()
-    )
-    return [save(panel.figure(), path, dpi=_RESOLUTION)[-1] for path, panel in named]
+    return [
+        save(panel.figure(), stem.with_name(f"{stem.name}-{name}"), dpi=_RESOLUTION)[-1]
+        for name, panel in panels(solution).items()
+    ]

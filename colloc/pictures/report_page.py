@@ -11,11 +11,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from colloc.bounds.optimality_gap import gap_line, upper_bound
-from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.inertia import GRAVITY
@@ -23,53 +21,14 @@ from colloc.pictures.motion_frames import Frames, foot_kinds, foot_words, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.robot_figure import robot_panels
 from colloc.pictures.style import INK, styled
+from colloc.pictures.templates import render
 from colloc.results.robot import SLOW_ENOUGH, Robot
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.replaced_file import replaced_file
 
 _MOST_PLANES = 6
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-"""The page may run its own script and nothing else: it can fetch nothing, whatever the file
-held."""
-_ANY_FLOOR = 0.5
-"""Friction of a floor, over the stated one, for which a period is told."""
-PLAIN = {
-    "KKT error": "To first order, no small change of the gait within its class is better.",
-    "second order": "To second order none is either: the gait is a best one, and no saddle between "
-    "better ones.",
-    "constraint violation": "Every condition of the problem is met at the solver's own points.",
-    "balance at nodes": "At these points no net force or torque acts on the body.",
-    "balance in replay": "Nor does any act at all the instants in between.",
-    "closure": "The body ends a cycle in the shape in which it began.",
-    "net rotation": "It ends the cycle pointing the same way, so that it crawls straight on.",
-    "joint limits": "No joint bends further than it may, at any instant.",
-    "joint speed": "No joint turns faster than it may, at any instant.",
-    "tangent angle": "The body bends no further from its own direction than it may, so that it "
-    "cannot cross itself.",
-    "self-contact": "No part of the body passes through another, at any instant.",
-    "stability": "After a push the body comes back to this motion, period by period.",
-    "statics": "How far the weights it is given press beside its centre of mass; a real body "
-    "shifts its weight by that.",
-    "actuators": "No joint has to do more than it can, at any instant.",
-    "replay gap": "An independent replay of the motion finds the same value.",
-    "replay error": "The replay itself is as exact as was asked for.",
-    "work = dissipation": "All work of what bends the body goes into friction and, on a slope, the "
-    "climb: energy is conserved.",
-    "mesh error": "More time steps would hardly change the result.",
-    "delta influence": "Friction is smoothed a little at rest; that hardly changes the result.",
-    "direction": "The body goes where it was asked to go.",
-    "one motion": "Friction leaves the body no choice of another motion, or none that changes the "
-    "result.",
-    "joins": "The pieces of the path meet without a jump.",
-    "curvature": "The path bends no more sharply than it may.",
-}
-"""What a check means for a reader who knows nothing of optimisation, by its name."""
-TURNING = {
-    "net rotation": "It ends the cycle turned by the angle that was asked for: it crawls in a "
-    "circle."
-}
-"""The same for gaits that are asked to turn."""
+_ANY_FLOOR = 0.5  # friction of a floor, over the stated one, for which a period is stated
 
 
 class Drawn(NamedTuple):
@@ -84,17 +43,6 @@ class Drawn(NamedTuple):
     has_phase: bool
 
 
-def environment() -> Environment:
-    """Templates of this package; they escape whatever is put into them."""
-    made = Environment(
-        loader=PackageLoader("colloc.pictures", "assets"), autoescape=True,
-        undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
-    made.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
-    return made
-
-
 def report_page(
     solution: Solution,
     reference: Reference | None = None,
@@ -105,60 +53,51 @@ def report_page(
     """The page as a string, also of a solution that failed: what does not exist is left out. The
     reference is the value to hold the result against, `gap` a sentence about the upper bound;
     `robot` gets a section of its own."""
-    found: dict[str, Any] = {}
-    errors = mesh_errors(solution)
-    drawn = {
-        name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")
+    problem, body, errors = solution.problem, solution.problem.body, mesh_errors(solution)
+    drawn = panels(solution) | {
+        "mesh": Panel(COLUMN, 2.4, lambda x: draw_mesh(x, solution, errors))
     }
-    drawn["mesh"] = Panel(COLUMN, 2.4, lambda axes: draw_mesh(axes, solution, errors))
     planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
-    body = solution.problem.body
     captions = {
         "angles": f"{body.quantity}s",
         "speeds": "speeds along the body; what is near δ sticks",
+        "power": "power against friction; ticks: mesh",
     }
-    captions["power"] = "power against friction; ticks: mesh"
-    found["gait_pictures"] = [
-        _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1))
-        for j, name in enumerate(planes)
-    ]
-    found["gait_pictures"] += [
-        _picture(drawn[name], text, has_phase=True) for name, text in captions.items()
-    ]
-    found["convergence_pictures"] = [
-        _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
-        _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
-    ]
-    found |= {"robot": robot, "robot_pictures": []}
-    if robot is not None:
-        found["robot_pictures"] = [
-            _picture(panel, f"{what} of the joints") for what, panel in robot_panels(robot).items()
-        ]
-    found |= {"motion": motion_data(frames(solution), body), "errors": float(errors.sum())}
-    return (
-        environment()
-        .get_template("report.html")
-        .render(
-            solution=solution,
-            problem=solution.problem,
-            certificate=solution.certificate,
-            solved=solution.status == SOLVED,
-            headline=_headline(solution),
-            pace=_pace(solution),
-            dry=_dry(solution),
-            floor=_floor(solution),
-            gap=gap.strip(),
-            reference=reference.verdict(solution.certificate.efficiency)
-            if reference and solution.certificate.replayed
-            else "",
-            plain=PLAIN | TURNING if solution.problem.rotation else PLAIN,
-            policy=_POLICY,
-            degrees=math.degrees,
-            fields={name: json.dumps(value) for name, value in solution.problem.to_dict().items()},
-            commands=_commands(solution),
-            source=solution.source or problem_file_text(solution.problem),
-            **found,
-        )
+    replayed = solution.certificate.replayed
+    return render(
+        "report.html",
+        solution=solution,
+        problem=problem,
+        certificate=solution.certificate,
+        solved=solution.status == SOLVED,
+        pace=_pace(solution),
+        dry=_dry(solution),
+        floor=_floor(solution),
+        gap=gap.strip(),
+        reference=reference.verdict(solution.certificate.efficiency)
+        if reference and replayed
+        else "",
+        degrees=math.degrees,
+        fields={name: json.dumps(value) for name, value in problem.to_dict().items()},
+        source=solution.source or problem_file_text(problem),
+        motion=motion_data(frames(solution), body),
+        errors=float(errors.sum()),
+        gait_pictures=[
+            *(
+                _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", (j, j + 1))
+                for j, name in enumerate(planes)
+            ),
+            *(_picture(drawn[name], text, has_phase=True) for name, text in captions.items()),
+        ],
+        convergence_pictures=[
+            _picture(drawn["convergence"], f"{problem.objective.name} at each level"),
+            _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
+        ],
+        robot=robot,
+        robot_pictures=[
+            _picture(panel, f"{what} of the joints")
+            for what, panel in (robot_panels(robot) if robot else {}).items()
+        ],
     )
 
 
@@ -177,19 +116,9 @@ def write_report(
         bound = upper_bound(solution.problem, known or path.parent, compute=False)
         gap = gap_line(solution.problem, solution.certificate.efficiency, bound)
     with replaced_file(path) as temporary:
-        Path(temporary).write_text(
-            report_page(solution, reference, gap, robot=robot), encoding="utf-8"
-        )
+        page = report_page(solution, reference, gap, robot=robot)
+        Path(temporary).write_text(page, encoding="utf-8")
     return path
-
-
-def _headline(solution: Solution) -> str:
-    measured = solution.measured
-    best = solution.problem.objective
-    other = "" if best == EFFICIENCY else f"; {best.name} {measured.value:.3g}"
-    turns = f" and {solution.turning}" if solution.turning else ""
-    moves = f"moves {measured.distance:.2g} body lengths a cycle{turns}"
-    return f"{moves}; {measured.efficiency:.2g} body lengths per unit of work{other}"
 
 
 def _pace(solution: Solution) -> str:
@@ -203,8 +132,8 @@ def _pace(solution: Solution) -> str:
     period = math.sqrt(1 / (GRAVITY * _ANY_FLOOR * froude))
     return (
         f"changes {100 * SLOW_ENOUGH:g} % or less up to a Froude number L/(gT²) of {froude:.2g}: a "
-        f"robot of 1 m on a "
-        f"floor with {_ANY_FLOOR:g} of this friction, from {period:.2g} s a period"
+        f"robot of 1 m on a floor with {_ANY_FLOOR:g} of this friction, from {period:.2g} s a "
+        f"period"
     )
 
 
@@ -229,79 +158,59 @@ def _floor(solution: Solution) -> list[list[str]]:
     return [[effect.name, f"{effect.now:.4g}", *found.beside(effect)] for effect in found.seen]
 
 
-def _commands(solution: Solution) -> str:
-    p = solution.problem
-    starts = f" --starts {solution.starts}" if solution.starts > 1 else ""
-    return (
-        f"# save the problem source above as {p.name}.py, then\n"
-        f"colloc solve {p.name}.py --delta {p.delta:g} --delta-start {p.delta_start:g} --mesh "
-        f"{p.intervals} "
-        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme} --formulation "
-        f"'{p.formulation}'{starts}\n"
-        f"colloc verify results/{p.name}.h5"
-    )
-
-
 def _picture(
     panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False
 ) -> Drawn:
     """The panel as SVG that takes its text colour and font from the page; nothing in it comes from
     a file but numbers."""
     text, figure = StringIO(), panel.figure()
+    unsaid = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with styled():
-        figure.savefig(
-            text,
-            format="svg",
-            transparent=True,
-            metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")),
-        )
+        figure.savefig(text, format="svg", transparent=True, metadata=unsaid)
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # it would style the whole page
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg)
     svg = re.sub(r'<g id="[^"]*"', "<g", svg)  # the same in every panel
+    label = f'role="img" aria-label="{escape(caption)}"'
     svg = re.sub(
-        r'<svg [^>]*viewBox="([^"]*)"[^>]*>',
-        lambda svg: f'<svg viewBox="{svg[1]}" role="img" aria-label="{escape(caption)}">',
-        svg,
+        r'<svg [^>]*viewBox="([^"]*)"[^>]*>', lambda x: f'<svg viewBox="{x[1]}" {label}>', svg
     )
     # hundredths of a point
     svg = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)
     svg = svg.replace(INK, "currentColor")
     axes = figure.axes[0]
-    box = 100 * axes.get_position().get_points()
-    (left, low), (right, high) = box.round(2).tolist()
+    (left, low), (right, high) = (100 * axes.get_position().get_points()).round(2).tolist()
     sides = (left, right, round(100 - high, 2), round(100 - low, 2))
-    return Drawn(
-        caption, Markup(svg), sides, (*axes.get_xlim(), *axes.get_ylim()), joints, has_phase
-    )
+    limits = (*axes.get_xlim(), *axes.get_ylim())
+    return Drawn(caption, Markup(svg), sides, limits, joints, has_phase)
 
 
 def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     """What report.js draws: rows over time, the window that holds all of it, the length of the
     arrows."""
     low, high = shown.window
-    grid = next(
-        step for step in (0.1, 0.2, 0.5, 1, 2, 5, 10, 1e9) if (high - low).max() / step < 16
-    )
+    steps = (0.1, 0.2, 0.5, 1, 2, 5, 10, 1e9)
+    kinds, (wide, tall) = foot_kinds(body), high - low
+    (x, y), (arrow_x, arrow_y), (force_x, force_y) = shown.ends, shown.arrow_base, shown.arrow
+    window = np.array([low[0], high[0], low[1], high[1]])
     rows = {
-        "t": shown.t, "angles": shown.angles, "x": shown.ends[0], "y": shown.ends[1],
-        "centre": shown.centre,
-        "arrowX": shown.arrow_base[0], "arrowY": shown.arrow_base[1], "window": np.array([low[0],
-        high[0], low[1], high[1]]),
+        "t": shown.t, "angles": shown.angles, "x": x, "y": y, "centre": shown.centre,
+        "arrowX": arrow_x, "arrowY": arrow_y, "window": window,
     }  # fmt: skip
     data: dict[str, Any] = {name: np.round(row, 4).tolist() for name, row in rows.items()}
-    force = {
-        "forceX": np.round(shown.arrow[0], 3).tolist(),
-        "forceY": np.round(shown.arrow[1], 3).tolist(),
-    }
-    return data | force | {
+    before = [np.array([np.exp(1j * b.rotation), b.shift]).view(float) for b in shown.before]
+    return data | {
+        "forceX": np.round(force_x, 3).tolist(),
+        "forceY": np.round(force_y, 3).tolist(),
         "holding": shown.holding.astype(int).tolist(),
-        "feet": np.round(shown.feet, 4).tolist(), "footKinds": foot_kinds(body),
-        "footWords": foot_words(foot_kinds(body)),
-        "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
-        "before": [np.array([np.exp(1j * b.rotation),
-        b.shift]).view(float).round(6).tolist() for b in shown.before],
-        "arrowScale": shown.arrow_scale, "grid": grid,
-        "shape": float(np.clip((high[0] - low[0]) / (high[1] - low[1]), 1.2, 4.0)),
-    }  # fmt: skip
+        "feet": np.round(shown.feet, 4).tolist(),
+        "footKinds": kinds,
+        "footWords": foot_words(kinds),
+        "hinges": body.hinges.indices(len(x))[:2],
+        "width": body.drawn_width,
+        "before": [each.round(6).tolist() for each in before],
+        "arrowScale": shown.arrow_scale,
+        "grid": next(step for step in steps if max(wide, tall) / step < 16),
+        "shape": float(np.clip(wide / tall, 1.2, 4.0)),
+    }

@@ -28,12 +28,10 @@ def robot_figure(robot: Robot) -> Figure:
 
 
 def draw_robot(axes: Axes, robot: Robot, panel: str = "torque") -> Axes:
-    """Draw the panel of that name, and return the axes. `ProblemError` if there is none."""
     return chosen(robot_panels(robot), panel).draw_on(axes)
 
 
 def robot_panels(robot: Robot) -> dict[str, Panel]:
-    """What is shown to its panel."""
     return {what: Panel(COLUMN, 2.2, partial(_draw, robot=robot, what=what)) for what in _SHOWN}
 
 

@@ -21,13 +21,10 @@ from colloc.pictures.style import INK, VERMILION, Picture, styled
 from colloc.results.solution import SOLVED, Solution
 
 _PHASES = np.linspace(0.0, 1.0, 1201)
-_Panels = dict[str, Callable[[Axes], object]]
-"""Title to what draws it."""
 
 
 def solution_figure(solution: Solution) -> Figure:
     """Filmstrip and lab paths of a solution; shape space, speeds and power."""
-    panels = _panels(solution)
     with styled():
         figure = Picture(figsize=(11, 8.2), layout="none")  # type: ignore[arg-type]  # the places are known: drawn once
         colour = INK if solution.status == SOLVED else VERMILION
@@ -41,10 +38,9 @@ def solution_figure(solution: Solution) -> Figure:
         )
         grid = figure.add_gridspec(
             2, 2, left=0.075, right=0.985, bottom=0.06, top=0.685, wspace=0.2, hspace=0.33,
-            width_ratios=(2, 1),
-            height_ratios=(1.35, 1),
+            width_ratios=(2, 1), height_ratios=(1.35, 1),
         )  # fmt: skip
-        for k, (title, draw) in enumerate(panels.items()):
+        for k, (title, draw) in enumerate(_panels(solution).items()):
             axes = figure.add_subplot(grid[k])
             draw(axes)
             axes.set_title(title)
@@ -62,17 +58,16 @@ def _headline(solution: Solution) -> str:
     )
 
 
-def _panels(solution: Solution) -> _Panels:
+def _panels(solution: Solution) -> dict[str, Callable[[Axes], object]]:
+    """Title to what draws it."""
     t, work = _PHASES, solution.measured.work
-    found: _Panels = {"in the lab (black: at the end)": lambda axes: draw_lab(axes, solution)}
-    found["shape space (disc: t = 0)" if _is_planar(solution) else "shape"] = lambda axes: (
-        draw_gait(axes, solution)
-    )
-    found["speeds along the body; what is near δ sticks"] = lambda axes: draw_speeds(
-        axes, solution, t
-    )
-    found[f"power; W = {work:.4f} (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
-    return found
+    shape = "shape space (disc: t = 0)" if _is_planar(solution) else "shape"
+    return {
+        "in the lab (black: at the end)": lambda axes: draw_lab(axes, solution),
+        shape: lambda axes: draw_gait(axes, solution),
+        "speeds along the body; what is near δ sticks": lambda axes: draw_speeds(axes, solution, t),
+        f"power; W = {work:.4f} (ticks: mesh)": lambda axes: draw_power(axes, solution, t),
+    }
 
 
 def _is_planar(solution: Solution) -> bool:

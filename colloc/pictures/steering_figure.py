@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -39,30 +40,18 @@ def _panels(family: Steering) -> dict[str, Panel]:
 
 
 def _draw_cost(axes: Axes, family: Steering) -> None:
-    turns = np.degrees(family.turns)
-    axes.plot(turns, family.efficiency, "-", color=BLUE, lw=0.8, zorder=1)
-    axes.scatter(turns, family.efficiency, c=snapshot_colours(len(turns)), s=28, zorder=2)
+    turns, values = np.degrees(family.turns), family.efficiency
+    axes.plot(turns, values, "-", color=BLUE, lw=0.8, zorder=1)
+    axes.scatter(turns, values, c=snapshot_colours(len(turns)), s=28, zorder=2)
     failed = ~np.array([point.success for point in family.points])
     if failed.any():
-        axes.plot(
-            turns[failed],
-            family.efficiency[failed],
-            "x",
-            color=VERMILION,
-            ms=9,
-            label="not certified",
-        )
+        look: Any = {"color": VERMILION, "ms": 9, "label": "not certified"}
+        axes.plot(turns[failed], values[failed], "x", **look)
     if (spot := family.on_the_spot) is not None:
-        axes.plot(
-            np.degrees(spot.turns),
-            spot.efficiency,
-            "s",
-            color=VERMILION,
-            ms=4,
-            label="on the spot, with least work",
-        )
+        look = {"color": VERMILION, "ms": 4, "label": "on the spot, with least work"}
+        axes.plot(np.degrees(spot.turns), spot.efficiency, "s", **look)
     axes.set(xlabel="turn of a period  [degrees, + left]", ylabel="efficiency, chord / W")
-    axes.set_ylim(0, 1.1 * family.efficiency.max())
+    axes.set_ylim(0, 1.1 * values.max())
     axes.set_title(family.problem.name)
     if axes.get_legend_handles_labels()[0]:
         axes.legend()
@@ -70,16 +59,13 @@ def _draw_cost(axes: Axes, family: Steering) -> None:
 
 def _draw_tracks(axes: Axes, family: Steering) -> None:
     colours = snapshot_colours(len(family.points))
-    tracks = [*zip(family.points, colours, "o" * len(colours), strict=True)]
+    tracks: Any = [*zip(family.points, colours, "o" * len(colours), strict=True)]
     if (spot := family.on_the_spot) is not None:
-        tracks += zip(
-            spot.points, [VERMILION] * len(spot.points), "s" * len(spot.points), strict=True
-        )
+        tracks += [(point, VERMILION, "s") for point in spot.points]
     t = np.linspace(0.0, _PERIODS, _PERIODS * _PHASES + 1)
     for point, colour, mark in tracks:
         track = point.motion.sample(t).centre  # all arcs set out along +x
         axes.plot(*track, color=colour, lw=1.0)
         axes.plot(*track[:, ::_PHASES], mark, color=colour, ms=3)
-    axes.set(
-        xlabel=f"x  [body lengths],  {_PERIODS} periods", ylabel="y  [body lengths]", aspect="equal"
-    )
+    what = f"x  [body lengths],  {_PERIODS} periods"
+    axes.set(xlabel=what, ylabel="y  [body lengths]", aspect="equal")

@@ -18,8 +18,8 @@ from colloc.mechanics.law import rate_independent
 from colloc.results.solution import Solution
 
 _INSTANTS = np.arange(2000) / 2000
-_BINDS, _SURELY = 0.99, 1.01
-"""Share at which a limit decides; part of a bound beyond which a limit cannot."""
+_BINDS = 0.99  # share of a limit at which it decides
+_MARGIN = 1.01  # beyond a bound by so much, a limit cannot decide
 UNITS = {
     "joint speed": ("speed_limit", "rad per period"),
     "torque": ("torque_limit", "weight x body length"),
@@ -30,84 +30,58 @@ UNITS = {
 def shares(solution: Solution) -> dict[str, float]:
     """The largest share of every limit that the gait uses in a period, by name; empty where no more
     than usual is limited."""
-    problem, body = solution.problem, solution.problem.body
-    limits = problem.path_limits
-    if not (
-        problem.gait.free
-        and (problem.joint_limit != body.usual.limit or limits.each or problem.largest_speeds)
-    ):
+    problem, body, limits = solution.problem, solution.problem.body, solution.problem.path_limits
+    limited = problem.joint_limit != body.usual.limit or limits.each or problem.largest_speeds
+    if not (problem.gait.free and limited):
         return {}
     motion = solution.sample(_INSTANTS)
     stretched, limit = under_one_limit(motion.angles, problem.joint_limit)
-    found = {
-        body.usual.limit_name.replace("limits", "angles"): float(
-            body.largest_angles(stretched).max()
-        )
-        / limit
-    }
+    name = body.usual.limit_name.replace("limits", "angles")
+    used = {name: float(body.largest_angles(stretched).max()) / limit}
     if problem.largest_speeds:
-        found["joint speed"] = float(
-            (
-                np.abs(solution.gait.driven.rates(_INSTANTS)).max(axis=1) / problem.largest_speeds
-            ).max()
-        )
+        fastest = np.abs(solution.gait.driven.rates(_INSTANTS)).max(axis=1)
+        used["joint speed"] = float((fastest / problem.largest_speeds).max())
     if limits.each:
-        z, load = (
-            (motion.z, problem.regime.pull(motion.theta[None]))
-            if limits.needs_forces
-            else (None, None)
-        )
-        now = Instants(
-            body, problem.law, motion.angles, motion.rates, solution.delta_per_period, z, load=load,
-            joint_map=problem.joint_map,
-        )  # fmt: skip
-        used = iter(limits.sizes(limits.at(now)).max(axis=1))
-        found |= {each.name: max(float(next(used)) for _ in each.names) for each in limits.each}
-    return found
+        forces = limits.needs_forces
+        z, load = (motion.z, problem.regime.pull(motion.theta[None])) if forces else (None, None)
+        at = (body, problem.law, motion.angles, motion.rates, solution.delta_per_period)
+        now = Instants(*at, z, load=load, joint_map=problem.joint_map)
+        each_used = iter(limits.sizes(limits.at(now)).max(axis=1))
+        used |= {x.name: max(float(next(each_used)) for _ in x.names) for x in limits.each}
+    return used
 
 
 def lines(solution: Solution) -> list[str]:
-    """The shares in a line, and one for each limit that is in other units, as it seems."""
-    used = shares(solution)
-    if not used:
-        return []
-    stated = {
-        name: getattr(solution.problem, field) for name, (field, _) in UNITS.items() if name in used
-    }
-    of = {
-        name: f" of {limit:g} {UNITS[name][1]}"
-        for name, limit in stated.items()
-        if not isinstance(limit, tuple)
-    }
-    told = (
-        f"{name} {100 * share:.{0 if share >= 0.01 else 2}f} %{of.get(name, '')}"
-        for name, share in used.items()
-    )
-    return [
-        ", ".join(told),
-        *_beyond_any_gait(solution.problem),
-        *_short_swings(solution.problem, used),
-    ]
+    """The shares in a line, and one for each limit that seems to be in other units."""
+    used, texts = shares(solution), []
+    for name, share in used.items():
+        text = f"{name} {100 * share:.{0 if share >= 0.01 else 2}f} %"
+        field, unit = UNITS.get(name, ("", ""))
+        if field and not isinstance(limit := getattr(solution.problem, field), tuple):
+            text += f" of {limit:g} {unit}"
+        texts.append(text)
+    hints = [*_beyond_any_gait(solution.problem), *_short_swings(solution.problem, used)]
+    return [", ".join(texts), *hints] if used else []
 
 
 def _beyond_any_gait(problem: Problem) -> Iterator[str]:
     """Limits that cannot matter: torques by statics, speeds by Bernstein's inequality for the
     derivative of a Fourier series, and powers by both."""
-    n, gait = problem.body.n_joint, problem.gait
-    torque, speed = np.full(n, np.inf), np.full(n, np.inf)
     if problem.joint_map is not None:  # motors share what their joints need
         return
+    n, gait = problem.body.n_joint, problem.gait
+    torque, speed = np.full(n, np.inf), np.full(n, np.inf)
     if isinstance(problem.body, Chain) and rate_independent(problem.law):
         torque = largest_moments(problem.body, problem.friction, problem.grade)
     if isinstance(gait.level, Harmonic) and problem.body.limited.shape == (n, n):
         speed = 2 * math.pi * gait.harmonics * _half_ranges(problem)
-    most = torque * np.minimum(speed, problem.largest_speeds or np.inf)
-    for (field, unit), bound in zip(UNITS.values(), (speed, torque, most), strict=True):
+    power = torque * np.minimum(speed, problem.largest_speeds or np.inf)
+    for (field, unit), bound in zip(UNITS.values(), (speed, torque, power), strict=True):
         limit = getattr(problem, field)
         if not isinstance(limit, tuple):  # of all joints: it matters if it does to one of them
             bound = bound.max(keepdims=True)
         stated = of_each(limit, bound.size)
-        if stated and (np.array(stated) > _SURELY * bound).any():
+        if stated and (np.array(stated) > _MARGIN * bound).any():
             joint = int(np.argmax(stated / bound))
             of = f" of joint {joint + 1}" * isinstance(limit, tuple)
             yield (
@@ -123,11 +97,10 @@ def _short_swings(problem: Problem, used: dict[str, float]) -> Iterator[str]:
         most, whole = np.array(problem.largest_speeds) / 2, 2 * _half_ranges(problem)
         joint = int(np.argmin(most / whole))
         if most[joint] < whole[joint]:
-            least, largest = np.degrees([most[joint], whole[joint]])
+            swing, largest = np.degrees([most[joint], whole[joint]])
             yield (
                 f"speed_limit {2 * most[joint]:g} rad per period, its unit, lets a joint swing by "
-                f"{least:.3g} of {largest:.3g} "
-                "degrees at most"
+                f"{swing:.3g} of {largest:.3g} degrees at most"
             )
 
 

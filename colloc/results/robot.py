@@ -10,7 +10,7 @@ with inertia is not found, they are those of slow motion, which is said.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -43,22 +43,14 @@ if TYPE_CHECKING:
 
 SLOW_ENOUGH = 0.01
 """Part of the efficiency that inertia may take from a gait that is called slow."""
-_MOMENT = 1e-5
-"""Of a period, over which velocities of links are differentiated."""
-_PACE = 0.01
-"""Relative difference of the Froude numbers of a robot and of the gait, up to which it is played at
-the pace that it is for."""
-_ACCURACY = 1e-6
-"""Of the momenta in the motion with inertia."""
-_LITTLE = 1e-3
-"""Share of the efficiency below which what inertia takes is not told apart."""
-_LARGEST = 1e9
-"""Of the metres, kilograms and seconds of a robot; one over it is the smallest."""
-_TURNS = 0.1
-"""Degrees a period, from which on a turn by inertia is said."""
+_STEP = 1e-5  # of a period, over which velocities of links are differentiated
+_SAME_PACE = 0.01  # relative difference of Froude numbers up to which a robot has a gait's pace
+_ACCURACY = 1e-6  # of the momenta in the motion with inertia
+_SMALLEST_LOSS, _SMALLEST_TURN = 1e-3, 0.1
+"""Share of the efficiency, and degrees a period, below which effects of inertia are not stated."""
+_LARGEST = 1e9  # of the metres, kilograms and seconds of a robot; one over it is the smallest
 _INSTANTS, _A_SIDE = 2000, 8
-"""Of a period at least, and of every side of a polygon."""
-_PHASES = np.arange(_INSTANTS) / _INSTANTS
+"""Samples of a period at least, and of every side of a polygon."""
 
 
 def joint_torques(
@@ -85,12 +77,12 @@ def joint_torques(
         )
     motion = motion or solution.sample(t)
     froude = solution.froude if froude is None else froude
-    (angles, rates), z, load = solution.gait(t), motion.z, problem.regime.pull(motion.theta[None])
+    (angles, rates), z = solution.gait(t), motion.z
+    load = problem.regime.pull(motion.theta[None])
     if not froude:
         return slow_torques(solution, angles, rates, load, z)
-    return _of_friction(solution, angles, rates, load, z) + _of_inertia(
-        solution, t, z, load, froude
-    )
+    against_friction = _friction_torques(solution, angles, rates, load, z)
+    return against_friction + _inertial_torques(solution, t, z, load, froude)
 
 
 def slow_torques(
@@ -104,12 +96,12 @@ def slow_torques(
     ``(n_joint, n_time)``, with a pull on the centre of mass ``(2, n_time)`` if there is one; tail
     velocities are sought near `start`."""
     body: Any = solution.problem.body
-    balanced = body.solve if load is None else partial(solve_balance, body, load=load)
-    z = balanced(solution.problem.law, angles, rates, solution.delta_per_period, start=start).z
-    return _of_friction(solution, angles, rates, load, z)
+    balance = body.solve if load is None else partial(solve_balance, body, load=load)
+    z = balance(solution.problem.law, angles, rates, solution.delta_per_period, start=start).z
+    return _friction_torques(solution, angles, rates, load, z)
 
 
-def _of_friction(
+def _friction_torques(
     solution: Solution,
     angles: np.ndarray,
     rates: np.ndarray,
@@ -122,77 +114,55 @@ def _of_friction(
     return solution.problem.of_motors(joint_moments(body, law, angles, forces, delta, load))
 
 
-def _of_inertia(
+def _inertial_torques(
     solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None, froude: float
 ) -> np.ndarray:
     """Torques of the motors that change how the links move, at phases with tail velocities z."""
-    problem = solution.problem
+    problem, how = solution.problem, {"delta": solution.delta_per_period, "froude": froude}
     body, joints = checked_mass(problem.body), solution.gait
     angles, rates = joints(t)
     link = body.velocity(body.posture(angles), rates, z)
     states = momenta(body, body.posture(angles), link)
-    grows = momentum_rates(
-        body, problem.law, angles, rates, states, delta=solution.delta_per_period, froude=froude
-    ).rates
+    changes = momentum_rates(body, problem.law, angles, rates, states, **how).rates
     if load is not None:
-        grows[:2] += load / froude
+        changes[:2] += load / froude
 
-    def later(by: float) -> LinkVelocity:
+    def link_velocity(by: float) -> LinkVelocity:
         then, pace = joints(t + by)
-        return body.velocity(
-            body.posture(then), pace, tail_velocity(body, then, pace, states + by * grows)
-        )
+        tail = tail_velocity(body, then, pace, states + by * changes)
+        return body.velocity(body.posture(then), pace, tail)
 
-    growth = LinkVelocity(
-        *(
-            (after - before) / (2 * _MOMENT)
-            for before, after in zip(later(-_MOMENT), later(_MOMENT), strict=True)
-        )
-    )
+    pairs = zip(link_velocity(-_STEP), link_velocity(_STEP), strict=True)
+    growth = LinkVelocity(*((after - before) / (2 * _STEP) for before, after in pairs))
     return problem.of_motors(froude * inertial_moments(body, angles, link, growth))
 
 
-class _Played:
-    """The motion of a gait with inertia in which all periods are alike, at a Froude number.
+class _MotionWithInertia:
+    """The periodic motion of a gait with inertia at a Froude number.
 
-    Attributes
-    ----------
-    distance, work, rotation : float
-        Of a period; distance as in `colloc.results.arc.Arc`.
-
-    Raises
-    ------
-    ProblemError
-        If the gait or the body cannot be played with inertia.
-    NotConvergedError
-        If the motion is not found.
+    Distance, work and rotation are those of a period, the distance as in `colloc.results.arc.Arc`.
+    `ProblemError` if gait or body cannot move with inertia, `NotConvergedError` if no motion is
+    found.
     """
 
     def __init__(self, solution: Solution, froude: float) -> None:
-        from colloc.verification.inertial_motion import gait_with_inertia  # loads what integrates
+        from colloc.verification.inertial_motion import GaitWithInertia  # loads what integrates
 
         problem, self._gait = solution.problem, solution.gait
-        self._body = problem.body
-        how: Any = {
-            "froude": froude,
-            "breaks": solution.gait.corner_phases,
-            "regime": problem.regime,
-        }
-        played = gait_with_inertia(
-            problem.body, problem.law, solution.gait, solution.delta_per_period, **how
-        )
-        closed = played.closed_from(None)
-        self._course = played.periodic_run(closed.momenta, _ACCURACY, closed.slopes).course
-        passed = played.passed(self._course.states)
+        moving = GaitWithInertia(
+            problem.body, problem.law, self._gait, solution.delta_per_period,
+            froude=froude, breaks=self._gait.corner_phases, regime=problem.regime,
+        )  # fmt: skip
+        self._chain, rough = moving.body, moving.find_period()
+        self._course = moving.periodic_run(rough.momenta, _ACCURACY, rough.slopes).course
+        totals = moving.totals(self._course.states)
         self.work, self.rotation, self.distance = (
-            passed["work"],
-            passed["rotation"],
-            passed["distance"],
+            totals[name] for name in ("work", "rotation", "distance")
         )
         self._ahead = 0.0
         if not problem.regime.slides:
-            way = arc(self.rotation, self._course.at(np.linspace(0.0, 1.0, _INSTANTS + 1))[4:6])
-            self.distance = way.chord
+            way = self._course.at(np.linspace(0.0, 1.0, _INSTANTS + 1))[4:6]
+            self.distance = arc(self.rotation, way).chord
             end = self._course.states[4:6, -1]
             self._ahead = float(np.arctan2(end[1], end[0])) - 0.5 * self.rotation
 
@@ -200,8 +170,8 @@ class _Played:
         """At ascending phases in [0, 1], in the axes of `Solution.sample`."""
         states, (angles, rates) = self._course.at(t), self._gait(t)
         theta, centre = states[3] - self._ahead, turned(states[4:6], -self._ahead)
-        z = tail_velocity(checked_mass(self._body), angles, rates, states[:3])
-        tail = centre - turned(np.array(self._body.centre(angles)), theta)
+        z = tail_velocity(self._chain, angles, rates, states[:3])
+        tail = centre - turned(np.array(self._chain.centre(angles)), theta)
         return SampledMotion(t, angles, rates, z, theta, centre, tail)
 
 
@@ -261,25 +231,22 @@ class Robot:
                     f"{name} must lie between {1 / _LARGEST:g} and {_LARGEST:g} in SI units, not "
                     f"{value:g}."
                 )
-        problem, n = self.solution.problem, self.solution.problem.n_motor
-        if (own := self.solution.froude) and abs(self.froude / own - 1.0) > _PACE:
-            needed = math.sqrt(self.length / (self.pressing * own))
+        problem, froude = self.solution.problem, self.solution.froude
+        if froude and abs(self.froude / froude - 1.0) > _SAME_PACE:
+            needed = math.sqrt(self.length / (self.pressing * froude))
             raise ProblemError(
-                f"{problem.name} is the best gait for the Froude number {own:.4g}: a robot of "
-                f"{self.length:g} m has "
-                f"to take {needed:.4g} s a period, not {self.period:g}: solve again with "
-                f"froude={self.froude:.4g}."
+                f"{problem.name} is the best gait for the Froude number {froude:.4g}: a robot of "
+                f"{self.length:g} m has to take {needed:.4g} s a period, not {self.period:g}: "
+                f"solve again with froude={self.froude:.4g}."
             )
-        for name, unit in (("max_speed", "speed"), ("max_torque", "torque")):
-            if getattr(self, name) is not None:
-                object.__setattr__(
-                    self, name, one_each(getattr(self, name), n, f"joint {unit} limit")
-                )
+        for name, what in (("max_speed", "speed"), ("max_torque", "torque")):
+            if (limit := getattr(self, name)) is not None:
+                each = one_each(limit, problem.n_motor, f"joint {what} limit")
+                object.__setattr__(self, name, each)
                 if problem.froude or not rate_independent(problem.law):
                     raise ProblemError(
                         f"{name} asks for another pace, and torques depend on it, as "
-                        f"{problem.paced_by}: leave it out, or "
-                        "solve again for that pace."
+                        f"{problem.paced_by}: leave it out, or solve again for that pace."
                     )
 
     @property
@@ -298,24 +265,26 @@ class Robot:
         return self.length / (self.pressing * self.period**2)
 
     @cached_property
-    def _played(self) -> _Played | None:
-        """With inertia, where the result has none and the motion is found."""
+    def _with_inertia(self) -> _MotionWithInertia | None:
+        """Where the result has no inertia, and the motion with it is found."""
         with suppress(ProblemError, NotConvergedError):
-            return None if self.solution.problem.froude else _Played(self.solution, self.froude)
+            if not self.solution.problem.froude:
+                return _MotionWithInertia(self.solution, self.froude)
         return None
 
     def torques(self, t: np.ndarray) -> np.ndarray:
         """Of the joints [N m] at ascending phases t in [0, 1] ``(n_time,)``, ``(n_joint,
         n_time)``."""
-        played = () if self._played is None else (self._played.sample(t), self.froude)
-        return self.torque_unit * joint_torques(self.solution, t, *played)
+        moving = self._with_inertia
+        other = () if moving is None else (moving.sample(t), self.froude)
+        return self.torque_unit * joint_torques(self.solution, t, *other)
 
     @cached_property
     def columns(self) -> dict[str, Column]:
         """The motion over a period at the gait's own pace: name to values, units and dimensions."""
         n = max(_INSTANTS, _A_SIDE * (len(self.solution.gait.corner_phases) + 1))
         t = np.arange(n + 1) / n
-        motion = (self._played or self.solution).sample(t)
+        motion = (self._with_inertia or self.solution).sample(t)
         angles, rates = self.solution.gait.driven(t)
         torques, speeds = self.torques(t), rates / self.period
         return {
@@ -331,99 +300,106 @@ class Robot:
 
     def to_xarray(self) -> xarray.Dataset:
         """The motion over a period as an xarray Dataset whose units are SI ones."""
-        return motion_dataset(
-            self.columns, {name: value for name, value in self.facts.items() if value is not None}
-        )
+        stated = {name: value for name, value in self.facts.items() if value is not None}
+        return motion_dataset(self.columns, stated)
 
     def plot(self, ax: Any = None, panel: str = "torque") -> Any:
         """Torque, speed and power of every joint over a period, as a matplotlib Figure; with `ax`,
         a matplotlib Axes, one of them there, "torque", "speed" or "power", and the Axes is
         returned."""
-        return (
-            bound("plot_robot")(self) if ax is None else bound("plot_robot_panel")(ax, self, panel)
-        )
+        if ax is None:
+            return bound("plot_robot")(self)
+        return bound("plot_robot_panel")(ax, self, panel)
 
     @cached_property
     def facts(self) -> dict[str, Any]:
         """All numbers by names that end in their units (JSON)."""
-        problem, motion = self.solution.problem, self._played or self.solution.measured
-        distance = motion.distance
-        torques, speeds, powers = (
-            self.columns[f"joint_{name}"].values for name in ("torques", "speeds", "powers")
+        motion = self._with_inertia or self.solution.measured
+        work, values = (
+            self.torque_unit * motion.work,
+            {k: c.values for k, c in self.columns.items()},
         )
-        work, total = self.torque_unit * motion.work, powers.sum(axis=0)
+        torques, speeds, powers = (values[f"joint_{x}"] for x in ("torques", "speeds", "powers"))
+        peak = np.abs(torques).max(axis=1)
         facts = {
-            "name": problem.name,
+            "name": self.solution.problem.name,
             "status": self.solution.status,
             "length_m": float(self.length),
             "mass_kg": float(self.mass),
             "period_s": float(self.period),
             "gravity_m_per_s2": float(self.gravity),
-            "speed_m_per_s": distance * self.length / self.period,
-            "body_lengths_per_period": distance,
-            "travels": direction_of_travel(
-                *(self.columns[name].values for name in ("centre", "tail"))
-            ),
+            "speed_m_per_s": motion.distance * self.length / self.period,
+            "body_lengths_per_period": motion.distance,
+            "travels": direction_of_travel(values["centre"], values["tail"]),
             "work_per_period_J": work,
             "motor_work_per_period_J": self.period * float(_mean(np.maximum(powers, 0.0)).sum()),
             "mean_power_W": work / self.period,
-            "peak_power_W": float(total.max()),
-            "cost_of_transport": motion.work / distance * self.pressing / self.gravity,
+            "peak_power_W": float(powers.sum(axis=0).max()),
+            "cost_of_transport": motion.work / motion.distance * self.pressing / self.gravity,
             "froude_number": self.froude,
-            "peak_torque_N_m": np.abs(torques).max(axis=1).tolist(),
+            "peak_torque_N_m": peak.tolist(),
             "rms_torque_N_m": np.sqrt(_mean(torques**2)).tolist(),
             "peak_speed_rad_per_s": np.abs(speeds).max(axis=1).tolist(),
             "rms_speed_rad_per_s": np.sqrt(_mean(speeds**2)).tolist(),
             "peak_joint_power_W": powers.max(axis=1).tolist(),
         }
-        return facts | self._inertia() | self._motors(np.abs(torques).max(axis=1))
+        return facts | dict(self._inertia_facts()) | dict(self._motor_facts(peak))
 
-    def _inertia(self) -> dict[str, Any]:
+    def _inertia_facts(self) -> Iterator[tuple[str, Any]]:
         """What inertia takes at this pace, and at which it takes little."""
-        solution, problem = self.solution, self.solution.problem
-        found: dict[str, Any] = {}
+        solution, problem, moving = self.solution, self.solution.problem, self._with_inertia
         if problem.froude:
             with suppress(NotConvergedError):
-                found["played_slowly"] = solution.played_slowly
-            return found
-        if problem.regime.slides:
-            return found
-        if self._played is not None:
-            found["inertia_takes"] = (
-                1.0 - self._played.distance / self._played.work / solution.efficiency
-            )
-            found["rotation_by_inertia_rad"] = self._played.rotation - solution.rotation
-        with suppress(ProblemError, NotConvergedError):
-            if rate_independent(problem.law):
-                found["slow_enough_period_s"] = math.sqrt(
-                    self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH))
-                )
-        return found
-
-    def _motors(self, peak: np.ndarray) -> dict[str, Any]:
-        """What the motors' data say; nothing of what is not given."""
-        found: dict[str, Any] = {}
-        if self.max_speed is not None:
-            gait, limits = self.solution.gait.driven, np.asarray(self.max_speed)
-            found["max_speed_rad_per_s"] = limits.tolist()
-            found["shortest_period_s"] = shortest = shortest_period(gait, limits, keep_pace=True)
+                yield "played_slowly", solution.played_slowly
+        elif not problem.regime.slides:
+            if moving is not None:
+                lost = 1.0 - moving.distance / moving.work / solution.efficiency
+                yield "inertia_takes", lost
+                yield "rotation_by_inertia_rad", moving.rotation - solution.rotation
             with suppress(ProblemError, NotConvergedError):
-                played = _Played(self.solution, self.froude * (self.period / shortest) ** 2)
-                found["speed_at_shortest_period_m_per_s"] = played.distance * self.length / shortest
-            if not self.solution.problem.paced_by:
-                found["shortest_period_paced_by_speed_s"] = shortest_period(gait, limits)
+                if rate_independent(problem.law):
+                    froude = solution.slow_enough(SLOW_ENOUGH)
+                    yield "slow_enough_period_s", math.sqrt(self.length / (self.gravity * froude))
+
+    def _motor_facts(self, peak: np.ndarray) -> Iterator[tuple[str, Any]]:
+        """What the motors' data say; nothing of what is not given."""
+        solution, gait = self.solution, self.solution.gait.driven
+        if self.max_speed is not None:
+            limits = np.asarray(self.max_speed)
+            shortest = shortest_period(gait, limits, keep_pace=True)
+            yield "max_speed_rad_per_s", limits.tolist()
+            yield "shortest_period_s", shortest
+            with suppress(ProblemError, NotConvergedError):
+                moving = _MotionWithInertia(solution, self.froude * (self.period / shortest) ** 2)
+                speed = moving.distance * self.length / shortest
+                yield "speed_at_shortest_period_m_per_s", speed
+            if not solution.problem.paced_by:
+                yield "shortest_period_paced_by_speed_s", shortest_period(gait, limits)
         if self.max_torque is not None:
-            found["max_torque_N_m"] = np.asarray(self.max_torque).tolist()
-            found["torque_used"] = (peak / self.max_torque).tolist()
-            if self._played is not None:
-                slowly = np.abs(joint_torques(self.solution, _PHASES)).max(axis=1)
-                found["torque_used_slowly"] = (self.torque_unit * slowly / self.max_torque).tolist()
-        return found
+            yield "max_torque_N_m", np.asarray(self.max_torque).tolist()
+            yield "torque_used", (peak / self.max_torque).tolist()
+            if self._with_inertia is not None:
+                slow = np.abs(joint_torques(solution, np.arange(_INSTANTS) / _INSTANTS)).max(axis=1)
+                yield "torque_used_slowly", (self.torque_unit * slow / self.max_torque).tolist()
 
     def lines(self) -> list[str]:
         """The sheet for people."""
-        f = self.facts
-        found = [
+        f, coordinate = self.facts, self.solution.gait.driven.coordinate
+        columns = (
+            f[name]
+            for name in (
+                "peak_torque_N_m",
+                "rms_torque_N_m",
+                "peak_speed_rad_per_s",
+                "rms_speed_rad_per_s",
+                "peak_joint_power_W",
+            )
+        )
+        rows = (
+            f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip()
+            for j, row in enumerate(zip(*columns, strict=True), 1)
+        )
+        return [
             f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period "
             f"({f['status']})",
             f"  speed              {f['speed_m_per_s']:.4g} m/s {f['travels']}; "
@@ -435,100 +411,92 @@ class Robot:
             "",
             "             torque [N m]      speed [rad/s]     power [W]",
             "             peak     r.m.s.   peak     r.m.s.   peak",
+            *rows,
+            "",
+            *(f"  {sentence}" for sentence in self.sentences()),
         ]
-        coordinate = self.solution.gait.driven.coordinate
-        names = (
-            "peak_torque_N_m",
-            "rms_torque_N_m",
-            "peak_speed_rad_per_s",
-            "rms_speed_rad_per_s",
-            "peak_joint_power_W",
-        )
-        for j, row in enumerate(zip(*(f[name] for name in names), strict=True), 1):
-            found.append(
-                f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip()
-            )
-        return [*found, "", *(f"  {sentence}" for sentence in self.sentences())]
 
     def sentences(self) -> list[str]:
         """What has to be known of the numbers."""
-        f, problem = self.facts, self.solution.problem
-        said = []
-        if "shortest_period_s" in f:
-            paced, fast = (
-                f.get("shortest_period_paced_by_speed_s"),
-                f.get("speed_at_shortest_period_m_per_s"),
+        law = self.solution.problem.law
+        sentences = [*self._speed_sentences(), *self._torque_sentences()]
+        if not rate_independent(law):
+            sentences.append(
+                f"Torques depend on the pace under {law.label}: its coefficients are taken to be "
+                f"those in units of this period."
             )
-            does = "" if fast is None else f" ({fast:.4g} m/s)"
-            more = "" if paced is None else f", {paced:.3g} s as colloc export --max-speed paces it"
-            said.append(
-                f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the "
-                f"gait's own pace{does}{more}."
+        return [*sentences, self._inertia_sentence()]
+
+    def _speed_sentences(self) -> Iterator[str]:
+        f = self.facts
+        if "shortest_period_s" not in f:
+            return
+        speed = f.get("speed_at_shortest_period_m_per_s")
+        paced = f.get("shortest_period_paced_by_speed_s")
+        yield (
+            f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the "
+            f"gait's own pace{'' if speed is None else f' ({speed:.4g} m/s)'}"
+            f"{'' if paced is None else f', {paced:.3g} s as colloc export --max-speed paces it'}."
+        )
+        if f["shortest_period_s"] > self.period * (1 + 1e-9):
+            yield (
+                f"That is more than {self.period:g} s, at which the numbers above are: the "
+                f"joints cannot follow."
             )
-            if f["shortest_period_s"] > self.period * (1 + 1e-9):
-                said.append(
-                    f"That is more than {self.period:g} s, at which the numbers above are: the "
-                    f"joints cannot follow."
-                )
-        if "torque_used" in f:
-            worst = int(np.argmax(f["torque_used"]))
-            peak, has = f["peak_torque_N_m"][worst], f["max_torque_N_m"][worst]
-            slowly = max(f.get("torque_used_slowly", f["torque_used"]))
-            if f["torque_used"][worst] <= 1:
-                said.append(
-                    f"The torques suffice at this pace: joint {worst + 1} uses "
-                    f"{100 * peak / has:.3g} % of its own."
-                )
-            elif slowly <= 1:
-                said.append(
-                    f"Joint {worst + 1} needs {peak:.3g} N m at this pace and has {has:.3g}; "
-                    f"played slowly no joint needs more "
-                    "than it has: take a longer period."
-                )
-            else:
-                limit = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
-                said.append(
-                    f"Joint {worst + 1} needs {peak:.3g} N m and has {has:.3g}. Played slowly "
-                    f"motors are too weak as well, so "
-                    f"a longer period does not help: solve with torque_limit=({limit})."
-                )
-        if not rate_independent(problem.law):
-            said.append(
-                f"Torques depend on the pace under {problem.law.label}: its coefficients are taken "
-                f"to be those in units "
-                "of this period."
+
+    def _torque_sentences(self) -> Iterator[str]:
+        f = self.facts
+        if "torque_used" not in f:
+            return
+        worst = int(np.argmax(f["torque_used"]))
+        peak, limit = f["peak_torque_N_m"][worst], f["max_torque_N_m"][worst]
+        if f["torque_used"][worst] <= 1:
+            yield (
+                f"The torques suffice at this pace: joint {worst + 1} uses "
+                f"{100 * peak / limit:.3g} % of its own."
             )
-        if problem.froude:
-            said.append("Torques and power include inertia")
-            if (slowly := f.get("played_slowly")) is not None:
-                value = (
-                    f"{problem.objective.short} {slowly:.4g} instead of "
-                    f"{self.solution.measured.value:.4g}"
+        elif max(f.get("torque_used_slowly", f["torque_used"])) <= 1:
+            yield (
+                f"Joint {worst + 1} needs {peak:.3g} N m at this pace and has {limit:.3g}; played "
+                f"slowly no joint needs more than it has: take a longer period."
+            )
+        else:
+            limits = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
+            yield (
+                f"Joint {worst + 1} needs {peak:.3g} N m and has {limit:.3g}. Played slowly "
+                f"motors are too weak as well, so a longer period does not help: solve with "
+                f"torque_limit=({limits})."
+            )
+
+    def _inertia_sentence(self) -> str:
+        f, solution, objective = self.facts, self.solution, self.solution.problem.objective
+        if solution.problem.froude:
+            text = "Torques and power include inertia"
+            if (value := f.get("played_slowly")) is not None:
+                text += (
+                    f"; played slowly the gait would have {objective.short} {value:.4g} instead of "
+                    f"{solution.measured.value:.4g}"
                 )
-                said[-1] += f"; played slowly the gait would have {value}"
-            return [*said[:-1], f"{said[-1]}."]
+            return f"{text}."
         pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
-        lost, slow = f.get("inertia_takes"), f.get("slow_enough_period_s")
+        slow, lost = f.get("slow_enough_period_s"), f.get("inertia_takes")
         more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
-        if self._played is None:
-            return [
-                *said,
-                f"All this is slow motion. What inertia does {pace} could not be computed{more}.",
-            ]
-        said.append(f"All this includes inertia {pace}")
-        if lost is not None:
-            share = (
-                f"{100 * abs(lost):.2g} %"
-                if abs(lost) > _LITTLE
-                else f"less than {100 * _LITTLE:g} %"
+        if self._with_inertia is None:
+            return f"All this is slow motion. What inertia does {pace} could not be computed{more}."
+        if lost is None:
+            text = f"All this includes inertia {pace}"
+        else:
+            least = f"less than {100 * _SMALLEST_LOSS:g} %"
+            share = f"{100 * abs(lost):.2g} %" if abs(lost) > _SMALLEST_LOSS else least
+            text = (
+                f"All this includes inertia. Inertia {'takes' if lost >= 0 else 'adds'} {share} of "
+                f"the efficiency {pace}{more}"
             )
-            does = f"Inertia {'takes' if lost >= 0 else 'adds'} {share} of the efficiency {pace}"
-            said[-1] = f"All this includes inertia. {does}{more}"
-            if abs(turns := math.degrees(f["rotation_by_inertia_rad"])) > _TURNS:
-                said[-1] += f". It also turns the robot by {turns:.2g}° a period: its way is an arc"
-        slowly = self.solution.distance * self.length / self.period
-        said[-1] += f". At this period slow motion would be {slowly:.4g} m/s."
-        return said
+            turns = math.degrees(f["rotation_by_inertia_rad"])
+            if abs(turns) > _SMALLEST_TURN:
+                text += f". It also turns the robot by {turns:.2g}° a period: its way is an arc"
+        slowly = solution.distance * self.length / self.period
+        return f"{text}. At this period slow motion would be {slowly:.4g} m/s."
 
     def __str__(self) -> str:
         return "\n".join(self.lines())

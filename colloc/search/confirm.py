@@ -21,7 +21,7 @@ import numpy as np
 from colloc.numerics.sqp import Stationarity, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
-from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
+from colloc.results.answer import NOT_MEASURED, PRESCRIBED, REDUCED, Answer, SecondOrder
 from colloc.search.certify import EXACT, VIOLATION
 from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
 from colloc.search.diagnosis import explanation
@@ -80,6 +80,9 @@ def confirm(optimum: Optimum) -> Answer:
         it.
     """
     begin = time.perf_counter()
+    if not optimum.problem.gait.free:
+        answer = unconfirmed(optimum)
+        return replace(answer, status=PRESCRIBED, program=PRESCRIBED, message=optimum.lacks)
 
     def compute() -> Answer:
         found = with_kink(optimum)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.control_problem import control_problem
+from colloc.gaits.control_problem import ControlProblem, control_problem
 from colloc.gaits.coupled import Coupled
 from colloc.gaits.fitted_gait import FittedGait, Given, Uncertainty, coefficients, fitted_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait
@@ -19,13 +19,19 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.joint_map import JointMap
 from colloc.motion.kinds import kind_of_motion
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
 from colloc.reduced.motion import ReducedMotion
-from colloc.results.answer import Answer
+from colloc.reduced.one_gait import OneGait
+from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
 from colloc.search.certify import EXACT, GAP, certify, goes_nowhere
-from colloc.search.prescribed import evaluated_answer
+from colloc.search.confirm import unconfirmed
+from colloc.search.converge import as_it_is
+from colloc.search.refine import MESHES
 from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.verification.refinement import planned_mesh
 
 _PHASES = 256
 """At which a record is looked at, before it is replayed."""
@@ -133,7 +139,7 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
     delta = problem.delta * (length if problem.gait.unit_speed else 1.0)
     usual = {"guess": None, "delta_start": None, "intervals": None}
     stated = problem.with_(gait=gait_class, rotation=None, delta=delta, **usual)
-    answer = evaluated_answer(stated, gait)
+    answer = _answer(stated, gait)
     turned = answer.motion.rotation
     if abs(turned) < GAP * answer.distance:
         if not problem.uses("rotation"):  # which then may be anything
@@ -141,7 +147,7 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
             answer = replace(answer, problem=stated)
     else:  # how far it goes is then the chord of its arc
         stated = stated.with_(rotation=turned)
-        answer = evaluated_answer(stated, gait)
+        answer = _answer(stated, gait)
     if goes_nowhere(answer):
         said = (
             "It goes nowhere for its work, so there is no value to certify: is it one that "
@@ -168,6 +174,34 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
             said = f" Samples that far off leave {what}.{said}"
         certificate = certificate.with_samples(errors)
     return Solution(stated, answer, certificate, message=f"{fitted.describe()}.{said}")
+
+
+def _answer(problem: Problem, gait: AnyGait) -> Answer:
+    """A gait as it is, with everything else following from its balance, on a mesh that meets the
+    problem's tolerance; its class is that of the problem, without symmetry, and it starts at the
+    phase that fixes the start of the class. Of a gait that goes nowhere, which no mesh would
+    resolve, on a first mesh."""
+    begin, parameters = time.perf_counter(), problem.gait.parameters(gait)
+    control = control_problem(problem)
+    member, mesh, message = control.admissible.member(parameters), control.mesh(), ""
+    first, answer = mesh, _measured(control, mesh, parameters)
+    meshes = MESHES if problem.mesh_tolerance > 0 and not goes_nowhere(answer) else 0
+    for _ in range(meshes):
+        plan = planned_mesh(control, mesh, member, problem.delta, problem.mesh_tolerance)
+        if plan is None:
+            break
+        mesh = Mesh(scheme(plan.scheme), plan.edges)
+        message = "" if plan.reached else f"the mesh is accurate to {plan.estimate:.0e} only."
+    if mesh is not first:
+        answer = _measured(control, mesh, parameters)
+    answer = replace(answer, message=message, seconds=time.perf_counter() - begin)
+    return replace(answer, history=(answer.step,))
+
+
+def _measured(control: ControlProblem, mesh: Mesh, parameters: np.ndarray) -> Answer:
+    space = OneGait(control, mesh.edges, mesh.scheme.name, full=parameters)
+    found = as_it_is(space, np.empty(0), control.problem.delta)
+    return replace(unconfirmed(found), status=EVALUATED, program=EVALUATED)
 
 
 def _errors_of_samples(

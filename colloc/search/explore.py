@@ -38,7 +38,7 @@ from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
 from colloc.search.closure import closed_gait
 from colloc.search.converge import as_it_is, converged
 from colloc.search.descend import FACTOR, descend, is_viscous, levels
-from colloc.search.effort import ROUGH, SKETCH
+from colloc.search.effort import FINE, ROUGH, SKETCH
 from colloc.search.helpers import Helpers, helping
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
@@ -123,6 +123,8 @@ def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
     A gait that is nearly an optimum at the problem's delta is not led there from a larger one: it
     begins there.
     """
+    if not problem.gait.free:
+        return converged(*space_near(problem, gait), problem.delta, FINE)
     near = _at_the_end(problem, gait)
     if near is not None:
         return near

@@ -37,11 +37,8 @@ doubling was seen to leave a sixth or less, with a point at rest that moves over
 class _Meshes:
     """The meshes tried so far, and the phases that have to stay knots."""
 
+    kept: np.ndarray
     count: int = 0
-    kept: np.ndarray = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        self.kept = np.empty(0)
 
     def plan(self, optimum: Optimum) -> MeshPlan | None:
         """A mesh on which the gait is accurate enough; None if its own will do."""
@@ -73,7 +70,7 @@ def refine(optimum: Optimum) -> Optimum:
     Optimum
         Optimised to the last digit. Its `lacks` says what is missing if no mesh was fine enough.
     """
-    meshes = _Meshes()
+    meshes = _Meshes(np.array(optimum.problem.gait.stages))
     if optimum.problem.regime.slides and optimum.objective > -NOWHERE:
         return optimum  # relative to nothing no mesh is fine enough
     while True:

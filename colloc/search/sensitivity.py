@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -48,10 +48,8 @@ CHANGE = 0.1
 _STEP = 1e-5
 """Of differences, relative. With delta = 1e-4 the motion bends over relative changes of that order;
 measured on three problems, steps from 1e-4 to 1e-7 agree to 1e-7."""
-_NOTHING = 1e-9
-"""Relative slope that counts as none."""
-_FINEST = 8
-"""Parts of each interval of the answer's mesh."""
+_NOTHING = 1e-9  # relative slope that counts as none
+_FINEST = 8  # parts of each interval of the answer's mesh
 _STATIONARY = 1e-4
 """Largest gradient of the Lagrangian, over the value, at which there are multipliers."""
 _OF_ARCS = (
@@ -99,14 +97,10 @@ class Again:
 
     def facts(self) -> dict[str, Any]:
         """As plain numbers; None for what there is not."""
-        numbers = {
-            name: getattr(self, name)
-            for name in ("change", "value", "error", "kept", "kept_error", "behind")
-        }
-        return {name: float(x) if np.isfinite(x) else None for name, x in numbers.items()} | {
-            "status": self.status,
-            "breaks": self.breaks,
-        }
+        names = ("change", "value", "error", "kept", "kept_error", "behind")
+        numbers = {name: float(getattr(self, name)) for name in names}
+        finite = {name: x if np.isfinite(x) else None for name, x in numbers.items()}
+        return finite | {"status": self.status, "breaks": self.breaks}
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,14 +135,6 @@ class Effect:
     sides: tuple[int, ...] = (-1, 1)
     again: tuple[Again, ...] = ()
 
-    def facts(self) -> dict[str, Any]:
-        """As plain numbers."""
-        own = {
-            name: getattr(self, name)
-            for name in ("name", "now", "relative", "slope", "error", "sides")
-        }
-        return own | {"again": [each.facts() for each in self.again]}
-
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
@@ -178,29 +164,28 @@ class Sensitivity:
         return f"<Sensitivity of {self.name} to {len(self.effects)} numbers>"
 
     def __getitem__(self, name: str) -> Effect:
-        found = next((effect for effect in self.effects if effect.name == name), None)
-        if found is None:
-            raise KeyError(
-                f"{name!r}: there is {', '.join(effect.name for effect in self.effects)}"
-            )
-        return found
+        effects = {effect.name: effect for effect in self.effects}
+        if name not in effects:
+            raise KeyError(f"{name!r}: there is {', '.join(effects)}")
+        return effects[name]
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
 
     def facts(self) -> dict[str, Any]:
         """All of it as plain numbers (JSON)."""
-        own = {
-            name: getattr(self, name) for name in ("name", "objective", "value", "error", "note")
-        }
-        return own | {"effects": [effect.facts() for effect in self.effects]}
+        effects = [
+            vars(effect) | {"again": [each.facts() for each in effect.again]}
+            for effect in self.effects
+        ]
+        own = {key: value for key, value in vars(self).items() if key != "effects"}
+        return own | {"effects": effects}
 
     @property
     def seen(self) -> list[Effect]:
         """Those that change the value to first order."""
-        return [
-            effect for effect in self.effects if not abs(effect.slope) <= _NOTHING * abs(self.value)
-        ]
+        least = _NOTHING * abs(self.value)
+        return [effect for effect in self.effects if not abs(effect.slope) <= least]
 
     def beside(self, effect: Effect) -> list[str]:
         """The best value where a number is a tenth smaller, and where it is a tenth larger; "-"
@@ -218,38 +203,31 @@ class Sensitivity:
             f"  {'':<{width}}  {'now':>8s}  {'10 % less':>9s}  {'10 % more':>9s}  slope",
         ]
         for effect in seen:
-            less, more = (f"{text:>9s}" for text in self.beside(effect))
-            unit = "" if effect.relative else "  (a tenth of its link)"
-            slope = f"{effect.slope:+.5f} +- {effect.error:.0e}"
+            less, more = self.beside(effect)
             lines.append(
-                f"  {effect.name:<{width}}  {effect.now:8.4g}  {less}  {more}  {slope}{unit}"
+                f"  {effect.name:<{width}}  {effect.now:8.4g}  {less:>9s}  {more:>9s}  "
+                f"{effect.slope:+.5f} +- {effect.error:.0e}"
+                f"{'' if effect.relative else '  (a tenth of its link)'}"
             )
         if without := [effect.name for effect in self.effects if effect not in seen]:
             lines.append(f"  no effect to first order: {', '.join(without)}")
-        if self.note:
-            lines.append(f"  {self.note}")
-        if any(effect.again for effect in self.effects):
-            lines += self._again(width)
-        return lines
-
-    def _again(self, width: int) -> list[str]:
+        lines += [f"  {self.note}"] if self.note else []
+        rows = [f"  {e.name:<{width}}  {self._row(e, x)}" for e in self.effects for x in e.again]
         head = (
             f"{'change':>7s}  {'first order':>11s}  {'best there':>10s}  {'on file':>8s}  behind by"
         )
-        lines = ["", f"  {'':<{width}}  {head}"]
-        for effect in self.effects:
-            for each in effect.again:
-                change = f"{100 * each.change:+.3g} %" if effect.relative else f"{each.change:+.3g}"
-                first, best = self.value + each.change * effect.slope, f"{each.value:10.4f}"
-                behind = f"{each.behind:9.1e}"
-                if not np.isfinite(each.value):
-                    best, behind = f"{'-':>10s}", f"  {each.status}"
-                row = (
-                    f"{change:>7s}  {first:11.4f}  {best}  {each.kept:8.4f}  {behind}  "
-                    f"{each.breaks}"
-                ).rstrip()
-                lines.append(f"  {effect.name:<{width}}  {row}")
-        return lines
+        return [*lines, "", f"  {'':<{width}}  {head}", *rows] if rows else lines
+
+    def _row(self, effect: Effect, there: Again) -> str:
+        unit = (100, " %") if effect.relative else (1, "")
+        change = f"{there.change * unit[0]:+.3g}{unit[1]}"
+        first, best = self.value + there.change * effect.slope, f"{there.value:.4f}"
+        behind = f"{there.behind:9.1e}"
+        if not np.isfinite(there.value):
+            best, behind = "-", f"  {there.status}"
+        return (
+            f"{change:>7s}  {first:11.4f}  {best:>10s}  {there.kept:8.4f}  {behind}  {there.breaks}"
+        ).rstrip()
 
 
 def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANGE) -> Sensitivity:
@@ -288,7 +266,14 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
     >>> bool(abs(sum(slopes) / solution.value + 1) < 1e-4)
     True
     """
-    _check_is_optimum(solution)
+    if solution.answer.program == EVALUATED or not solution.problem.gait.free:
+        raise ProblemError(
+            "the gait was given: only of an optimum is it known how the best value changes."
+        )
+    if not solution.success:
+        raise ProblemError(
+            f"only an optimum has a sensitivity, and this solve ended as: {solution.status}."
+        )
     answer, certificate, effects = solution.answer, solution.certificate, []
     finest, *others = _on_meshes(answer)
     for parameter in parameters(answer.problem):
@@ -298,56 +283,38 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
         slope = _slope(finest, parameter, sides)
         error = max(abs(_slope(other, parameter, sides) - slope) for other in others)
         error += abs(_slope(finest, parameter, sides, 2 * _STEP) - slope)
-        effect = Effect(parameter.name, parameter.value, parameter.relative, slope, error, sides)
+        again: tuple[Again, ...] = ()
         if resolve and abs(slope) > _NOTHING * abs(solution.value):
-            beside = _beside(parameter, change)
-            again = tuple(
-                _again(solution, problem, side * change) for side, problem in beside.items()
-            )
-            effect = replace(effect, again=again)
-        effects.append(effect)
-    problem, at = solution.problem, (certificate.value, certificate.value_error)
-    return Sensitivity(
-        problem.name,
-        problem.objective.short,
-        *at,
-        tuple(effects),
-        _OF_ARCS if problem.gait.of_arcs else "",
-    )
-
-
-def _check_is_optimum(solution: Solution) -> None:
-    if solution.answer.program == EVALUATED or not solution.problem.gait.free:
-        raise ProblemError(
-            "the gait was given: only of an optimum is it known how the best value changes."
-        )
-    if not solution.success:
-        raise ProblemError(
-            f"only an optimum has a sensitivity, and this solve ended as: {solution.status}."
-        )
+            beside = _beside(parameter, change).items()
+            again = tuple(_again(solution, problem, side * change) for side, problem in beside)
+        at = parameter.name, parameter.value, parameter.relative
+        effects.append(Effect(*at, slope, error, sides, again))
+    problem, stated = solution.problem, (certificate.value, certificate.value_error)
+    note = _OF_ARCS if problem.gait.of_arcs else ""
+    return Sensitivity(problem.name, problem.objective.short, *stated, tuple(effects), note)
 
 
 @dataclass(frozen=True, eq=False)
 class _Lagrangian:
     """The Lagrangian of the reduced program on one mesh at its optimum, as a function of the
-    problem.
+    problem."""
 
-    Attributes
-    ----------
-    space : SearchSpace
-        The class of gaits on its mesh, for the problem as it was solved.
-    v : (n,)
-        The gait.
-    on_rows : dict
-        Multipliers by names of rows, positive at upper bounds.
-    on_bounds : (n,)
-        Multipliers of the parameters' bounds.
-    """
+    space: SearchSpace  # the class of gaits on its mesh, for the problem as it was solved
+    v: np.ndarray  # the gait
+    on_rows: dict[tuple[str, int], float]  # multipliers by names of rows, positive at upper bounds
+    on_bounds: np.ndarray  # of the parameters' bounds
 
-    space: SearchSpace
-    v: np.ndarray
-    on_rows: dict[tuple[str, int], float]
-    on_bounds: np.ndarray
+    @classmethod
+    def at_optimum(cls, space: SearchSpace, v: np.ndarray, delta: float) -> _Lagrangian:
+        program = ReducedProgram(space, delta)
+        program.place_rows(v)
+        found = stationarity(program, v)
+        if not found.kkt_error <= _STATIONARY * abs(program.objective(v)):
+            why = f"the gradient of the Lagrangian does not vanish ({found.kkt_error:.0e})"
+            raise ProblemError(f"the gait has no sensitivity: {why}, as where it rests on a kink.")
+        named = zip(program.row_names, found.on_rows, strict=True)
+        on_rows = {name: float(multiplier) for name, multiplier in named if multiplier}
+        return cls(space, v, on_rows, found.on_bounds)
 
     def __call__(self, problem: Problem) -> float:
         """Its value, in the units of the stated objective, with the rows at the worst instants of
@@ -358,13 +325,11 @@ class _Lagrangian:
         if missing := self.on_rows.keys() - at.keys():
             what = f"the bound {min(missing)[0]!r}, which holds the gait back, vanishes beside it"
             raise ProblemError(f"the gait has no sensitivity: {what}.")
-        rows, which = program.rows(self.v), [at[name] for name in self.on_rows]
-        left = _beyond(
-            rows[which],
-            program.row_lower[which],
-            program.row_upper[which],
-            np.array([*self.on_rows.values()]),
+        which = [at[name] for name in self.on_rows]
+        rows, low, high = (
+            row[which] for row in (program.rows(self.v), program.row_lower, program.row_upper)
         )
+        left = _beyond(rows, low, high, np.array([*self.on_rows.values()]))
         left += _beyond(self.v, program.lower, program.upper, self.on_bounds)
         return program.stated(program.objective(self.v)) + program.stated(1.0) * left
 
@@ -377,39 +342,23 @@ def _beyond(
     return float(multipliers @ (values - bounds))
 
 
-def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> _Lagrangian:
-    program = ReducedProgram(space, delta)
-    program.place_rows(v)
-    found = stationarity(program, v)
-    if not found.kkt_error <= _STATIONARY * abs(program.objective(v)):
-        why = f"the gradient of the Lagrangian does not vanish ({found.kkt_error:.0e})"
-        raise ProblemError(f"the gait has no sensitivity: {why}, as where it rests on a kink.")
-    named = zip(program.row_names, found.on_rows, strict=True)
-    on_rows = {name: float(multiplier) for name, multiplier in named if multiplier}
-    return _Lagrangian(space, v, on_rows, found.on_bounds)
-
-
-def _on_its_mesh(answer: Answer) -> _Lagrangian:
-    space, v = space_near(answer.problem, answer.gait, answer.edges, answer.scheme)
-    return _lagrangian(with_far(space, answer.problem.body.far_pairs), v, answer.delta)
-
-
 def _on_meshes(answer: Answer) -> list[_Lagrangian]:
     """At the optima of several meshes, the finest first: multipliers go with their mesh."""
-    own, edges = _on_its_mesh(answer), answer.edges
+    gait, edges = answer.problem.gait, answer.edges
+    space, v = space_near(answer.problem, answer.gait, edges, answer.scheme)
+    far = answer.problem.body.far_pairs
+    solved = _Lagrangian.at_optimum(with_far(space, far), v, answer.delta)
 
     def on(parts: int, later: float = 0.0) -> _Lagrangian:
         inner = edges[:-1, None] + (np.arange(parts) + later) / parts * np.diff(edges)[:, None]
-        space = remeshed(
-            own.space, answer.gait, np.unique([edges[0], *inner.flat, edges[-1]]), answer.scheme
-        )
+        finer = np.unique([edges[0], *inner.flat, edges[-1]])
+        space = remeshed(solved.space, answer.gait, finer, answer.scheme)
         found = converged(space, space.parameters(answer.gait), answer.delta, FINE)
-        return _lagrangian(found.space, found.v, answer.delta)
+        return _Lagrangian.at_optimum(found.space, found.v, answer.delta)
 
-    gait = answer.problem.gait
     if gait.of_arcs:  # every interval is one
-        return [on(2), own]
-    return [on(_FINEST), on(2), on(4, 0.5) if gait.moves_knots else own]
+        return [on(2), solved]
+    return [on(_FINEST), on(2), on(4, 0.5) if gait.moves_knots else solved]
 
 
 def _beside(parameter: Parameter, step: float) -> dict[int, Problem]:
@@ -436,40 +385,25 @@ def _slope(
 
 
 def _again(solution: Solution, problem: Problem, change: float) -> Again:
-    """What is best where a number differs, and what the gait on file does there."""
     gait, delta = solution.answer.gait, problem.delta
     space, v = space_about(problem, gait)
     found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
     best = found.certificate if found.success else UNCERTIFIED
-    at = problem.body, problem.law, gait, delta * gait.delta_unit
-    asked: Any = {
-        "objective": problem.objective,
-        "quantities": problem.integrals,
-        "turn": problem.rotation or 0.0,
-    }
-    kept = replayer(problem.regime)(*at, breaks=gait.corner_phases, **asked)
+    kept = replayer(problem.regime)(
+        problem.body, problem.law, gait, delta * gait.delta_unit, breaks=gait.corner_phases,
+        objective=problem.objective, quantities=problem.integrals, turn=problem.rotation or 0.0,
+    )  # fmt: skip
     breaks = "; ".join(_broken(problem, kept, ReducedProgram(space, delta).place_rows(v)))
-    return Again(
-        change,
-        best.value,
-        best.value_error,
-        found.status,
-        kept.value,
-        kept.error * abs(kept.value),
-        breaks,
-    )
+    here = kept.value, kept.error * abs(kept.value)
+    return Again(change, best.value, best.value_error, found.status, *here, breaks)
 
 
 def _broken(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
-    """What a gait does not keep of a problem, in words."""
     if excess > _EXCESS:
         yield f"{excess:.2g} beyond its limits"
     turned = kept.rotation - (problem.rotation or 0.0)
-    if (
-        problem.rotation is not None
-        and problem.gait.closing_symmetry == NONE
-        and abs(turned) > _TURNS
-    ):
+    asked = problem.rotation is not None and problem.gait.closing_symmetry == NONE
+    if asked and abs(turned) > _TURNS:
         yield f"turns {np.degrees(turned):+.2g}° too far a period"
     for aim, least in problem.at_least:
         if aim(kept.values) < least * (1 - _EXCESS):

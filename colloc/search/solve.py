@@ -30,7 +30,6 @@ from colloc.search.descend import FACTOR, below_saddle, descend
 from colloc.search.explore import CLOSE, Exploration, begin_at, explore, followed_further, is_finite
 from colloc.search.literal import literal_answer
 from colloc.search.optimum import Optimum
-from colloc.search.prescribed import prescribed_answer
 from colloc.search.refine import refine
 from colloc.search.run import Progress, Run, this_run
 from colloc.search.spaces import space_about
@@ -123,9 +122,7 @@ def _solved(
     def goes_on() -> bool:
         return time.monotonic() < until
 
-    if not problem.gait.free:
-        return solution_of(problem, certified(prescribed_answer(problem)))
-    if search == FULL:
+    if search == FULL and problem.gait.free:
         return solution_of(problem, certified(literal_answer(problem)))
     explored = _explored(problem, starts, goes_on)
     first = descend(explored.optima[0])
@@ -141,7 +138,7 @@ def _solved(
 
 
 def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool]) -> Exploration:
-    if starts != 1:
+    if starts != 1 and problem.gait.free:
         try:
             return explore(problem, starts, goes_on)
         except NotConvergedError:
@@ -227,8 +224,10 @@ def certified(answer: Answer) -> Certified:
 
 def _is_viscous(found: Certified) -> bool:
     """Whether nothing fails but the influence of delta: the gait is so slow, or small, that
-    friction is viscous at it."""
-    return [check.name for check in found.certificate.failures] == ["delta influence"]
+    friction is viscous at it. A motion that is prescribed is measured at the delta that is asked
+    for."""
+    viscous = [check.name for check in found.certificate.failures] == ["delta influence"]
+    return viscous and found.answer.problem.gait.free
 
 
 def _at_smaller_delta(optimum: Optimum) -> Optimum:

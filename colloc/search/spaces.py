@@ -19,15 +19,18 @@ from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.heading import whole_turns
 from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
+from colloc.reduced.one_gait import OneGait
 from colloc.reduced.program import SearchSpace
 from colloc.system.errors import ProblemError
 from colloc.transcription.full_program import FullProgram, full_program
 
 
-def _space_class(problem: Problem) -> type[LinearSpace]:
+def _space_class(problem: Problem) -> type[LinearSpace] | type[OneGait]:
     if isinstance(problem.gait, Serpenoid):
         return SerpenoidSpace
-    if isinstance(problem.gait, LinearClass | Prescribed):
+    if isinstance(problem.gait, Prescribed):
+        return OneGait
+    if isinstance(problem.gait, LinearClass):
         return LinearSpace
     raise ProblemError(
         f"no search is known for the class {type(problem.gait).__name__}: derive it from "

@@ -19,29 +19,26 @@ _BLANK = frozenset(
 )
 """What loggers write where there is no number."""
 _COMMENT = re.compile(r"\s*(#|%|//)[\s#%/]*")
-_MANY = 500
-"""Lines, from which delimiter and width are told."""
-_LARGEST = 1e150
-"""Sums of squares of smaller numbers are finite."""
+_MANY = 500  # lines, from which delimiter and width are told
+_LARGEST = 1e150  # sums of squares of smaller numbers are finite
 
 
 class Table(NamedTuple):
     """Numbers of a text file, with what stands about them."""
 
-    names: list[str]
-    """Of the columns; none if the file does not say."""
-    units: list[str]
-    """Of a row below the names; as many empty ones if there is none."""
-    values: np.ndarray
-    """``(n_row, n_column)``; NaN where there is no number."""
-    cells: list[list[str]]
-    """The same as text."""
-    lines: list[int]
-    """Of the rows in the file, from 1."""
-    preamble: str
-    """What stands before the names, and comments."""
-    notes: list[str]
-    """What a person should know of the format, in words."""
+    names: list[str]  # of the columns; none if the file does not say
+    units: list[str]  # of a row below the names; as many empty ones if there is none
+    values: np.ndarray  # (n_row, n_column); NaN where there is no number
+    cells: list[list[str]]  # the same as text
+    lines: list[int]  # of the rows in the file, from 1
+    preamble: str  # what stands before the names, and comments
+    notes: list[str]  # what a person should know of the format, in words
+
+
+class _Row(NamedTuple):
+    line: int
+    cells: list[str]
+    comment: bool
 
 
 def read_table(path: Path) -> Table:
@@ -51,79 +48,66 @@ def read_table(path: Path) -> Table:
     Blank lines and comments (``#``, ``%``, ``//``) are left out, and a last line that was cut
     short. `ProblemError` if the file cannot be read, or its rows are not of one width.
     """
-    rows: list[
-        tuple[int, list[str], bool]
-    ] = []  # number of the line, its cells, whether it is a comment
     lines = _text(path).splitlines()
-    plain = [line for line in lines[: 4 * _MANY] if line.strip() and not _COMMENT.match(line)][
-        -_MANY:
-    ]
-    delimiter = max(_DELIMITERS, key=lambda mark: _fit(plain, mark))
-    for k, line in enumerate(lines, 1):
-        if cells := _split(_COMMENT.sub("", line, count=1), delimiter):
-            rows.append((k, cells, _COMMENT.match(line) is not None))
-    usual = [cells for _, cells, comment in rows[: 4 * _MANY] if not comment][-_MANY:]
+    plain = [line for line in lines[: 4 * _MANY] if line.strip() and not _COMMENT.match(line)]
+    delimiter = max(_DELIMITERS, key=lambda mark: _fit(plain[-_MANY:], mark))
+    split = (
+        (k, _split(_COMMENT.sub("", line, count=1), delimiter)) for k, line in enumerate(lines)
+    )
+    rows = [_Row(k + 1, cells, bool(_COMMENT.match(lines[k]))) for k, cells in split if cells]
+    usual = [row.cells for row in rows[: 4 * _MANY] if not row.comment][-_MANY:]
     if usual and all(cells[-1] == "" for cells in usual):  # a delimiter at the end of every line
         rows = [
-            (k, cells[:-1] if cells[-1] == "" else cells, comment) for k, cells, comment in rows
+            row._replace(cells=row.cells[: -1 if row.cells[-1] == "" else None]) for row in rows
         ]
         usual = [cells[:-1] for cells in usual]
     width = Counter(map(len, usual)).most_common(1)[0][0] if usual else 0
-    fitting = [row for row in usual if len(row) == width]
-    numeric = [
-        j
-        for j in range(width)
-        if 2 * sum(_number(row[j]) is not None for row in fitting) >= len(fitting)
-    ]
-
-    def is_data(cells: list[str], comment: bool) -> bool:
-        """Whether a row looks like those that most are like; a cell of it may be spoilt."""
-        if comment or len(cells) != width:
-            return False
-        told = [_number(cells[j]) is not None or is_blank(cells[j]) for j in numeric]
-        return (
-            2 * sum(told) >= len(told)
-            and told[:1] == [True]
-            and any(_number(cells[j]) is not None for j in numeric)
-        )
-
-    first = next(
-        (i for i, (_, cells, comment) in enumerate(rows) if is_data(cells, comment)), len(rows)
-    )
-    if [cells for _, cells, _ in rows[first : first + 1]] == [[str(j) for j in range(width)]]:
-        after = _number(rows[first + 1][1][0]) if first + 1 < len(rows) else None
-        first += after is not None and after <= 0  # columns that are numbered, not named
+    first = _first_row(rows, width, [cells for cells in usual if len(cells) == width])
     names, units = _names(path, rows[:first], width)
     notes = [f"{_DELIMITERS[delimiter]} between"] if delimiter != "," else []
-    data = [(k, cells) for k, cells, comment in rows[first:] if not comment]
-    if len(data) > 1 and len(data[-1][1]) < width:
-        notes.append(f"line {data.pop()[0]}, the last one, cut short, left out")
-    for k, cells in data:
+    data = [row for row in rows[first:] if not row.comment]
+    if len(data) > 1 and len(data[-1].cells) < width:
+        notes.append(f"line {data.pop().line}, the last one, cut short, left out")
+    for k, cells, _ in data:
         if len(cells) != width:
             raise ProblemError(
                 f"{path}, line {k}, has {len(cells)} cell{'s' * (len(cells) != 1)}, and the lines "
-                f"about it have {width}: mend "
-                "it, or leave it out."
+                f"about it have {width}: mend it, or leave it out."
             )
         if cells == names:
             raise ProblemError(
                 f"{path}, line {k}, names the columns again: the file holds two records; give one "
                 f"of them."
             )
-    if any("," in cell for _, cells in data[:_MANY] for cell in cells if _number(cell) is not None):
-        notes.append(
-            "commas in numbers"
-            if any("." in cell for _, cells in data[:_MANY] for cell in cells)
-            else "decimal commas"
-        )
-    numbers = [
-        [np.nan if (x := _number(cell)) is None else x for cell in cells] for _, cells in data
-    ]
+    some = [cell for row in data[:_MANY] for cell in row.cells]
+    if any("," in cell for cell in some if _number(cell) is not None):
+        points = any("." in cell for cell in some)
+        notes.append("commas in numbers" if points else "decimal commas")
+    texts = [row.cells for row in data]
+    numbers = [[np.nan if (x := _number(cell)) is None else x for cell in row] for row in texts]
     values = np.array(numbers).reshape(len(data), width)
-    before = "\n".join(lines[: rows[first][0] - 1 if first < len(rows) else None])
-    return Table(
-        names, units, values, [cells for _, cells in data], [k for k, _ in data], before, notes
-    )
+    before = "\n".join(lines[: rows[first].line - 1 if first < len(rows) else None])
+    return Table(names, units, values, texts, [row.line for row in data], before, notes)
+
+
+def _first_row(rows: list[_Row], width: int, usual: list[list[str]]) -> int:
+    """The first row of numbers: it looks like those that most are like; a cell of it may be
+    spoilt."""
+    count = [sum(_number(cells[j]) is not None for cells in usual) for j in range(width)]
+    numeric = [j for j in range(width) if 2 * count[j] >= len(usual)]
+
+    def is_data(row: _Row) -> bool:
+        if row.comment or len(row.cells) != width:
+            return False
+        numbers = [_number(row.cells[j]) is not None for j in numeric]
+        fits = [x or is_blank(row.cells[j]) for x, j in zip(numbers, numeric, strict=True)]
+        return 2 * sum(fits) >= len(fits) and fits[:1] == [True] and any(numbers)
+
+    first = next((i for i, row in enumerate(rows) if is_data(row)), len(rows))
+    if first + 1 < len(rows) and rows[first].cells == [str(j) for j in range(width)]:
+        after = _number(rows[first + 1].cells[0])
+        first += after is not None and after <= 0  # columns that are numbered, not named
+    return first
 
 
 def csv_table(path: Path, fewest: int) -> tuple[list[str], np.ndarray]:
@@ -173,8 +157,7 @@ def _text(path: Path) -> str:
             return text
     raise ProblemError(
         f"{path} is no text of numbers in UTF-8: a CSV file is read here, lines of numbers with "
-        f"commas between, such as a "
-        "spreadsheet (save as CSV) or colloc export writes."
+        f"commas between, such as a spreadsheet (save as CSV) or colloc export writes."
     )
 
 
@@ -183,12 +166,10 @@ def _split(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
     try:
-        cells = [
-            cell.strip()
-            for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
-        ]
+        row = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
     except csv.Error:  # a cell of more than 100 kB
         return [line]
+    cells = [cell.strip() for cell in row]
     return cells if any(cells) else []
 
 
@@ -203,7 +184,6 @@ def _fit(lines: list[str], delimiter: str) -> tuple[float, float]:
 
 
 def is_blank(cell: str) -> bool:
-    """Whether a cell says that there is no number."""
     return cell.lower() in _BLANK
 
 
@@ -222,21 +202,17 @@ def _number(cell: str) -> float | None:
     return number if abs(number) < np.inf and "_" not in cell else None
 
 
-def _names(
-    path: Path, rows: list[tuple[int, list[str], bool]], width: int
-) -> tuple[list[str], list[str]]:
+def _names(path: Path, rows: list[_Row], width: int) -> tuple[list[str], list[str]]:
     """Names of the columns and their units, from the lines before the first row of numbers."""
-    plain = [(k, cells) for k, cells, comment in rows if not comment]
-    fitting = [cells for _, cells in plain if len(cells) == width]
-    if rows and not fitting and len(rows[-1][1]) == width > 1:
-        fitting = [rows[-1][1]]  # the names are a comment, as NumPy and ROS write them
-    elif plain and len(plain[-1][1]) != width and (fitting or len(plain[-1][1]) > 1):
-        k, cells = plain[-1]
+    plain = [row for row in rows if not row.comment]
+    fitting = [row.cells for row in plain if len(row.cells) == width]
+    if rows and not fitting and len(rows[-1].cells) == width > 1:
+        fitting = [rows[-1].cells]  # the names are a comment, as NumPy and ROS write them
+    elif plain and (found := len(plain[-1].cells)) != width and (fitting or found > 1):
         raise ProblemError(
-            f"{path}, line {k}, has {len(cells)} cells, and the lines below have {width}: write a "
-            f"name for each column and a "
-            "number for each name, with decimal points, or semicolons between, if numbers have "
-            "decimal commas."
+            f"{path}, line {plain[-1].line}, has {found} cells, and the lines below have {width}: "
+            f"write a name for each column and a number for each name, with decimal points, or "
+            f"semicolons between, if numbers have decimal commas."
         )
     units = [""] * width
     if len(fitting) > 1 and all(

@@ -75,8 +75,8 @@ def balanced_variables(
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     else:
         x[layout.speed] = speed
-        shapes = shapes._replace(rates=rates, delta=slow * speed if relative else slow)
-        _lift(control, layout, x, shapes, z, theta_0 + pose.theta_on(mesh))
+        slows = slow * speed if relative else np.full(mesh.n_point, slow)
+        _lift(control, layout, x, (angles, rates, z), slows, theta_0 + pose.theta_on(mesh))
     return x
 
 
@@ -84,25 +84,26 @@ def _lift(
     control: ControlProblem,
     layout: Layout,
     x: np.ndarray,
-    shapes: Shapes,
-    z: np.ndarray,
+    motion: tuple[np.ndarray, np.ndarray, np.ndarray],
+    delta: np.ndarray,
     theta: np.ndarray,
 ) -> None:
-    """Set the variables of the links, from the motion of the tail and its orientations
-    ``(1, n_point)``."""
+    """Set the variables of the links, from joint angles, rates and tail velocities, and delta and
+    the tail's orientations ``(n_point,)``."""
+    angles, rates, z = motion
     dynamics = control.dynamics.in_speeds_of(RADIANS)
     body, law, pull = dynamics.body, dynamics.law, _pull(dynamics.regime)
     assert isinstance(body, Links)
-    posture = body.posture(shapes.angles)
-    link = body.velocity(posture, shapes.rates, z)
+    posture = body.posture(angles)
+    link = body.velocity(posture, rates, z)
     axes = np.exp(1j * theta)
     along = axes * (posture.cos + 1j * posture.sin)  # directions of the links, complex
     velocity, place = (link.vs + 1j * link.vn) * along, axes * (posture.x + 1j * posture.y)
-    friction = body.forces(law, shapes.angles, shapes.rates, z, shapes.delta)
+    friction = body.forces(law, angles, rates, z, delta[None])
     on_link = body.contact.on_links(friction)
     mass = body.mass_column()
     force = (on_link.tangential + 1j * on_link.normal) * along + mass * pull
-    x[layout.directions] = theta + body.tangent_angles(shapes.angles)
+    x[layout.directions] = theta + body.tangent_angles(angles)
     x[layout.spins] = link.w
     x[layout.vx], x[layout.vy] = velocity.real, velocity.imag
     x[layout.friction] = friction

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,8 +30,7 @@ _NARROWEST = 1e-9
 _MOST_PANELS = 20_000
 
 
-@dataclass(frozen=True, eq=False)
-class Rates:
+class Rates(NamedTuple):
     """Velocities at instants, arrays that end in the same shape: tail velocity ``(3, ...)``,
     velocity of the centre of mass in the body frame (complex; turned back evenly by the turn of a
     period), and ``(1 + k, ...)`` power and densities of k quantities."""
@@ -39,17 +39,9 @@ class Rates:
     centre: np.ndarray
     gained: np.ndarray
 
-    def of(self, chosen: np.ndarray) -> Rates:
-        """Those of some intervals."""
-        return Rates(self.z[:, chosen], self.centre[chosen], self.gained[:, chosen])
-
-    def joined(self, other: Rates) -> Rates:
-        """Those of these intervals, then of others."""
-        z, gained = (
-            np.concatenate(pair, axis=1)
-            for pair in ((self.z, other.z), (self.gained, other.gained))
-        )
-        return Rates(z, np.concatenate([self.centre, other.centre]), gained)
+    def of(self, panels: np.ndarray) -> Rates:
+        """Those at the nodes of some panels."""
+        return Rates(*(each[..., panels, :] for each in self))
 
 
 def rates_at(
@@ -68,14 +60,8 @@ def rates_at(
     time where several motions are balanced."""
     angles, rates = path(t.ravel())
     if near is None:
-        start = on_one_branch(
-            body,
-            friction,
-            angles,
-            rates,
-            delta,
-            body.solve(friction, angles, rates, delta).require().z,
-        )
+        z = body.solve(friction, angles, rates, delta).require().z
+        start = on_one_branch(body, friction, angles, rates, delta, z)
     else:
         start = near.reshape(3, -1)
     solved = body.solve(friction, angles, rates, delta, start=start).require()
@@ -140,16 +126,11 @@ def increments(
 class FineMotion:
     """The motion of a gait over its solved part."""
 
-    edges: np.ndarray
-    """Panel edges, ``(n + 1,)``."""
-    rates: Rates
-    """At the panel nodes, ``(n, s)``."""
-    theta: np.ndarray
-    path: np.ndarray
-    """Orientation, and displacement in the lab (complex, starting with orientation 0) at the edges,
-    ``(n + 1,)`` each."""
-    totals: np.ndarray
-    """Work and quantities up to the edges, ``(1 + k, n + 1)``."""
+    edges: np.ndarray  # of panels, (n + 1,)
+    rates: Rates  # at the panel nodes, (n, s)
+    theta: np.ndarray  # orientation at the edges
+    path: np.ndarray  # displacement in the lab there (complex, starting with orientation 0)
+    totals: np.ndarray  # work and quantities up to the edges, (1 + k, n + 1)
     unresolved: np.ndarray
     """``(n,)``: relative error of the objective that a panel may still hold: what halving it last
     changed, at its end and half way."""
@@ -164,21 +145,24 @@ class FineMotion:
         """Phases of the panel nodes, ``(n, s)``."""
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
+    def _locate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Panels of phases, where in these they lie, from 0 to 1, and the lengths of all panels."""
+        k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
+        h = np.diff(self.edges)
+        return k, (t - self.edges[k]) / h[k], h
+
     def velocity(self, t: np.ndarray) -> np.ndarray:
         """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``: good
         to start a solve from."""
-        k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
-        weights = PANEL_RULE.lagrange(
-            ((t - self.edges[k]) / np.diff(self.edges)[k]).ravel()
-        ).reshape(*t.shape, -1)
+        k, place, _ = self._locate(t)
+        weights = PANEL_RULE.lagrange(place.ravel()).reshape(*t.shape, -1)
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
     def at(self, t: np.ndarray) -> Increments:
         """Orientation, displacement, work and quantities at phases t ``(n_time,)``, by the panels'
         polynomials."""
-        k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
-        h = np.diff(self.edges)
-        weights = PANEL_RULE.integrals((t - self.edges[k]) / h[k]) * h[k][:, None]
+        k, place, h = self._locate(t)
+        weights = PANEL_RULE.integrals(place) * h[k][:, None]
         omega = self.rates.z[2]
         turn = np.exp(1j * (self.theta[:-1, None] + h[:, None] * (omega @ PANEL_RULE.A.T)))
         moved = turn * self.rates.centre
@@ -200,44 +184,35 @@ def fine_motion(
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> FineMotion:
-    """Integrate a path between the first and the last of `edges` to a relative error of the
-    efficiency, or another objective.
+    """Integrate a path between the first and the last of `edges`, which are those of the first
+    panels, to a relative error of the efficiency, or another objective.
 
-    Parameters
-    ----------
-    body, friction
-    path : callable
-        Joint angles and rates at phases.
-    delta : float
-        Regularisation speed, per period.
-    edges : (n + 1,)
-        First panels; the mesh to be measured is a good choice.
-    tolerance : float
-        Panels are halved until the sum of their disagreements is below this. The sum that remains
-        is in the result.
-    shares : callable
-        From way, work, rotation and quantities to what a small change of each changes in the
-        objective, relative to it.
-    quantities : sequence of Quantity
-        What is asked for besides.
-    turn : float
-        That a period is asked for [rad]: the way is seen from axes that turn evenly
-        (`colloc.gaits.period`).
-
-    Raises
-    ------
-    NotConvergedError
-        If the balance cannot be solved at some instant.
+    Panels are halved until the sum of their disagreements is below the tolerance; what remains is
+    in the result. `shares` makes of way, work, rotation and quantities what a small change of each
+    changes in the objective, relative to it. The way is seen from axes that turn evenly, by `turn`
+    a period (`colloc.gaits.period`). `NotConvergedError` if the balance cannot be solved at some
+    instant.
     """
+    asked: Any = {"quantities": quantities, "turn": turn}
 
     def solved(
         left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None
     ) -> tuple[Rates, Increments]:
         nodes = left[:, None] + width[:, None] * PANEL_RULE.c
-        rates = rates_at(
-            body, friction, path, delta, nodes, near=near, quantities=quantities, turn=turn
-        )
+        rates = rates_at(body, friction, path, delta, nodes, near=near, **asked)
         return rates, increments(PANEL_RULE, width, rates)
+
+    def error_weights(parts: Increments) -> tuple[list[float], float, float]:
+        """What a change of the work and quantities, of displacement and of rotation in a panel
+        changes in the objective, relative."""
+        turned, travelled, totals = _accumulated(parts)
+        period = dict(zip(names, totals[:, -1], strict=True))
+        period |= {"distance": max(abs(travelled[-1]), 1e-300), "rotation": turned[-1]}
+        period["work"] = max(period["work"], 1e-300)
+        share = {name: abs(value) for name, value in shares(period).items()}
+        reach = np.abs(travelled - travelled[-1]).max()
+        on_spin = share["distance"] * reach + share["rotation"]
+        return [share.get(name, 0.0) for name in names], share["distance"], on_spin
 
     names = "work", *(quantity.name for quantity in quantities)
     left, width = edges[:-1], np.diff(edges)
@@ -250,8 +225,7 @@ def fine_motion(
         chosen = np.sort(order[(tail > tolerance) & (width[order] > _NARROWEST)])
         if chosen.size == 0 or left.size + chosen.size > _MOST_PANELS:
             break
-        half = 0.5 * np.repeat(width[chosen], 2)
-        start = np.repeat(left[chosen], 2)
+        half, start = 0.5 * np.repeat(width[chosen], 2), np.repeat(left[chosen], 2)
         start[1::2] += half[1::2]
         if friction.associated:
             near = (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1)
@@ -263,55 +237,38 @@ def fine_motion(
         new_rates, new = solved(start, half, near)
         middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
         # the whole panel, and its polynomials half way, against the two halves
-        spin, move = (
-            new[0][0::2] + new[0][1::2],
-            new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2],
-        )
-        sums = list(zip(new[2:], parts[2:], strict=True))
+        first, second = ([part[k::2] for part in new] for k in (0, 1))
+        second[1] = np.exp(1j * first[0]) * second[1]
+        both = [one + other for one, other in zip(first, second, strict=True)]
+        pairs = zip(both, (part[chosen] for part in parts), strict=True)
         differences = (
-            (
-                spin - parts[0][chosen],
-                move - parts[1][chosen],
-                *(n[0::2] + n[1::2] - p[chosen] for n, p in sums),
-            ),
-            tuple(
-                half - polynomial
-                for half, polynomial in zip((a[0::2] for a in new), middle, strict=True)
-            ),
+            [halves - whole for halves, whole in pairs],
+            [half_way - polynomial for half_way, polynomial in zip(first, middle, strict=True)],
         )
-        kept = np.ones(left.size, dtype=bool)
-        kept[chosen] = False
+        kept = np.setdiff1d(np.arange(left.size), chosen)
         place = np.argsort(np.concatenate([left[kept], start]))
-        rates = rates.of(kept).joined(new_rates).of(place)
-        parts = tuple(np.concatenate([a[kept], b])[place] for a, b in zip(parts, new, strict=True))
-        turned, travelled, totals = _accumulated(parts)
-        known = dict(zip(names, totals[:, -1], strict=True))
-        known |= {"distance": max(abs(travelled[-1]), 1e-300), "rotation": turned[-1]}
-        share = {k: abs(s) for k, s in shares(known | {"work": max(known["work"], 1e-300)}).items()}
-        on_spin = share["distance"] * np.abs(travelled - travelled[-1]).max() + share["rotation"]
+
+        def merged(old: np.ndarray, new: np.ndarray, kept: Any = kept, place: Any = place) -> Any:
+            return np.concatenate([old[kept], new])[place]
+
+        joined = zip(rates.of(kept), new_rates, strict=True)
+        rates = Rates(*(np.concatenate(pair, axis=-2) for pair in joined)).of(place)
+        parts = tuple(merged(old, added) for old, added in zip(parts, new, strict=True))
+        on_sums, on_move, on_spin = error_weights(parts)
         change = sum(
-            np.abs(move) * share["distance"]
+            np.abs(move) * on_move
             + np.abs(spin) * on_spin
-            + sum(
-                np.abs(part) * share.get(name, 0.0)
-                for name, part in zip(names, gained, strict=True)
-            )
+            + sum(np.abs(part) * share for share, part in zip(on_sums, gained, strict=True))
             for spin, move, *gained in differences
         )
-        gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
-        left, width = (
-            np.concatenate([left[kept], start])[place],
-            np.concatenate([width[kept], half])[place],
-        )
+        gap = merged(gap, np.repeat(0.5 * change, 2))
+        left, width = merged(left, start), merged(width, half)
     return FineMotion(np.append(left, edges[-1]), rates, *_accumulated(parts), gap)
 
 
 def _accumulated(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Orientation, lab displacement, and work and quantities at the edges, from every interval's
     own."""
-    theta, *totals = (np.concatenate([[0.0], np.cumsum(a)]) for a in (parts[0], *parts[2:]))
-    return (
-        theta,
-        np.concatenate([[0.0], np.cumsum(np.exp(1j * theta[:-1]) * parts[1])]),
-        np.stack(totals),
-    )
+    theta, *totals = (np.append(0.0, np.cumsum(part)) for part in (parts[0], *parts[2:]))
+    moved = np.exp(1j * theta[:-1]) * parts[1]
+    return theta, np.append(0.0, np.cumsum(moved)), np.stack(totals)

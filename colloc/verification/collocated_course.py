@@ -33,18 +33,19 @@ from colloc.motion.kinds import (
 )
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import totals_along
-from colloc.verification.inertial_motion import amplified, gait_with_inertia
+from colloc.verification.inertial_motion import GaitWithInertia, amplification
 from colloc.verification.played import LEAST
 from colloc.verification.slope import gait_on_slope
 
 
 class CourseOfGait(NamedTuple):
-    """A gait's motion by the differential equation: momenta if they are states, theta, place, work
-    against friction, ``(4 or 7, n)``, at phases in order, seen from axes that turn evenly; and
-    about the error of these."""
+    """A gait's motion by the differential equation."""
 
     at: Callable[[np.ndarray], np.ndarray]
+    """Momenta if they are states, theta, place, work against friction, ``(4 or 7, n)``, at phases
+    in order, seen from axes that turn evenly."""
     error: float
+    """About that of these states."""
     sums: Callable[[np.ndarray], np.ndarray] | None = None
     """Quantities that forces are needed for up to phases in order, ``(k, n)``; None if there are
     none."""
@@ -68,7 +69,8 @@ def course(
 def course_in(
     regime: Regime, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
 ) -> CourseOfGait:
-    """The same in a regime; that of another is registered with ``course_in.register``."""
+    """The motion of a gait in a regime; that of another is registered with
+    ``course_in.register``."""
     raise NotImplementedError(
         f"no differential equation is known for {type(regime).__name__}: register one."
     )
@@ -79,9 +81,8 @@ def _on_slope(
     regime: Slope, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
 ) -> CourseOfGait:
     asked = [each for each in control.aims.integrals if each.needs_forces]
-    on = gait_on_slope(
-        control.dynamics.body, control.dynamics.law, gait, delta, regime.grade, gait.corner_phases
-    )
+    body, law, *_ = control.dynamics
+    on = gait_on_slope(body, law, gait, delta, regime.grade, gait.corner_phases)
     ran = on.followed(np.array([gait.theta]), error)
     return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
 
@@ -90,18 +91,18 @@ def _on_slope(
 def _with_inertia(
     regime: Paced, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
 ) -> CourseOfGait:
-    dynamics = control.dynamics
-    at, regime = (dynamics.body, dynamics.law, gait, delta), regime.at(gait)
-    played = gait_with_inertia(
-        *at, froude=regime.froude, breaks=(), turn=dynamics.turn, regime=regime
-    )
-    kind: Any = kind_of_motion(dynamics)
-    begin, _, slopes = played.closed(
-        kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)).edges[:, 0]
-    )
-    times = 1.0 + np.abs(amplified(slopes)).sum(axis=1).max()
-    ran = played.periodic_run(begin, max(error / times, LEAST), slopes)
+    dynamics, regime, kind = control.dynamics, regime.at(gait), _kind(control)
+    how: Any = {"froude": regime.froude, "turn": dynamics.turn, "regime": regime}
+    moving = GaitWithInertia(dynamics.body, dynamics.law, gait, delta, **how)
+    along = kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait))
+    begin, _, slopes = moving.rough_period(along.edges[:, 0])
+    times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
+    ran = moving.periodic_run(begin, max(error / times, LEAST), slopes)
     return CourseOfGait(ran.course.at, times * ran.aim, alone=kind.alone)
+
+
+def _kind(control: ControlProblem) -> Any:
+    return kind_of_motion(control.dynamics)
 
 
 def _shapes(gait: Any, mesh: Mesh, delta: float) -> Shapes:
@@ -114,37 +115,30 @@ class _Collocated(NamedTuple):
 
     along: Along
     pose: CollocatedPose
-    work: np.ndarray
-    """Against friction, ``(n,)``."""
+    work: np.ndarray  # against friction, (n,)
     integrals: dict[str, np.ndarray]
     period: dict[str, float]
 
 
 def _collocated(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> _Collocated:
-    kind = kind_of_motion(control.dynamics)
-    own, weights = (
-        kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait)),
-        stage_weights(mesh),
-    )
-    pose = CollocatedPose.on_mesh(
-        mesh, own.z[OMEGA] - kind.turn, own.now.centre, first_theta(kind, own.begin)
-    )
-    now = kind.instants(_shapes(gait, mesh, delta), pose.theta_on(mesh), own.z)
-    spent = (weights * own.now.power[mesh.points]).sum(axis=1)
-    summed = {
+    kind, shapes, weights = _kind(control), _shapes(gait, mesh, delta), stage_weights(mesh)
+    along = kind.along(mesh, shapes, begin_of(kind, gait))
+    theta = first_theta(kind, along.begin)
+    pose = CollocatedPose.on_mesh(mesh, along.z[OMEGA] - kind.turn, along.now.centre, theta)
+    now = kind.instants(shapes, pose.theta_on(mesh), along.z)
+    work = (weights * along.now.power[mesh.points]).sum(axis=1)
+    sums = {
         each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1)
         for each in control.aims.integrals
     }
-    passed = Passed(
-        complex(pose.place[-1]), float(pose.rotations.sum()), float(spent.sum()), own.begin
-    )
-    return _Collocated(own, pose, spent, summed, _period(kind, passed, summed))
+    way, turn = complex(pose.place[-1]), float(pose.rotations.sum())
+    period = _period(kind, Passed(way, turn, float(work.sum()), along.begin), sums)
+    return _Collocated(along, pose, work, sums, period)
 
 
-def _period(kind: Kind, passed: Passed, summed: dict[str, np.ndarray]) -> dict[str, float]:
-    return kind.counted(passed) | {
-        name: kind.periods * float(part.sum()) for name, part in summed.items()
-    }
+def _period(kind: Kind, passed: Passed, sums: dict[str, np.ndarray]) -> dict[str, float]:
+    totals = {name: kind.periods * float(part.sum()) for name, part in sums.items()}
+    return kind.counted(passed) | totals
 
 
 def course_defects(
@@ -153,59 +147,49 @@ def course_defects(
     """Errors of collocating a gait whose motion has states, delta per period, by the names of
     `colloc.verification.mesh_error.MeshError`: of the work against friction, and none of
     velocities."""
-    kind, objective = kind_of_motion(control.dynamics), control.aims.objective
-    own, pose, spent, summed, other = _collocated(control, mesh, gait, delta)
+    kind, objective = _kind(control), control.aims.objective
+    along, pose, collocated_work, sums, other = _collocated(control, mesh, gait, delta)
     at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
-    true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), own.begin)
-    known, followed = (
-        {},
-        iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1)),
-    )
-    for each in control.aims.integrals:
-        known[each.name] = (
-            next(followed)
-            if each.needs_forces
-            else totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
-        )
+    true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), along.begin)
+    with_forces = iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
+    known = {
+        each.name: next(with_forces)
+        if each.needs_forces
+        else totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
+        for each in control.aims.integrals
+    }
     period = _period(kind, true, known)
-    aims, value = objective.shares(period), np.zeros(mesh.n)
-    rotation, energy, displacement = (
-        pose.rotations - theta,
-        spent - work,
-        np.diff(pose.place) - (x + 1j * y),
-    )
+    weights, value = objective.shares(period), np.zeros(mesh.n)
+    rotation, energy = pose.rotations - theta, collocated_work - work
+    displacement = np.diff(pose.place) - (x + 1j * y)
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     if exact.alone is not None:
         shapes = _shapes(gait, mesh, delta)
         # momenta, perhaps theta
         edge_states, near = (at[: len(kind.states)] for at in (at_edges, exact.at(mesh.times)))
-        out, ends, alone = exact.alone(mesh, shapes, own, edge_states[:, :-1], near)
+        out, ends, alone = exact.alone(mesh, shapes, along, edge_states[:, :-1], near)
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
-        here, spent_alone = (
-            np.exp(1j * angle[:-1]),
-            (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1),
-        )
-        # an error of rotation turns everything after it, and by half of it the direction that
-        # counts
-        rest = (place[0] - place[0][0]) + 1j * (place[1] - place[1][0])
-        rotation, energy = local.rotations - theta, spent_alone - work
-        displacement = here * local.displacements - (x + 1j * y)
+        rotation = local.rotations - theta
+        energy = (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1) - work
+        displacement = np.exp(1j * angle[:-1]) * local.displacements - (x + 1j * y)
         if not kind.states[3:]:
+            # an error of rotation turns everything after it, and by half of it the direction that
+            # counts
+            rest = (place[0] - place[0][0]) + 1j * (place[1] - place[1][0])
             displacement += 1j * rotation * (0.5 * rest[-1] - rest[1:])
-        shares, (_, on_states) = kind.shares(true), kind.slopes(shapes, own)
+        shares, (_, on_states) = kind.shares(true), kind.slopes(shapes, along)
         *_, on_ends = through_motion(kind, mesh, pose, shares.values(), on_states)
-        weights = np.array([aims.get(name, 0.0) for name in shares])
-        value += np.einsum("m,mkn,kn->n", weights, on_ends, ends - edge_states[:, 1:])
+        aims = np.array([weights.get(name, 0.0) for name in shares])
+        value += np.einsum("m,mkn,kn->n", aims, on_ends, ends - edge_states[:, 1:])
         value[~alone] = 1.0
     for name, share in kind.shares(true).items():
         turns = rotation if name == "rotation" else 0.0
-        value += aims.get(name, 0.0) * (
-            (np.conj(share.side) * displacement).real + turns + share.work * energy
-        )
-    value += sum(aims[name] * kind.periods * (summed[name] - known[name]) for name in known)
-    if not own.held.all():
+        way = (np.conj(share.side) * displacement).real
+        value += weights.get(name, 0.0) * (way + turns + share.work * energy)
+    value += sum(weights[name] * kind.periods * (sums[name] - known[name]) for name in known)
+    if not along.held.all():
         value = np.nan * value
     return {
         "rotation": rotation,
@@ -214,6 +198,6 @@ def course_defects(
         "velocity": np.full(mesh.n, np.nan),
         "value": value,
         "total": float(objective(other) / objective(period) - 1),
-        "unresolved": float(exact.error * sum(map(abs, aims.values()))),
+        "unresolved": float(exact.error * sum(map(abs, weights.values()))),
         "turning": turned if control.admissible.gait.symmetry == NONE else 0.0,
     }

@@ -1,10 +1,10 @@
-"""A gait played with inertia, period by period alike: by Adams' and Gear's methods, steps of their
-own, and shooting.
+"""A gait with inertia, over a period of the motion in which all periods are alike: by Adams' and
+Gear's methods, steps of their own, and shooting.
 
-How fast a gait is played matters once the body's mass does. The Froude number Fr = L/(g T^2),
-length over gravity and the period squared, says how much: it is the mass times acceleration of a
-body that covers its length in a period, over its weight. It counts against the coefficient of
-friction. At Fr = 0 this is `colloc.verification.replay.replay`.
+The pace of a gait matters once the body's mass does. The Froude number Fr = L/(g T^2), length over
+gravity and the period squared, says how much: it is the mass times acceleration of a body that
+covers its length in a period, over its weight. It counts against the coefficient of friction. At
+Fr = 0 this is `colloc.verification.replay.replay`.
 
 Nothing is shared with collocation but the forces. The momenta after a period are those before it;
 they are found by Newton's method on the map from one to the other, whose derivatives also say
@@ -26,37 +26,36 @@ from colloc.gaits.period import Period, chord_per_way
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import LENGTH, Quantity, quantities_of
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import checked_mass, momenta
+from colloc.mechanics.inertia import checked_mass, kinetic_energy, momenta, tail_velocity
 from colloc.mechanics.law import Law
 from colloc.motion.compiled_momenta import MomentaAt
 from colloc.motion.follow import ONE_SIDED, STEP, Course, followed
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.played import Numbers, Path, to_tolerance
+from colloc.verification.played import Numbers, Path, Replay, lever, to_tolerance
 
 _ROUGH = 1e-4
 """Error of the runs that say how the momenta at the end depend on those at the start, over the size
 of the momenta; less where friction is so dry that a step would err by more than a tenth of delta:
 then bodies that should rest are shaken to and fro."""
-_APART = 1e-3
-"""How far the runs of that start from each other."""
-_CLOSED = 10.0
+_APART = 1e-3  # distance between the starts of those runs
+_LEFT_OPEN = 10.0
 """Gap between the momenta at start and end that is left open at most, over the error of a run:
 where steps close it no more."""
 _USUAL = 0.125
-"""What the ends of two runs differ by, over the larger of the errors that were asked of their
+"""Difference between the ends of two runs, over the larger of the errors that were asked of their
 steps: at most, in 19 of 20."""
-_MOST_PERIODS = 30
+_MOST_STEPS = 30
+_OTHER = 1e-2  # momenta [body lengths per period] by which two motions differ that are not one
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
 
 @dataclass(frozen=True, eq=False)
 class InertialMotion(Period):
-    """A gait played with inertia, over one period of the motion in which all periods are alike.
+    """A gait with inertia, over one period of the motion in which all periods are alike.
 
     The work is that against friction [weight x length]; errors are those of
     `GaitWithInertia.errors`.
@@ -90,59 +89,74 @@ class InertialMotion(Period):
         return bool(np.abs(self.multipliers).max() < 1.0)
 
 
+class RoughPeriod(NamedTuple):
+    """A period that leaves the momenta as they are, but for the error of rough runs."""
+
+    momenta: np.ndarray  # at the start, (3,)
+    ends: np.ndarray  # states at the start and the end, (7, 2)
+    slopes: np.ndarray  # of the states at the end by the momenta at the start, (7, 3)
+
+
+class PeriodicRun(NamedTuple):
+    """A period that leaves the momenta as they are, to an error `aim`."""
+
+    course: Course
+    momenta: np.ndarray
+    """At the start of one that would close the gap that is left, ``(3,)``: where a body glides far
+    they are much further away than the gap is wide."""
+    aim: float
+
+    @property
+    def ends(self) -> np.ndarray:
+        """States at the start and the end, ``(7, 2)``."""
+        return self.course.states[:, [0, -1]]
+
+
 class GaitWithInertia:
-    """A gait of a chain, and how fast it is played.
+    """A gait of a chain at a Froude number.
 
     Parameters
     ----------
-    body, friction, path, delta
+    body, friction, gait, delta
     froude : float
     breaks : tuple of float
-        Phases in (0, 1), ascending, at which the rates jump.
+        Phases in (0, 1) at which the rates jump.
     turn : float
         That a period is asked for [rad].
     regime : Regime
         Whose weight pulls, as on a slope; then orientations are from straight uphill.
-    theta : float
-        Angle of the tail link at first [rad].
+
+    Raises
+    ------
+    ProblemError
+        If the body cannot move with inertia.
     """
 
     def __init__(
         self,
-        body: Chain,
+        body: Body,
         friction: Law,
-        path: Path,
+        gait: Path,
         delta: float,
         *,
         froude: float,
-        breaks: tuple[float, ...] = (),
+        breaks: np.ndarray | tuple[float, ...] = (),
         turn: float = 0.0,
         regime: Regime = LEVEL,
-        theta: float = 0.0,
     ) -> None:
-        self.body, self.friction, self.path, self.delta = body, friction, path, delta
-        self.froude, self.breaks, self.turn, self.regime, self.theta = (
-            froude,
-            breaks,
-            turn,
-            regime,
-            theta,
-        )
+        self.body, self.path = checked_mass(body), gait
+        self.friction, self.delta, self.froude = friction, delta, float(froude)
+        self.breaks, self.turn, self.regime = tuple(sorted(map(float, breaks))), turn, regime
+        self.theta = float(getattr(gait, "theta", None) or 0.0)  # of the tail link at first
         self._rough = min(_ROUGH, 0.1 * delta / STEP)
-        self._momenta_of = lru_cache(partial(MomentaAt, body, friction, delta, froude))
+        self._momenta_of = lru_cache(partial(MomentaAt, self.body, friction, delta, self.froude))
 
-    def slow_momenta(self) -> np.ndarray:
-        """Those at the start of the period if the gait is played slowly on the level, ``(3,)``:
-        where to begin."""
-        angles, rates = self.path(np.full(1, ONE_SIDED))
-        return self.momenta(
-            solve_balance(self.body, self.friction, angles, rates, self.delta).require().z
-        )
-
-    def momenta(self, z: np.ndarray) -> np.ndarray:
+    def momenta(self, z: np.ndarray | None = None) -> np.ndarray:
         """Those at the start of the period, ``(3,)``, where the tail link has a velocity ``(3,
-        1)``."""
+        1)``; by default as if the gait were played slowly on the level."""
         angles, rates = self.path(np.full(1, ONE_SIDED))
+        if z is None:
+            z = solve_balance(self.body, self.friction, angles, rates, self.delta).require().z
         posture = self.body.posture(angles)
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
@@ -154,57 +168,83 @@ class GaitWithInertia:
     def _run(self, begin: np.ndarray, aim: float) -> Course:
         """Several such motions with the same steps, from states ``(n, 7)``."""
 
-        def slope(t: float, states: np.ndarray, _: None) -> tuple[np.ndarray, None]:
+        def rates(t: float, states: np.ndarray, _: None) -> tuple[np.ndarray, None]:
             return self._rates(t, states.reshape(begin.shape)).ravel(), None
 
-        return followed(slope, begin.ravel(), aim, self.breaks)
+        return followed(rates, begin.ravel(), aim, self.breaks)
 
-    def mapped(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States before and after a period ``(7, 2)``, and derivatives of the latter with respect
-        to the momenta before it, ``(7, 3)``, by differences."""
+    def _at(self, t: float, states: np.ndarray) -> np.ndarray:
+        """What `colloc.motion.compiled_momenta` says of a phase and n momenta, with the weight's
+        pull, ``(n, 9)``."""
+        angles, rates = self.path(np.array([t]))
+        now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
+        if self.regime.slides:
+            pull: Any = self.regime.pull(states[None, :, _THETA])
+            now[:, -3:-1] += pull.T / self.froude
+        return now
+
+    def _rates(self, t: float, states: np.ndarray) -> np.ndarray:
+        now, rates = self._at(t, states), np.empty(states.shape)
+        moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
+        rates[:, _MOMENTA], rates[:, _THETA] = now[:, 6:], now[:, 2] - self.turn
+        rates[:, 4], rates[:, 5], rates[:, _WORK] = moved.real, moved.imag, now[:, 5]
+        return rates
+
+    def totals(self, states: np.ndarray) -> Numbers:
+        """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the
+        last."""
+        change = states[:, -1] - states[:, 0]
+        way = self.regime.counted(complex(*change[_PLACE]))
+        return {
+            "distance": chord_per_way(self.turn) * way.real,
+            "work": float(change[_WORK] + self.regime.grade * change[_PLACE][0]),
+            "rotation": float(change[_THETA]) + self.turn,
+        }
+
+    def period_map(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States before and after a period ``(7, 2)``, and derivatives of the latter by the momenta
+        before it, ``(7, 3)``, by differences."""
         begin = np.zeros((4, 7))
-        begin[:, _MOMENTA], begin[:, _THETA] = (
-            start + np.vstack([np.zeros(3), _APART * np.eye(3)]),
-            self.theta,
-        )
+        begin[:, _MOMENTA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)])
+        begin[:, _THETA] = self.theta
         end = self._run(begin, self._rough).states[:, -1].reshape(begin.shape)
         return np.stack([begin[0], end[0]], axis=1), (end[1:] - end[0]).T / _APART
 
-    def closed(self, near: np.ndarray) -> Closed:
-        """A period near some momenta that leaves them as they are, but for the error of rough
-        runs."""
+    def rough_period(self, near: np.ndarray) -> RoughPeriod:
+        """A period near some momenta that leaves them as they are."""
         start = near
-        for _ in range(_MOST_PERIODS):
-            ends, slopes = self.mapped(start)
+        for _ in range(_MOST_STEPS):
+            ends, slopes = self.period_map(start)
             step = _newton_step(ends[_MOMENTA, 1] - start, slopes)
             start = start + step
-            if np.abs(step).max() < _CLOSED * self._rough:
-                return Closed(start, ends, slopes)
+            if np.abs(step).max() < _LEFT_OPEN * self._rough:
+                return RoughPeriod(start, ends, slopes)
         raise NotConvergedError(
             f"at a Froude number of {self.froude:g} no motion was found in which all periods are "
             f"alike; try a smaller one."
         )
 
-    def closed_from(self, near: np.ndarray | None) -> Closed:
-        """`closed` near some momenta; where they are not given or lead nowhere, near the slow ones,
-        or near none: a body that friction hardly brakes keeps what it begins with at rest."""
-        for begin in (lambda: near, self.slow_momenta):
+    def find_period(self, near: np.ndarray | None = None) -> RoughPeriod:
+        """`rough_period` near some momenta; where they are not given or lead nowhere, near the slow
+        ones, or near none: a body that friction hardly brakes keeps what it begins with at rest."""
+        if near is not None:
             with suppress(NotConvergedError):
-                if (momenta := begin()) is not None:
-                    return self.closed(momenta)
-        return self.closed(np.zeros(3))
+                return self.rough_period(near)
+        with suppress(NotConvergedError):
+            return self.rough_period(self.momenta())
+        return self.rough_period(np.zeros(3))
 
     def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
-        """A period that leaves the momenta as they are, to an error, sought near those of `closed`,
-        with its derivatives."""
+        """A period that leaves the momenta as they are, to an error, sought near those of a
+        `RoughPeriod`, with its derivatives."""
         start, before = near, np.inf
-        for _ in range(_MOST_PERIODS):
-            ran = self.run(start, aim)
-            gap = ran.states[_MOMENTA, -1] - start
+        for _ in range(_MOST_STEPS):
+            course = self.run(start, aim)
+            gap = course.states[_MOMENTA, -1] - start
             step = _newton_step(gap, slopes)
             start, size = start + step, np.abs(step).max()
-            if size < aim or (before <= size and np.abs(gap).max() < _CLOSED * aim):
-                return PeriodicRun(ran, start, aim)
+            if size < aim or (before <= size and np.abs(gap).max() < _LEFT_OPEN * aim):
+                return PeriodicRun(course, start, aim)
             before = size
         raise NotConvergedError(
             f"at a Froude number of {self.froude:g} the periods do not become alike; try a "
@@ -212,7 +252,7 @@ class GaitWithInertia:
         )
 
     def errors(self, ran: PeriodicRun, before: PeriodicRun, slopes: np.ndarray) -> Numbers:
-        """How wrong `passed` of a run may be, seen from one whose steps might err more.
+        """Errors of the `totals` of a run, seen from one whose steps might err more.
 
         From a start s a run ends at F(s) + e, F being the exact map of a period, and e what its
         steps err by. The true motion starts where the momenta are those at the end, s* = F(s*); so
@@ -231,112 +271,24 @@ class GaitWithInertia:
     def changes(
         self, ends: np.ndarray, slopes: np.ndarray, steps: np.ndarray, gap: np.ndarray
     ) -> Numbers:
-        """Of `passed` between states ``(7, 2)``, where those at the end err by `steps` ``(7,)``,
-        and momenta do not close by a gap ``(3,)``."""
-        off = np.column_stack([np.diag(steps), amplified(slopes) * (steps[_MOMENTA] + gap)])
-        numbers, changed = (
-            self.passed(ends),
-            [self.passed(np.column_stack([ends[:, 0], ends[:, 1] + each])) for each in off.T],
-        )
-        return {
-            name: sum(abs(each[name] - value) for each in changed)
-            for name, value in numbers.items()
-        }
-
-    def _at(self, t: float, states: np.ndarray) -> np.ndarray:
-        """What `colloc.motion.compiled_momenta` says of a phase and n momenta, with the weight's
-        pull, ``(n, 9)``."""
-        angles, rates = self.path(np.array([t]))
-        now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
-        if self.regime.slides:
-            pull: Any = self.regime.pull(states[None, :, _THETA])
-            now[:, -3:-1] += pull.T / self.froude
-        return now
-
-    def _rates(self, t: float, states: np.ndarray) -> np.ndarray:
-        """Of `InertialMotion.states` ``(n, 7)`` at a phase."""
-        now, rates = self._at(t, states), np.empty(states.shape)
-        moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
-        rates[:, _MOMENTA], rates[:, _THETA], rates[:, _WORK] = (
-            now[:, 6:],
-            now[:, 2] - self.turn,
-            now[:, 5],
-        )
-        rates[:, 4], rates[:, 5] = moved.real, moved.imag
-        return rates
-
-    def passed(self, states: np.ndarray) -> dict[str, float]:
-        """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the
-        last."""
-        gone = states[:, -1] - states[:, 0]
-        way = self.regime.counted(complex(*gone[_PLACE]))
-        work = float(gone[_WORK] + self.regime.grade * gone[_PLACE][0])
-        return {
-            "distance": chord_per_way(self.turn) * way.real,
-            "work": work,
-            "rotation": float(gone[_THETA]) + self.turn,
-        }
+        """Changes of `totals` between states ``(7, 2)``, where those at the end err by `steps`
+        ``(7,)``, and momenta do not close by a gap ``(3,)``."""
+        off = np.column_stack([np.diag(steps), amplification(slopes) * (steps[_MOMENTA] + gap)])
+        start, end = ends.T
+        totals = self.totals(ends)
+        changed = [self.totals(np.column_stack([start, end + each])) for each in off.T]
+        return {x: sum(abs(other[x] - value) for other in changed) for x, value in totals.items()}
 
 
-class Closed(NamedTuple):
-    """A period that leaves the momenta as they are, but for the error of rough runs."""
-
-    momenta: np.ndarray
-    """At the start, ``(3,)``."""
-    ends: np.ndarray
-    """States at the start and the end, ``(7, 2)``, about."""
-    slopes: np.ndarray
-    """Of the states at the end with respect to the momenta at the start, ``(7, 3)``."""
-
-
-class PeriodicRun(NamedTuple):
-    """A period that leaves the momenta as they are, to an error."""
-
-    course: Course
-    momenta: np.ndarray
-    """At the start of one that would close the gap that is left, ``(3,)``: where a body glides far
-    they are much further away than the gap is wide."""
-    aim: float
-
-    @property
-    def ends(self) -> np.ndarray:
-        """States at the start and the end, ``(7, 2)``."""
-        return self.course.states[:, [0, -1]]
-
-
-def amplified(slopes: np.ndarray) -> np.ndarray:
-    """Derivatives ``(7, 3)`` of the states at the end of a period with respect to what every period
-    adds to the momenta."""
+def amplification(slopes: np.ndarray) -> np.ndarray:
+    """Derivatives ``(7, 3)`` of the states at the end of a period by what every period adds to the
+    momenta."""
     return np.asarray(np.linalg.solve(np.eye(3) - slopes[_MOMENTA].T, slopes.T).T)
 
 
 def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """To where a period changes nothing."""
     return np.linalg.solve(np.eye(3) - slopes[_MOMENTA], gap)
-
-
-def gait_with_inertia(
-    body: Body,
-    friction: Law,
-    gait: Path,
-    delta: float,
-    *,
-    froude: float,
-    breaks: np.ndarray | tuple[float, ...],
-    turn: float = 0.0,
-    regime: Regime = LEVEL,
-) -> GaitWithInertia:
-    """A gait of a body, or a `ProblemError` that says why it cannot be played with inertia."""
-    chain, at = checked_mass(body), tuple(sorted(float(t) for t in breaks))
-    theta = float(getattr(gait, "theta", None) or 0.0)
-    how: Any = {
-        "froude": float(froude),
-        "breaks": at,
-        "turn": turn,
-        "regime": regime,
-        "theta": theta,
-    }
-    return GaitWithInertia(chain, friction, gait, delta, **how)
 
 
 def inertial_motion(
@@ -354,7 +306,7 @@ def inertial_motion(
     regime: Regime = LEVEL,
     near: np.ndarray | None = None,
 ) -> InertialMotion:
-    """Play a gait with inertia, once the body has settled to a motion in which all periods are
+    """Move a body by a gait with inertia, once it has settled to a motion in which all periods are
     alike.
 
     Parameters
@@ -406,41 +358,93 @@ def inertial_motion(
     (0.136, True)
     """
     check_finite(positive=True, froude=froude, delta=delta)
-    played = gait_with_inertia(
+    moving = GaitWithInertia(
         body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime
     )
-    start, ends, slopes = played.closed_from(near)
+    start, ends, slopes = moving.find_period(near)
     totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
     period = {"period": float(froude) ** -0.5}
 
     def run(aim: float) -> tuple[PeriodicRun, Numbers]:
         nonlocal start
-        ran = played.periodic_run(start, aim, slopes)
+        ran = moving.periodic_run(start, aim, slopes)
         start = ran.momenta
-        return ran, played.passed(ran.ends) | period
+        return ran, moving.totals(ran.ends) | period
 
     # runs that cannot be the last but one are left out
-    usual = played.changes(ends, slopes, np.full(7, _USUAL * tolerance), np.zeros(3))
-    lost = objective.relative_error(played.passed(ends) | period | totals[0], usual)
+    usual = moving.changes(ends, slopes, np.full(7, _USUAL * tolerance), np.zeros(3))
+    lost = objective.relative_error(moving.totals(ends) | period | totals[0], usual)
     first = tolerance / max(1.0, lost / tolerance)
-    ran, values, errors = to_tolerance(
-        run, first, objective, tolerance, totals, partial(played.errors, slopes=slopes)
-    )
-    multipliers, course = np.linalg.eigvals(slopes[_MOMENTA]), ran.course
-    return InertialMotion(
-        values, errors, {}, froude, multipliers, phases=course.phases, states=course.states
+    errors_of = partial(moving.errors, slopes=slopes)
+    ran, values, errors = to_tolerance(run, first, objective, tolerance, totals, errors_of)
+    multipliers, (phases, states, _) = np.linalg.eigvals(slopes[_MOMENTA]), ran.course
+    return InertialMotion(values, errors, {}, froude, multipliers, phases, states)
+
+
+def inertial_replay(
+    body: Body,
+    friction: Law,
+    gait: Path,
+    delta: float,
+    *,
+    regime: Regime,
+    tolerance: float = 1e-6,
+    breaks: np.ndarray | tuple[float, ...] = (),
+    objective: Objective = EFFICIENCY,
+    turn: float = 0.0,
+    quantities: Iterable[Quantity | str] = (),
+    near: Replay | None = None,
+    **_: object,
+) -> Replay:
+    """A period of a gait with inertia as a certificate asks for it: arguments are as of
+    `colloc.verification.replay.replay`; the regime says its pace.
+
+    What a body comes to that sets out from rest is looked at, too: if it is another motion, the
+    gait has several. Of a gait replayed `near` another, as at another delta, one motion is looked
+    for where that had one. Of the result the residual is the change of the momenta in a period; the
+    work of the joints is that against friction and what the body gains in kinetic energy.
+    """
+    regime = regime.at(gait)
+    how: Any = {"froude": regime.froude, "breaks": breaks, "turn": turn, "regime": regime}
+    moving = GaitWithInertia(body, friction, gait, delta, **how)
+    begin = None if near is None else moving.momenta(near.tail_velocity(np.zeros(1)))
+    how |= {"tolerance": tolerance, "objective": objective, "quantities": quantities}
+    ran = inertial_motion(body, friction, gait, delta, near=begin, **how)
+    phases, states, chain = ran.phases % 1.0, ran.states, moving.body
+    from_rest = states[_MOMENTA, 0]
+    if near is None or near.several:
+        with suppress(NotConvergedError):  # Newton's method need not lead to any from there
+            from_rest = moving.rough_period(np.zeros(3)).momenta
+    several = float(np.abs(from_rest - states[_MOMENTA, 0]).max() > _OTHER)
+    other = moving.run(from_rest, tolerance).states if several else states
+    here, there = moving.totals(states), moving.totals(other)
+    angles, rates = moving.path(phases)
+    z = tail_velocity(chain, angles, rates, states[_MOMENTA])
+    energy = regime.froude * kinetic_energy(chain, angles, rates, z)[0]
+    change = states[:, -1] - states[:, 0]
+    return Replay(
+        values=ran.values,
+        errors=ran.errors,
+        others={name: abs(there[name] - here[name]) for name in here},
+        lever=float(lever(chain, angles).max()),
+        actuator_work=ran.work + float(energy[-1] - energy[0]),
+        residual=float(np.abs(change[_MOMENTA]).max()),
+        error=ran.error_of(objective),
+        several=several,
+        instants=phases.size,
+        tail=(phases, z),
+        objective=objective,
+        across=regime.counted(complex(*change[_PLACE])).imag,
+        multipliers=tuple(map(complex, ran.multipliers)),
     )
 
 
 class FromRest(NamedTuple):
     """Periods of a gait that a body with inertia begins at rest."""
 
-    phases: np.ndarray
-    """Where the solver stepped, ``(n,)``, from 0 to the number of periods."""
-    states: np.ndarray
-    """There, as in `InertialMotion`, ``(7, n)``."""
-    periods: np.ndarray
-    """Distance, work and rotation of each period, ``(n_period, 3)``."""
+    phases: np.ndarray  # where the solver stepped, (n,), from 0 to the number of periods
+    states: np.ndarray  # there, as in `InertialMotion`, (7, n)
+    periods: np.ndarray  # distance, work and rotation of each period, (n_period, 3)
 
 
 def motion_from_rest(
@@ -456,7 +460,7 @@ def motion_from_rest(
     grade: float = 0.0,
     theta: float = 0.0,
 ) -> FromRest:
-    """Play a gait from rest: how a body with inertia comes to the motion in which all periods are
+    """Move a body from rest: how a body with inertia comes to the motion in which all periods are
     alike, or glides downhill.
 
     Its momenta are zero at first, while its joints already turn at the gait's rates.
@@ -487,26 +491,24 @@ def motion_from_rest(
     --------
     >>> import colloc
     >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-    >>> begun = colloc.motion_from_rest(colloc.Chain(), colloc.Friction(), gait, delta=1e-2,
+    >>> ran = colloc.motion_from_rest(colloc.Chain(), colloc.Friction(), gait, delta=1e-2,
     ...     froude=0.1, periods=2)
-    >>> begun.periods[:, 0].round(3)
+    >>> ran.periods[:, 0].round(3)
     array([0.12 , 0.146])
     """
     check_finite(positive=True, froude=froude, delta=delta, tolerance=tolerance)
     check_count(MOST_PERIODS, periods=periods)
     check_finite(grade=grade, theta=theta)
     regime = Slope(float(grade)) if grade else LEVEL
-    played = gait_with_inertia(
+    moving = GaitWithInertia(
         body, friction, gait, delta, froude=froude, breaks=breaks, regime=regime
     )
-    courses: list[tuple[np.ndarray, np.ndarray]] = []
-    passed, start = [], np.zeros(7)
-    start[_THETA] = theta
+    start, courses = np.array([0.0, 0.0, 0.0, theta, 0.0, 0.0, 0.0]), []
     for _ in range(periods):
-        course = played.run(start, tolerance)
-        courses.append((course.phases + len(courses), course.states))
-        before, start = start, course.states[:, -1]
-        gone = start - before
-        passed.append([np.hypot(*gone[_PLACE]), gone[_WORK], gone[_THETA]])
-    phases, states = (np.concatenate(parts, axis=-1) for parts in zip(*courses, strict=True))
-    return FromRest(phases, states, np.array(passed))
+        courses.append(moving.run(start, tolerance))
+        start = courses[-1].states[:, -1]
+    change = np.array([course.states[:, -1] - course.states[:, 0] for course in courses])
+    totals = [np.hypot(*change[:, _PLACE].T), change[:, _WORK], change[:, _THETA]]
+    phases = np.concatenate([k + course.phases for k, course in enumerate(courses)])
+    states = np.concatenate([course.states for course in courses], axis=1)
+    return FromRest(phases, states, np.array(totals).T)

@@ -18,10 +18,9 @@ Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
 Ran = TypeVar("Ran")
 Numbers = dict[str, float]
-_TENTH = 0.1
-"""Error of each run over that of the last."""
+_TENTH = 0.1  # error of each run over that of the last
 LEAST = 1e-12
-"""The smallest tried."""
+"""The smallest error that is tried."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,6 @@ class Replay(Period):
 
     @property
     def value(self) -> float:
-        """Of the objective."""
         return self.objective(self.values)
 
     @property
@@ -126,15 +124,13 @@ def to_tolerance(
         ran, now = run(aim)
         if before is not None:
             if errors_of is None:
-                errors = {
-                    name: max(abs(value - before[1][name]), 0.5 * aim)
-                    for name, value in now.items()
-                }
+                changes = {name: abs(value - before[1][name]) for name, value in now.items()}
+                errors = {name: max(change, 0.5 * aim) for name, change in changes.items()}
             else:
                 errors = dict.fromkeys(now, 0.0) | errors_of(ran, before[0])
-            errors |= known[1]
-            if not objective.relative_error(now | known[0], errors) > tolerance:
-                return ran, now | known[0], errors
+            values, errors = now | known[0], errors | known[1]
+            if not objective.relative_error(values, errors) > tolerance:
+                return ran, values, errors
         aim, before = _TENTH * aim, (ran, now)
     raise NotConvergedError(
         f"the motion cannot be replayed to a relative error of {tolerance:.0e}."

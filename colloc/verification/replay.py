@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -159,7 +158,7 @@ def replay(
     froude : float
         Froude number L/(g T^2) at which the path is played; 0 is so slow that inertia does not
         matter. At another one only `tolerance`, `breaks`, `objective`, `quantities` and `turn`
-        count (`colloc.verification.inertial_replay`).
+        count (`colloc.verification.inertial_motion.inertial_replay`).
 
     Raises
     ------
@@ -177,20 +176,12 @@ def replay(
     0.26
     """
     if froude:
-        # which makes replays like this one
-        from colloc.verification.inertial_replay import (
-            inertial_replay,
-        )
+        from colloc.verification.inertial_motion import inertial_replay  # loads what integrates
 
-        played: Any = {
-            "regime": Paced(froude),
-            "tolerance": tolerance,
-            "breaks": breaks,
-            "objective": objective,
-        }
         return inertial_replay(
-            body, friction, path, delta, quantities=quantities, turn=turn, **played
-        )
+            body, friction, path, delta, regime=Paced(froude), tolerance=tolerance, breaks=breaks,
+            objective=objective, quantities=quantities, turn=turn,
+        )  # fmt: skip
     if "period" in objective.uses:
         raise ProblemError(
             f"the objective {objective.name!r} speaks of the period: give the froude at which it "

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial, singledispatch
-from typing import Any
 
 from colloc.gaits.inertia import Paced
 from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope
-from colloc.mechanics.bodies import Body
-from colloc.mechanics.law import Law
 from colloc.verification.played import Replay
 from colloc.verification.replay import replay
 
@@ -23,20 +20,14 @@ def replayer(regime: Regime) -> Callable[..., Replay]:
 
 
 @replayer.register
-def _on_slope(regime: Slope) -> Callable[..., Replay]:
-    from colloc.verification.slope_replay import slope_replay
+def _(regime: Slope) -> Callable[..., Replay]:
+    from colloc.verification.slope import slope_replay  # loads what integrates
 
     return partial(slope_replay, slope=regime)
 
 
 @replayer.register
-def _with_inertia(regime: Paced) -> Callable[..., Replay]:
-    return partial(_at_pace, regime)
+def _(regime: Paced) -> Callable[..., Replay]:
+    from colloc.verification.inertial_motion import inertial_replay
 
-
-def _at_pace(
-    regime: Paced, body: Body, friction: Law, path: Any, delta: float, **asked: Any
-) -> Replay:
-    from colloc.verification.inertial_replay import inertial_replay
-
-    return inertial_replay(body, friction, path, delta, regime=regime.at(path), **asked)
+    return partial(inertial_replay, regime=regime)

@@ -19,16 +19,25 @@ which is measured on both sides: the left one from the moments in the joints.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.densities import Instants, Quantity
+from colloc.mechanics.densities import (
+    LENGTH,
+    Instants,
+    PathLimit,
+    PathLimits,
+    Quantity,
+    limits_of,
+    quantities_of,
+)
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
@@ -36,17 +45,18 @@ from colloc.motion.follow import Course, followed
 from colloc.motion.on_slope import balance_on_slope
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
-from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion
-from colloc.verification.played import Path
+from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion, whole_totals
+from colloc.verification.played import Path, Replay, lever, to_tolerance
 
-_UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
-"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed
-less exactly."""
+_UNITS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
+"""Of the errors of theta, place, works, and of the logarithm of the steering, which is needed less
+exactly."""
 _OMEGA = 2
-_LOOSER = 30.0
+_LOOSER = 30.0  # error of the run that states the error, over that of the run it is of
 _PANELS = 40
-_OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0}
-"""Shares in the error of the motion on the level: its way alone is asked for."""
+_WAY_ALONE = {"distance": 1.0, "work": 0.0, "rotation": 0.0}
+_FIRST = 0.1  # error of the first run of a replay, over the relative one that is asked for
+_LONGEST = 4.0  # longest step of a replay, in instants of a uniform grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,27 +139,14 @@ class GaitOnSlope(NamedTuple):
     def course(self, tolerance: float) -> float:
         """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
         edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), self.breaks)
-        way = fine_motion(
-            self.body,
-            self.friction,
-            self.path,
-            self.delta,
-            edges,
-            tolerance,
-            lambda period: _OF_WAY,
-        ).path[-1]
+        way = fine_motion(*self[:4], edges, tolerance, lambda period: _WAY_ALONE).path[-1]
         return float(np.angle(way)) if abs(way) > tolerance else 0.0
 
     def followed(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
         """The unknowns ``(6,)`` through a period, from those at its begin, of which theta is the
         first; no step is longer than `longest`."""
-        return followed(
-            self._rates,
-            np.append(begin, np.zeros(6 - begin.size)),
-            tolerance * _UNKNOWNS,
-            self.breaks,
-            longest,
-        )
+        start = np.append(begin, np.zeros(6 - begin.size))
+        return followed(self._rates, start, tolerance * _UNITS, self.breaks, longest)
 
     def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
         """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the steps of
@@ -161,20 +158,16 @@ class GaitOnSlope(NamedTuple):
         t = (edges[:-1, None] + h[:, None] * PANEL_RULE.c).ravel()
         now, _ = self.instants(t, ran.at(t)[0])
         parts = [h * (each.at(now)[0].reshape(h.size, -1) @ PANEL_RULE.b) for each in quantities]
-        upto = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
-        return upto[:, np.searchsorted(edges, ends)]
+        sums = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
+        return sums[:, np.searchsorted(edges, ends)]
 
     def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
         """Part of the time at which several motions are balanced, from phases and orientations
         there, ``(n,)``."""
         if self.friction.associated:
             return 0.0
-        angles, rates = self.path(phases % 1.0)
-        at, load = (
-            (self.body, self.friction, angles, rates, self.delta),
-            self.slope.pull(theta[None]),
-        )
-        several = all_balanced_velocities(*at, load).number > 1
+        at = (self.body, self.friction, *self.path(phases % 1.0), self.delta)
+        several = all_balanced_velocities(*at, self.slope.pull(theta[None])).number > 1
         return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
 
     def run(
@@ -182,26 +175,17 @@ class GaitOnSlope(NamedTuple):
     ) -> SlopeMotion:
         """The motion through periods from a heading, without its error; no step is longer than
         `longest`."""
-        ends, phases, states = [np.append(heading - course, np.zeros(5))], [], []
-        for period in range(periods):
-            t, through, _ = self.followed(ends[-1], tolerance, longest)
-            ends.append(through[:, -1])
-            phases.append(period + t)
-            states.append(through)
-        theta, *sums = np.stack(ends, axis=1)
-        climb, aside, friction_work, joint_work, steering = np.diff(sums)
+        start, courses = np.append(heading - course, np.zeros(5)), []
+        for _ in range(periods):
+            courses.append(self.followed(start, tolerance, longest))
+            start = courses[-1].states[:, -1]
+        states = np.concatenate([ran.states for ran in courses], axis=1)
+        ends = np.stack([states[:, 0], *(ran.states[:, -1] for ran in courses)], axis=1)
+        climb, aside, friction_work, joint_work, steering = np.diff(ends[1:])
         ways = climb, aside, friction_work, joint_work
-        unknown = np.concatenate(phases), np.concatenate(states, axis=1)
-        return SlopeMotion(
-            self.slope.grade,
-            course,
-            theta + course,
-            *ways,
-            np.exp(steering),
-            np.nan,
-            np.nan,
-            *unknown,
-        )
+        phases = np.concatenate([k + ran.phases for k, ran in enumerate(courses)])
+        at = self.slope.grade, course, ends[0] + course
+        return SlopeMotion(*at, *ways, np.exp(steering), np.nan, np.nan, phases, states)
 
     def _rates(
         self, t: float, state: np.ndarray, near: np.ndarray | None
@@ -209,34 +193,25 @@ class GaitOnSlope(NamedTuple):
         """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next
         balance may start."""
         shapes, theta = (*self.path(np.array([t])), self.delta), state[0]
-        solved, now, _, on_theta = balance_on_slope(
+        solved, now, _, by_theta = balance_on_slope(
             self.body, self.friction, self.slope, shapes, np.array([theta]), start=near
         )
         if not solved.converged.all():
             raise NotConvergedError(
                 f"no balance at phase {t:.4f} on a slope of grade {self.slope.grade:g} (residual "
-                f"{solved.residual[0]:.1e}): "
-                "friction may be too weak to hold the body in that direction, so that it slides "
-                "down; try a gentler slope."
+                f"{solved.residual[0]:.1e}): friction may be too weak to hold the body in that "
+                f"direction, so that it slides down; try a gentler slope."
             )
         moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
-        unknowns = (
-            now.z[_OMEGA, 0],
-            moved.real,
-            moved.imag,
-            now.power[0],
-            now.actuator_power[0],
-            on_theta[_OMEGA, 0],
-        )
-        return np.array(unknowns), solved.z
+        works = now.power[0], now.actuator_power[0]
+        omega, steering = now.z[_OMEGA, 0], by_theta[_OMEGA, 0]
+        return np.array([omega, moved.real, moved.imag, *works, steering]), solved.z
 
     def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
         """What formulas see at phases, from the orientations there ``(n,)``, and what balance
         leaves over, ``(n,)``."""
-        at, load = (
-            (self.body, self.friction, *self.path(phases), self.delta),
-            self.slope.pull(theta[None]),
-        )
+        at = (self.body, self.friction, *self.path(phases), self.delta)
+        load = self.slope.pull(theta[None])
         solved = solve_balance(*at, load=load)
         return Instants(*at, z=solved.z, load=load), solved.residual
 
@@ -250,10 +225,8 @@ def gait_on_slope(
     breaks: np.ndarray | tuple[float, ...],
 ) -> GaitOnSlope:
     """A gait of a body on a slope, or a `ProblemError` that says why it cannot be there."""
-    chain = checked_chain(body, friction, grade)
-    return GaitOnSlope(
-        chain, friction, gait, delta, tuple(sorted(float(t) for t in breaks)), Slope(float(grade))
-    )
+    at = checked_chain(body, friction, grade), friction, gait, delta
+    return GaitOnSlope(*at, tuple(sorted(map(float, breaks))), Slope(float(grade)))
 
 
 def slope_motion(
@@ -333,4 +306,63 @@ def slope_motion(
         ran,
         error=float(np.abs(ran.states[:5, -1] - loose).max()),
         several=on.several(ran.phases, ran.states[0]),
+    )
+
+
+def slope_replay(
+    body: Body,
+    friction: Law,
+    gait: Any,
+    delta: float,
+    *,
+    slope: Slope,
+    instants: int = 1600,
+    tolerance: float = 1e-6,
+    breaks: np.ndarray | tuple[float, ...] = (),
+    objective: Objective = EFFICIENCY,
+    quantities: Iterable[Quantity | str] = (),
+    limits: Iterable[PathLimit] | PathLimits = (),
+    **_: object,
+) -> Replay:
+    """A period of a gait that says where it points, on a slope: arguments as of
+    `colloc.verification.replay.replay`.
+
+    The equation is solved with ever smaller errors a step until the last tenth of them changes the
+    objective by less than is allowed. Of the result the distance is the way in the direction that
+    counts, the work that of the joints; what other balanced motions would change is not known, only
+    for which part of the time there are any. `NotConvergedError` if no balance is found at some
+    instant, or rounding hides the accuracy that is asked for.
+    """
+    asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
+    with_forces = [each for each in asked if each.needs_forces]
+    totals = whole_totals([each for each in asked if not each.needs_forces], gait)
+    on = gait_on_slope(body, friction, gait, delta, slope.grade, breaks)
+
+    def run(aim: float) -> tuple[tuple[Course, float], dict[str, float]]:
+        ran = on.followed(np.array([gait.theta]), aim, _LONGEST / instants)
+        theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
+        way, work = slope.counted(complex(climb, aside)), float(spent + slope.grade * climb)
+        found = {"distance": way.real, "work": work, "rotation": float(theta)}
+        sums = on.totals(ran, with_forces, np.ones(1))[:, 0].tolist()
+        return (ran, way.imag), found | dict(zip((x.name for x in with_forces), sums, strict=True))
+
+    first = _FIRST * tolerance
+    (ran, across), values, errors = to_tolerance(run, first, objective, tolerance, totals)
+    limits, phases = limits_of(limits, body.n_joint), ran.phases % 1.0
+    now, residual = on.instants(phases, ran.states[0])
+    used = limits.at(now) if limits.names else np.empty((0, phases.size))
+    return Replay(
+        values=values,
+        errors=errors,
+        others={},
+        lever=float(lever(body, now.angles).max()),
+        actuator_work=float(ran.states[4, -1]),
+        residual=float(residual.max()),
+        error=float(objective.relative_error(values, errors)),
+        several=on.several(ran.phases, ran.states[0]),
+        instants=phases.size,
+        tail=(phases, now.z),
+        shares=limits.sizes(used).max(axis=1),
+        objective=objective,
+        across=across,
     )

@@ -30,24 +30,18 @@ from colloc.verification.played import Path
 
 _PHASES = np.linspace(0.0, 1.0, 20001)
 MOST_SAMPLES = 2_000_000
-_APPROACH = 5000
-"""Steps in which the clock of an approach is summed up."""
+_APPROACH = 5000  # steps in which the clock of an approach is summed up
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """One period at a fixed rate of samples; the sample after the last is the first."""
 
-    time: np.ndarray
-    """Seconds, 0, 1/rate, ..., period - 1/rate, ``(n,)``."""
-    phase: np.ndarray
-    """Of the gait, in [0, 1), ``(n,)``."""
-    angles: np.ndarray
-    """Joint angles [rad], ``(n_joint, n)``."""
-    speeds: np.ndarray
-    """Their time derivatives [rad/s], ``(n_joint, n)``."""
-    period: float
-    """Seconds; a whole number of samples."""
+    time: np.ndarray  # seconds, 0, 1/rate, ..., period - 1/rate, (n,)
+    phase: np.ndarray  # of the gait, in [0, 1), (n,)
+    angles: np.ndarray  # [rad], (n_joint, n)
+    speeds: np.ndarray  # [rad/s], (n_joint, n)
+    period: float  # seconds; a whole number of samples
 
 
 def timed(
@@ -58,36 +52,20 @@ def timed(
     *,
     keep_pace: bool = False,
 ) -> Trajectory:
-    """Sample a path at `rate`, with a period in seconds and joint speed limits.
+    """Sample a path at `rate` samples a second, with a period in seconds and joint speed limits
+    [rad/s], ``(n_joint,)`` or one.
 
-    Parameters
-    ----------
-    path : callable
-        Joint angles and rates at phases, see `colloc.verification.played.Path`.
-    rate : float
-        Samples a second.
-    period : float, optional
-        Seconds, rounded up to a whole number of samples; by default the shortest that the limits
-        allow.
-    limits : (n_joint,) or float, optional
-        Largest joint speeds [rad/s].
-    keep_pace : bool
-        Whether the pace has to remain that of the gait; limits then make the period longer.
-
-    Raises
-    ------
-    ProblemError
-        If neither a period nor limits are given, a number is unusable, or the period is too short
-        for the limits.
+    The period is rounded up to a whole number of samples; by default it is the shortest that the
+    limits allow. Where the pace has to remain that of the gait, limits make the period longer.
+    `ProblemError` if neither a period nor limits are given, a number is unusable, or the period is
+    too short for the limits.
     """
     if not np.isfinite(rate) or rate <= 0:
         raise ProblemError(f"the sample rate must be positive, not {rate:g}.")
     vertices, _ = path(_PHASES)
-    most = (
-        np.full(len(vertices), np.inf)
-        if limits is None
-        else one_each(limits, len(vertices), "joint speed limit")
-    )
+    most = np.full(len(vertices), np.inf)
+    if limits is not None:
+        most = one_each(limits, len(vertices), "joint speed limit")
     slowest = _slowest(vertices, most, keep_pace)
     shortest = float(slowest.mean())
     if period is None and limits is None:
@@ -122,8 +100,7 @@ def timed(
 class Approach(NamedTuple):
     """From rest to a trajectory, at equal steps that end one step before it begins."""
 
-    time: np.ndarray
-    """Seconds, below 0, ``(n,)``."""
+    time: np.ndarray  # seconds, below 0, (n,)
     angles: np.ndarray
     speeds: np.ndarray
 
@@ -142,9 +119,8 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    closed = (
-        np.append(rows, rows[:, :1], axis=1) for rows in (trajectory.angles, trajectory.speeds)
-    )
+    both = (trajectory.angles, trajectory.speeds)
+    closed = (np.append(rows, rows[:, :1], axis=1) for rows in both)
     cycle = CubicHermiteSpline(np.append(trajectory.time, trajectory.period), *closed, axis=1)
     share = np.linspace(0.0, 1.0, _APPROACH + 1)
     grown = share**3 * (10.0 + share * (6.0 * share - 15.0))
@@ -208,6 +184,6 @@ def _level(slowest: np.ndarray, period: float) -> float:
     def excess(level: float) -> float:
         return float(np.maximum(level, slowest).mean()) - period
 
-    return (
-        0.0 if excess(0.0) >= 0 else float(brentq(excess, 0.0, 2 * period, xtol=1e-14, rtol=1e-14))
-    )
+    if excess(0.0) >= 0:
+        return 0.0
+    return float(brentq(excess, 0.0, 2 * period, xtol=1e-14, rtol=1e-14))

@@ -9,9 +9,9 @@ from colloc.gaits.control_problem import control_problem
 from colloc.gaits.inertia import PacedOnSlope
 from colloc.gaits.sloped import Slope
 from colloc.motion.kinds import kind_of_motion
+from colloc.pictures.robot_model import mjcf
 from colloc.reduced.motion import ReducedMotion
 from colloc.results.robot import joint_torques
-from colloc.results.robot_model import mjcf
 from colloc.search.spaces import space_near
 from colloc.verification.inertial_motion import inertial_motion
 

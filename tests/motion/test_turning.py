@@ -12,7 +12,7 @@ from colloc.results.arc import arc
 from colloc.search.spaces import space_near
 from colloc.transcription.full_program import full_program
 from colloc.transcription.layout import RADIANS
-from colloc.verification.inertial_replay import inertial_replay
+from colloc.verification.inertial_motion import inertial_replay
 from colloc.verification.mesh_error import mesh_error
 
 DELTA = 0.3

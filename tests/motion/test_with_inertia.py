@@ -23,8 +23,7 @@ from colloc.search.converge import converged
 from colloc.search.effort import ROUGH
 from colloc.search.small_starts import small_loops
 from colloc.search.spaces import space_near
-from colloc.verification.inertial_motion import GaitWithInertia
-from colloc.verification.inertial_replay import inertial_replay
+from colloc.verification.inertial_motion import GaitWithInertia, inertial_replay
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.refinement import planned_mesh
 
@@ -378,10 +377,10 @@ def test_a_motion_that_does_not_follow_from_rest_is_another_one(monkeypatch):
             else found._replace(momenta=found.momenta + np.array([0.5, 0.0, 0.0]))
         )
 
-    closed = GaitWithInertia.closed
+    closed = GaitWithInertia.rough_period
     at = colloc.Chain(), colloc.Friction(), ROUND, 1e-2
     one = inertial_replay(*at, regime=Paced(0.1), tolerance=1e-4)
-    monkeypatch.setattr(GaitWithInertia, "closed", other_from_rest)
+    monkeypatch.setattr(GaitWithInertia, "rough_period", other_from_rest)
     two = inertial_replay(*at, regime=Paced(0.1), tolerance=1e-4)
     assert (one.several, one.ambiguity) == (0.0, 0.0)
     assert two.several == 1.0

@@ -23,8 +23,9 @@ from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames, lab_outline
-from colloc.pictures.report_page import PLAIN, environment, motion_data, report_page
+from colloc.pictures.report_page import motion_data, report_page
 from colloc.pictures.style import INK
+from colloc.pictures.templates import environment
 from colloc.results.checks import Check
 from colloc.results.solution import Solution
 from colloc.results.store import save
@@ -223,13 +224,14 @@ def test_templates_escape_texts_and_attributes():
 
 
 def test_every_check_of_a_certificate_is_put_in_plain_words(page, three_link):
+    plain = environment().get_template("checks.html").module.plain
     for check in three_link.certificate.checks:
-        assert PLAIN[check.name] in unescape(page)
+        assert plain[check.name] in unescape(page)
     source = Path(certificate.__file__).read_text(encoding="utf-8")
     limits = {body.usual.limit_name for body in (Chain(), ModalBody(2))}
     path = arcs_through(ellipse(0.0, 1.0, 1.0), FreePath(), np.linspace(0.0, 1.0, 41))
     limits |= {name for name, *_ in FreePath().own_checks(path)}
-    assert set(re.findall(r'Check\(\s*"([^"]+)"', source)) | limits == set(PLAIN)
+    assert set(re.findall(r'Check\(\s*"([^"]+)"', source)) | limits == set(plain)
 
 
 def test_the_page_says_how_slow_is_slow_enough(page, three_link):

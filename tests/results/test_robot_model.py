@@ -9,7 +9,7 @@ import pytest
 import colloc
 from colloc import Chain, Coupled, Foot, Friction, Harmonic, Pad, Problem, ProblemError, Wheel
 from colloc.commands.export import main
-from colloc.results.robot_model import mjcf, urdf
+from colloc.pictures.robot_model import mjcf, urdf
 from colloc.results.solution import direction_of_travel
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}

@@ -167,12 +167,12 @@ def test_a_period_that_does_not_close_is_off_by_no_more_than_is_stated():
     """However small its steps are: what is left open leads away from the motion in which all
     periods are alike."""
     gait = GaitWithInertia(CHAIN, colloc.Friction(0.1, 0.1, 0.1), LEANING, 1e-2, froude=1.0)
-    closed = gait.closed_from(None)
+    closed = gait.find_period()
     exact = gait.periodic_run(closed.momenta, 1e-6, closed.slopes)
     start = exact.momenta + np.array([3e-4, -2e-4, 1e-4])
     left_open = PeriodicRun(gait.run(start, 1e-6), start, 1e-6)
-    stated, true = gait.errors(left_open, left_open, closed.slopes), gait.passed(exact.ends)
-    off = {name: abs(value - true[name]) for name, value in gait.passed(left_open.ends).items()}
+    stated, true = gait.errors(left_open, left_open, closed.slopes), gait.totals(exact.ends)
+    off = {name: abs(value - true[name]) for name, value in gait.totals(left_open.ends).items()}
     assert off["distance"] > 2e-5
     assert all(off[name] <= stated[name] for name in off)
 
@@ -352,7 +352,7 @@ def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_frictio
         froude=0.02,
     )
     monkeypatch.setattr(GaitWithInertia, "_at", lambda *given: asked.append(1) or at(*given))
-    _, slopes = played.mapped(played.slow_momenta())
+    _, slopes = played.period_map(played.momenta())
     assert np.abs(slopes[:3]).max() < 1e-6, (
         "friction leaves nothing of the momenta of the period before"
     )
@@ -361,7 +361,7 @@ def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_frictio
 
 
 def test_momenta_that_lead_nowhere_give_way_to_slow_ones_and_these_to_rest(monkeypatch):
-    at, begun, closed = (CHAIN, ISOTROPIC, GAIT, 1e-2, 0.1), [], GaitWithInertia.closed
+    at, begun, closed = (CHAIN, ISOTROPIC, GAIT, 1e-2, 0.1), [], GaitWithInertia.rough_period
     usual = colloc.inertial_motion(*at, tolerance=1e-3)
 
     def mostly_lost(self, near):
@@ -370,7 +370,7 @@ def test_momenta_that_lead_nowhere_give_way_to_slow_ones_and_these_to_rest(monke
             raise colloc.NotConvergedError("nowhere")
         return closed(self, near)
 
-    monkeypatch.setattr(GaitWithInertia, "closed", mostly_lost)
+    monkeypatch.setattr(GaitWithInertia, "rough_period", mostly_lost)
     asked = np.array([0.1, 0.2, 0.3])
     found = colloc.inertial_motion(*at, tolerance=1e-3, near=asked)
     assert [near.any() for near in begun] == [True, True, False]

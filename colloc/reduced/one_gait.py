@@ -1,0 +1,61 @@
+"""A gait in which nothing is free, on a mesh, as a search sees it: a class without parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.gaits.control_problem import ControlProblem
+from colloc.gaits.gait_fields import AnyGait
+from colloc.mechanics.bodies import Pairs
+from colloc.numerics.mesh import Mesh
+from colloc.reduced.constraints import Constraints
+from colloc.reduced.given import Given
+
+_NONE = np.empty(0)
+
+
+class OneGait:
+    """The only member of a class, or that of its parameters `full`; what it answers is told by
+    `colloc.reduced.program.SearchSpace`."""
+
+    n = 0
+    lower = upper = _NONE
+    own = np.arange(0)
+
+    def __init__(
+        self,
+        control: ControlProblem,
+        edges: np.ndarray | None = None,
+        scheme: str = "",
+        far: Pairs = (),
+        full: np.ndarray = _NONE,
+    ) -> None:
+        self.control, self.given = control, Given(None, edges, scheme, far)
+        self.mesh, self._full = control.mesh(edges, scheme), full
+        self._gait = control.admissible.member(full)
+
+    def member(self, v: np.ndarray) -> AnyGait:
+        return self._gait
+
+    def parameters(self, gait: AnyGait) -> np.ndarray:
+        return _NONE
+
+    laid = parameters
+
+    def full_parameters(self, v: np.ndarray) -> np.ndarray:
+        return self._full
+
+    def phase_mesh(self, gait: AnyGait) -> Mesh:
+        return self.mesh
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return *self._gait(self.mesh.times), np.ones(self.mesh.n_point)
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        return np.empty((len(on_shape), 0))
+
+    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+        return Constraints({}, _NONE, _NONE, -np.inf, lambda v: _NONE, lambda v: np.empty((0, 0)))
+
+    def metric(self, v: np.ndarray) -> np.ndarray | None:
+        return None
