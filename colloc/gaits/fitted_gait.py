@@ -490,7 +490,8 @@ def _uncertainty(time: np.ndarray, angles: np.ndarray, fit: _Fit, table: np.ndar
         table.shape[1],
         _richer(time, angles, table, fit, far),
     )
-    if richer is not None:  # what is left of the residuals is noise
+    if richer is not None and richer.shape[1] < time.size:
+        # what is left of the residuals is noise; where nothing is left, all of them may be
         size = richer.shape[1]
         residuals = angles - richer @ _columns(time, far).T
     columns, left, freedom = (
