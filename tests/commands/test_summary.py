@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Harmonic, Problem, ellipse, evaluate
+from colloc import Chain, Fourier, Friction, Harmonic, PathLimit, Problem, ellipse, evaluate, replay
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_dict, summary_lines
+from colloc.results import limit_use
 from colloc.results.checks import Check
 from colloc.results.robot import joint_torques
 from colloc.results.store import load
@@ -177,3 +178,30 @@ def test_what_solve_prints_is_what_the_file_and_verify_say(tmp_path, capsys):
     assert facts["value"] == pytest.approx(
         facts["certificate"]["efficiency_at_zero_delta"], rel=1e-2
     )
+
+
+@pytest.mark.parametrize("harmonics", [1, 3])
+def test_a_limit_that_a_gait_reaches_is_never_said_not_to_matter(harmonics):
+    rng = np.random.default_rng(harmonics)
+    for _ in range(4):
+        waves = rng.normal(size=(2, 2, harmonics))
+        gait = Fourier(np.zeros(2), *waves)
+        gait = gait.scaled(1.2 / np.abs(gait.angles(np.arange(500) / 500)).max())
+        most = np.abs(gait.rates(np.arange(500) / 500)).max()
+        stated = Problem("reached", gait=Harmonic(harmonics), delta=1e-2)
+        shares = replay(
+            Chain(),
+            Friction(),
+            gait,
+            1e-2,
+            tolerance=1e-3,
+            limits=(PathLimit("torque", "moment", 1), PathLimit("power", "power", 1)),
+        ).shares
+        limits = {
+            "joint_limit": 1.2,
+            "speed_limit": 0.99 * most,
+            "torque_limit": 0.99 * shares[:2].max(),
+            "power_limit": 0.99 * shares[2:].max(),
+        }
+        said = limit_use.lines(evaluate(stated.with_(guess=None, **limits), gait))
+        assert not any("cannot matter" in line for line in said)

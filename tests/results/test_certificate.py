@@ -417,3 +417,21 @@ def test_no_check_knows_left_from_right_or_one_sense_from_the_other(image):
     for a, b in zip(one.checks, two.checks, strict=True):
         assert abs(b.value) == pytest.approx(abs(a.value), rel=1e-3, abs=1e-7), a.name
     assert two.efficiency == pytest.approx(one.efficiency, rel=1e-4)
+
+
+def test_samples_make_every_error_larger_by_their_own_and_nothing_else_differs(three_link):
+    known, samples = three_link.certificate, (1e-2, 2e-2, 3e-2, 4e-2)
+    more = known.with_samples(samples)
+    value, efficiency, distance, work = samples
+    by = {
+        "value_error": value,
+        "value_error_at_zero_delta": value,
+        "efficiency_error": efficiency,
+        "error_at_zero_delta": efficiency,
+        "distance_error": distance,
+        "work_error": work,
+    }
+    assert more.numbers == pytest.approx(
+        {name: number + by.get(name, 0.0) for name, number in known.numbers.items()}, rel=1e-12
+    )
+    assert more.by_replay.numbers == pytest.approx(known.numbers, rel=1e-9, abs=1e-15)
