@@ -349,22 +349,3 @@ def test_servos_that_stand_about_90_degrees_are_refused_before_the_replay_where_
         colloc.ProblemError, match=r"all joints move about 90°, where links cross: .* subtract it"
     ):
         colloc.evaluate(five, path)
-
-
-def test_noise_that_leaves_the_best_gait_as_it_is_is_stated_by_what_it_usually_takes():
-    """All of it at the highest frequency that the samples have: the series is the best one, whose
-    gradient vanishes; but so much noise changes others."""
-    problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    best, rng = colloc.solve(problem, starts=1), np.random.default_rng(4)
-    noise = 0.1 * np.tile([[1.0, -1.0], [-1.0, 1.0]], N // 2)
-    found = colloc.evaluate(
-        QUICK.with_(delta=1e-2), best.gait.angles(np.arange(N) / N) + noise, harmonics=1
-    )
-    assert found.value == pytest.approx(best.value, rel=1e-4)
-    lost = []
-    for _ in range(4):
-        off = 0.1 * np.sqrt(2 / N) * rng.normal(size=(2, 3))
-        mean, cos, sin = (off + coefficients(best.gait)).T
-        other = colloc.Fourier(mean, cos[:, None], sin[:, None])
-        lost.append(best.value - colloc.evaluate(QUICK.with_(delta=1e-2), other).value)
-    assert found.certificate.value_error > np.mean(lost) > 1e-4
