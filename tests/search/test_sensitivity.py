@@ -341,3 +341,13 @@ def test_a_mirror_image_on_slippery_ground_has_the_same_sensitivity_in_other_uni
     here, there = a.again[1], b.again[1]
     assert there.value == pytest.approx(100 * here.value, rel=1e-4)
     assert 20 < there.error / here.error < 500
+
+
+def test_the_error_of_a_slope_is_the_most_that_it_differs_by_on_another_mesh(
+    three_link, monkeypatch
+):
+    """Meshes on which a problem is worth so many times its friction sideways."""
+    on = [lambda problem, n=n: n * problem.friction.mu_t for n in (3.0, 2.6, 3.1)]
+    monkeypatch.setattr("colloc.search.sensitivity._on_meshes", lambda answer: on)
+    found = three_link.sensitivity()["friction sideways"]
+    assert (found.slope, found.error) == pytest.approx((3.0, 0.4), rel=1e-6)
