@@ -1,5 +1,5 @@
-"""Work and precision of schemes, on uniform and on refined meshes: python -m
-benchmarks.work_precision [--path]
+"""Work and precision of schemes, on uniform and on refined meshes:
+python -m benchmarks.work_precision [--path]
 
 The isotropic one-harmonic three-link optimum at delta = 1e-4, from a good guess. Every solve is
 held against the optimum itself, as the finest refined solve finds it by independent replay, and

@@ -1,5 +1,5 @@
-"""Follow concertina crawlers to small epsilon, delta falling along: python -m
-scripts.continue_epsilon [problem file]."""
+"""Follow concertina crawlers to small epsilon, delta falling along:
+python -m scripts.continue_epsilon [problem file]."""
 
 import runpy
 import sys

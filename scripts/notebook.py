@@ -1,5 +1,5 @@
-"""Run the notebook of the documentation, docs/notebook.ipynb, and keep what it shows: python -m
-scripts.notebook
+"""Run the notebook of the documentation, docs/notebook.ipynb, and keep what it shows:
+python -m scripts.notebook
 
 Needs the extra ``docs``. What depends on the machine or the time of day is left out, so that a run
 without a change of results changes the file little.

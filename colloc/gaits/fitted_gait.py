@@ -396,7 +396,8 @@ class _Samples(NamedTuple):
         near, far = (fit._replace(harmonics=min(most, k * fit.harmonics + 1)) for k in (2, 4))
         richer, used = self.richer(fit, table, far), table
         residuals = self.angles - table @ fit.columns(time).T
-        if richer is not None:  # what is left of the residuals is noise
+        if richer is not None and richer.shape[1] < time.size:
+            # what is left of the residuals is noise; where nothing is left, all of them may be
             residuals, used = self.angles - richer @ far.columns(time).T, richer
         columns, left = near.columns(time), (residuals**2).sum(axis=1)
         freedom = max(time.size - used.shape[1], 1)

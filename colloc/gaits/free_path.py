@@ -212,7 +212,7 @@ class FreePath(ClassOfGaits):
 
     unit_speed = True
     delta_start = DELTA_START
-    of_arcs = without_cusps = may_tell = True
+    of_arcs = may_tell = True
     series = series_of
 
     def __post_init__(self) -> None:

@@ -220,8 +220,6 @@ class ClassOfGaits:
     """Where a search begins in delta; None: where the body's usual one does."""
     moves_knots = False
     """Whether a planned mesh may move its knots a little, to be even."""
-    without_cusps = False
-    """Whether members come to rest nowhere, but for paths that are retraced."""
     linear = True
     """Whether angles of a class of series are linear in the parameters by which its members are
     searched."""

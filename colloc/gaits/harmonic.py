@@ -197,12 +197,6 @@ class Harmonic(LinearClass):
                 f"{self.harmonics - 1}; ask for {self.harmonics - 1} or {self.harmonics + 1}."
             )
 
-    @property
-    def without_cusps(self) -> bool:  # type: ignore[override]
-        """Whether members come to rest nowhere, but for paths that are retraced: ellipses do
-        not."""
-        return self.harmonics == 1
-
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series that stand for its gaits: its members are such."""
         return self

@@ -37,6 +37,8 @@ _SMALLEST_EIGENVALUE = 1e-12
 """Of the product of the equations, scaled to length 1, with their transpose: where it is less, they
 are redundant. What sums distance and work over n intervals has one of 1.2 / n^2; redundant rows
 have one of 1e-18."""
+_UNITS = {"moment": " weight x body length", "power": " weight x body length per period"}
+"""Of limits on the joints, by what is limited."""
 _STEPS, _SHARE = 2, 0.1
 """Steps of inverse iteration; share of the largest weight from which an equation counts as part of
 the combination."""
@@ -99,6 +101,9 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
             else f"between phases {first:.3f} and {last:.3f}, worst at {when:.3f}"
         )
         failed = f"{what} is off by {result.excess[worst]:.1e} {window}"
+        if group == ACTUATORS:
+            needed = f"the gait takes {1 + result.excess[worst]:.4g} times as much"
+            failed = f"{what} is {_stated_limit(transcription, worst)}, and {needed} {window}"
         advice = _advice(group)
     elif result.status == "still moving":
         failed, advice = (
@@ -124,6 +129,14 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
     return f"{effort}: {failed} ({result.status}). Try to {advice}."
 
 
+def _stated_limit(transcription: GaitProgram, row: int) -> str:
+    limits = transcription.control.problem.path_limits
+    index = (row - transcription.groups[ACTUATORS].start) % len(limits.names)
+    each = [(limit.function, most) for limit in limits.each for most in np.ravel(limit.most)]
+    function, most = each[index]
+    return f"{most:g}{_UNITS.get(function, '')}"
+
+
 def _advice(group: str) -> str:
     if group in _EQUATIONS or group.startswith("force law"):
         return (
@@ -131,7 +144,7 @@ def _advice(group: str) -> str:
             "formulation"
         )
     if group == ACTUATORS:
-        return "allow the joints more, or start from another guess"
+        return "allow the joints more, take other links, or start from another guess"
     if group == "at least":
         return "ask for less, or start from a guess that reaches it"
     if group == "rotation":

@@ -108,12 +108,15 @@ class Exploration:
     left : tuple of Optimum
         Gaits at a larger delta that nobody followed further, the most promising first (see
         `followed_further`).
+    failure : str
+        Why the starts led nowhere, where the guess alone is left.
     """
 
     optima: tuple[Optimum, ...]
     starts: int
     others: tuple[Alternative, ...] = ()
     left: tuple[Optimum, ...] = ()
+    failure: str = ""
 
 
 def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
@@ -231,7 +234,10 @@ def _explored(
     """What starts lead to, of whatever size."""
     known, tried = candidates(problem, starts, goes_on, helpers)
     if not known:
-        raise NotConvergedError("no start led to any gait of the class; give a guess.")
+        kept = " that keeps the limits of its joints" if problem.path_limits.names else ""
+        raise NotConvergedError(
+            f"none of {tried} starts led to a gait of the class{kept}; give a guess."
+        )
     ends = _followed_to_the_end(problem, known, goes_on, helpers)
     distinct: list[tuple[Optimum, Candidate]] = []
     for optimum, candidate in sorted(ends, key=lambda end: end[0].objective):
@@ -337,7 +343,12 @@ def candidates(
                 drawn[-1] = next(starts)
         return drawn[number], True
 
-    while tried == 0 or (tried < _MOST * count and not knows() and goes_on()):
+    def is_hopeless() -> bool:
+        """Whether the joints are so weak that no gait keeps their limits, as it seems."""
+        nothing = tried >= ENOUGH and not known[-1] and not loops
+        return nothing and not asked and bool(problem.path_limits.names)
+
+    while tried == 0 or (tried < _MOST * count and not knows() and not is_hopeless() and goes_on()):
         helpers.begin((time.monotonic() - begin) / max(tried, 1) * (count - tried))
         ahead = range(tried, min(tried + 2 * helpers.count, _MOST * count))
         for start, number in zip(ahead, used + np.cumsum([0, *map(_is_new, ahead)]), strict=False):

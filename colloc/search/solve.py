@@ -21,7 +21,6 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer
 from colloc.results.solution import Solution
-from colloc.search.actuator_demand import check_actuators_suffice
 from colloc.search.certify import GAP, SADDLE, Certified, certify, is_trivial
 from colloc.search.choose import choose, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
@@ -95,7 +94,6 @@ def solve(
     """
     if search not in SEARCHES:
         raise ProblemError(f"search must be one of {', '.join(SEARCHES)}, not {search!r}.")
-    check_actuators_suffice(problem)
     begin, run = time.monotonic(), Run(keep, problem, progress)
     try:
         with run.under_way(seconds):
@@ -134,16 +132,20 @@ def _solved(
         found += _certified_best(problem, followed_further(problem, explored, goes_on))
     solution = choose(problem, found)
     solution.starts, solution.others = explored.starts, explored.others
+    if explored.failure and not solution.success:
+        why = explored.failure[:1].upper() + explored.failure[1:]
+        solution.message = f"{solution.message} {why}".strip()
     return solution
 
 
 def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool]) -> Exploration:
+    failure = ""
     if starts != 1 and problem.gait.free:
         try:
             return explore(problem, starts, goes_on)
-        except NotConvergedError:
-            pass  # what fails with the guess alone is said in detail
-    return Exploration((begin_at(problem, problem.guess),), 1)
+        except NotConvergedError as error:
+            failure = str(error)  # what fails with the guess alone is said in detail
+    return Exploration((begin_at(problem, problem.guess),), 1, failure=failure)
 
 
 def _certified_best(problem: Problem, optima: Sequence[Optimum]) -> list[Certified]:

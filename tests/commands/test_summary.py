@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Harmonic, Problem, ellipse, evaluate
+from colloc import Chain, Fourier, Friction, Harmonic, PathLimit, Problem, ellipse, evaluate, replay
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_dict, summary_lines
+from colloc.results import limit_use
 from colloc.results.checks import Check
 from colloc.results.robot import joint_torques
 from colloc.results.store import load
@@ -177,3 +178,54 @@ def test_what_solve_prints_is_what_the_file_and_verify_say(tmp_path, capsys):
     assert facts["value"] == pytest.approx(
         facts["certificate"]["efficiency_at_zero_delta"], rel=1e-2
     )
+
+
+@pytest.mark.parametrize("harmonics", [1, 3])
+def test_a_limit_that_a_gait_reaches_is_never_said_not_to_matter(harmonics):
+    rng = np.random.default_rng(harmonics)
+    for _ in range(4):
+        waves = rng.normal(size=(2, 2, harmonics))
+        gait = Fourier(np.zeros(2), *waves)
+        gait = gait.scaled(1.2 / np.abs(gait.angles(np.arange(500) / 500)).max())
+        most = np.abs(gait.rates(np.arange(500) / 500)).max()
+        stated = Problem("reached", gait=Harmonic(harmonics), delta=1e-2)
+        shares = replay(
+            Chain(),
+            Friction(),
+            gait,
+            1e-2,
+            tolerance=1e-3,
+            limits=(PathLimit("torque", "moment", 1), PathLimit("power", "power", 1)),
+        ).shares
+        limits = {
+            "joint_limit": 1.2,
+            "speed_limit": 0.99 * most,
+            "torque_limit": 0.99 * shares[:2].max(),
+            "power_limit": 0.99 * shares[2:].max(),
+        }
+        said = limit_use.lines(evaluate(stated.with_(guess=None, **limits), gait))
+        assert not any("cannot matter" in line for line in said)
+
+
+def test_whatever_shows_a_number_shows_its_own_error_with_it(three_link):
+    """On a card and at the end of a command: no two numbers or errors of this certificate are
+    alike."""
+    known = replace(
+        three_link.certificate,
+        values=three_link.certificate.values | {"distance": 0.31, "work": 1.07},
+        errors={"distance": 1e-3, "work": 2e-3},
+        value=0.21, value_error=3e-3, value_at_zero_delta=0.22, value_error_at_zero_delta=4e-3,
+        efficiency_at_zero_delta=0.24, error_at_zero_delta=6e-3, efficiency_error=5e-3,
+    )  # fmt: skip
+    shown = replace(three_link, certificate=known)
+    told = "\n".join(summary_lines(shown, None))
+    for words in (
+        "0.210000 +- 3e-03 by",
+        "0.220000 +- 4e-03 for delta",
+        "d      0.310000 +- 1e-03",
+        "work W  1.070000 +- 2e-03",
+    ):
+        assert words in told
+    card = shown._repr_html_()
+    for words in ("0.21000 ± 3e-03", "0.22000 ± 4e-03", "0.31000", "1.07000"):
+        assert words in card

@@ -344,3 +344,16 @@ def test_joints_that_all_move_about_a_right_angle_are_hinted_at(tmp_path):
     assert found.centre == 90
     assert "all joints move about 90°, which servos may count from" in found.describe()
     assert read(tmp_path, "t,s1_deg,s2_deg,s3_deg\n" + table(SECONDS, *DEGREES)).centre == 0
+
+
+def test_a_mirrored_record_is_fitted_as_well_and_off_by_as_much():
+    """And one of which the joints are named from the other end."""
+    t, rng = np.arange(30) / 30, np.random.default_rng(6)
+    angles = np.stack([np.cos(2 * np.pi * t), 0.5 * np.sin(2 * np.pi * t) + 0.02 * t])
+    angles = angles + 0.01 * rng.exponential(size=angles.shape)  # larger to one side
+    known = fitted_gait(angles, 2, harmonics=1)
+    for image, back in ((-angles, lambda x: -x), (angles[::-1], lambda x: x[::-1])):
+        other = fitted_gait(image, 2, harmonics=1)
+        for name in ("rms", "largest", "drift"):
+            assert getattr(other, name) == pytest.approx(getattr(known, name), abs=1e-12), name
+        np.testing.assert_allclose(back(other.gait.angles(t)), known.gait.angles(t), atol=1e-9)

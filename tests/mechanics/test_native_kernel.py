@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -88,7 +87,8 @@ def test_threads_are_those_asked_for(monkeypatch):
 )
 def test_a_clone_that_was_not_built_uses_the_kernel_that_was_installed(fresh):
     """As `python -m colloc.solve` does in a clone, after an installation from it."""
-    built = Path(find_spec("colloc.mechanics._kernel").origin)
+    built = Path(library()._name)
+    library.cache_clear()
     fresh.setattr(native_kernel_module, "find_spec", lambda name: None)
     fresh.setattr(
         metadata,

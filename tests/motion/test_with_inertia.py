@@ -308,6 +308,14 @@ def test_a_gait_that_is_given_is_evaluated_at_its_pace():
     assert f"played slowly   {slowly:.4f}" in told
 
 
+def test_what_a_gait_that_turns_is_worth_slowly_is_the_limit_of_slow_paces():
+    """Its chord, then, as at any pace."""
+    bent = colloc.Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
+    found = colloc.evaluate(colloc.Problem("bent", froude=1e-5, delta=1e-2), bent)
+    assert abs(found.rotation) > 0.3
+    assert found.played_slowly == pytest.approx(found.value, rel=1e-3)
+
+
 def test_a_body_that_begins_at_rest_comes_to_move_as_certified():
     """Its centre of mass is at rest at first, and after some periods goes as far in each as in the
     motion of equal periods."""

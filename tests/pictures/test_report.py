@@ -31,6 +31,7 @@ from colloc.results.solution import Solution
 from colloc.results.store import save
 from colloc.search import certify as certificate
 from colloc.search.certify import certify
+from colloc.search.evaluate import evaluate
 from colloc.smooth.modal_body import ModalBody
 
 BROWSER = next(
@@ -539,3 +540,13 @@ def test_the_page_says_what_a_wrong_floor_costs(page, three_link):
     assert rows
     assert "What a wrong floor costs" in page
     assert all(f"<td>{name}</td>" in page for name in rows)
+
+
+def test_feet_that_hold_are_filled_in_the_film_of_a_card():
+    problem = Problem("feet", body=Chain(feet=1), gait=Harmonic(1), delta=1e-2)
+    found = evaluate(problem, ellipse(0.0, 1.6, 1.1))
+    held = found.holding(found.sample(np.linspace(0.0, 1.0, 25)))[:, :-1]
+    assert 0.1 < held.mean() < 0.9
+    hollow = re.findall(r'attributeName="stroke-opacity"[^>]*values="([^"]+)"', found._repr_html_())
+    drawn = [each.split(";") for each in hollow]
+    np.testing.assert_array_equal(drawn, np.where(np.tile(held, 2), "0", "1"))

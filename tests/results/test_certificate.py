@@ -384,3 +384,54 @@ def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):
     assert "not measured" in meaning(
         with_answer(three_link, second_order=SecondOrder(np.nan, np.nan, 0, "not measured"))
     )
+
+
+@pytest.mark.parametrize("image", ["mirrored", "back in time", "from the other end"])
+def test_no_check_knows_left_from_right_or_one_sense_from_the_other(image):
+    """Where friction does not either, and the body is alike from both ends: an image of a gait has
+    its certificate, its fastest joint and its hardest motor, whatever way they turn."""
+    gait = Fourier([0.3, 0.4], [[0.0, 0.0], [0.5, 0.0]], [[0.6, -0.2], [0.0, 0.1]])
+    rates = gait.rates(np.arange(1000) / 1000)
+    assert rates.max() < 0.9 * -rates.min()  # what this gait is here for
+    other = {
+        "mirrored": Fourier(-gait.mean, -gait.cos, -gait.sin),
+        "back in time": Fourier(gait.mean, gait.cos, -gait.sin),
+        "from the other end": Fourier(gait.mean[::-1], gait.cos[::-1], gait.sin[::-1]),
+    }[image]
+    problem = Problem(
+        "images",
+        friction=Friction(mu_t=1.7, mu_f=1, mu_b=1),
+        gait=Harmonic(2),
+        joint_limit=0.7,
+        speed_limit=4.0,
+        torque_limit=0.02,
+        power_limit=0.05,
+        delta=1e-2,
+    )
+    one, two = (
+        gait_certificate(problem, each, 1e-2, np.empty(0), instants=800, tolerance=1e-5)
+        for each in (gait, other)
+    )
+    failed = {check.name for check in one.failures}
+    assert failed >= {"joint limits", "joint speed", "actuators", "net rotation"}
+    for a, b in zip(one.checks, two.checks, strict=True):
+        assert abs(b.value) == pytest.approx(abs(a.value), rel=1e-3, abs=1e-7), a.name
+    assert two.efficiency == pytest.approx(one.efficiency, rel=1e-4)
+
+
+def test_samples_make_every_error_larger_by_their_own_and_nothing_else_differs(three_link):
+    known, samples = three_link.certificate, (1e-2, 2e-2, 3e-2, 4e-2)
+    more = known.with_samples(samples)
+    value, efficiency, distance, work = samples
+    by = {
+        "value_error": value,
+        "value_error_at_zero_delta": value,
+        "efficiency_error": efficiency,
+        "error_at_zero_delta": efficiency,
+        "distance_error": distance,
+        "work_error": work,
+    }
+    assert more.numbers == pytest.approx(
+        {name: number + by.get(name, 0.0) for name, number in known.numbers.items()}, rel=1e-12
+    )
+    assert more.by_replay.numbers == pytest.approx(known.numbers, rel=1e-9, abs=1e-15)

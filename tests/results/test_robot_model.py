@@ -9,6 +9,7 @@ import pytest
 import colloc
 from colloc import Chain, Coupled, Foot, Friction, Harmonic, Pad, Problem, ProblemError, Wheel
 from colloc.commands.export import main
+from colloc.mechanics.inertia import kinetic_energy
 from colloc.pictures.robot_model import mjcf, urdf
 from colloc.results.solution import direction_of_travel
 
@@ -71,6 +72,51 @@ def test_an_mjcf_has_the_links_masses_ranges_and_feet_of_the_robot(uneven):
     )
     angles = [angle for name, angle in zip(joints, start, strict=True) if name.startswith("joint")]
     assert angles == pytest.approx(uneven.gait.angles(np.zeros(1))[:, 0])
+
+
+def links_of_mjcf(root):
+    """Of every link: its place in the one behind, its middle, mass, and moment of inertia."""
+    for body in root.iter("body"):
+        if body.get("name").startswith("link"):
+            own = body.find("inertial")
+            inertia = numbers(own.get("diaginertia"))[2]
+            yield (
+                numbers(body.get("pos"))[0],
+                numbers(own.get("pos"))[0],
+                float(own.get("mass")),
+                inertia,
+            )
+
+
+def links_of_urdf(root):
+    places = [numbers(joint.find("origin").get("xyz"))[0] for joint in root.iter("joint")]
+    for place, link in zip([0.0, *places], root.iter("link"), strict=True):
+        own = link.find("inertial")
+        mass, inertia = own.find("mass").get("value"), own.find("inertia").get("izz")
+        yield place, numbers(own.find("origin").get("xyz"))[0], float(mass), float(inertia)
+
+
+@pytest.mark.parametrize(("write", "links"), [(mjcf, links_of_mjcf), (urdf, links_of_urdf)])
+def test_a_model_has_the_energy_and_the_centre_of_mass_of_the_robot(write, links, uneven):
+    """So it has its masses, lengths and moments of inertia, each at its place."""
+    body, size, rng = uneven.problem.body, SIZE["length"], np.random.default_rng(0)
+    angles, rates, z = (rng.normal(size=(n, 1)) for n in (2, 2, 3))
+    root = ElementTree.fromstring(write(uneven.robot(**SIZE)))
+    place, heading, joint, spin = 0j, 0.0, size * complex(*z[:2, 0]), float(z[2, 0])
+    energy, moment, turns = 0.0, 0j, zip([0.0, *angles[:, 0]], [0.0, *rates[:, 0]], strict=True)
+    for (ahead, middle, mass, inertia), (angle, rate) in zip(links(root), turns, strict=True):
+        place, joint = (
+            place + ahead * np.exp(1j * heading),
+            joint + 1j * spin * ahead * np.exp(1j * heading),
+        )
+        heading, spin = heading + angle, spin + rate
+        arm = middle * np.exp(1j * heading)
+        energy += 0.5 * mass * abs(joint + 1j * spin * arm) ** 2 + 0.5 * inertia * spin**2
+        moment += mass * (place + arm)
+    known = float(kinetic_energy(body, angles, rates, z)[0, 0])
+    assert energy == pytest.approx(SIZE["mass"] * size**2 * known, rel=1e-6)
+    centre = complex(*(each[0, 0] for each in body.centre_of_mass(body.posture(angles))))
+    assert moment == pytest.approx(SIZE["mass"] * size * centre, rel=1e-6)
 
 
 def test_every_contact_has_the_coefficients_of_its_own_foot_along_and_across(uneven, tmp_path):

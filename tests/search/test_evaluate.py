@@ -8,7 +8,7 @@ import pytest
 
 import colloc
 from colloc.commands.main import main
-from colloc.gaits.fitted_gait import fitted_gait
+from colloc.gaits.fitted_gait import coefficients, fitted_gait
 
 GAIT = colloc.Fourier([0.2, -0.1], [[0.9, 0.1], [0.3, 0.0]], [[0.0, 0.1], [0.8, -0.1]])
 PROBLEM = colloc.Problem("mine", delta=1e-3)
@@ -276,6 +276,21 @@ def test_two_standard_deviations_cover_the_true_gait_in_95_of_100_records(exact,
         inside.append(abs(noisy.distance - exact.distance) <= errors["distance"])
         inside.append(abs(noisy.work - exact.work) <= errors["work"])
     assert np.mean(inside) >= (0.75 if slow else 0.92)
+
+
+@pytest.mark.parametrize("samples", [9, 12, 40])
+def test_19_of_20_records_are_within_what_a_series_says_its_coefficients_are_off_by(samples):
+    """However few their samples are."""
+    rng, inside = np.random.default_rng(2), []
+    true = GAIT.angles(np.arange(samples) / samples)
+    for _ in range(300):
+        noise = 0.02 * rng.normal(size=true.shape)
+        fitted = fitted_gait(true + noise, 2, period=samples, harmonics=2)
+        off = coefficients(fitted.gait) - coefficients(GAIT.resized(2))
+        stated, few = fitted.uncertainty, fitted.gait.n_harmonic * 2 + 1
+        deviation = np.linalg.norm(stated.directions[:, :, :few], axis=0)
+        inside.append(np.abs(off) <= stated.factor * deviation)
+    assert 0.93 < np.mean(inside) < 0.995
 
 
 def test_noise_about_an_optimum_is_stated_though_its_gradient_vanishes():

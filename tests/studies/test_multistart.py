@@ -558,3 +558,19 @@ def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 5e6
+
+
+def test_a_start_that_fails_on_its_way_is_told_with_the_last_optimum_it_came_through(monkeypatch):
+    problem = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=10)
+
+    def stopped(*asked, **how):
+        solution = solve(*asked, **how)
+        assert len([step for step in solution.history if step.optimal]) > 1
+        answer = replace(solution.answer, optimal=False)
+        return replace(solution, answer=answer, certificate=UNCERTIFIED)
+
+    monkeypatch.setattr(campaign, "solve", stopped)
+    outcome = campaign.run_guess(problem, lambda: problem.guess, 3, np.inf)
+    assert outcome.status not in (ERROR, SOLVED)
+    assert outcome.delta == problem.delta
+    assert outcome.efficiency > 0.2

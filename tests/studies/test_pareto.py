@@ -8,11 +8,23 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ProblemError, load, pareto_front, replay
+from colloc import (
+    Chain,
+    Fourier,
+    Friction,
+    Harmonic,
+    Objective,
+    Problem,
+    ProblemError,
+    evaluate,
+    load,
+    pareto_front,
+    replay,
+)
 from colloc.commands.main import main
 from colloc.pictures.front_figure import front_figure
 from colloc.search.solve import solve
-from colloc.studies.pareto import Gap
+from colloc.studies.pareto import Gap, ParetoFront
 
 PROBLEM = Problem(
     "wide",
@@ -164,3 +176,12 @@ def test_the_figure_names_its_axes(front):
     axes = front_figure(front).axes
     assert (axes[0].get_xlabel(), axes[0].get_ylabel()) == ("efficiency d/W", "speed d/L")
     assert len(axes[1].lines) == len(front.points)
+
+
+def test_a_gait_that_turns_is_as_far_whether_its_certificate_knows_the_objective_or_not():
+    bent = Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
+    point = evaluate(Problem("bent", delta=1e-2), bent)
+    assert abs(point.rotation) > 0.3
+    aims = Objective("distance"), Objective("distance * driven_work / driven_work")
+    ((known, measured),) = ParetoFront(point.problem, aims, (point,)).values
+    assert measured == pytest.approx(known, rel=1e-4)

@@ -1,6 +1,7 @@
 """Gaits that steer: certified at every turn, and between two of them a controller can
 interpolate."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -164,3 +165,14 @@ def test_turns_that_cannot_be_asked_for_are_refused(turns):
 def test_a_problem_that_turns_already_is_no_begin():
     with pytest.raises(ProblemError, match="straight"):
         steer(PROBLEM.with_(gait=Harmonic(1), rotation=0.1), [0.2])
+
+
+def test_the_figure_shows_every_efficiency_at_its_turn_and_crosses_what_is_not_certified(family):
+    bad = family.points[2]
+    bad = replace(bad, answer=replace(bad.answer, optimal=False))
+    known = np.array([np.degrees(TURNS), family.efficiency]).T
+    for points, crossed in ((family.points, []), ((*family.points[:2], bad), [2])):
+        cost = steering_figure(replace(family, points=points)).axes[0]
+        line, *crosses = (each.get_xydata() for each in cost.lines)
+        np.testing.assert_allclose(line, known)
+        np.testing.assert_allclose(np.concatenate([*crosses, np.empty((0, 2))]), known[crossed])

@@ -376,3 +376,11 @@ def test_momenta_that_lead_nowhere_give_way_to_slow_ones_and_these_to_rest(monke
     assert [near.any() for near in begun] == [True, True, False]
     np.testing.assert_array_equal(begun[0], asked)
     assert found.efficiency == pytest.approx(usual.efficiency, rel=1e-3)
+
+
+def test_a_gait_that_inertia_makes_better_is_slow_enough_up_to_where_it_is_by_that_part():
+    gait = colloc.ellipse(A0=1.5, A1=1.1, B1=0.9)
+    froude = colloc.slow_enough(CHAIN, ISOTROPIC, gait, 1e-2, 0.05)
+    slow = colloc.replay(CHAIN, ISOTROPIC, gait, 1e-2).efficiency
+    played = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, froude, tolerance=1e-4)
+    assert played.efficiency / slow - 1 == pytest.approx(0.05, rel=0.05)
