@@ -106,7 +106,7 @@ def guess_in_balance(problem):
         "status": "guess",
     }
     answer = Answer(
-        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, None, x, 0 * x,
+        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, x, 0 * x,
         np.zeros(transcription.assembly.m),
         **measured, **conditions, iterations=0, seconds=0.0,
     )  # fmt: skip

@@ -55,15 +55,12 @@ class Layout:
         return np.concatenate([(ends | own)[name] for name in names])[:, None]
 
 
-def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = None) -> Layout:
-    """Index arrays of all variables on a mesh; a gait's arcs meet at knots, by default at the
-    edges."""
+def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
+    """Index arrays of all variables on a mesh."""
     body, gait, full = control.dynamics.body, control.admissible.gait, control.formulation == FULL
-    n_joint = body.n_joint
-    # without them angles, rates and velocities along a path follow from its parameters
-    n_point = mesh.n_point if full or not gait.unit_speed else 0
+    n_joint, n_point = body.n_joint, mesh.n_point
     sizes = {
-        "parameters": (gait.size(n_joint, (mesh.edges if knots is None else knots).size - 1), 1),
+        "parameters": (gait.size(n_joint), 1),
         "theta": (1, mesh.n_site),
         "distance": (1, mesh.n + 1),
         "work": (1, mesh.n + 1),

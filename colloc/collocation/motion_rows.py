@@ -116,9 +116,11 @@ def asked_rows(
         control.actuators,
         control.dynamics.in_speeds_of(unit),
     )
+    relative = control.admissible.gait.relative_delta
     for quantity, total in zip(aims.integrals, layout.totals, strict=True):
         parts = block(
-            density_point(quantity, dynamics, unit), WITH_FORCES if quantity.needs_forces else SHAPE
+            density_point(quantity, dynamics, unit, relative=relative),
+            WITH_FORCES if quantity.needs_forces else SHAPE,
         )
         found[quantity.name] = parts, total_group(quantity.name, total[:, None], mesh, n, unit)
     if aims.at_least:
@@ -128,7 +130,7 @@ def asked_rows(
     if limits.names:
         n_point = mesh.n_point
         function = (
-            actuator_point(limits, dynamics, unit),
+            actuator_point(limits, dynamics, unit, relative=relative),
             at_points(layout, mesh, WITH_FORCES),
             np.empty((0, n_point)),
         )

@@ -40,7 +40,13 @@ power."""
 
 @lru_cache(maxsize=32)
 def point_function(
-    formulation: str, body: Body, friction: Law, regime: Regime = LEVEL, unit: float = 1.0
+    formulation: str,
+    body: Body,
+    friction: Law,
+    regime: Regime = LEVEL,
+    unit: float = 1.0,
+    *,
+    relative: bool = False,
 ) -> LocalFunction:
     """Outputs at a mesh point: equations that must vanish, then rates of rotation and distance and
     power of the joints, all per period divided by `unit`, as the law of friction takes rates.
@@ -48,7 +54,7 @@ def point_function(
     Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces,
     couples of the links. With inertia the momenta, too: they, not the balance, have to be those
     that the body has, and before the last outputs are their rates; at a free pace the logarithm of
-    the period comes last.
+    the period comes last. Delta may be relative to the shape speed.
     """
     if regime.froude:
         log_period = ca.SX.sym("log_period", int(regime.free_pace))
@@ -57,7 +63,9 @@ def point_function(
             checked_mass(body), friction, regime, froude * unit**2, log_period
         )
     return (
-        _full_point(body, friction, regime) if formulation == FULL else _map_point(body, friction)
+        _full_point(body, friction, regime, relative=relative)
+        if formulation == FULL
+        else _map_point(body, friction, relative=relative)
     )
 
 
@@ -72,10 +80,16 @@ def forward(theta: ca.SX, centre: ca.SX) -> ca.SX:
     return ca.cos(theta) * centre[0] - ca.sin(theta) * centre[1]
 
 
-def _full_point(body: Body, friction: Law, regime: Regime) -> LocalFunction:
+def _slow(delta: ca.SX, rates: ca.SX, *, relative: bool) -> ca.SX:
+    """Delta at a point."""
+    return delta * ca.norm_2(rates) if relative else delta
+
+
+def _full_point(body: Body, friction: Law, regime: Regime, *, relative: bool) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     forces = ca.SX.sym("forces", len(body.force_names))
-    laws, balance, centre, power = body.with_forces(friction, angles, rates, z, forces, delta)
+    slow = _slow(delta, rates, relative=relative)
+    laws, balance, centre, power = body.with_forces(friction, angles, rates, z, forces, slow)
     load = regime.pull(theta)
     if load is not None:
         balance += load_wrench(body, body.posture(angles), load)  # type: ignore[attr-defined, arg-type]
@@ -125,13 +139,14 @@ def across_point(dynamics: Dynamics) -> LocalFunction:
     return local_function("across", ca.vertcat(theta, angles, rates, z), ca.SX(0, 1), delta, out)
 
 
-def _map_point(body: Body, friction: Law) -> LocalFunction:
+def _map_point(body: Body, friction: Law, *, relative: bool) -> LocalFunction:
     """Outputs z - Z, rates at z, power at Z, where Z(angles, rates) solves the balance (an instance
     parameter)."""
     theta, angles, rates, z, delta = _symbols(body)
     solved, local = ca.SX.sym("Z", 3), ca.vertcat(theta, angles, rates, z)
-    balanced = body.sliding(friction, angles, rates, solved, delta)
-    ahead = forward(theta, body.sliding(friction, angles, rates, z, delta).centre)
+    slow = _slow(delta, rates, relative=relative)
+    balanced = body.sliding(friction, angles, rates, solved, slow)
+    ahead = forward(theta, body.sliding(friction, angles, rates, z, slow).centre)
     out = ca.vertcat(z - solved, z[2], ahead, balanced.power)
     return implicit_function("point", local, ca.SX(0, 1), solved, delta, balanced.force, out)
 
@@ -155,6 +170,24 @@ def mean_square(weights: ca.DM) -> LocalFunction:
     )
 
 
+def square_of_mean_speed(shares: np.ndarray, rates: np.ndarray) -> LocalFunction:
+    """The square of the mean shape speed from gait parameters, by the share of each side in the
+    time and its rates per parameter ``(n_side, n_joint, n_parameter)``."""
+    p = ca.SX.sym("p", rates.shape[2])
+    speeds = (share * ca.norm_2(ca.DM(each) @ p) for share, each in zip(shares, rates, strict=True))
+    return local_function("mean_speed", p, ca.SX(0, 1), ca.SX.sym("delta"), sum(speeds) ** 2)
+
+
+def shares_of_length(shares: np.ndarray, rates: np.ndarray) -> LocalFunction:
+    """The length of every side over that of all, from gait parameters; arguments as of
+    `square_of_mean_speed`."""
+    p = ca.SX.sym("p", rates.shape[2])
+    sides = zip(shares, rates, strict=True)
+    lengths = ca.vertcat(*(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides))
+    out = lengths / ca.sum1(lengths)
+    return local_function("shares", p, ca.SX(0, 1), ca.SX.sym("delta"), out)
+
+
 def member_equations(gait: AnyClass, n_joint: int) -> LocalFunction:
     """Fourier coefficients less those that the own parameters of a class give
     (`colloc.gaits.serpenoid`): 0 of members."""
@@ -169,14 +202,17 @@ def member_equations(gait: AnyClass, n_joint: int) -> LocalFunction:
     )
 
 
-def density_point(quantity: Quantity, dynamics: Dynamics, unit: float) -> LocalFunction:
+def density_point(
+    quantity: Quantity, dynamics: Dynamics, unit: float, *, relative: bool = False
+) -> LocalFunction:
     """Density of a quantity at a point, from joint angles and rates or, if it needs forces, from
     the locals of `with_forces`, per period divided by `unit`."""
     theta, angles, rates, _, delta = _symbols(dynamics.body)
+    slow = _slow(delta, rates, relative=relative)
     if not quantity.needs_forces:
-        out = quantity.at(Instants(dynamics.body, dynamics.law, angles, rates, delta, unit=unit))
+        out = quantity.at(Instants(dynamics.body, dynamics.law, angles, rates, slow, unit=unit))
         return local_function(quantity.name, ca.vertcat(angles, rates), ca.SX(0, 1), delta, out)
-    local, now = with_forces(dynamics, theta, angles, rates, delta, unit)
+    local, now = with_forces(dynamics, theta, angles, rates, slow, unit)
     return local_function(quantity.name, local, ca.SX(0, 1), delta, quantity.at(now))
 
 
@@ -191,9 +227,12 @@ def with_forces(
     return ca.vertcat(theta, angles, rates, forces), now
 
 
-def actuator_point(limits: PathLimits, dynamics: Dynamics, unit: float) -> LocalFunction:
+def actuator_point(
+    limits: PathLimits, dynamics: Dynamics, unit: float, *, relative: bool = False
+) -> LocalFunction:
     """What limited actuators do at a point, as parts of what they can; locals and unit as of
     `with_forces`."""
     theta, angles, rates, _, delta = _symbols(dynamics.body)
-    local, now = with_forces(dynamics, theta, angles, rates, delta, unit)
+    slow = _slow(delta, rates, relative=relative)
+    local, now = with_forces(dynamics, theta, angles, rates, slow, unit)
     return local_function("actuators", local, ca.SX(0, 1), delta, limits.at(now))

@@ -34,19 +34,11 @@ class CollocatedClass(Protocol):
     def mesh(self) -> Mesh: ...
 
     @property
-    def knots(self) -> np.ndarray | None:
-        """``(n,)`` or None: phases where the arcs of a free path meet; None for other gaits."""
-
-    @property
     def checks(self) -> list[ShapeCheck]:
         """Shape functions whose largest value in each mesh cell is constrained."""
 
-    def phase_mesh(self, gait: AnyGait) -> Mesh:
-        """The mesh in phases of a member."""
-
-    def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
-        """What a check's block is given at an instant of every cell of a mesh in phases,
-        ``(n_given, n_cell)``."""
+    def placed(self, check: ShapeCheck, times: np.ndarray) -> np.ndarray:
+        """What a check's block is given at an instant of every cell, ``(n_given, n_cell)``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +68,6 @@ class GaitProgram:
         return self.gaits.mesh
 
     @property
-    def knots(self) -> np.ndarray | None:
-        return self.gaits.knots
-
-    @property
     def checks(self) -> list[ShapeCheck]:
         return self.gaits.checks
 
@@ -94,11 +82,7 @@ class GaitProgram:
 
     def member(self, parameters: np.ndarray) -> AnyGait:
         """The gait of a parameter vector ``(n_parameter,)``."""
-        return self.control.admissible.member(parameters, self.knots)
-
-    def phase_mesh(self, gait: AnyGait) -> Mesh:
-        """The mesh in phases of a member."""
-        return self.gaits.phase_mesh(gait)
+        return self.control.admissible.member(parameters)
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks (objective first), with every check moved to its cell's
@@ -107,14 +91,13 @@ class GaitProgram:
         An inequality between nodes is kept by constraining it where the gait `parameters` comes
         closest to it: see `colloc.collocation.worst_instants`.
         """
-        gait = self.member(parameters)
-        mesh, given = self.phase_mesh(gait), {}
-        limit = self.control.admissible.joint_limit
+        gait, body, limit, *_ = self.control.admissible
+        trajectory, given = gait.trajectory(parameters, body.n_joint), {}
         for check, times in zip(
-            self.checks, worst_instants(gait, mesh, self.checks, limit), strict=True
+            self.checks, worst_instants(trajectory, self.mesh, self.checks, limit), strict=True
         ):
             given[check.name] = np.vstack(
-                [self.gaits.placed(check, times, mesh), held_shares(check, gait, times)]
+                [self.gaits.placed(check, times), held_shares(check, trajectory, times)]
             )
         blocks = zip(self.names, self.assembly.blocks, strict=True)
         return [

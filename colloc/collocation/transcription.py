@@ -25,7 +25,6 @@ from scipy import sparse
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, layout_of
 from colloc.collocation.motion_rows import (
-    SHAPE,
     BlockParts,
     asked_rows,
     at_points,
@@ -33,21 +32,19 @@ from colloc.collocation.motion_rows import (
     motion_groups,
     objective_block,
 )
-from colloc.collocation.path_equations import full_path_point, path_point, per_phase
-from colloc.collocation.path_geometry import path_geometry
 from colloc.collocation.point_equations import (
     N_RATE,
     gait_check,
     mean_square,
     member_equations,
     point_function,
+    shares_of_length,
+    square_of_mean_speed,
 )
 from colloc.collocation.program import CollocatedClass, GaitProgram, Implicit, stacked_rows
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.gaits.control_problem import Admissible, ControlProblem
-from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import widest
-from colloc.gaits.path_samples import Gait
 from colloc.mechanics.bodies import FULL, Pairs
 from colloc.mechanics.inertia import STATES
 from colloc.motion.heading import momenta_image
@@ -70,12 +67,8 @@ class _Series(NamedTuple):
     admissible: Admissible
     mesh: Mesh
     checks: list[ShapeCheck]
-    knots: np.ndarray | None = None
 
-    def phase_mesh(self, gait: AnyGait) -> Mesh:
-        return self.mesh
-
-    def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
+    def placed(self, check: ShapeCheck, times: np.ndarray) -> np.ndarray:
         """The matrices from parameters to what is checked at the instants, a column each."""
         matrix = check.matrix(self.admissible.gait, times, self.admissible.n_joint)
         return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
@@ -95,7 +88,10 @@ def transcribe(
     body, friction = moved.body, moved.law
     gait, n_joint = admissible.gait, body.n_joint
     series = _Series(admissible, mesh, shape_checks(body, far, admissible.largest_speeds))
-    point = point_function(control.formulation, body, friction, dynamics.regime, RADIANS)
+    relative = gait.relative_delta
+    point = point_function(
+        control.formulation, body, friction, dynamics.regime, RADIANS, relative=relative
+    )
     n_parameter = layout.parameters.shape[0]
 
     paces = np.repeat(layout.parameters[[layout.pace]], mesh.n_point, axis=1)[
@@ -110,18 +106,30 @@ def transcribe(
         function = gait_check(check, n_joint, n_parameter)
         middles = np.vstack(
             [
-                series.placed(check, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]), mesh),
+                series.placed(check, 0.5 * (mesh.edges[1:] + mesh.edges[:-1])),
                 np.full(mesh.n, -1.0),
             ]
         )
         blocks[check.name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
-    square = mean_square(ca.DM(gait.mean_square_rate(n_joint) / RADIANS**2))
+    if relative:
+        shares, on_sides = gait.side_rates(n_joint)
+        square = square_of_mean_speed(shares, on_sides / RADIANS)
+    else:
+        square = mean_square(ca.DM(gait.mean_square_rate(n_joint) / RADIANS**2))
     blocks["shape speed"] = square, layout.parameters, np.empty((0, 1))
+    evenly = None
+    if relative and dynamics.turn:  # axes that turn evenly along the path
+        blocks["shares"] = shares_of_length(shares, on_sides), layout.parameters, np.empty((0, 1))
+        side = np.searchsorted(gait.corners_in_time, mesh.edges[:-1], side="right") - 1
+        at, every = np.repeat(side, mesh.scheme.s), np.arange(mesh.n_point)
+        evenly = sparse.csr_matrix(
+            (dynamics.turn / shares[at], (every, at)), shape=(mesh.n_point, shares.size)
+        )
 
     def block(function: LocalFunction, names: Sequence[str]) -> BlockParts:
         return function, at_points(layout, mesh, names), none
 
-    rates = gait.rate_matrix(mesh.times, n_joint) / RADIANS
+    rates = gait.rates_on(mesh, n_joint) / RADIANS
     groups = [
         gait_group(
             "angles",
@@ -132,7 +140,7 @@ def transcribe(
         ),
         gait_group("rates", layout.rates, layout.parameters, rates, layout.n),
         *_point_groups(control, point.n_out, mesh, layout),
-        *motion_groups(control, layout, mesh, point.n_out, RADIANS),
+        *motion_groups(control, layout, mesh, point.n_out, RADIANS, evenly),
         *(check.group(admissible.joint_limit, mesh.n, layout.n) for check in series.checks),
         block_group("shape speed", admissible.smallest_shape_speed**2, np.inf, 1, layout.n),
     ]
@@ -146,69 +154,19 @@ def transcribe(
         _, angles, rates, z = ca.vertsplit(
             local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint]
         )
-        return velocity(angles, rates, z, delta)
+        if not relative:
+            return velocity(angles, rates, z, delta)
+        speed = ca.sqrt(ca.sum1(rates * rates))
+        unit, start = (each / ca.repmat(speed, each.size1(), 1) for each in (rates, z))
+        return ca.repmat(speed, 3, 1) * velocity(angles, unit, start, delta)
 
     asked = asked_rows(control, layout, mesh, block, RADIANS)
     rows = _Rows(
         blocks, groups, asked, {} if control.formulation == FULL else {"point": velocity_map}
     )
     bounds = gait.bounds(body, widest(admissible.joint_limit))
-    return _program(control, series, layout, rows, bounds=bounds, unit=RADIANS, velocity=velocity)
-
-
-def transcribe_path(
-    control: ControlProblem,
-    gait: Gait,
-    edges: np.ndarray | None = None,
-    scheme: str = "",
-    far: Pairs = (),
-) -> GaitProgram:
-    """The nonlinear program for a class that bounds the path, near a gait: arguments as of
-    `colloc.collocation.path_geometry.path_geometry`.
-
-    Rates are unit tangents and delta is measured at unit shape speed; joint angles, rates, tail
-    velocity and link forces are variables in the formulation "full" only.
-    """
-    paths = path_geometry(control, gait, edges, scheme, far)
-    mesh, piece, blocks = paths.mesh, paths.piece, paths.blocks
-    layout, (body, law, regime, *_) = layout_of(control, mesh, paths.knots), control.dynamics
-    full = layout.forces.size > 0
-    point = full_path_point(body, law, piece, regime) if full else path_point(body, law, piece)
-    here, given = (
-        np.repeat(paths.shape, mesh.scheme.s, axis=1),
-        paths.given(np.tile(mesh.scheme.c, mesh.n)),
-    )
-    own = at_points(
-        layout, mesh, ("theta", "angles", "rates", "z", "forces") if full else ("theta",)
-    )
-    blocks["point"] = (point, np.concatenate([own, here]), given)
-    groups = [
-        *paths.groups,
-        *(_point_groups(control, point.n_out, mesh, layout, placed=True) if full else []),
-        *motion_groups(
-            control, layout, mesh, point.n_out, 1.0, paths.evenly(control.dynamics.turn)
-        ),
-    ]
-    velocity = ImplicitVelocity(body, law, mesh.n_point)
-    place = ca.Function("place", [piece.shape, piece.given], [piece.angles, piece.direction]).map(
-        mesh.n_point
-    )
-    unknown = ca.DM(np.full((3, mesh.n_point), np.nan))
-
-    def balanced(local: ca.MX, delta: ca.MX) -> ca.MX:
-        angles, direction = place(local[1:, :], ca.DM(given))
-        return velocity(angles, direction, unknown, delta)
-
-    def block(function: LocalFunction, names: Sequence[str]) -> BlockParts:
-        placed = names == SHAPE
-        own = [] if placed else [at_points(layout, mesh, names)]
-        return per_phase(function, piece, placed=placed), np.concatenate([*own, here]), given
-
-    asked = asked_rows(control, layout, mesh, block, 1.0)
-    rows = _Rows(blocks, groups, asked, {} if full else {"point": balanced})
-    return _program(
-        control, paths, layout, rows, bounds=(paths.lower, paths.upper), unit=1.0, velocity=velocity
-    )
+    unit = 1.0 if relative else RADIANS
+    return _program(control, series, layout, rows, bounds=bounds, unit=unit, velocity=velocity)
 
 
 class _Rows(NamedTuple):
@@ -253,21 +211,12 @@ def _program(
     )  # fmt: skip
 
 
-def _point_groups(
-    control: ControlProblem, n_out: int, mesh: Mesh, layout: Layout, *, placed: bool = False
-) -> list[Group]:
-    """The equations of every point: where it is, if its block says that; lifted force laws, then
-    the balance (or the velocity map in its place), or with inertia what the momenta are; and how
-    these grow, and close a period."""
-    n, n_point, momenta, n_joint = (
-        layout.n,
-        mesh.n_point,
-        layout.momenta,
-        control.admissible.n_joint,
-    )
+def _point_groups(control: ControlProblem, n_out: int, mesh: Mesh, layout: Layout) -> list[Group]:
+    """The equations of every point: lifted force laws, then the balance (or the velocity map in
+    its place), or with inertia what the momenta are; and how these grow, and close a period."""
+    n, n_point, momenta = layout.n, mesh.n_point, layout.momenta
     end = n_out - N_RATE - len(momenta)
-    names = (*(SHAPE if placed else ()), "force law", "balance")
-    starts = [0, *((n_joint, 2 * n_joint) if placed else ()), end - 3]
+    names, starts = ("force law", "balance"), [0, end - 3]
     groups = [
         output_group(name, range(a, b), n_out, n_point, n)
         for name, a, b in zip(names, starts, [*starts[1:], end], strict=True)

@@ -27,7 +27,7 @@ from colloc.gaits.regime import Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimits, Quantity
 from colloc.mechanics.law import Law
-from colloc.numerics.mesh import Mesh, uniform_mesh
+from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
 
@@ -63,9 +63,9 @@ class Admissible(NamedTuple):
     def n_joint(self) -> int:
         return self.body.n_joint
 
-    def member(self, parameters: np.ndarray, knots: np.ndarray | None = None) -> AnyGait:
-        """The gait of a parameter vector of the full program; a path's arcs meet at knots."""
-        return self.gait.member(parameters, self.n_joint, knots)
+    def member(self, parameters: np.ndarray) -> AnyGait:
+        """The gait of a parameter vector of the full program."""
+        return self.gait.member(parameters, self.n_joint)
 
 
 class Aims(NamedTuple):
@@ -134,14 +134,15 @@ class ControlProblem:
     unit: float
 
     def mesh(self, edges: np.ndarray | None = None, of_scheme: str = "") -> Mesh:
-        """The first mesh on the part of the period that is solved: uniform and of the usual scheme;
-        or as given."""
-        rule = scheme(of_scheme or self.scheme)
-        return (
-            uniform_mesh(rule, self.intervals, self.admissible.gait.fraction)
-            if edges is None
-            else Mesh(rule, edges)
-        )
+        """The first mesh on the part of the period that is solved, that of the class and of the
+        usual scheme; or as given."""
+        if edges is None:
+            edges = self.admissible.gait.edges(self.intervals)
+        return Mesh(scheme(of_scheme or self.scheme), edges)
+
+    def in_phases(self, mesh: Mesh, gait: AnyGait) -> Mesh:
+        """A program's mesh in phases of a member."""
+        return Mesh(mesh.scheme, self.admissible.gait.phases(gait, mesh.edges))
 
     def stated(self, value: float) -> float:
         """A value of the objective as the problem states it."""

@@ -61,8 +61,6 @@ PLAIN = {
     "direction": "The body goes where it was asked to go.",
     "one motion": "Friction leaves the body no choice of another motion, or none that changes the "
     "result.",
-    "joins": "The pieces of the path meet without a jump.",
-    "curvature": "The path bends no more sharply than it may.",
 }
 """What a check means for a reader who knows nothing of optimisation, by its name."""
 TURNING = {

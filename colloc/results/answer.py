@@ -10,6 +10,7 @@ import numpy as np
 
 from colloc.collocation.layout import Layout, layout_of
 from colloc.gaits.control_problem import control_problem
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
@@ -26,8 +27,8 @@ class Step:
     Attributes
     ----------
     delta : float
-        Regularisation speed, in the units of the problem's class of gaits: per period, or at unit
-        shape speed.
+        Regularisation speed, in the units of the problem's class of gaits: per period, or relative
+        to the shape speed.
     intervals : int
     value, distance, work : float
         The problem's objective, distance and work of a period, as collocation sees them.
@@ -96,9 +97,6 @@ class Answer:
     edges : (n_interval + 1,)
         The mesh, in phases of the gait.
     scheme : str
-    knots : (n_arc + 1,), optional
-        Phases where the arcs of a free path meet; they are among the edges. By default they are the
-        edges.
     x, lam_x : (n,)
         Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces
         are in units of `colloc.gaits.control_problem`.
@@ -129,7 +127,6 @@ class Answer:
     delta: float
     edges: np.ndarray
     scheme: str
-    knots: np.ndarray | None
     x: np.ndarray
     lam_x: np.ndarray
     lam_g: np.ndarray
@@ -181,12 +178,12 @@ class Answer:
     @property
     def layout(self) -> Layout:
         """Where every variable is in `x`."""
-        return layout_of(control_problem(self.problem), self.mesh, self.knots)
+        return layout_of(control_problem(self.problem), self.mesh)
 
     @property
     def delta_per_period(self) -> float:
         """Regularisation speed in body lengths per period, whatever the class measures it in."""
-        return self.delta * self.gait.delta_unit
+        return delta_per_period(self.problem.gait, self.gait, self.delta)
 
     @cached_property
     def motion(self) -> CollocatedMotion:

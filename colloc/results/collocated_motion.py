@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.collocation.layout import Layout
+from colloc.collocation.layout import RADIANS, Layout
 from colloc.gaits.gait import finite_array
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
@@ -50,12 +50,10 @@ class CollocatedMotion:
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates and tail velocities per period at the collocation points."""
-        x, layout, problem = self.x, self.layout, self.problem
-        if layout.z.size:
-            unit = self.gait.speed_unit
-            return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
-        angles, rates = self.gait(self.mesh.times)
-        return angles, rates, problem.body.solve(problem.law, angles, rates, self.delta).z
+        x, layout, unit = self.x, self.layout, RADIANS
+        if self.problem.gait.relative_delta:  # the gait has another pace than the variables
+            unit = self.gait.length / np.linalg.norm(x[layout.rates], axis=0)
+        return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
 
     @cached_property
     def at_points(self) -> Sliding:
@@ -73,7 +71,7 @@ class CollocatedMotion:
     def _growth(self) -> np.ndarray:
         """Force, and torque about the tail, that change the momenta as the scheme's polynomials
         say, ``(3, n_point)``."""
-        mesh, unit = self.mesh, self.gait.speed_unit
+        mesh, unit = self.mesh, RADIANS
         momenta = unit * self.x[self.layout.momenta]
         grown = momenta[:, mesh.sites] - momenta[:, mesh.edge_sites[:-1], None]
         growth = np.empty((3, mesh.n_point))

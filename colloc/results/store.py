@@ -5,11 +5,10 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
 
     /problem            JSON text of all fields          /source     text of the problem file
     /gait/{mean,cos,sin}                                 /versions   JSON text
-         or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute
-         symmetry
+         or {corners} of a polygon, with attribute symmetry
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result; of a smooth body
         modes and mode_rates
-    /answer/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, value, distance, work,
+    /answer/{edges,x,lam_x,lam_g}; attributes delta, value, distance, work,
     kkt_error, panels, ... /history/{delta,intervals,value,distance,work,...}: how the search came
     there, a row a step /certificate/{name,value,threshold,passed,meaning}, attributes value,
     value_error, distance, distance_error, work, ...
@@ -56,7 +55,7 @@ _ANSWER_ARRAYS = {
     "lam_x": (_LAYOUT, "variable"),
     "lam_g": (_LAYOUT, "constraint"),
 }
-_APART = ("problem", "gait", "knots", "second_order", "history", *_ANSWER_ARRAYS)
+_APART = ("problem", "gait", "second_order", "history", *_ANSWER_ARRAYS)
 """Of an answer; the rest are attributes."""
 
 _GAIT_ARRAYS = {
@@ -64,10 +63,6 @@ _GAIT_ARRAYS = {
     "cos": ("rad", "joint, harmonic"),
     "sin": ("rad", "joint, harmonic"),
     "table": ("", "joint, function"),
-    "edges": ("period", "edge"),
-    "shapes": ("rad", "joint, edge"),
-    "tangents": ("heading in rad, or unit vector", "component, edge"),
-    "length": ("rad", ""),
     "corners": ("rad", "joint, vertex"),
     "schedule": ("period", "stage"),
 }
@@ -164,8 +159,6 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
     group = file.create_group("answer")
     for name, (units, dims) in _ANSWER_ARRAYS.items():
         put(group, name, getattr(answer, name), units=units, dims=dims)
-    if answer.knots is not None:
-        put(group, "knots", answer.knots, units="period", dims="knot")
     for field in dataclasses.fields(answer):
         if field.name not in _APART:
             put_attribute(group, field.name, getattr(answer, field.name))
@@ -182,7 +175,6 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
 def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     group = child(file, "answer")
     arrays = {name: array(group, name) for name in _ANSWER_ARRAYS}
-    knots = array(group, "knots") if "knots" in group else None
     plain = {
         f.name: attribute(group, f.name) for f in dataclasses.fields(Answer) if f.name not in _APART
     }
@@ -208,19 +200,11 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)
     )
     # by the variables, not by what the group gait says for other readers
-    layout = layout_of(
-        control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]), knots
-    )
+    layout = layout_of(control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]))
     if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
         raise StoreError("its variables do not fit its mesh.")
-    parameters, meet = (
-        arrays["x"][layout.parameters[:, 0]],
-        arrays["edges"] if knots is None else knots,
-    )
-    gait = problem.gait.member(parameters, problem.body.n_joint, meet)
-    return Answer(
-        problem, gait, knots=knots, **arrays, **plain, second_order=second, history=history
-    )
+    gait = problem.gait.member(arrays["x"][layout.parameters[:, 0]], problem.body.n_joint)
+    return Answer(problem, gait, **arrays, **plain, second_order=second, history=history)
 
 
 def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:

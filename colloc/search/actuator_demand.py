@@ -154,7 +154,7 @@ def _instants(problem: Problem, samples: np.ndarray) -> tuple[np.ndarray, np.nda
 def _delta(problem: Problem, rates: np.ndarray) -> float:
     """Regularisation speed per period."""
     return problem.delta * (
-        float(np.linalg.norm(rates, axis=0).mean()) if problem.gait.unit_speed else 1.0
+        float(np.linalg.norm(rates, axis=0).mean()) if problem.gait.relative_delta else 1.0
     )
 
 

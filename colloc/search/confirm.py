@@ -38,8 +38,7 @@ from colloc.search.spaces import heading, space_near, transcribed, with_far
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
 _MOST_PARAMETERS = 150
-"""Curvature is measured for so many parameters at most: it takes two gradients for each, 8 s for a
-free path of 256."""
+"""Curvature is measured for so many parameters at most: it takes two gradients for each."""
 
 
 class Verdict(Enum):
@@ -107,10 +106,7 @@ def confirm(optimum: Optimum) -> Answer:
 
 def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity) -> _Outcome:
     space, delta = optimum.space, optimum.delta
-    mesh = space.phase_mesh(optimum.gait)
-    program = transcribed(
-        optimum.problem, optimum.gait, mesh.edges, mesh.scheme.name, space.given.far
-    )
+    program = transcribed(optimum.problem, None, *space.given)
     x = feasible_point(program, space.full_parameters(optimum.v), delta)
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, CONFIRMING)
@@ -186,9 +182,8 @@ def answer_of(program: GaitProgram, result: NlpResult, delta: float) -> Answer:
         program.control.problem,
         gait,
         delta,
-        edges=program.phase_mesh(gait).edges,
+        edges=program.control.in_phases(program.mesh, gait).edges,
         scheme=program.mesh.scheme.name,
-        knots=program.knots,
         x=result.x,
         lam_x=result.lam_x,
         lam_g=result.lam_g,
@@ -211,26 +206,16 @@ def unconfirmed(optimum: Optimum) -> Answer:
     """The gait as the search found it, every other variable following from its balance: where there
     is no time for more."""
     space, control = optimum.space, optimum.space.control
-    mesh, layout = (
-        space.phase_mesh(optimum.gait),
-        layout_of(control, space.mesh, optimum.gait.knots),
-    )
-    x = balanced_variables(
-        control.dynamics,
-        layout,
-        mesh,
-        optimum.gait,
-        space.full_parameters(optimum.v),
-        optimum.delta,
-    )
+    layout = layout_of(control, space.mesh)
+    parameters = space.full_parameters(optimum.v)
+    x = balanced_variables(control, layout, space.mesh, parameters, optimum.delta)
     distance, work = distance_and_work(control, layout, x)
     return Answer(
         optimum.problem,
         optimum.gait,
         optimum.delta,
-        edges=mesh.edges,
+        edges=control.in_phases(space.mesh, optimum.gait).edges,
         scheme=space.mesh.scheme.name,
-        knots=optimum.gait.knots,
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),

@@ -18,19 +18,6 @@ of delta, the tail velocity that is solved for resolves 1e-16, so the gradient i
 1e-16/delta. Measured on one harmonic of three links: a KKT error of 1.8e-8 at 1e-8, 1.3e-7 at 1e-9
 and 2e-6 at 1e-10, where 1e-6 is allowed."""
 _COMPONENTS = ("force along the tail", "force across the tail", "torque about the tail")
-_PATH = {
-    "path": "the joining of arcs to a path",
-    "closure": "closure of the path",
-    "smooth closure": "closure of the path's direction",
-    "curvature": "the bound on curvature",
-    "curvature to the left": "the bound on curvature",
-    "curvature to the right": "the bound on curvature",
-    "turn": "the most that one arc may turn",
-    "winding": "the winding of the path",
-    "unit tangent": "the unit length of the path's direction",
-    "start": "the start of the path",
-    "sides": "the least length of sides and path",
-}
 _OF_PERIOD = {
     "at least": "a value that has to be reached",
     "shape speed": "the lower bound on the shape speed",
@@ -85,7 +72,7 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
         return f"the limit of {name}", phase
     if name.startswith("links"):
         return f"contact of {name}", phase
-    return _PATH.get(name, f"the {name}"), phase
+    return f"the {name}", phase
 
 
 def time_window(transcription: GaitProgram, excess: np.ndarray, group: str) -> tuple[float, float]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer, Step
 from colloc.search.confirm import answer_of, second_order
@@ -55,9 +56,14 @@ def literal_answer(problem: Problem) -> Answer:
     for done in range(MESHES if problem.mesh_tolerance > 0 else 0):
         this_run().told("refine", done, MESHES)
         gait = program.member(parameters)
-        mesh = program.phase_mesh(gait)
+        mesh = program.control.in_phases(program.mesh, gait)
         plan = planned_mesh(
-            program.control, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept
+            program.control,
+            mesh,
+            gait,
+            delta_per_period(problem.gait, gait, delta),
+            problem.mesh_tolerance,
+            kept=kept,
         )
         if plan is None:
             break

@@ -101,19 +101,18 @@ def as_it_is(
     """A gait with everything else following from its balance."""
     control = control_problem(problem)
     layout, aim = layout_of(control, mesh), control.aims.objective
-    x = balanced_variables(control.dynamics, layout, mesh, gait, parameters, problem.delta)
+    x = balanced_variables(control, layout, mesh, parameters, problem.delta, gait)
     distance, work = distance_and_work(control, layout, x)
     motion = ReducedMotion(
         kind_of_motion(control.dynamics), mesh, _Given(gait, mesh), aim.integrals
     )
-    value = control.stated(float(aim(motion.values(parameters, problem.delta * gait.delta_unit))))
+    value = control.stated(float(aim(motion.values(parameters, problem.delta))))
     return Answer(
         problem,
         gait,
         problem.delta,
         edges=mesh.edges,
         scheme=mesh.scheme.name,
-        knots=None,
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),

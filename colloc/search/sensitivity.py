@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.parameters import Parameter, parameters
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
@@ -38,7 +39,7 @@ from colloc.search.choose import solution_of
 from colloc.search.converge import converged
 from colloc.search.effort import FINE, ROUGH
 from colloc.search.solve import finished
-from colloc.search.spaces import remeshed, space_about, space_near, space_of, with_far
+from colloc.search.spaces import remeshed, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
 from colloc.verification.played import Replay
 from colloc.verification.replayer import replayer
@@ -54,12 +55,6 @@ _FINEST = 8
 """Parts of each interval of the answer's mesh."""
 _STATIONARY = 1e-4
 """Largest gradient of the Lagrangian, over the value, at which there are multipliers."""
-_OF_ARCS = (
-    "of paths of so many arcs: other numbers of arcs may change slopes by some per cent, "
-    "which the errors leave out"
-)
-"""For curvature 2 and bilateral paths, with 90 to 240 arcs of the half that is solved, the slope
-along curvature is 0.057 to 0.060, whichever way the number goes."""
 _EXCESS, _TURNS = 1e-5, 1e-4
 """By how much a gait may exceed its limits [rad, or relative], and turn in a period [rad], and
 still be one of the problem."""
@@ -312,7 +307,6 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
         problem.objective.short,
         *at,
         tuple(effects),
-        _OF_ARCS if problem.gait.of_arcs else "",
     )
 
 
@@ -352,7 +346,7 @@ class _Lagrangian:
     def __call__(self, problem: Problem) -> float:
         """Its value, in the units of the stated objective, with the rows at the worst instants of
         the gait."""
-        program = ReducedProgram(space_of(problem, *self.space.given), problem.delta)
+        program = ReducedProgram(space_of(problem, None, *self.space.given), problem.delta)
         program.place_rows(self.v)
         at = {name: k for k, name in enumerate(program.row_names)}
         if missing := self.on_rows.keys() - at.keys():
@@ -406,10 +400,8 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
         found = converged(space, space.parameters(answer.gait), answer.delta, FINE)
         return _lagrangian(found.space, found.v, answer.delta)
 
-    gait = answer.problem.gait
-    if gait.of_arcs:  # every interval is one
-        return [on(2), own]
-    return [on(_FINEST), on(2), on(4, 0.5) if gait.moves_knots else own]
+    fixed = answer.problem.gait.has_fixed_edges
+    return [on(_FINEST), on(2), own if fixed else on(4, 0.5)]
 
 
 def _beside(parameter: Parameter, step: float) -> dict[int, Problem]:
@@ -438,10 +430,10 @@ def _slope(
 def _again(solution: Solution, problem: Problem, change: float) -> Again:
     """What is best where a number differs, and what the gait on file does there."""
     gait, delta = solution.answer.gait, problem.delta
-    space, v = space_about(problem, gait)
+    space, v = space_near(problem, gait)
     found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
     best = found.certificate if found.success else UNCERTIFIED
-    at = problem.body, problem.law, gait, delta * gait.delta_unit
+    at = problem.body, problem.law, gait, delta_per_period(problem.gait, gait, delta)
     asked: Any = {
         "objective": problem.objective,
         "quantities": problem.integrals,

@@ -4,9 +4,10 @@ every way to it agrees."""
 import numpy as np
 import pytest
 
-from colloc import Chain, FreePath, Friction, Harmonic, Polygon, Problem, evaluate, replay
+from colloc import Chain, Friction, Harmonic, Polygon, Problem, evaluate, replay
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.control_problem import control_problem
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.harmonic import Fourier
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
@@ -117,7 +118,6 @@ def test_the_chord_tends_to_the_displacement_as_the_turn_tends_to_nothing():
 CASES = {
     "series": {"gait": Harmonic(1)},
     "with inertia": {"gait": Harmonic(1), "froude": 0.05},
-    "free path": {"gait": FreePath(4.0, "none")},
     "polygon of unequal friction": {
         "gait": Polygon(4, "none"),
         "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
@@ -148,7 +148,7 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     values = program.motion.values(v, delta)
     assert values["rotation"] == pytest.approx(turn, abs=1e-12)
 
-    full = transcribed(problem, space.member(v), space.mesh.edges)
+    full = transcribed(problem, None, space.mesh.edges)
     x = feasible_point(full, space.full_parameters(v), delta)
     found = oracles(full.assembly)
     p = found.parameter_vector(
@@ -164,13 +164,14 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
         )
 
     gait = space.member(v)
-    per_period = delta * gait.delta_unit
+    per_period = delta_per_period(problem.gait, gait, delta)
     run, law = (inertial_replay, problem.law) if problem.froude else (replay, problem.law)
     more = {"regime": problem.regime} if problem.froude else {}
     fine = run(
         BODY, law, gait, per_period, breaks=gait.corner_phases, tolerance=1e-6, turn=turn, **more
     )
-    error = mesh_error(control_problem(problem), full.phase_mesh(gait), gait, per_period, 1e-7)
+    control = control_problem(problem)
+    error = mesh_error(control, control.in_phases(full.mesh, gait), gait, per_period, 1e-7)
     assert values["distance"] / values["work"] / fine.efficiency - 1 == pytest.approx(
         error.total, abs=3e-6
     )

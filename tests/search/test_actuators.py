@@ -8,11 +8,11 @@ from shared.instants import random_instants
 
 from colloc import (
     Chain,
-    FreePath,
     Friction,
     Harmonic,
     ModalBody,
     OwnLaw,
+    Polygon,
     PowerLaw,
     Problem,
     ProblemError,
@@ -233,7 +233,7 @@ def test_joints_too_weak_for_a_search_from_one_guess_are_named():
 
 
 def largest_share(problem, gait):
-    delta = problem.delta * gait.delta_unit
+    delta = problem.delta
     limits = problem.path_limits
     return replay(
         problem.body, problem.friction, gait, delta, limits=limits, tolerance=1e-3, instants=200
@@ -330,7 +330,7 @@ SIZED = ("guess", "joint_limit", "delta", "delta_start", "intervals", "formulati
 """What has another usual value for another body."""
 REFUSED = {
     "pace open": (
-        {"power_limit": 1.0, "gait": FreePath(2.0, "none")},
+        {"power_limit": 1.0, "gait": Polygon(4)},
         "leaves the pace open, but the joints' power is limited",
     ),
     "smooth": (

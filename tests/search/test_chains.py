@@ -6,10 +6,10 @@ import pytest
 from colloc.collocation.shape_checks import shape_checks
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.bspline import Polygon
 from colloc.gaits.columns import Basis
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import (

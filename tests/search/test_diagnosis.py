@@ -9,10 +9,9 @@ import pytest
 
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.bspline import Polygon
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.free_path import FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FORMULATIONS
 from colloc.mechanics.chain import Chain
@@ -44,9 +43,7 @@ def test_every_row_has_a_meaning_and_a_phase(formulation):
 @pytest.mark.parametrize(
     ("gait", "links"),
     [
-        (FreePath(8.0, "bilateral"), 3),
-        (FreePath(8.0, "none"), 3),
-        (FreePath(8.0, "antipodal"), 4),
+        (Polygon(6, "antipodal"), 4),
         (Polygon(4, "bilateral", "side"), 3),
         (Polygon(3, "none"), 3),
     ],
