@@ -4,15 +4,14 @@ symmetry.
     python -m benchmarks.robustness --starts 100
     python -m benchmarks.robustness --starts 4 --harmonics 3
     python -m benchmarks.robustness --starts 12 --harmonics 3 --lengths 0.2 0.5 0.3 --symmetries
-    none python -m benchmarks.robustness --starts 20 --curvature 4 --lengths 0.25 0.25 0.25 0.25
-    --symmetries none --laws 1
+    none
 
 For every case: the share of starts that reach a certified optimum (first-order conditions and an
 independent fine replay) at delta = 1e-4 and, followed from there, at 1e-6; the median processor
 time of a start (certificate included); every failure and why; the best optimum and the share of
 starts that found it; and a second replay of every distinct optimum that shares neither grid nor
 start phase with the certificate's. Latin-hypercube starts, seed 0; one harmonic and three equal
-links unless asked otherwise. Free paths start from two harmonics.
+links unless asked otherwise.
 
 Both symmetries are valid for every friction law: a bilateral gait closes its rotation for any mu_b
 / mu_f (`colloc.results.distinct_optima`), and the second half of an antipodal one is its first half
@@ -36,7 +35,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc import Chain, FreePath, Friction, Harmonic, Problem
+from colloc import Chain, Friction, Harmonic, Problem
 from colloc.gaits.harmonic import Fourier, harmonics_within, shifted
 from colloc.gaits.starts import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
@@ -65,30 +64,19 @@ class Table(NamedTuple):
 
     body: Chain = Chain()
     harmonics: int = 1
-    curvature: float | None = None
 
-    def gait_class(self, symmetry: str) -> Harmonic | FreePath:
-        """Free paths where a curvature is given."""
-        return (
-            harmonics_within(self.harmonics, symmetry)
-            if self.curvature is None
-            else FreePath(self.curvature, symmetry)
-        )
+    def gait_class(self, symmetry: str) -> Harmonic:
+        return harmonics_within(self.harmonics, symmetry)
 
     @property
     def words(self) -> str:
         """The class of gaits, whatever its symmetry."""
-        return (
-            f"harmonics: {self.harmonics}"
-            if self.curvature is None
-            else f"free paths of curvature <= {self.curvature:g}"
-        )
+        return f"harmonics: {self.harmonics}"
 
     @property
     def suffix(self) -> str:
         """Of its files; none for the published one."""
         parts = [] if self.harmonics == 1 else [f"{self.harmonics}-harmonics"]
-        parts += [] if self.curvature is None else [f"curvature-{self.curvature:g}"]
         parts += (
             []
             if self.body == Chain()
@@ -118,11 +106,7 @@ def case_problem(
         delta=delta,
         delta_start=delta_start,
     )
-    return (
-        stated.with_(intervals=INTERVALS[symmetry])
-        if table.harmonics == 1 and table.curvature is None
-        else stated
-    )
+    return stated.with_(intervals=INTERVALS[symmetry]) if table.harmonics == 1 else stated
 
 
 def stored(problem: Problem, folder: Path) -> Archive:
@@ -176,7 +160,7 @@ def contradiction(problem: Problem, outcome: Outcome) -> float:
     phase (paths: the same)."""
     gait = shifted(outcome.gait, PHASE) if isinstance(outcome.gait, Fourier) else outcome.gait
     again = replay(
-        problem.body, problem.friction, gait, problem.delta * outcome.gait.delta_unit,
+        problem.body, problem.friction, gait, problem.delta,
         instants=REPLAY_INSTANTS, most_instants=REPLAY_INSTANTS,
     )  # fmt: skip
     return float(outcome.efficiency / again.efficiency - 1)
@@ -305,12 +289,6 @@ def main() -> None:
     parser.add_argument("--symmetries", nargs="+", choices=SYMMETRIES, default=SYMMETRIES)
     parser.add_argument("--harmonics", type=int, default=1, metavar="N")
     parser.add_argument(
-        "--curvature",
-        type=float,
-        metavar="C",
-        help="free paths of at most so much, in place of harmonics",
-    )
-    parser.add_argument(
         "--laws", type=int, default=len(LAWS), metavar="N", help="the first so many of the six"
     )
     parser.add_argument(
@@ -331,14 +309,11 @@ def main() -> None:
     table = Table(
         Chain(tuple(options.lengths)) if options.lengths else Chain(),
         options.harmonics,
-        options.curvature,
     )
     laws = LAWS[: options.laws]
     command = f"python -m benchmarks.robustness --starts {options.starts}"
     if options.harmonics != 1:
         command += f" --harmonics {options.harmonics}"
-    if options.curvature is not None:
-        command += f" --curvature {options.curvature:g}"
     if len(laws) < len(LAWS):
         command += f" --laws {len(laws)}"
     if options.lengths:

@@ -1,15 +1,11 @@
 """Work and precision of schemes, on uniform and on refined meshes:
-python -m benchmarks.work_precision [--path]
+python -m benchmarks.work_precision
 
 The isotropic one-harmonic three-link optimum at delta = 1e-4, from a good guess. Every solve is
 held against the optimum itself, as the finest refined solve finds it by independent replay, and
 against a replay of its own gait. Outcomes are kept in results/work_precision.json, so an
 interrupted run goes on where it stopped. Writes results/work_precision.md and
 results/work_precision.png and .pdf.
-
-With --path the free path of curvature 8 instead, from an ellipse; into work_precision_path.md, .png
-and .pdf. There every mesh has a class of paths of its own, so errors are those against a replay of
-the same path.
 """
 
 from __future__ import annotations
@@ -23,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.tables import cached
-from colloc import FreePath, Harmonic, Problem, certify, ellipse
+from colloc import Harmonic, Problem, certify, ellipse
 from colloc.pictures.style import (
     BLACK,
     BLUE,
@@ -84,18 +80,6 @@ def run_problem(scheme: str, intervals: int, tolerance: float) -> Problem:
     )
 
 
-def path_problem(scheme: str, intervals: int, tolerance: float) -> Problem:
-    """One solve of the picture of free paths."""
-    return Problem(
-        "path",
-        ellipse(0, 2.8, 1.3),
-        gait=FreePath(8, "bilateral"),
-        intervals=intervals,
-        scheme=scheme,
-        mesh_tolerance=tolerance,
-    )
-
-
 ELLIPSE = Picture(
     "work_precision",
     "Three links, isotropic, one harmonic",
@@ -104,15 +88,6 @@ ELLIPSE = Picture(
     (10, 20, 40, 80, 160),
     (1e-3, 1e-4, 1e-5, 1e-6),
     20,
-)
-PATH = Picture(
-    "work_precision_path",
-    "Three links, isotropic, free path of curvature 8",
-    path_problem,
-    ("gauss-1", "gauss-2", "gauss-3", "gauss-5", "radau-3"),
-    (30, 60, 120, 240),
-    (1e-3, 3e-4, 1e-4, 3e-5),
-    40,
 )
 
 
@@ -182,28 +157,17 @@ a replay of the same gait.
 |---|---|---|---|---|---|---|---|---|"""
 
 
-PATH_HEADER = """# Schemes, mesh tolerance and error on a free path
-
-Written by `python -m benchmarks.work_precision --path`: isotropic friction, curvature at most 8, bilateral, delta = 1e-4 at
-unit shape speed, the whole continuation from an ellipse. Processor seconds (certificate not included), one run on a machine
-that other work shared. Error: collocated efficiency over that of a replay of the same path, less 1.
-
-| scheme | mesh | ended with | points | efficiency | replayed | error | iterations | CPU s |
-|---|---|---|---|---|---|---|---|---|"""
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--path", action="store_true", help="the free path instead of one harmonic")
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     cache = options.output / "work_precision.sqlite"
-    picture = PATH if options.path else ELLIPSE
-    reference = np.nan if options.path else kept(cache, run_problem(*REFERENCE))["replayed"]
-    lines = [PATH_HEADER if options.path else HEADER.format(reference=reference)]
+    picture = ELLIPSE
+    reference = kept(cache, run_problem(*REFERENCE))["replayed"]
+    lines = [HEADER.format(reference=reference)]
     curves: dict[bool, dict[str, tuple[np.ndarray, np.ndarray]]] = {False: {}, True: {}}
     for scheme in picture.schemes:
         for refine in (False, True):
@@ -213,14 +177,10 @@ def main() -> None:
                     continue  # thousands of intervals
                 result = kept(cache, picture.problem(scheme, intervals, tolerance))
                 own = result["efficiency"] / result["replayed"] - 1
-                error = own if options.path else result["efficiency"] / reference - 1
+                error = result["efficiency"] / reference - 1
                 mesh = f"to {tolerance:.0e}" if refine else "uniform"
                 note = "" if result["optimal"] else " (not converged)"
-                errors = (
-                    f"{result['replayed']:.7f} | {own:+.1e}"
-                    if options.path
-                    else f"{error:+.1e} | {own:+.1e}"
-                )
+                errors = f"{error:+.1e} | {own:+.1e}"
                 lines.append(
                     f"| {scheme} | {mesh}{note} | {result['scheme']} x {result['intervals']} | "
                     f"{result['points']} "

@@ -43,6 +43,9 @@ _HOME = {
 """Public name to the module where it lives, as the stub beside this file states it."""
 __all__ = sorted(_HOME)
 _GONE = {
+    "FreePath": "take BSpline(knots=24), which has better gaits than paths of bounded curvature "
+    "(docs/gait_classes.md).",
+    "ArcPath": "gaits are Fourier series, splines (BSpline(...).member) or polygons (Corners).",
     "Relaxed": "take Polygon(n) with many corners, which come as near as one likes "
     "(docs/known.md).",
     "heading_map": "colloc.slope_motion and a root finder find headings that last "

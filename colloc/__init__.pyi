@@ -27,10 +27,9 @@ from colloc.laws.fitted_friction import (
 from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
 from colloc.gaits.inertia import Free as Free
-from colloc.gaits.bspline import BSpline as BSpline
+from colloc.gaits.bspline import BSpline as BSpline, Polygon as Polygon
 from colloc.gaits.columns import Basis as Basis
-from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath
-from colloc.gaits.polygon import Polygon as Polygon, Corners as Corners
+from colloc.gaits.polygon import Corners as Corners
 from colloc.studies.calls import (
     solve as solve,
     multistart as multistart,

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 CLASSES = {
     "three_link": ("one harmonic", BLUE),
     "three_link_two_harmonics": ("two harmonics", VERMILION),
-    "three_link_free_path": ("free path", GREEN),
+    "three_link_spline": ("spline of 24 knots", GREEN),
 }
 """Problem files, and the class of gaits and colour of each."""
 SIZES = np.geomspace(0.003, 0.6, 25)

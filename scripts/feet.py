@@ -16,7 +16,6 @@ from pathlib import Path
 
 from colloc.bounds.infinitesimal import best_small_gait
 from colloc.bounds.sampled import efficiency_bound
-from colloc.gaits.free_path import FreePath
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
@@ -26,7 +25,7 @@ from colloc.search.solve import solve
 from colloc.system.errors import CollocError, ProblemError
 
 STANDS = {"line": 0, "1 foot a link": 1, "2 feet": 2, "3 feet": 3}
-CLASSES: tuple[Harmonic | FreePath, ...] = (Harmonic(1), Harmonic(2), Harmonic(3), FreePath())
+CLASSES = (Harmonic(1), Harmonic(2), Harmonic(3))
 LEVEL = Friction(), Friction(mu_t=2, mu_f=1, mu_b=1)
 
 
@@ -40,7 +39,7 @@ def column(body: Chain, friction: Friction, starts: int) -> list[str]:
         Problem("feet", body=body, friction=friction),
     )
     for kind in CLASSES if body.n_joint > 1 else CLASSES[:1]:
-        cells.append("none" if kind.unit_speed or not cells else cells[-1])
+        cells.append(cells[-1] if cells else "none")
         with warnings.catch_warnings(action="ignore"), suppress(CollocError):
             problem = plain.with_(gait=kind)
             with suppress(ProblemError):  # where it is too small for the class
@@ -51,7 +50,7 @@ def column(body: Chain, friction: Friction, starts: int) -> list[str]:
                 f"{best.certificate.efficiency:.4f} ({best.certificate.distance:.3f})",
                 best.certificate.passed,
             )
-            if passed and (best.value > most or kind.unit_speed):
+            if passed and best.value > most:
                 cells[-1], most = text, best.value
             elif cells[-1] == "none":
                 cells[-1] = f"[{text}]"
@@ -60,7 +59,7 @@ def column(body: Chain, friction: Friction, starts: int) -> list[str]:
 
 def table(columns: dict[str, list[str]], links: int, friction: str) -> list[str]:
     """The rows of one body and friction, a class each."""
-    names = ("1 harmonic", "2 harmonics", "3 harmonics", "free path")
+    names = ("1 harmonic", "2 harmonics", "3 harmonics")
     return [
         f"| {links} | {friction} | {' | '.join(row)} |"
         for row in zip(names, *columns.values(), strict=False)

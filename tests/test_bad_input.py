@@ -35,10 +35,6 @@ PROBLEM = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2)
 ON = {"body": Chain(), "friction": Friction(), "gait": GAIT, "delta": 1e-2}
 TABLE = [[0.1, 1, 2], [0.2, 1, 2], [0.3, 1, 2], [0.5, 1, 2], [1, 1, 2]]
 NEEDED = {
-    "ArcPath": {
-        "edges": np.linspace(0, 1, 5), "shapes": np.array([[1, 0, -1, 0, 1.0], [0, 1, 0, -1, 0]]),
-        "tangents": np.array([[1.5, 3.0, 4.7, 6.2, 7.8]]), "length": 6.3,
-    },
     "Axis": {"name": "mu_t", "values": (1, 2)},
     "Basis": {"columns": (np.sin(np.arange(64) * np.pi / 32),)},
     "Corners": {"corners": np.array([[1, 0, -1.0], [0, 1, 0]])}, "Coupled": {

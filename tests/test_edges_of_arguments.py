@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from colloc import (
-    ArcPath,
     Chain,
     Concertina,
     Corners,
@@ -117,7 +116,7 @@ def test_what_lies_beyond_is_refused(case):
         made(**arguments)
 
 
-@pytest.mark.parametrize("made", [Corners, ArcPath, Fourier])
+@pytest.mark.parametrize("made", [Corners, Fourier])
 def test_a_gait_that_lacks_a_part_or_is_given_one_of_another_kind_is_refused_in_a_sentence(made):
     for given in ((), (np.eye(2), np.eye(2)), (1,) * 9):
         with pytest.raises(ProblemError):

@@ -91,7 +91,7 @@ def test_the_module_behind_python_m_is_also_the_function():
         (lambda: colloc.Friction(mu=1), "did you mean mu_t, mu_f or mu_b"),
         (lambda: colloc.Harmonic(harmonic=2), "did you mean harmonics"),
         (lambda: colloc.Problem("x").with_(intervalls=3), "did you mean intervals"),
-        (lambda: colloc.FreePath(colour=1), "it takes curvature, symmetry, winding"),
+        (lambda: colloc.Polygon(colour=1), "it takes corners, symmetry, axis"),
         (
             lambda: colloc.solve(5),
             "problem must be a Problem or the path of a problem file, not int",

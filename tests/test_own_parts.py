@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colloc import FreePath, Objective, PathLimit, Problem, ProblemError, Quantity, ellipse
+from colloc import Objective, PathLimit, Polygon, Problem, ProblemError, Quantity, ellipse
 from colloc.gaits import gait_fields
 from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Harmonic
@@ -96,7 +96,7 @@ class Tents(ClassOfGaits):
     def series(self, harmonics):
         return Harmonic(harmonics)
 
-    def size(self, n_joint, n_interval):
+    def size(self, n_joint):
         return n_joint * self.values
 
 
@@ -181,12 +181,12 @@ def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
     assert (read.problem.hash, read.certificate.values) == (problem.hash, values)
     assert read.problem.objective == cool
     with pytest.raises(ProblemError, match="the heat of a path depends on how fast it is followed"):
-        problem.with_(gait=FreePath(4.0, "bilateral"))
+        problem.with_(gait=Polygon(4, "bilateral"))
 
 
 @pytest.mark.parametrize(
     "gait",
-    [Harmonic(1, "bilateral"), pytest.param(FreePath(4.0, "bilateral"), marks=pytest.mark.slow)],
+    [Harmonic(1, "bilateral"), Polygon(3, "bilateral")],
     ids=["series", "path"],
 )
 def test_a_quantity_stated_anew_is_the_one_that_is_known(gait):
@@ -268,7 +268,7 @@ def test_limits_that_cannot_be_kept_or_read_are_refused():
     with pytest.raises(ProblemError, match="the speed is limited"):
         WEAK.with_(
             torque_limit=None,
-            gait=FreePath(4.0, "bilateral"),
+            gait=Polygon(4, "bilateral"),
             limits=[PathLimit("speed", "rate", 9.0)],
         )
     for none in (["moment < 1"], 3):

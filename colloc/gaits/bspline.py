@@ -3,6 +3,10 @@
 Function i is the cardinal B-spline of the degree, centred at phase i / knots (C. de Boor, A
 Practical Guide to Splines, 2001). It differs from 0 on degree + 1 intervals between knots, so one
 coefficient changes a part of the period alone, which no harmonic does.
+
+Splines of degree 1 are polygons. Their pace does not matter: delta is relative to the shape speed,
+a program spends as much of its time on one side as on any other, and members are run through at
+constant shape speed.
 """
 
 from __future__ import annotations
@@ -12,20 +16,215 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.gait import DELTA_START
 from colloc.gaits.harmonic import Harmonic, series_of
-from colloc.gaits.linear import LinearClass
-from colloc.gaits.symmetry import ANTIPODAL
+from colloc.gaits.linear import Combination, LinearClass
+from colloc.gaits.polygon import Corners
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, symmetric_samples
+from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _DRAWN = 3
 """Harmonics, at most, through which starts are drawn: coefficients by chance would make rough
 gaits."""
+_INSTANTS = 32
+"""Phases a side at which polygons are fitted."""
+_INTERVALS, _A_SIDE = 24, 4
+"""Of the first mesh of a polygon, and of each of its sides, at least."""
+_POINTS = 241
+_AT_A_CORNER = 1e-9
+"""Distance at which an edge of a mesh is at a corner."""
+
+
+class Splines(LinearClass):
+    """Base of `BSpline` and `Polygon`: periodic splines by their ``knots`` and ``degree``."""
+
+    knots: int
+    degree: int
+    shift = 0.0
+    """Phase of the first knot, in spacings of knots."""
+    series = series_of
+
+    @property
+    def relative_delta(self) -> bool:  # type: ignore[override]
+        return self.degree == 1
+
+    @property
+    def delta_start(self) -> float | None:  # type: ignore[override]
+        return DELTA_START if self.relative_delta else None
+
+    @property
+    def harmonics(self) -> int:  # type: ignore[override]
+        """As many waves as so many knots resolve."""
+        return self.knots // 2
+
+    def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """``(knots, n_time)``: the B-splines at phases t, or their derivatives per period; at a
+        corner those of the side ahead."""
+        from scipy.interpolate import BSpline as Piecewise
+
+        one, width = (
+            Piecewise.basis_element(np.arange(self.degree + 2), extrapolate=False),
+            self.degree + 1,
+        )
+        since = (
+            self.knots * t - np.arange(self.knots)[:, None] - self.shift + 0.5 * width
+        ) % self.knots
+        values = self.knots**derivative * np.nan_to_num(one(since, nu=derivative), nan=0.0)
+        return np.where(since < width, values, 0.0)
+
+    @property
+    def instants(self) -> np.ndarray:
+        if not self.relative_delta:
+            return super().instants
+        n = _INSTANTS * self.knots
+        return np.arange(n) / n
+
+    # starts
+    @property
+    def _smooth(self) -> Harmonic:
+        """What starts are drawn through."""
+        return self.series(min(self.harmonics, _DRAWN))
+
+    def dimension(self, n_joint: int) -> int:
+        return self._smooth.dimension(n_joint)
+
+    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
+        return self._smooth.drawn(unit, n_joint)
+
+    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
+        """The member nearest to a gait, moved by smooth waves by chance: all finer features
+        stay."""
+        rest = self._smooth.fourier(np.zeros(self._smooth.size(gait.n_joint)), gait.n_joint)
+        by = self.parameters(self._smooth.moved(rest, step, fall, rng))
+        return self.member(self.parameters(self.through(gait)) + by, gait.n_joint)
+
+    # polygons
+    @property
+    def corners_in_time(self) -> np.ndarray:
+        """Times of the corners of the solved part, and of its ends, ``(n_side + 1,)``."""
+        corners = (np.arange(self.knots + 1) + self.shift) / self.knots
+        inner = corners[(corners > _AT_A_CORNER) & (corners < self.fraction - _AT_A_CORNER)]
+        return np.concatenate([[0.0], inner, [self.fraction]])
+
+    def intervals(self, n_joint: int) -> int:
+        if not self.relative_delta:
+            return super().intervals(n_joint)
+        return max(_INTERVALS, _A_SIDE * (self.corners_in_time.size - 1))
+
+    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
+        if not self.relative_delta:
+            return super().fewest_intervals(per_interval)
+        return 2 * (self.corners_in_time.size - 1), "the sides"
+
+    def edges(self, n: int) -> np.ndarray:
+        if not self.relative_delta:
+            return super().edges(n)
+        corners = self.corners_in_time
+        counts = np.maximum(2, np.round(n * np.diff(corners) / corners[-1]).astype(int))
+        sides = zip(corners, corners[1:], counts, strict=False)
+        return np.concatenate([*(np.linspace(a, b, k + 1)[:-1] for a, b, k in sides), corners[-1:]])
+
+    def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
+        if not self.relative_delta:
+            return super().rates_on(mesh, n_joint)
+        times = np.empty(mesh.n_point)
+        times[mesh.points] = (mesh.edges[:-1] + 0.5 * mesh.h)[:, None]
+        return self.rate_matrix(times, n_joint)
+
+    def side_rates(self, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
+        """Share of each side of the solved part in its time, ``(n_side,)``, and joint rates on it
+        per parameter, ``(n_side, n_joint, n_parameter)``."""
+        corners = self.corners_in_time
+        middles = 0.5 * (corners[1:] + corners[:-1])
+        return np.diff(corners) / corners[-1], self.rate_matrix(middles, n_joint)
+
+    def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
+        table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
+        return Combination(self, table)
+
+    def member(self, parameters: np.ndarray, n_joint: int) -> Any:
+        gait = self.trajectory(parameters, n_joint)
+        if not self.relative_delta:
+            return gait
+        return Corners.through(gait.angles(self.corners_in_time), self.symmetry)
+
+    def _is_timed(self, gait: Any) -> bool:
+        """Whether a gait has the corners of a member."""
+        return (
+            self.relative_delta
+            and isinstance(gait, Corners)
+            and gait.symmetry == self.symmetry
+            and gait.phases.size == self.corners_in_time.size
+        )
+
+    def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
+        if not self.relative_delta:
+            return times
+        return np.interp(times, self.corners_in_time, gait.phases)
+
+    def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
+        """The edges are at the corners, whatever gait it is."""
+        if not self.relative_delta:
+            return phases
+        corners, edges = self.corners_in_time, phases
+        if self._is_timed(gait):
+            edges = np.interp(phases, gait.phases, corners)
+        apart = np.abs(edges[:, None] - corners).min(axis=1)
+        return np.union1d(edges[apart > _AT_A_CORNER], corners)
+
+    def _corners_on(self, gait: Any) -> np.ndarray:
+        """Corners of the solved part, and its ends, on the path of a gait."""
+        samples = symmetric_samples(gait, self.symmetry)
+        steps = np.linalg.norm(np.diff(samples), axis=0)
+        along = np.concatenate([[0.0], np.cumsum(steps)])
+        even = np.linspace(0.0, along[-1], _POINTS)
+        path = np.stack([np.interp(even, along, row) for row in samples])
+        return path[:, _best_corners(path, self.corners_in_time.size - 1)]
+
+    def nearest(self, gait: Any) -> np.ndarray:
+        if not self.relative_delta or getattr(gait, "basis", None) == self:
+            return super().nearest(gait)
+        if self._is_timed(gait):
+            times, points = self.corners_in_time, gait.vertices
+        else:
+            times, points = self.corners_in_time, self._corners_on(gait)
+        matrix = self.angle_matrix(times, gait.n_joint)
+        return np.linalg.lstsq(matrix.reshape(points.size, -1), points.T.ravel(), rcond=None)[0]
+
+
+def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
+    """Indices of the ``pieces + 1`` points, ends included, whose chords are nearest to all points
+    (dynamic programming)."""
+    n = points.shape[1]
+    cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
+    for i in range(n - 1):
+        # points beyond i, seen from it: the chord to each of them, and all that lie before that one
+        seen = points[:, i + 1 :] - points[:, i : i + 1]
+        dots, squares = seen.T @ seen, np.sum(seen**2, axis=0)
+        along = dots / np.maximum(squares, 1e-300)
+        np.clip(along, 0.0, 1.0, out=along)
+        nearer = along * (2 * dots - along * squares)
+        cost[i, i + 1 :] = (
+            np.cumsum(squares)
+            - squares
+            - np.einsum("kj,kj->j", nearer, before[: n - i - 1, : n - i - 1])
+        )
+    best, back = cost[0].copy(), []
+    for _ in range(pieces - 1):
+        total = best[:, None] + cost
+        back.append(np.argmin(total, axis=0))
+        best = np.min(total, axis=0)
+    chosen = [n - 1]
+    for step in reversed(back):
+        chosen.append(int(step[chosen[-1]]))
+    return np.array([0, *chosen[::-1]])
 
 
 @named_arguments
 @dataclass(frozen=True)
-class BSpline(LinearClass):
+class BSpline(Splines):
     """The class of gaits whose joint angles are periodic B-splines in time.
 
     A joint has as many coefficients as the spline has knots.
@@ -36,7 +235,8 @@ class BSpline(LinearClass):
         In a period, evenly spaced; more than the degree, 64 at most, and an even number for
         antipodal gaits.
     degree : int
-        Of the polynomials between knots, 3 to 5; its derivatives below the degree are continuous.
+        Of the polynomials between knots, 1 to 5; its derivatives below the degree are continuous.
+        Those of degree 1 are polygons, see `Polygon`.
     symmetry : {"none", "bilateral", "antipodal"}
 
     Raises
@@ -57,11 +257,9 @@ class BSpline(LinearClass):
     degree: int = 4
     symmetry: str = "none"
 
-    series = series_of
-
     def __post_init__(self) -> None:
-        if not is_whole(self.degree, 3, 5):
-            raise ProblemError(f"gait.degree must be 3, 4 or 5, not {self.degree!r}.")
+        if not is_whole(self.degree, 1, 5):
+            raise ProblemError(f"gait.degree must be 1, 2, 3, 4 or 5, not {self.degree!r}.")
         if not is_whole(self.knots, self.degree + 1, 64):
             raise ProblemError(
                 f"gait.knots must be an integer from degree + 1 = {self.degree + 1} to 64, not "
@@ -74,41 +272,67 @@ class BSpline(LinearClass):
                 f"not {self.knots}."
             )
 
-    @property
-    def harmonics(self) -> int:  # type: ignore[override]
-        """As many waves as so many knots resolve."""
-        return self.knots // 2
-
-    def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """``(knots, n_time)``: the B-splines at phases t, or their derivatives per period."""
-        from scipy.interpolate import BSpline as Piecewise
-
-        one = Piecewise.basis_element(np.arange(self.degree + 2), extrapolate=False)
-        since = (
-            self.knots * t - np.arange(self.knots)[:, None] + 0.5 * (self.degree + 1)
-        ) % self.knots
-        return self.knots**derivative * np.nan_to_num(one(since, nu=derivative), nan=0.0)
-
     def describe(self) -> str:
         return (
             f"periodic B-splines of degree {self.degree}, {self.knots} knots, symmetry "
             f"{self.symmetry}"
         )
 
+
+@named_arguments
+@dataclass(frozen=True)
+class Polygon(Splines):
+    """Closed polygons with a given number of corners, which are free: splines of degree 1 with a
+    knot at every corner.
+
+    Parameters
+    ----------
+    corners : int
+        At least 2 (a retraced segment), over the whole period. Even if antipodal.
+    symmetry : {"none", "bilateral", "antipodal"}
+    axis : {"corner", "side"}
+        Of a bilateral polygon: whether its axis (angle 1 = -angle 2 for two joints) first meets a
+        corner or the middle of a side. With an odd number of corners it meets one of each, and this
+        does not matter.
+
+    Examples
+    --------
+    >>> from colloc import Polygon
+    >>> Polygon(corners=3).describe()
+    'polygons of 3 corners, symmetry none'
+    """
+
+    corners: int = 3
+    symmetry: str = "none"
+    axis: str = "corner"
+
+    degree = 1
+
+    def __post_init__(self) -> None:
+        if not is_whole(self.corners, 2, 64):
+            raise ProblemError(
+                f"gait.corners must be a whole number from 2 to 64, not {self.corners!r}."
+            )
+        self._check_symmetry()
+        if self.axis not in ("corner", "side"):
+            raise ProblemError(f"gait.axis must be 'corner' or 'side', not {self.axis!r}.")
+        if self.symmetry == ANTIPODAL and self.corners % 2:
+            raise ProblemError(
+                f"an antipodal polygon has an even number of corners, not {self.corners}."
+            )
+
     @property
-    def _smooth(self) -> Harmonic:
-        """What starts are drawn through."""
-        return self.series(min(self.harmonics, _DRAWN))
+    def knots(self) -> int:  # type: ignore[override]
+        return self.corners
 
-    def dimension(self, n_joint: int) -> int:
-        return self._smooth.dimension(n_joint)
+    @property
+    def _has_axis(self) -> bool:
+        return self.symmetry == BILATERAL and self.corners % 2 == 0
 
-    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
-        return self._smooth.drawn(unit, n_joint)
+    @property
+    def shift(self) -> float:  # type: ignore[override]
+        return 0.5 if self._has_axis and self.axis == "side" else 0.0
 
-    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
-        """The member nearest to a gait, moved by smooth waves by chance: all finer features
-        stay."""
-        rest = self._smooth.fourier(np.zeros(self._smooth.size(gait.n_joint)), gait.n_joint)
-        by = self.parameters(self._smooth.moved(rest, step, fall, rng))
-        return self.member(self.parameters(self.through(gait)) + by, gait.n_joint)
+    def describe(self) -> str:
+        axis = f" through a {self.axis}" if self._has_axis else ""
+        return f"polygons of {self.corners} corners, symmetry {self.symmetry}{axis}"

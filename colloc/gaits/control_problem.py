@@ -65,9 +65,9 @@ class Admissible(NamedTuple):
     def n_joint(self) -> int:
         return self.body.n_joint
 
-    def member(self, parameters: np.ndarray, knots: np.ndarray | None = None) -> AnyGait:
-        """The gait of a parameter vector of the full program; a path's arcs meet at knots."""
-        return self.gait.member(parameters, self.n_joint, knots)
+    def member(self, parameters: np.ndarray) -> AnyGait:
+        """The gait of a parameter vector of the full program."""
+        return self.gait.member(parameters, self.n_joint)
 
 
 class Aims(NamedTuple):
@@ -136,10 +136,15 @@ class ControlProblem:
     unit: float
 
     def mesh(self, edges: np.ndarray | None = None, of_scheme: str = "") -> Mesh:
-        """The first mesh on the part of the period that is solved, of the usual scheme; or as
-        given."""
-        first = self.admissible.gait.edges(self.intervals) if edges is None else edges
-        return Mesh(scheme(of_scheme or self.scheme), first)
+        """The first mesh on the part of the period that is solved, that of the class and of the
+        usual scheme; or as given."""
+        if edges is None:
+            edges = self.admissible.gait.edges(self.intervals)
+        return Mesh(scheme(of_scheme or self.scheme), edges)
+
+    def in_phases(self, mesh: Mesh, gait: AnyGait) -> Mesh:
+        """A program's mesh in phases of a member."""
+        return Mesh(mesh.scheme, self.admissible.gait.phases(gait, mesh.edges))
 
     def stated(self, value: float) -> float:
         """A value of the objective as the problem states it."""

@@ -1,8 +1,7 @@
 """What a gait is, and a class of gaits: the bases of all kinds.
 
 A gait is a function of the phase, with words for its reader. A class says which gaits are allowed.
-Its members are known by a vector of parameters on a mesh. How a class is collocated and searched,
-where its angles are not linear in its parameters, is registered in `colloc.search.spaces`.
+Its members are known by a vector of parameters.
 """
 
 from __future__ import annotations
@@ -13,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced, symmetric_samples
+from colloc.gaits.symmetry import SYMMETRIES, fraction, symmetric_samples
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.joint_map import JointMap
 from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
 
+_DENSE = 2000
 _SEED_HARMONICS = 2
-
 DELTA_START = 0.01
-"""Where searches begin in delta at unit shape speed [body lengths per radian of path]."""
+"""Where searches begin in delta relative to the shape speed [body lengths per radian of path]."""
 
 
 class GaitFunction:
@@ -68,6 +67,12 @@ class GaitFunction:
         """Joint rates ``(n_joint, n_time)`` per period at phases t."""
         raise NotImplementedError
 
+    @property
+    def length(self) -> float:
+        """Of the closed path [rad], which is the mean shape speed per period."""
+        points = self.angles(np.linspace(0.0, 1.0, _DENSE + 1))
+        return float(np.linalg.norm(np.diff(points), axis=0).sum())
+
     def mapped(self, matrix: np.ndarray) -> Any:
         """The gait, or a polygon near it, with shapes multiplied by a matrix ``(m, n_joint)``."""
         raise NotImplementedError
@@ -82,17 +87,6 @@ class GaitFunction:
         """Its mirror image: all angles are negative."""
         return self.mapped(-np.eye(self.n_joint))
 
-    @property
-    def delta_unit(self) -> float:
-        """What the delta of the gait's class is multiplied by to get delta per period."""
-        return 1.0
-
-    @property
-    def speed_unit(self) -> float:
-        """Speeds among the variables of a program are those per period divided by this: by default
-        per radian of phase."""
-        return 2 * np.pi
-
     def grown(self, factor: float) -> Any:
         """The gait with shapes multiplied by a factor about their mean, where it can grow; else as
         it is."""
@@ -102,11 +96,6 @@ class GaitFunction:
     def corner_phases(self) -> np.ndarray:
         """Phases in (0, 1) where the rates jump: by default none."""
         return np.empty(0)
-
-    @property
-    def knots(self) -> np.ndarray | None:
-        """Phases where the arcs of a free path meet, ``(n_arc + 1,)``; None for other gaits."""
-        return None
 
     def lines(self) -> list[str]:
         """The gait in words or as a formula."""
@@ -149,61 +138,6 @@ class GaitFunction:
         )
 
 
-class UnitSpeedGait(GaitFunction):
-    """A gait that runs along its path at constant shape speed.
-
-    Only the part of the period that symmetry leaves is stored; `colloc.gaits.symmetry` gives the
-    rest. The phase is the arc length from the start over the length of the whole closed path,
-    ``|q'(t)| = length``. Power and distance do not depend on the pace once delta scales with it:
-    delta of such gaits is measured at unit shape speed, ``delta_unit`` times that per period.
-    """
-
-    length: float
-    symmetry: str
-
-    def _check_symmetry(self) -> None:
-        if self.symmetry not in SYMMETRIES:
-            raise ProblemError(
-                f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not "
-                f"{self.symmetry!r}."
-            )
-
-    def _angles(self, phase: np.ndarray) -> np.ndarray:
-        """At phases of the part that is stored, as `angles`."""
-        raise NotImplementedError
-
-    def _rates(self, phase: np.ndarray) -> np.ndarray:
-        """At phases of the part that is stored, as `rates`."""
-        raise NotImplementedError
-
-    @property
-    def delta_unit(self) -> float:
-        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per
-        period."""
-        return self.length
-
-    @property
-    def speed_unit(self) -> float:
-        """Speeds among the variables of a program are those per period divided by this: they are at
-        unit shape speed."""
-        return self.length
-
-    @property
-    def shape_speed(self) -> float:
-        """Root-mean-square shape speed, in rad per radian of phase."""
-        return self.length / (2 * np.pi)
-
-    def angles(self, t: np.ndarray) -> np.ndarray:
-        phase, image = reduced(self.symmetry, t)
-        return imaged(self.symmetry, self._angles(phase), image)
-
-    def rates(self, t: np.ndarray) -> np.ndarray:
-        """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side
-        ahead."""
-        phase, image = reduced(self.symmetry, t)
-        return imaged(self.symmetry, self._rates(phase), image, derivative=1)
-
-
 class ClassOfGaits:
     """Base of the classes of gaits; besides what stands here a class has ``symmetry``."""
 
@@ -214,17 +148,16 @@ class ClassOfGaits:
     """Whether it has more than one member."""
     stages: tuple[float, ...] = ()
     """Phases that every mesh has to have as knots."""
-    unit_speed = False
-    """Whether delta and rates are those at unit shape speed, so that the pace does not matter."""
+    relative_delta = False
+    """Whether delta is relative to the shape speed, in body lengths per radian of path, as
+    where members are given by their path and the pace does not matter."""
     delta_start: float | None = None
     """Where a search begins in delta; None: where the body's usual one does."""
-    moves_knots = False
-    """Whether a planned mesh may move its knots a little, to be even."""
+    has_fixed_edges = True
+    """Whether edges of its meshes are where the rates jump, so that a planned mesh keeps them."""
     linear = True
     """Whether angles of a class of series are linear in the parameters by which its members are
     searched."""
-    of_arcs = False
-    """Whether it has curvature, and arcs that meet."""
     may_tell = False
     """Whether members can say where they point (`colloc.gaits.told`)."""
 
@@ -240,7 +173,7 @@ class ClassOfGaits:
 
     def check_joints(self, n_joint: int) -> None:
         """A `ProblemError` if bodies with so many shape coordinates have no gaits of the class."""
-        if self.unit_speed and n_joint < 2:
+        if self.relative_delta and n_joint < 2:
             raise ProblemError(
                 f"the class {type(self).__name__} needs a body of at least three links, or two "
                 f"modes."
@@ -268,12 +201,6 @@ class ClassOfGaits:
     def closing_symmetry(self) -> str:
         """What is known of the net rotation of all members: that of gaits with this symmetry."""
         return self.symmetry
-
-    @property
-    def seeds(self) -> Any:
-        """The class that starts are drawn from: by default a few harmonics, where the class bounds
-        the path."""
-        return self.series(_SEED_HARMONICS)
 
     def series(self, harmonics: int) -> Any:
         """The class of Fourier series with about so many harmonics that stand for its gaits."""
@@ -309,34 +236,34 @@ class ClassOfGaits:
         """Intervals that a first mesh wants."""
         raise NotImplementedError
 
-    def coarse_intervals(self, n_joint: int) -> int:
-        """Intervals on which starts are told apart."""
-        return self.intervals(n_joint) // 2
-
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         """Intervals that a mesh with so many points on each needs at least, and for what."""
-        return 4, "a path"
+        return 4, "a gait"
 
     def edges(self, n: int) -> np.ndarray:
         """A mesh of about n intervals on the part of the period that is solved."""
         return np.linspace(0.0, self.fraction, n + 1)
 
-    def first_edges(self, edges: np.ndarray) -> np.ndarray:
-        """The mesh from which a finer one is grown: by default its own, whose edges mean
-        something."""
-        return edges
+    @property
+    def seeds(self) -> Any:
+        """The class that starts are drawn from: a few harmonics where the class is one of paths."""
+        return self.series(_SEED_HARMONICS)
 
-    def laid_on(self, gait: Any, edges: np.ndarray) -> Any:
-        """A member whose pieces are those of a mesh, where that matters."""
-        return gait
-
-    def size(self, n_joint: int, n_interval: int) -> int:
+    def size(self, n_joint: int) -> int:
         """Number of parameters."""
         raise NotImplementedError
 
-    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> Any:
-        """The gait of a parameter vector, on a mesh where that matters."""
+    def member(self, parameters: np.ndarray, n_joint: int) -> Any:
+        """The gait of a parameter vector."""
         raise NotImplementedError
+
+    def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
+        """Phases of a member at times of its program: by default the same."""
+        return times
+
+    def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
+        """Edges of a program's mesh, from phases of a member."""
+        return phases
 
     def parameters(self, gait: Any) -> np.ndarray:
         """The parameter vector of a member."""
@@ -350,10 +277,10 @@ class ClassOfGaits:
         """Whether a gait starts where members do."""
         return True
 
-    def own_checks(self, gait: Any) -> list[tuple[str, float, float, str]]:
-        """What a certificate checks of a member beyond what all gaits have to keep: name, value,
-        allowed, meaning."""
-        return []
+
+def delta_per_period(gait_class: ClassOfGaits, gait: GaitFunction, delta: float) -> float:
+    """Delta of a class, in body lengths per period of a gait."""
+    return delta * gait.length if gait_class.relative_delta else delta
 
 
 def finite_array(name: str, value: object, ndim: int) -> np.ndarray:

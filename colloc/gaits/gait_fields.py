@@ -14,13 +14,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from colloc.gaits.bspline import BSpline
+from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.columns import Basis
 from colloc.gaits.coupled import Coupled, CoupledGait
-from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.linear import Combination
-from colloc.gaits.polygon import Corners, Polygon
+from colloc.gaits.polygon import Corners
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
 from colloc.laws.elliptic import Elliptic
@@ -47,10 +46,8 @@ AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
 # what files can hold, and is asked for; parts of your own making are added to these lists
-GAITS: list[type] = [Fourier, ArcPath, Combination, Corners, CoupledGait, Phases, SerpenoidSeries]
-CLASSES: list[type] = [
-    Harmonic, BSpline, Basis, Coupled, FreePath, Polygon, Prescribed, Serpenoid
-]  # fmt: skip
+GAITS: list[type] = [Fourier, Combination, Corners, CoupledGait, Phases, SerpenoidSeries]
+CLASSES: list[type] = [Harmonic, BSpline, Basis, Coupled, Polygon, Prescribed, Serpenoid]
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 MOTIONS: list[type] = []

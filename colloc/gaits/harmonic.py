@@ -256,10 +256,8 @@ class Harmonic(LinearClass):
             table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
         return Fourier(table[:, 0], table[:, 1::2], table[:, 2::2])
 
-    def member(
-        self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None
-    ) -> Fourier:
-        """The gait of a parameter vector; the mesh does not matter."""
+    def member(self, parameters: np.ndarray, n_joint: int) -> Fourier:
+        """The gait of a parameter vector."""
         return self.fourier(parameters, n_joint)
 
     def through(self, gait: Any) -> Fourier:

@@ -104,7 +104,7 @@ class Paced(Regime):
         level = super().class_of(gait_class)
         if self.free is None:
             return level
-        if not level.may_tell or level.unit_speed or not level.linear:
+        if not level.may_tell or level.relative_delta or not level.linear:
             raise ProblemError(
                 f"a free pace is sought with a gait of a class Harmonic, not "
                 f"{type(level).__name__}."
@@ -145,7 +145,7 @@ class Paced(Regime):
                 "froude out."
             )
         super().check(problem)
-        if not problem.gait.unit_speed and problem.gait.symmetry not in (NONE, ANTIPODAL):
+        if not problem.gait.relative_delta and problem.gait.symmetry not in (NONE, ANTIPODAL):
             raise ProblemError(
                 f"gaits of symmetry {problem.gait.symmetry} run backwards in half of their period, "
                 f"as nothing with inertia "

@@ -20,11 +20,10 @@ from scipy.linalg import qr
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.mechanics.bodies import Body
+from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import STATED_IF_SET, named_arguments
 from colloc.system.errors import ProblemError
 
-_COARSE = 16
-"""Intervals a period, at least, from which a mesh is grown; also two for every harmonic."""
 _SERIES = 64
 """Harmonics through which a path that has no phase of its own is laid into a class."""
 _CLOSED = 1e-6
@@ -139,7 +138,7 @@ class LinearClass(ClassOfGaits):
     symmetry: str
     harmonics: int
     """As many as the functions need to be resolved."""
-    linear = moves_knots = may_tell = True
+    linear = may_tell = True
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """``(n_function, n_time)``: the functions of the phase at phases t, or their derivatives
@@ -163,7 +162,7 @@ class LinearClass(ClassOfGaits):
 
     @property
     def seeds(self) -> Any:
-        return self.level
+        return super().seeds if self.relative_delta else self.level
 
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
@@ -173,11 +172,13 @@ class LinearClass(ClassOfGaits):
         """Intervals that a mesh with so many points on each needs at least, and for what."""
         return max(2, -(-4 * self.harmonics // per_interval)), f"{self.harmonics} harmonics"
 
-    def first_edges(self, edges: np.ndarray) -> np.ndarray:
-        """The mesh from which a finer one is grown: a coarse uniform one."""
-        return np.linspace(
-            edges[0], edges[-1], max(int(_COARSE * self.fraction), 2 * self.harmonics) + 1
-        )
+    def edges(self, n: int) -> np.ndarray:
+        """A mesh of about n intervals on the part of the period that is solved."""
+        return np.linspace(0.0, self.fraction, n + 1)
+
+    @property
+    def has_fixed_edges(self) -> bool:  # type: ignore[override]
+        return self.relative_delta
 
     def offset(self, n_joint: int) -> np.ndarray:
         """Joint angles ``(n_joint, 1)`` that all members have besides."""
@@ -188,12 +189,13 @@ class LinearClass(ClassOfGaits):
         allows."""
         return _symmetric_tables(self, n_joint)
 
-    def size(self, n_joint: int, n_interval: int | None = None) -> int:
+    def size(self, n_joint: int) -> int:
         """Number of parameters."""
         return self._basis(n_joint).shape[1]
 
     def check_joints(self, n_joint: int) -> None:
         """A `ProblemError` if bodies with so many joints have no gaits of the class."""
+        super().check_joints(n_joint)
         self._basis(n_joint)
 
     def retraces(self, n_joint: int) -> bool:
@@ -202,9 +204,14 @@ class LinearClass(ClassOfGaits):
         drawn = np.random.default_rng(0).normal(size=self._basis(n_joint).shape[1])
         return bool(np.linalg.matrix_rank(self.rate_matrix(self.instants, n_joint) @ drawn) <= 1)
 
-    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
-        """The gait of a parameter vector; the mesh does not matter."""
+    def member(self, parameters: np.ndarray, n_joint: int) -> Any:
+        """The gait of a parameter vector."""
         return Combination(self, (self._basis(n_joint) @ parameters).reshape(n_joint, -1))
+
+    def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
+        """The same in the time of a program, in which angles are linear in the parameters; where
+        the pace does not matter, a member may have another."""
+        return self.member(parameters, n_joint)
 
     def parameters(self, gait: Any) -> np.ndarray:
         """The parameter vector of the class member nearest to a gait."""
@@ -222,18 +229,22 @@ class LinearClass(ClassOfGaits):
     def through(self, gait: Any) -> Any:
         """The member nearest to a gait; of one that has no phase of its own, to its Fourier series
         in arc length."""
-        if getattr(gait, "basis", None) == self:
+        if self.relative_delta or getattr(gait, "basis", None) == self:
             return gait
         timed = gait if gait.is_series else self.series(_SERIES).through(gait)
         return self.member(self.parameters(timed), gait.n_joint)
 
     def guessed(self, gait: Any) -> tuple[Any, float]:
+        if self.relative_delta:
+            return super().guessed(gait)
         near = self.member(self.parameters(self.through(gait)), gait.n_joint)
         return near, near.shape_speed
 
     def first_guess(self, gait: Any) -> Any:
         """The member nearest to a wave; where there is next to nothing of a wave in the class, all
         its functions at once."""
+        if self.relative_delta:
+            return gait
         near = self.through(gait)
         if near.shape_speed > _MOVES * gait.shape_speed:
             return near.scaled(gait.shape_speed / near.shape_speed)
@@ -264,6 +275,11 @@ class LinearClass(ClassOfGaits):
     def rate_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
         """``(n_time, n_joint, n_parameter)``: joint rates per period at phases t per parameter."""
         return self._combined(self.functions(t, 1), n_joint)
+
+    def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
+        """`rate_matrix` at the points of a mesh, at corners those of the interval that a point
+        belongs to."""
+        return self.rate_matrix(mesh.times, n_joint)
 
     def _combined(self, functions: np.ndarray, n_joint: int) -> np.ndarray:
         basis = self._basis(n_joint).reshape(n_joint, functions.shape[0], -1)

@@ -115,12 +115,10 @@ class Prescribed(ClassOfGaits):
     def describe(self) -> str:
         return f"a prescribed motion, symmetry {self.symmetry}"
 
-    def size(self, n_joint: int, n_interval: int | None = None) -> int:
+    def size(self, n_joint: int) -> int:
         return 0
 
-    def member(
-        self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None
-    ) -> Phases:
+    def member(self, parameters: np.ndarray, n_joint: int) -> Phases:
         """The only one."""
         return Phases(self.stages, self.symmetry)
 

@@ -66,24 +66,24 @@ class Problem:
     name : str
         Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200, and no ending
         that colloc itself gives to files (`colloc.system.result_names`).
-    guess : Fourier, ArcPath or Corners, optional
+    guess : Fourier, Combination or Corners, optional
         An admissible gait to start from, of any class; it is projected onto the class `gait`. By
         default a travelling wave (`colloc.gaits.guesses`).
     body : Chain or ModalBody
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
         Or any other `colloc.mechanics.law.Law` (docs/howto/laws.md).
-    gait : Harmonic, FreePath or Polygon
+    gait : Harmonic, BSpline or Polygon
         The class of gaits; which paths in shape space are allowed decides the answer
         (docs/gait_classes.md). By default one harmonic or, for a body whose motion is prescribed,
         that motion (`colloc.gaits.prescribed`).
     delta : float
         Regularisation speed of friction at which the problem is finally solved, in body lengths per
-        period; for free paths and polygons at unit shape speed, in body lengths per radian of path.
+        period; for polygons relative to the shape speed, in body lengths per radian of path.
         By default 1e-4 for chains; 1e-2 for smooth bodies, whose panels have to resolve it.
     delta_start : float
         Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), 0.02 on a
-        slope, and 0.01 where delta is measured at unit shape speed.
+        slope, and 0.01 where delta is relative to the shape speed.
     joint_limit : float, or sequence of float or (float, float)
         Largest |joint angle| [rad], at most pi, of all joints or of each, or the least and the
         largest of a joint, as in ``((-1, 2), 1.5)``; of a smooth body, largest |tangent angle| from
@@ -441,7 +441,7 @@ class Problem:
 
     def _check_resolution(self) -> None:
         collocation, kind = scheme(self.scheme), type(self.gait).__name__
-        if self.gait.unit_speed and collocation.left:
+        if self.gait.relative_delta and collocation.left:
             raise ProblemError(
                 f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}."
             )
@@ -464,7 +464,7 @@ class Problem:
             if self.body.crossing_depth(self.joint_map.offset).any():
                 raise ProblemError("links cross where joints are stuck.")
         self.gait.check_joints(self.body.n_joint)
-        if self.gait.unit_speed and self.paced_by:
+        if self.gait.relative_delta and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
         if self.law.reversible and not self.froude and self.gait.retraces(self.body.n_joint):

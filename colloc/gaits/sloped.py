@@ -61,7 +61,7 @@ class Slope(Regime):
         return replace(super().in_units_of(unit), grade=self.grade / unit)
 
     def class_of(self, gait_class: Any) -> Any:
-        """Any class that derives from `LinearClass`, one's own too, can be here, and paths.
+        """Any class that derives from `LinearClass`, one's own too, can be here.
         `ProblemError` for others."""
         level = super().class_of(gait_class)
         name = type(level).__name__
@@ -69,9 +69,9 @@ class Slope(Regime):
             raise ProblemError(
                 f"on a slope gaits say where the body points, which those of the class {name} "
                 f"cannot: take Harmonic, BSpline, "
-                "Basis, FreePath or Polygon."
+                "Basis or Polygon."
             )
-        if level.unit_speed and level.symmetry != NONE:
+        if level.relative_delta and level.symmetry != NONE:
             raise ProblemError(
                 f"on a slope no part of a period follows from another: take {name}(..., "
                 f"symmetry='none'), which has gaits of "
@@ -121,7 +121,7 @@ class OnSlope(Telling):
     @property
     def delta_start(self) -> float:  # type: ignore[override]
         """At more the body creeps down faster than it crawls up."""
-        return 0.2 * DELTA_START if self.unit_speed else 0.02
+        return 0.2 * DELTA_START if self.relative_delta else 0.02
 
     @property
     def fraction(self) -> float:

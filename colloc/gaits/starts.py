@@ -15,7 +15,6 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.guesses import largest_factor, largest_share
 from colloc.gaits.limits import Limit
-from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
@@ -153,9 +152,8 @@ def over_links(
     """A gait of a chain laid into another body: every link gets the mean tangent angle of the part
     of the body it covers.
 
-    That is linear in the joint angles and keeps the symmetries, if both bodies have them. A path of
-    arcs becomes a polygon of many corners. Where links would cross, or a joint pass its limit, all
-    angles shrink.
+    That is linear in the joint angles and keeps the symmetries, if both bodies have them. Where
+    links would cross, or a joint pass its limit, all angles shrink.
     """
     matrix = other.laid(np.array(body.lengths))
     angles = matrix @ gait.angles(_PERIOD)
@@ -177,7 +175,7 @@ def laid_into(
     about its mean.
     """
     near = gait_class.through(gait)
-    growth = 2 * np.pi * smallest_shape_speed / path_length(near)
+    growth = 2 * np.pi * smallest_shape_speed / near.length
     if growth > _SHORT:
         near = near.grown(growth)
     if near is gait or not near.is_series:
@@ -186,13 +184,10 @@ def laid_into(
     return near.scaled(min(1.0, largest))
 
 
-def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float:
-    """Delta in the units of a class, from delta at unit shape speed, for a gait of the same path
-    length.
-
-    Harmonic gaits measure it per period, paths at unit shape speed.
-    """
-    return at_unit_speed * (1.0 if gait_class.unit_speed else path_length(gait))
+def delta_in(gait_class: AnyClass, gait: AnyGait, relative: float) -> float:
+    """Delta in the units of a class, from delta relative to the shape speed, for a gait of the same
+    path length."""
+    return relative * (1.0 if gait_class.relative_delta else gait.length)
 
 
 def prolonged(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:
@@ -203,14 +198,14 @@ def prolonged(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: 
 
     Examples
     --------
-    >>> from colloc import FreePath, Harmonic, Problem, ellipse
+    >>> from colloc import Harmonic, Polygon, Problem, ellipse
     >>> best = ellipse(0, 2.86, 1.30)
-    >>> prolonged(Problem("loop", best, gait=Harmonic(1, "bilateral")), best, FreePath(8.0,
+    >>> prolonged(Problem("loop", best, gait=Harmonic(1, "bilateral")), best, Polygon(5,
     ...     "bilateral")).gait
-    FreePath(curvature=8.0, symmetry='bilateral', winding=None)
+    Polygon(corners=5, symmetry='bilateral', axis='corner')
     """
-    at_unit_speed = problem.delta / delta_in(problem.gait, problem.guess, 1.0)
-    delta = delta_in(gait_class, gait, at_unit_speed)
+    relative = problem.delta / delta_in(problem.gait, problem.guess, 1.0)
+    delta = delta_in(gait_class, gait, relative)
     guess = laid_into(
         gait_class, gait, problem.body, problem.joint_limit, problem.smallest_shape_speed
     )

@@ -17,7 +17,7 @@ from colloc.mechanics.bodies import Body
 
 
 class Telling(ClassOfGaits):
-    """What saying a number changes in a class, of series or of paths; members whose last parameter
+    """What saying a number changes in a class; members whose last parameter
     is NaN do not say it yet. Such classes derive from a child of this one first and then from the
     class that they are without (`telling`)."""
 
@@ -49,17 +49,13 @@ class Telling(ClassOfGaits):
     def series(self, harmonics: int) -> Any:
         return self.without.series(harmonics)
 
-    def size(self, n_joint: int, n_interval: int | None = None) -> int:
-        return self.without.size(n_joint, n_interval) + 1
+    def size(self, n_joint: int) -> int:
+        return self.without.size(n_joint) + 1
 
     def _basis(self, n_joint: int) -> np.ndarray:
         """Of a class that is linear in its parameters."""
         basis = self.without._basis(n_joint)
         return np.column_stack([basis, np.zeros(len(basis))])
-
-    def split(self, parameters: np.ndarray, n_joint: int) -> Any:
-        """Of a class of paths: what they are made of."""
-        return self.without.split(parameters[:-1], n_joint)
 
     def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
         own = self.without.bounds(body, limit)
@@ -74,8 +70,8 @@ class Telling(ClassOfGaits):
     def nearest(self, gait: Any) -> np.ndarray:
         return np.append(self.without.nearest(gait), self.said(gait))
 
-    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
-        gait = self.without.member(parameters[:-1], n_joint, edges)
+    def member(self, parameters: np.ndarray, n_joint: int) -> Any:
+        gait = self.without.member(parameters[:-1], n_joint)
         return (
             gait
             if np.isnan(parameters[-1])

@@ -12,10 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.densities import PathLimits
 from colloc.motion.kinds import Shapes
-from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks
 from colloc.reduced.density_slopes import density_slopes
 from colloc.reduced.motion import ReducedMotion
@@ -44,18 +42,22 @@ class ActuatorRows:
         Share and point of each row.
     """
 
-    def __init__(self, motion: ReducedMotion, limits: PathLimits) -> None:
-        self._motion, self._limits = motion, limits
+    def __init__(
+        self,
+        motion: ReducedMotion,
+        limits: PathLimits,
+        at_times: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    ) -> None:
+        self._motion, self._limits, self._at_times = motion, limits, at_times
         self.placed = np.empty((2, 0), dtype=int)
         shape = len(limits.names), motion.mesh.n_point
         self.lower, self.upper = np.tile(limits.least[:, None], shape[1]), np.ones(shape)
 
-    def place(self, v: np.ndarray, delta: float, gait: AnyGait, phases: Mesh) -> float:
-        """Choose the rows near the gait v, whose mesh in its phases is given; by how much it
-        exceeds any limit, relative."""
+    def place(self, v: np.ndarray, delta: float) -> float:
+        """Choose the rows near the gait v; by how much it exceeds any limit, relative."""
         mesh = self._motion.mesh
         here = self._limits.sizes(self._all(v, delta))
-        largest = self._largest(v, delta, gait, phases)
+        largest = self._largest(v, delta)
         between = np.maximum(largest - here[:, mesh.points].max(axis=2), 0.0)
         lowered = np.zeros_like(here)
         for points in mesh.points.T:  # neighbours may share a point
@@ -67,10 +69,11 @@ class ActuatorRows:
         excess = float(largest.max()) - 1.0
         return excess if excess > _EXACT or np.isnan(excess) else 0.0
 
-    def _largest(self, v: np.ndarray, delta: float, gait: AnyGait, phases: Mesh) -> np.ndarray:
+    def _largest(self, v: np.ndarray, delta: float) -> np.ndarray:
         """In every interval, ``(n_share, n)``."""
-        t = phases.edges[:-1, None] + phases.h[:, None] * _INSIDE
-        found = self._limits.sizes(self._signed_at(v, delta, gait, t.ravel())).reshape(-1, *t.shape)
+        mesh = self._motion.mesh
+        t = mesh.edges[:-1, None] + mesh.h[:, None] * _INSIDE
+        found = self._limits.sizes(self._signed_at(v, delta, t.ravel())).reshape(-1, *t.shape)
         largest = found.max(axis=2)
         share, interval = np.nonzero(largest > 1.0 - _CLOSE)
         if share.size:
@@ -81,7 +84,7 @@ class ActuatorRows:
             left, right = t[interval, near - 1], t[interval, near + 1]
 
             def own(t: np.ndarray) -> np.ndarray:
-                return self._limits.sizes(self._signed_at(v, delta, gait, t.ravel())).reshape(
+                return self._limits.sizes(self._signed_at(v, delta, t.ravel())).reshape(
                     -1, *t.shape
                 )[share, each]
 
@@ -90,37 +93,27 @@ class ActuatorRows:
             )
         return largest
 
-    def _signed_at(self, v: np.ndarray, delta: float, gait: AnyGait, t: np.ndarray) -> np.ndarray:
-        """Shares of the gait of parameters v at phases, ``(n_share, n_time)``."""
-        shapes, motion = (
-            Shapes(gait.angles(t), gait.rates(t), delta * gait.delta_unit),
-            self._motion,
-        )
+    def _signed_at(self, v: np.ndarray, delta: float, t: np.ndarray) -> np.ndarray:
+        """Shares of the gait of parameters v at times of the mesh, ``(n_share, n_time)``."""
+        motion = self._motion
+        shapes = Shapes(*self._at_times(v, t), delta)
         return np.asarray(self._limits.at(motion.kind.instants(shapes, motion.theta(v, delta, t))))
 
-    def of_moving_peaks(
-        self,
-        v: np.ndarray,
-        delta: float,
-        member: Callable[[np.ndarray], AnyGait],
-        phases: Mesh,
-        on_rows: np.ndarray,
-    ) -> np.ndarray:
+    def of_moving_peaks(self, v: np.ndarray, delta: float, on_rows: np.ndarray) -> np.ndarray:
         """What is added to the second derivatives ``(n, n)`` of multipliers times rows, as the
-        largest values between the points move with the gait (`colloc.reduced.second_order`);
-        `member` gives gaits, `phases` is the mesh of that of v."""
+        largest values between the points move with the gait (`colloc.reduced.second_order`)."""
         held = np.flatnonzero(on_rows)
         if held.size == 0:
             return np.zeros((v.size, v.size))
         (share, point), on_rows = self.placed[:, held], on_rows[held]
-        interval = (self._motion.mesh.points[:, :, None] == point).any(axis=1).argmax(axis=0)
-        each, left, width = np.arange(held.size), phases.edges[interval], phases.h[interval]
+        mesh = self._motion.mesh
+        interval = (mesh.points[:, :, None] == point).any(axis=1).argmax(axis=0)
+        each, left, width = np.arange(held.size), mesh.edges[interval], mesh.h[interval]
         edge = _INSIDE[0] * width
 
         def shares(at: np.ndarray, t: np.ndarray) -> np.ndarray:
             """Of every row ``(n_row, k)``, for parameters and phases of that shape."""
-            gait = member(at)
-            return self._signed_at(at, delta, gait, t.ravel()).reshape(-1, *t.shape)[share, each]
+            return self._signed_at(at, delta, t.ravel()).reshape(-1, *t.shape)[share, each]
 
         peak, _ = peaks(lambda t: np.abs(shares(v, t)), left + edge, width - 2 * edge)
         t = peak[:, None] + _SHIFT * width[:, None] * np.array([-1.0, 0.0, 1.0])

@@ -6,16 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.bodies import Pairs
 
 
 class Given(NamedTuple):
     """What a space was made of, besides its problem: made of the same it is the same."""
 
-    near: AnyGait
-    """A gait that says which members of a class are meant: of paths, how they wind. None if there
-    is one kind only."""
     edges: np.ndarray | None
     scheme: str
     far: Pairs

@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
-from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import widest
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.kinds import kind_of_motion
-from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import remembered
 from colloc.reduced.constraints import Constraints, Function
 from colloc.reduced.given import Given
@@ -41,7 +40,7 @@ class LinearSpace:
         scheme: str = "",
         far: Pairs = (),
     ) -> None:
-        self.control, self.given = control, Given(None, edges, scheme, far)
+        self.control, self.given = control, Given(edges, scheme, far)
         self.mesh, self._admissible = control.mesh(edges, scheme), control.admissible
         gait, body, limit, speeds, _ = control.admissible
         self.checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
@@ -49,50 +48,65 @@ class LinearSpace:
         self._offset = gait.offset(n_joint)
         angles, rates = (
             gait.angle_matrix(self.mesh.times, n_joint),
-            gait.rate_matrix(self.mesh.times, n_joint),
+            gait.rates_on(self.mesh, n_joint),
         )
         self._matrix = np.concatenate([angles, rates], axis=1)
         self.n = self._matrix.shape[2]
         self._pace = np.ones(self.mesh.n_point)
-        self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
+        self._speed = (_MeanSpeed if gait.relative_delta else _RootMeanSquareSpeed)(gait, n_joint)
         self.lower, self.upper = gait.bounds(body, widest(limit))
         self.own = np.arange(self.n)
         self._peaks = remembered(
-            lambda v: near_peaks(self.member(v), self.mesh, self.checks, limit)
+            lambda v: near_peaks(self.trajectory(v), self.mesh, self.checks, limit)
         )
 
     def member(self, v: np.ndarray) -> AnyGait:
         return self._admissible.member(v)
+
+    def trajectory(self, v: np.ndarray) -> AnyGait:
+        """The gait in the time of the mesh."""
+        return self._admissible.gait.trajectory(v, self._admissible.n_joint)
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters ``(n,)`` of the member nearest to a gait."""
         v = self._admissible.gait.parameters(self._admissible.gait.through(gait))
         return pointed(self.control, self.mesh, self, v)
 
-    laid = parameters
-
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         return v
 
-    def phase_mesh(self, gait: AnyGait) -> Mesh:
-        """The mesh in phases of a member: it is the same for all."""
-        return self.mesh
-
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
+        """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1; where delta is relative
+        to the shape speed, rates at unit shape speed and the pace, that speed."""
         shapes, n_joint = (self._matrix @ v).T, self._matrix.shape[1] // 2
-        return shapes[:n_joint] + self._offset, shapes[n_joint:], self._pace
+        angles, rates = shapes[:n_joint] + self._offset, shapes[n_joint:]
+        if not self._admissible.gait.relative_delta:
+            return angles, rates, self._pace
+        speed = np.linalg.norm(rates, axis=0)
+        return angles, rates / speed, speed
+
+    def at_times(self, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        angles, rates = self.trajectory(v)(t)
+        relative = self._admissible.gait.relative_delta
+        return angles, rates / np.linalg.norm(rates, axis=0) if relative else rates
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        if self._admissible.gait.relative_delta:
+            _, unit, speed = self.at(v)
+            on_angles, on_rates = np.split(on_shape, 2, axis=2)
+            along = np.einsum("kpj,jp->kp", on_rates, unit)
+            across = on_rates - along[..., None] * unit.T
+            on_rates = across / speed[:, None] + on_pace[..., None] * unit.T
+            on_shape = np.concatenate([on_angles, on_rates], axis=2)
         return np.asarray(
             on_shape.reshape(len(on_shape), -1) @ self._matrix.reshape(-1, self._matrix.shape[2])
         )
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """Shape checks at their worst instants in the mesh cells in which they might bind, then the
-        mean square shape speed."""
+        square of the shape speed."""
         gait, n_joint, limit = (
-            self.member(v),
+            self.trajectory(v),
             self._admissible.n_joint,
             self._admissible.joint_limit,
         )
@@ -138,15 +152,15 @@ class LinearSpace:
 
     def _rows(self, placed: Callable[[np.ndarray], list[_Placed]]) -> tuple[Function, Function]:
         """Values and slopes of the rows, with checks where they stand for parameters v."""
-        square = self._square
+        speed = self._speed
         return (
-            lambda v: np.concatenate([*(each.value(v) for each in placed(v)), [v @ square @ v]]),
-            lambda v: np.vstack([*(each.slope(v) for each in placed(v)), 2 * square @ v]),
+            lambda v: np.concatenate([*(each.value(v) for each in placed(v)), [speed.square(v)]]),
+            lambda v: np.vstack([*(each.slope(v) for each in placed(v)), speed.slope(v)]),
         )
 
     def _at_worst(self, placed: list[_Placed], v: np.ndarray) -> list[_Placed]:
         """Checks at the worst instants of v, in the cells where they were placed."""
-        gait, found = self.member(v), []
+        gait, found = self.trajectory(v), []
         for each in placed:
             which, matrix = each.moving, each.matrix
             if which.size:
@@ -160,9 +174,37 @@ class LinearSpace:
             found.append(each._replace(matrix=matrix))
         return found
 
-    def metric(self, v: np.ndarray) -> np.ndarray | None:
-        """None: parameters are alike."""
-        return None
+
+class _RootMeanSquareSpeed:
+    """The square of the root-mean-square shape speed [rad per radian of phase]."""
+
+    def __init__(self, gait: AnyClass, n_joint: int) -> None:
+        self._form = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
+
+    def square(self, v: np.ndarray) -> float:
+        return float(v @ self._form @ v)
+
+    def slope(self, v: np.ndarray) -> np.ndarray:
+        return 2 * self._form @ v
+
+
+class _MeanSpeed:
+    """The square of the mean shape speed, which is the length of the path over 2 pi."""
+
+    def __init__(self, gait: AnyClass, n_joint: int) -> None:
+        self._shares, rates = gait.side_rates(n_joint)
+        self._rates = rates / (2 * np.pi)
+
+    def square(self, v: np.ndarray) -> float:
+        return float(self._shares @ np.linalg.norm(self._rates @ v, axis=1)) ** 2
+
+    def slope(self, v: np.ndarray) -> np.ndarray:
+        rates = self._rates @ v
+        speeds = np.linalg.norm(rates, axis=1)
+        unit = rates / speeds[:, None]
+        return (
+            2 * (self._shares @ speeds) * np.einsum("k,kj,kjp->p", self._shares, unit, self._rates)
+        )
 
 
 class SerpenoidSpace(LinearSpace):

@@ -7,7 +7,6 @@ import numpy as np
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.bodies import Pairs
-from colloc.numerics.mesh import Mesh
 from colloc.reduced.constraints import Constraints
 from colloc.reduced.given import Given
 
@@ -30,7 +29,7 @@ class OneGait:
         far: Pairs = (),
         full: np.ndarray = _NONE,
     ) -> None:
-        self.control, self.given = control, Given(None, edges, scheme, far)
+        self.control, self.given = control, Given(edges, scheme, far)
         self.mesh, self._full = control.mesh(edges, scheme), full
         self._gait = control.admissible.member(full)
 
@@ -40,13 +39,14 @@ class OneGait:
     def parameters(self, gait: AnyGait) -> np.ndarray:
         return _NONE
 
-    laid = parameters
-
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         return self._full
 
-    def phase_mesh(self, gait: AnyGait) -> Mesh:
-        return self.mesh
+    def trajectory(self, v: np.ndarray) -> AnyGait:
+        return self._gait
+
+    def at_times(self, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return tuple(self._gait(t))
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return *self._gait(self.mesh.times), np.ones(self.mesh.n_point)
@@ -56,6 +56,3 @@ class OneGait:
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         return Constraints({}, _NONE, _NONE, -np.inf, lambda v: _NONE, lambda v: np.empty((0, 0)))
-
-    def metric(self, v: np.ndarray) -> np.ndarray | None:
-        return None

@@ -36,23 +36,15 @@ class SearchSpace(Shapes, Protocol):
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters of the member nearest to a gait."""
 
-    def laid(self, gait: AnyGait) -> np.ndarray:
-        """Parameters near a gait that need not keep every row: where a search may begin that keeps
-        them as it goes."""
-
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """The parameters as the full program has them (see `colloc.transcription.layout`)."""
 
-    def phase_mesh(self, gait: AnyGait) -> Mesh:
-        """The mesh in phases of a member."""
+    def at_times(self, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angles and rates ``(n_joint, n_time)`` at times of the mesh between its points."""
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """What keeps gaits in the class, with every check at the worst instants of the gait v, or
         later by a share of its mesh cell."""
-
-    def metric(self, v: np.ndarray) -> np.ndarray | None:
-        """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near
-        an optimum; None for 1."""
 
 
 class ReducedProgram:
@@ -93,7 +85,7 @@ class ReducedProgram:
             np.array([*equal, *least]),
             np.array([*equal, *np.full(len(least), np.inf)]),
         )
-        self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
+        self.actuators = ActuatorRows(self.motion, limits, space.at_times) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
         self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None
 
@@ -103,8 +95,7 @@ class ReducedProgram:
         excess = self.move_checks(v)
         if self.actuators is None:
             return excess
-        gait = self.space.member(v)
-        return max(excess, self.actuators.place(v, self.delta, gait, self.space.phase_mesh(gait)))
+        return max(excess, self.actuators.place(v, self.delta))
 
     @property
     def row_lower(self) -> np.ndarray:
@@ -151,8 +142,7 @@ class ReducedProgram:
             return np.zeros((v.size, v.size))
         first = self._own_lower.size
         mine = on_rows[first : first + self.actuators.placed.shape[1]]
-        phases = self.space.phase_mesh(self.space.member(v))
-        return self.actuators.of_moving_peaks(v, self.delta, self.space.member, phases, mine)
+        return self.actuators.of_moving_peaks(v, self.delta, mine)
 
     def objective(self, v: np.ndarray) -> float:
         """Minus the value that is maximised."""

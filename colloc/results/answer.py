@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from colloc.gaits.control_problem import control_problem
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
@@ -26,8 +27,8 @@ class Step:
     Attributes
     ----------
     delta : float
-        Regularisation speed, in the units of the problem's class of gaits: per period, or at unit
-        shape speed.
+        Regularisation speed, in the units of the problem's class of gaits: per period, or relative
+        to the shape speed.
     intervals : int
     value, distance, work : float
         The problem's objective, distance and work of a period, as collocation sees them.
@@ -182,7 +183,7 @@ class Answer:
     @property
     def delta_per_period(self) -> float:
         """Regularisation speed in body lengths per period, whatever the class measures it in."""
-        return self.delta * self.gait.delta_unit
+        return delta_per_period(self.problem.gait, self.gait, self.delta)
 
     @cached_property
     def motion(self) -> CollocatedMotion:

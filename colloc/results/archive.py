@@ -4,7 +4,7 @@ file of all for users.
 An archive is about one problem. Its starts are told apart by sampler, seed and number, so searches
 with other seeds join it, also at the same time. The rows (NAME.sqlite beside NAME.h5) are what a
 search goes on from: they hold every gait as it is. The HDF5 file is made of them when a search
-ends, with named dimensions; a free path or polygon is there by its Fourier series::
+ends, with named dimensions; a polygon is there by its Fourier series::
 
     start, sampler, seed, status, message                        (start)
     value, value_error, efficiency, efficiency_error, distance, work, delta, iterations, seconds, cpu_seconds    (start)

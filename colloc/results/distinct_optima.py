@@ -104,7 +104,7 @@ def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, fric
 
 
 SERIES_HARMONICS = 16
-"""Free paths and polygons are tabulated and told apart by their Fourier series in arc length."""
+"""Polygons are tabulated and told apart by their Fourier series in arc length."""
 
 
 def series_class(problem: Problem) -> Harmonic:

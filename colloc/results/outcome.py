@@ -55,7 +55,7 @@ class Outcome:
         One of `STATUSES`; only "solved" (certified by replay) is a success.
     message : str
         What went wrong, if something did.
-    guess, gait : Fourier, ArcPath or Corners
+    guess, gait : Fourier, Combination or Corners
         Where the search began and ended.
     efficiency, efficiency_error, distance, work : float
         Replayed and, failing that, collocated; NaN if there is none.

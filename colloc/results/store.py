@@ -5,11 +5,10 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
 
     /problem            JSON text of all fields          /source     text of the problem file
     /gait/{mean,cos,sin}                                 /versions   JSON text
-         or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute
-         symmetry
+         or {corners} of a polygon, with attribute symmetry
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result; of a smooth body
         modes and mode_rates
-    /answer/{edges,x,lam_x,lam_g}, attributes delta, value, distance, work,
+    /answer/{edges,x,lam_x,lam_g}; attributes delta, value, distance, work,
     kkt_error, panels, ... /history/{delta,intervals,value,distance,work,...}: how the search came
     there, a row a step /certificate/{name,value,threshold,passed,meaning}, attributes value,
     value_error, distance, distance_error, work, ...
@@ -64,10 +63,6 @@ _GAIT_ARRAYS = {
     "cos": ("rad", "joint, harmonic"),
     "sin": ("rad", "joint, harmonic"),
     "table": ("", "joint, function"),
-    "edges": ("period", "edge"),
-    "shapes": ("rad", "joint, edge"),
-    "tangents": ("heading in rad, or unit vector", "component, edge"),
-    "length": ("rad", ""),
     "corners": ("rad", "joint, vertex"),
     "schedule": ("period", "stage"),
 }

@@ -114,9 +114,7 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     if answer.program == EVALUATED:
         return gait_certificate(*at, claimed=answer.value, after=tuple(_mesh(answer)))
     before = (*_first_order(answer), _second_order(answer))
-    return gait_certificate(
-        *at, claimed=answer.value, before=before, after=(*_class(answer), *_mesh(answer))
-    )
+    return gait_certificate(*at, claimed=answer.value, before=before, after=tuple(_mesh(answer)))
 
 
 def gait_certificate(
@@ -404,11 +402,6 @@ def _one_motion(problem: Problem, fine: Replay) -> Check:
     else:
         meaning = f"relative; several motions are balanced at {fine.several:.2g} of the period"
     return Check("one motion", fine.ambiguity, problem.body.usual.delta_influence, meaning)
-
-
-def _class(answer: Answer) -> list[Check]:
-    """What members of its class have to keep besides."""
-    return [Check(*line) for line in answer.problem.gait.own_checks(answer.gait)]
 
 
 def _mesh(answer: Answer) -> list[Check]:

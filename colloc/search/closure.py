@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
-from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.numerics.sqp import minimised
@@ -78,8 +78,7 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
     ):
         return gait
     delta = problem.delta if delta is None else delta
-    if problem.gait.unit_speed:
-        delta *= path_length(gait)
+    delta = delta_per_period(problem.gait, gait, delta)
     own = problem.gait.seeds
     paced = (
         {"objective": EFFICIENCY, "froude": problem.regime.froude}

@@ -37,8 +37,7 @@ from colloc.transcription.warm_start import balanced_variables
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
 _MOST_PARAMETERS = 150
-"""Curvature is measured for so many parameters at most: it takes two gradients for each, 8 s for a
-free path of 256."""
+"""Curvature is measured for so many parameters at most: it takes two gradients for each."""
 
 
 class Verdict(Enum):

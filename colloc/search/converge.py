@@ -27,7 +27,7 @@ from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stati
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
 from colloc.search.certify import EXACT, VIOLATION
-from colloc.search.effort import ROUGH, SKETCH, Effort
+from colloc.search.effort import ROUGH, Effort
 from colloc.search.optimum import Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.search.spaces import with_far
@@ -93,8 +93,6 @@ def at_rest(
         if len(ends) > 1:
             # with the instants held, every round overshoots where they move far with the gait
             program.follow_worst()
-        if fresh and effort.accuracy < SKETCH.accuracy:
-            curvature = program.space.metric(v)
         result = minimised(program, v, BOX, effort.accuracy, curvature=curvature)
         v, iterations, evaluations = (
             result.v,

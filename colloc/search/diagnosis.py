@@ -103,7 +103,7 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
         failed = f"{what} is off by {result.excess[worst]:.1e} {window}"
         if group == ACTUATORS:
             needed = f"the gait takes {1 + result.excess[worst]:.4g} times as much"
-            failed = f"{what} is {_stated_limit(transcription, worst)}, and {needed} {window}"
+            failed = f"{what} is {_stated_limit(program, worst)}, and {needed} {window}"
         advice = _advice(group)
     elif result.status == "still moving":
         failed, advice = (
@@ -129,9 +129,9 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
     return f"{effort}: {failed} ({result.status}). Try to {advice}."
 
 
-def _stated_limit(transcription: GaitProgram, row: int) -> str:
-    limits = transcription.control.problem.path_limits
-    index = (row - transcription.groups[ACTUATORS].start) % len(limits.names)
+def _stated_limit(program: FullProgram, row: int) -> str:
+    limits = program.control.problem.path_limits
+    index = (row - program.groups[ACTUATORS].start) % len(limits.names)
     each = [(limit.function, most) for limit in limits.each for most in np.ravel(limit.most)]
     function, most = each[index]
     return f"{most:g}{_UNITS.get(function, '')}"

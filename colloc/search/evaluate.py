@@ -135,8 +135,7 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
             f"smallest_shape_speed "
             f"{problem.smallest_shape_speed:g}, where friction is viscous."
         )
-    # of unit-speed classes delta is that at unit shape speed
-    delta = problem.delta * (length if problem.gait.unit_speed else 1.0)
+    delta = problem.delta * (length if problem.gait.relative_delta else 1.0)
     usual = {"guess": None, "delta_start": None, "intervals": None}
     stated = problem.with_(gait=gait_class, rotation=None, delta=delta, **usual)
     answer = _answer(stated, gait)
@@ -225,7 +224,7 @@ def _errors_of_samples(
     series = _Series(
         np.stack([wide.functions(phases), wide.functions(phases, 1)]), answer.problem.joint_map
     )
-    aims, delta = control.aims, answer.problem.delta * answer.gait.delta_unit
+    aims, delta = control.aims, answer.problem.delta
     motion = ReducedMotion(kind_of_motion(control.dynamics), answer.mesh, series, aims.integrals)
     scale = np.array([control.stated(1.0), 1 / control.unit, 1.0, control.unit])
 

@@ -43,7 +43,7 @@ from colloc.search.helpers import Helpers, helping
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
 from colloc.search.small_starts import small_loops
-from colloc.search.spaces import space_about, space_near
+from colloc.search.spaces import space_near, space_of
 from colloc.system.errors import CollocError, NotConvergedError
 
 STARTS, ENOUGH, _MOST = 32, 8, 3
@@ -306,18 +306,18 @@ def candidates(
     one."""
     run, count = this_run(), asked or STARTS * (_MOST if problem.regime.froude else 1)
     coarse = problem.with_(
-        intervals=min(problem.intervals, problem.gait.coarse_intervals(problem.body.n_joint))
+        intervals=min(problem.intervals, problem.gait.intervals(problem.body.n_joint) // 2)
     )
     # compared where friction is nearly dry
     usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)
     deltas = [max(delta, problem.delta) for delta in (problem.delta_start, FACTOR * usual)]
     # where friction is as dry for a loop as slow as may be
     dry = max(
-        deltas[-1] * (1.0 if problem.gait.unit_speed else problem.smallest_shape_speed),
+        deltas[-1] * (1.0 if problem.gait.relative_delta else problem.smallest_shape_speed),
         problem.delta,
     )
     with suppress(CollocError):  # something to show from the first second on
-        run.told("explore", 0, count, as_it_is(*space_about(coarse, problem.guess), deltas[0]))
+        run.told("explore", 0, count, as_it_is(*space_near(coarse, problem.guess), deltas[0]))
     known: list[list[Candidate]] = [[] for _ in deltas]
     loops: list[Candidate] = []
     for loop in run.kept("small loops", (problem,), lambda: small_loops(problem)):
@@ -447,7 +447,7 @@ def _follow(
 ) -> None:
     """Follow a start through the deltas until it comes through a known gait; what it finds is added
     to the known ones."""
-    space, v = space_about(problem, gait)
+    space, v = space_near(problem, gait)
     before = None
     for delta, here in zip(deltas, known, strict=True):
         found = converged(space, v, delta, SKETCH)
@@ -540,10 +540,11 @@ def _followed_to_the_end(
 
 
 def _followed(problem: Problem, optimum: Optimum) -> Optimum:
-    """The gait at the final delta, with a free path's few arcs, on a mesh that resolves more."""
-    edges = optimum.space.phase_mesh(optimum.gait).edges
+    """The gait at the final delta, on a mesh that resolves more."""
+    edges = optimum.space.mesh.edges
     finer = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
-    space, v = space_near(problem, optimum.gait, finer)
+    space = space_of(problem, None, finer)
+    v = space.parameters(optimum.gait)
     return descend(converged(space, v, optimum.delta, ROUGH))
 
 

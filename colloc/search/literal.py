@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer, Step
@@ -55,8 +56,15 @@ def literal_answer(problem: Problem) -> Answer:
     kept = np.empty(0)
     for done in range(MESHES if problem.mesh_tolerance > 0 else 0):
         this_run().told("refine", done, MESHES)
-        gait, mesh = answer.gait, program.mesh
-        plan = planned_mesh(program.control, mesh, gait, delta, problem.mesh_tolerance, kept=kept)
+        gait = answer.gait
+        plan = planned_mesh(
+            program.control,
+            program.control.in_phases(program.mesh, gait),
+            gait,
+            delta_per_period(problem.gait, gait, delta),
+            problem.mesh_tolerance,
+            kept=kept,
+        )
         if plan is None:
             break
         kept = np.concatenate([kept, plan.kept])

@@ -83,7 +83,7 @@ class Optimum:
     def space(self) -> SearchSpace:
         """The class of gaits on its mesh. Its rows are placed by whoever asks for them
         (`ReducedProgram.place_rows`)."""
-        return space_of(self.problem, *self.given)
+        return space_of(self.problem, None, *self.given)
 
     def program(self) -> ReducedProgram:
         """The program that this is an optimum of, with its rows placed."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.gaits.gait import delta_per_period
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.search.certify import NOWHERE
 from colloc.search.converge import converged
@@ -43,12 +44,13 @@ class _Meshes:
     def plan(self, optimum: Optimum) -> MeshPlan | None:
         """A mesh on which the gait is accurate enough; None if its own will do."""
         problem, gait, late = optimum.problem, optimum.gait, max(0, self.count - _SAME_AIM)
-        mesh = optimum.space.phase_mesh(gait)
+        control = optimum.space.control
+        mesh = control.in_phases(optimum.space.mesh, gait)
         return planned_mesh(
-            optimum.space.control,
+            control,
             mesh,
             gait,
-            optimum.delta * gait.delta_unit,
+            delta_per_period(problem.gait, gait, optimum.delta),
             problem.mesh_tolerance,
             kept=self.kept,
             nested=self.count >= _SAME_AIM,
@@ -109,10 +111,7 @@ def _finer(optimum: Optimum, meshes: _Meshes) -> Optimum | None:
         space = remeshed(space, optimum.gait, plan.edges, plan.scheme)
         known = optimum.iterations == 0  # the search began at it, and no mesh will move it far
         effort = FINE if known or meshes.count > _SAME_AIM else ROUGH
-        try:
-            v = space.parameters(optimum.gait)
-        except NotConvergedError:
-            v = space.laid(optimum.gait)  # breaks a row a little, as its own mesh lets it
+        v = space.parameters(optimum.gait)
     curvature = optimum.curvature if optimum.v.size == v.size else None
     return converged(space, v, optimum.delta, effort, curvature).after(*optimum.history)
 
@@ -124,15 +123,13 @@ def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:
     They do where half as many change the objective by no more than six times what the mesh may.
     """
     space, v, here, problem = optimum.space, optimum.v, optimum.objective, optimum.problem
-    panels, mesh = problem.body.panels, space.phase_mesh(optimum.gait)
+    panels = problem.body.panels
     if panels == 0:
         return None
 
     def on(count: int) -> tuple[SearchSpace, np.ndarray, float]:
         body = problem.body.on_panels(count)
-        space = space_of(
-            problem.with_(body=body), optimum.gait, mesh.edges, mesh.scheme.name, optimum.given.far
-        )
+        space = space_of(problem.with_(body=body), None, *optimum.space.given)
         v = space.parameters(optimum.gait)
         return space, v, ReducedProgram(space, optimum.delta).objective(v)
 

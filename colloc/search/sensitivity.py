@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.parameters import Parameter, parameters
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
@@ -38,7 +39,7 @@ from colloc.search.choose import solution_of
 from colloc.search.converge import converged
 from colloc.search.effort import FINE, ROUGH
 from colloc.search.solve import finished
-from colloc.search.spaces import remeshed, space_about, space_near, space_of, with_far
+from colloc.search.spaces import remeshed, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
 from colloc.verification.played import Replay
 from colloc.verification.replayer import replayer
@@ -52,12 +53,6 @@ _NOTHING = 1e-9  # relative slope that counts as none
 _FINEST = 8  # parts of each interval of the answer's mesh
 _STATIONARY = 1e-4
 """Largest gradient of the Lagrangian, over the value, at which there are multipliers."""
-_OF_ARCS = (
-    "of paths of so many arcs: other numbers of arcs may change slopes by some per cent, "
-    "which the errors leave out"
-)
-"""For curvature 2 and bilateral paths, with 90 to 240 arcs of the half that is solved, the slope
-along curvature is 0.057 to 0.060, whichever way the number goes."""
 _EXCESS, _TURNS = 1e-5, 1e-4
 """By how much a gait may exceed its limits [rad, or relative], and turn in a period [rad], and
 still be one of the problem."""
@@ -290,8 +285,7 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
         at = parameter.name, parameter.value, parameter.relative
         effects.append(Effect(*at, slope, error, sides, again))
     problem, stated = solution.problem, (certificate.value, certificate.value_error)
-    note = _OF_ARCS if problem.gait.of_arcs else ""
-    return Sensitivity(problem.name, problem.objective.short, *stated, tuple(effects), note)
+    return Sensitivity(problem.name, problem.objective.short, *stated, tuple(effects))
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,7 +313,7 @@ class _Lagrangian:
     def __call__(self, problem: Problem) -> float:
         """Its value, in the units of the stated objective, with the rows at the worst instants of
         the gait."""
-        program = ReducedProgram(space_of(problem, *self.space.given), problem.delta)
+        program = ReducedProgram(space_of(problem, None, *self.space.given), problem.delta)
         program.place_rows(self.v)
         at = {name: k for k, name in enumerate(program.row_names)}
         if missing := self.on_rows.keys() - at.keys():
@@ -344,7 +338,7 @@ def _beyond(
 
 def _on_meshes(answer: Answer) -> list[_Lagrangian]:
     """At the optima of several meshes, the finest first: multipliers go with their mesh."""
-    gait, edges = answer.problem.gait, answer.edges
+    edges = answer.edges
     space, v = space_near(answer.problem, answer.gait, edges, answer.scheme)
     far = answer.problem.body.far_pairs
     solved = _Lagrangian.at_optimum(with_far(space, far), v, answer.delta)
@@ -356,9 +350,8 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
         found = converged(space, space.parameters(answer.gait), answer.delta, FINE)
         return _Lagrangian.at_optimum(found.space, found.v, answer.delta)
 
-    if gait.of_arcs:  # every interval is one
-        return [on(2), solved]
-    return [on(_FINEST), on(2), on(4, 0.5) if gait.moves_knots else solved]
+    fixed = answer.problem.gait.has_fixed_edges
+    return [on(_FINEST), on(2), solved if fixed else on(4, 0.5)]
 
 
 def _beside(parameter: Parameter, step: float) -> dict[int, Problem]:
@@ -386,12 +379,13 @@ def _slope(
 
 def _again(solution: Solution, problem: Problem, change: float) -> Again:
     gait, delta = solution.answer.gait, problem.delta
-    space, v = space_about(problem, gait)
+    space, v = space_near(problem, gait)
     found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
     best = found.certificate if found.success else UNCERTIFIED
     kept = replayer(problem.regime)(
-        problem.body, problem.law, gait, delta * gait.delta_unit, breaks=gait.corner_phases,
-        objective=problem.objective, quantities=problem.integrals, turn=problem.rotation or 0.0,
+        problem.body, problem.law, gait, delta_per_period(problem.gait, gait, delta),
+        breaks=gait.corner_phases, objective=problem.objective, quantities=problem.integrals,
+        turn=problem.rotation or 0.0,
     )  # fmt: skip
     breaks = "; ".join(_broken(problem, kept, ReducedProgram(space, delta).place_rows(v)))
     here = kept.value, kept.error * abs(kept.value)

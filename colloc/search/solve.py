@@ -31,7 +31,7 @@ from colloc.search.literal import literal_answer
 from colloc.search.optimum import Optimum
 from colloc.search.refine import refine
 from colloc.search.run import Progress, Run, this_run
-from colloc.search.spaces import space_about
+from colloc.search.spaces import space_near
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.interruption import heeded
 
@@ -244,7 +244,7 @@ def _interrupted(problem: Problem, run: Run, why: str) -> Solution:
     elif found:
         solution = Solution(problem, found[0].answer)
     else:
-        best = run.best or as_it_is(*space_about(problem, problem.guess), problem.delta_start)
+        best = run.best or as_it_is(*space_near(problem, problem.guess), problem.delta_start)
         solution = Solution(problem, unconfirmed(best))
     solution.interrupted = True
     solution.message = f"{why}; this is the best gait so far. {solution.message}".strip()

@@ -1,9 +1,4 @@
-"""From a problem to its programs: the full one, and the space of gaits that a search sees; which of
-them a class wants.
-
-A class that derives from `LinearClass`, as `Harmonic` does, needs nothing here; any other has a
-line in `SEARCHED`.
-"""
+"""From a problem to its programs: the full one, and the space of gaits that a search sees."""
 
 from __future__ import annotations
 
@@ -59,37 +54,31 @@ def heading(program: FullProgram, x: np.ndarray) -> FullProgram:
 def space_near(
     problem: Problem, gait: AnyGait, edges: np.ndarray | None = None, scheme: str = ""
 ) -> tuple[SearchSpace, np.ndarray]:
-    """The class of a problem on its first mesh, or a given one, and the parameters of its member
-    nearest to a gait. `NotConvergedError` if no path of the class is found near the gait."""
+    """The class of a problem on its first mesh, or one in phases of a gait, and the parameters of
+    its member nearest to that gait."""
     space = space_of(problem, gait, edges, scheme)
     return space, space.parameters(gait)
 
 
 def space_of(
     problem: Problem,
-    near: AnyGait,
+    gait: AnyGait | None = None,
     edges: np.ndarray | None = None,
     scheme: str = "",
     far: Pairs = (),
 ) -> SearchSpace:
-    """The class of a problem on its first mesh, or a given one, with the pairs `far` kept apart;
-    `near` says which of several kinds of members are meant."""
+    """The class of a problem, with the pairs `far` kept apart, on its first mesh or a given one, in
+    phases of a gait or, without one, in the program's own time."""
+    if gait is not None and edges is not None:
+        edges = problem.gait.times(gait, edges)
     return _space_class(problem)(control_problem(problem), edges, scheme, far)
 
 
 def with_far(space: SearchSpace, far: Pairs) -> SearchSpace:
     """The same class on the same mesh with other pairs of links kept apart."""
-    return space_of(space.control.problem, *space.given._replace(far=far))
+    return space_of(space.control.problem, None, *space.given._replace(far=far))
 
 
 def remeshed(space: SearchSpace, gait: AnyGait, edges: np.ndarray, scheme: str) -> SearchSpace:
-    """The same class near a member on another mesh, in the member's phases."""
-    near = space.control.admissible.gait.laid_on(gait, edges)
-    return space_of(space.control.problem, near, edges, scheme, space.given.far)
-
-
-def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
-    """The class of a problem on its first mesh, and parameters about a gait that need not keep
-    every row: ten times as fast for free paths."""
-    space = space_of(problem, gait)
-    return space, space.laid(gait)
+    """The same class on another mesh, in phases of a member."""
+    return space_of(space.control.problem, gait, edges, scheme, space.given.far)

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait, fields, statement_hash
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
@@ -130,7 +131,7 @@ def value_as_it_is(
             problem.body,
             problem.law,
             gait,
-            problem.delta * gait.delta_unit,
+            delta_per_period(problem.gait, gait, problem.delta),
             instants=instants,
             most_instants=most_instants,
             breaks=gait.corner_phases,

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
@@ -58,7 +59,7 @@ class Known:
     ----------
     statement : dict
         Fields of the problem, as `Problem.to_dict` gives them.
-    parameters, edges : tuple of float
+    parameters : tuple of float
         Of the class of gaits, as `member` takes them: in the class by construction.
     value, value_error : float
         The problem's objective at its delta.
@@ -80,7 +81,6 @@ class Known:
 
     statement: dict[str, Any]
     parameters: tuple[float, ...]
-    edges: tuple[float, ...]
     value: float
     value_error: float
     value_at_zero_delta: float
@@ -96,9 +96,7 @@ class Known:
     @property
     def gait(self) -> AnyGait:
         problem = self.problem
-        return problem.gait.member(
-            np.array(self.parameters), problem.body.n_joint, np.array(self.edges)
-        )
+        return problem.gait.member(np.array(self.parameters), problem.body.n_joint)
 
     @property
     def question(self) -> str:
@@ -112,7 +110,9 @@ class Known:
         """The verdict of an independent replay of the gait as it stands here."""
         gait = self.gait
         problem = self.problem.with_(guess=gait)  # which has to be admissible
-        return gait_certificate(problem, gait, problem.delta * gait.delta_unit, gait.corner_phases)
+        return gait_certificate(
+            problem, gait, delta_per_period(problem.gait, gait, problem.delta), gait.corner_phases
+        )
 
     def complaint(self, certificate: Certificate) -> str:
         """What a certificate has against the row, in a sentence; empty if it holds."""
@@ -182,8 +182,8 @@ def known(table: str | os.PathLike[str] | None = None) -> tuple[Known, ...]:
 def _row(fields: dict[str, Any]) -> Known:
     """A row that has a gait, whatever that achieves."""
     dry = None if fields["dry"] is None else tuple(map(float, fields["dry"]))
-    lists = {name: tuple(map(float, fields[name])) for name in ("parameters", "edges")}
-    row = Known(**fields | lists | {"dry": dry} | {name: float(fields[name]) for name in _NUMBERS})
+    given = {"parameters": tuple(map(float, fields["parameters"])), "dry": dry}
+    row = Known(**fields | given | {name: float(fields[name]) for name in _NUMBERS})
     if not np.isfinite(row.gait.angles(np.zeros(1))).all():
         raise ValueError(f"the gait of {row.statement['name']} has no finite angles")
     return row
@@ -202,11 +202,9 @@ def row_of(solution: Solution, command: str) -> Known:
         raise ProblemError(
             f"{problem.name} is not the certified gait of a class: a row of the table has to be."
         )
-    edges = answer.edges if answer.knots is None else answer.knots
     return Known(
         problem.with_(guess=None).to_dict(),
         tuple(answer.x[answer.layout.parameters[:, 0]].tolist()),
-        tuple(np.asarray(edges).tolist()) if problem.gait.unit_speed else (),
         **{name: float(getattr(solution.certificate, name)) for name in _NUMBERS},
         dry=solution.certificate.dry,
         command=command,

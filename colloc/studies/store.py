@@ -3,7 +3,7 @@ open.
 
 Dimensions are the axes of the study, and ``joint`` and ``harmonic``; every dimension has its
 coordinate. Numbers of cells without a certified gait are NaN, and ``status`` and ``message`` say
-why. ``delta`` is per period for every class; ``mean``, ``cos`` and ``sin`` of a free path or
+why. ``delta`` is per period for every class; ``mean``, ``cos`` and ``sin`` of a
 polygon are its Fourier series in arc length, cut (the journal has the gait itself).
 ``below_neighbour`` is 1 where a neighbour's gait, as it is, does better (``neighbour_value``) than
 the cell's own. Layout::

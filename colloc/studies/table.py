@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.law import rate_independent
@@ -138,7 +139,7 @@ def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]
 def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     gait = fourier_series(problem, outcome.gait)
     row: dict[str, Any] = {name: getattr(outcome, name) for name in NUMBERS}
-    row["delta"] = outcome.delta * outcome.gait.delta_unit
+    row["delta"] = delta_per_period(problem.gait, outcome.gait, outcome.delta)
     row |= {"mean": gait.mean, "cos": gait.cos, "sin": gait.sin}
     row["at_slowest"] = int(on_speed_floor(problem, outcome.gait))
     if problem.body.n_joint > 1:

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import Limit
-from colloc.gaits.path_samples import Gait
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, peaks, vertex
 from colloc.transcription.shape_checks import ShapeCheck
@@ -32,7 +32,7 @@ the largest; and how many."""
 
 
 def worst_instants(
-    gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit
+    gait: AnyGait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit
 ) -> list[np.ndarray]:
     """For each check, the instant in every mesh cell where it comes closest to its bound,
     ``(n_interval,)``."""
@@ -40,7 +40,7 @@ def worst_instants(
 
 
 def near_peaks(
-    gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit
+    gait: AnyGait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each check, the mesh cells in which it might bind soon, and its worst instants there,
     ``(n,)`` each.
@@ -69,7 +69,7 @@ def near_peaks(
 
 
 def _worst(
-    gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray, limit: Limit
+    gait: AnyGait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray, limit: Limit
 ) -> np.ndarray:
 
     def beyond(t: np.ndarray) -> np.ndarray:
@@ -97,7 +97,7 @@ def moving(
 def followed(
     check: ShapeCheck,
     shares: np.ndarray,
-    gait: Gait,
+    gait: AnyGait,
     times: np.ndarray,
     *,
     cells: tuple[np.ndarray, np.ndarray],
@@ -132,12 +132,12 @@ def followed(
     return times
 
 
-def check_values(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
+def check_values(check: ShapeCheck, gait: AnyGait, times: np.ndarray) -> np.ndarray:
     """A check along a gait, ``(n_time,)``."""
     return check.along(check.of(gait, times))
 
 
-def held_shares(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
+def held_shares(check: ShapeCheck, gait: AnyGait, times: np.ndarray) -> np.ndarray:
     """The share of the first sum to hold in the cut at each of the instants, or that of the check
     itself, ``(n_time,)``."""
     shapes = check.of(gait, times)

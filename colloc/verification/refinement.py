@@ -58,6 +58,8 @@ a little."""
 _MORE_NODES, _MOST_NODES = (0, 2, 4), 9
 _HANDICAP = 1.1
 _SNAP = 0.3
+_COARSE, _A_HARMONIC = 16, 2
+"""Intervals a period, at least, from which a mesh is grown, and for every harmonic."""
 GRADE = 0.2
 """Where an interval with a kink at one end is cut, as a fraction of its length from there. Beside a
 kink velocities go like x log|x|; cutting in the middle costs schemes of high order twice the
@@ -190,16 +192,22 @@ def planned_mesh(
         # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself
         # kinked
         on_knots = kinks[:0] if switches and (rule.left or rule.right) else kinks
-        # knots of a path are where its arcs and sides end: there they may be added, not moved
-        snap = _SNAP if control.admissible.gait.moves_knots and not nested else 0.0
-        first = np.union1d(
-            mesh.edges if nested else control.admissible.gait.first_edges(mesh.edges), knots
-        )
+        # where the rates jump edges may be added, not moved
+        keeps = nested or control.admissible.gait.has_fixed_edges
+        snap = 0.0 if keeps else _SNAP
+        first = np.union1d(mesh.edges if keeps else coarse_edges(control, mesh.edges), knots)
         edges = moved_knots(first, np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
         plan = _split(known, rule, edges, knots, on_knots, tolerance, aim, budget)
         best = plan if best is None else _fewest([best, plan])
     return best
+
+
+def coarse_edges(control: ControlProblem, edges: np.ndarray) -> np.ndarray:
+    """The uniform mesh from which a finer one is grown."""
+    gait = control.admissible.gait
+    n = max(int(_COARSE * gait.fraction), _A_HARMONIC * gait.harmonics)
+    return np.linspace(edges[0], edges[-1], n + 1)
 
 
 def _fewest(plans: Iterable[MeshPlan]) -> MeshPlan:

@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Harmonic, Polygon, Problem, ellipse
-from colloc.gaits.path_samples import path_length
+from colloc import Chain, Corners, Fourier, Harmonic, Polygon, Problem, ellipse
 from colloc.gaits.starts import laid_into, over_links, prolonged
-from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth
 from colloc.search.solve import solve
-from colloc.search.spaces import nearest_parameters, transcribed
 from colloc.system.errors import ProblemError
 
 THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
@@ -23,12 +20,6 @@ FIVE_HARMONICS = Fourier(
     [[0.84175, -0.00217, -0.2703, 0.00101, -0.0018]] * 2,
 )
 """The optimum of five harmonics, efficiency 0.40044."""
-
-
-def arcs(symmetry="bilateral"):
-    problem = Problem("p", ellipse(0, 1.8, 1.2), gait=FreePath(4.0, symmetry), intervals=20)
-    program = transcribed(problem)
-    return program.member(nearest_parameters(program, problem.guess))
 
 
 GAITS = {
@@ -52,19 +43,6 @@ def test_links_cut_in_two_move_as_before(name):
     np.testing.assert_allclose(
         over_links(cut, SIX, THREE).angles(PHASES), gait.angles(PHASES), rtol=0, atol=1e-12
     )
-
-
-@pytest.mark.parametrize("symmetry", SYMMETRIES)
-def test_a_path_of_arcs_keeps_its_symmetry_in_another_chain(symmetry):
-    gait = arcs(symmetry)
-    assert isinstance(gait, ArcPath)
-    laid = over_links(gait, THREE, Chain((0.25,) * 4))
-    assert laid.symmetry == symmetry
-    # the polygon is paced by its own length, so sets of points are compared
-    same = over_links(gait, THREE, THREE)
-    points, path = same.angles(np.linspace(0, 1, 4001)), gait.angles(PHASES)
-    distance = np.linalg.norm(points[:, :, None] - path[:, None, :], axis=0).min(axis=0)
-    assert distance.max() < 2e-3
 
 
 @pytest.mark.parametrize("lengths", [(0.25,) * 4, (0.2,) * 5, (0.1, 0.4, 0.4, 0.1)])
@@ -96,7 +74,7 @@ def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class
     }
     small = Corners(np.array(corners[symmetry]), symmetry)
     laid = laid_into(gait_class(3, symmetry), small, THREE)
-    assert path_length(laid) == pytest.approx(0.2 * np.pi, rel=2e-3)
+    assert laid.length == pytest.approx(0.2 * np.pi, rel=2e-3)
     np.testing.assert_allclose(
         laid.angles(PHASES[:-1]).mean(axis=1), small.angles(PHASES[:-1]).mean(axis=1), atol=1e-3
     )

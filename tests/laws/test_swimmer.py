@@ -10,9 +10,8 @@ from scipy.integrate import solve_ivp
 from benchmarks.peers import drag
 from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.summary import summary_lines
-from colloc.gaits.free_path import FreePath
+from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.harmonic import Harmonic, ellipse
-from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import load_problem
 from colloc.laws.power_law import PowerLaw
@@ -135,7 +134,7 @@ def test_harmonics_settle_the_pace_and_more_of_them_come_closer_to_the_best_one_
 
 def test_classes_that_leave_the_pace_open_are_refused_where_it_matters():
     for law in (LAW, PowerLaw(0.5)):
-        for gait in (FreePath(2.0), Polygon(6)):
+        for gait in (BSpline(6, 1), Polygon(6)):
             with pytest.raises(
                 ProblemError, match=r"work depends on the pace under .*; use Harmonic"
             ):

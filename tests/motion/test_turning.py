@@ -4,14 +4,14 @@ every way to it agrees."""
 import numpy as np
 import pytest
 
-from colloc import Chain, FreePath, Friction, Harmonic, Polygon, Problem, evaluate, replay
+from colloc import Chain, Friction, Harmonic, Polygon, Problem, evaluate, replay
 from colloc.gaits.control_problem import control_problem
+from colloc.gaits.gait import delta_per_period
 from colloc.gaits.harmonic import Fourier
 from colloc.reduced.program import ReducedProgram
 from colloc.results.arc import arc
 from colloc.search.spaces import space_near
 from colloc.transcription.full_program import full_program
-from colloc.transcription.layout import RADIANS
 from colloc.verification.inertial_motion import inertial_replay
 from colloc.verification.mesh_error import mesh_error
 
@@ -117,7 +117,6 @@ def test_the_chord_tends_to_the_displacement_as_the_turn_tends_to_nothing():
 CASES = {
     "series": {"gait": Harmonic(1)},
     "with inertia": {"gait": Harmonic(1), "froude": 0.05},
-    "free path": {"gait": FreePath(4.0, "none")},
     "polygon of unequal friction": {
         "gait": Polygon(4, "none"),
         "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
@@ -150,21 +149,23 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
 
     full = full_program(space.control, space.full_parameters(v), space.mesh.edges)
     x, functions = full.feasible(space.full_parameters(v), delta), full.nlp.functions
-    g = np.array(functions["jac_g"](x, delta / RADIANS)[0]).ravel()
-    value = float(functions["grad_f"](x, delta / RADIANS)[0])
+    at = x, delta / full.delta_unit
+    g = np.array(functions["jac_g"](*at)[0]).ravel()
+    value = float(functions["grad_f"](*at)[0])
     assert value == pytest.approx(-values["distance"] / values["work"], rel=1e-9)
     for group in ("orientation", "rotation", "distance", "work"):
         rows = full.groups[group]
         np.testing.assert_allclose(g[rows], full.row_lower[rows], atol=1e-10)
 
     gait = space.member(v)
-    per_period = delta * gait.delta_unit
+    per_period = delta_per_period(problem.gait, gait, delta)
     run, law = (inertial_replay, problem.law) if problem.froude else (replay, problem.law)
     more = {"regime": problem.regime} if problem.froude else {}
     fine = run(
         BODY, law, gait, per_period, breaks=gait.corner_phases, tolerance=1e-6, turn=turn, **more
     )
-    error = mesh_error(control_problem(problem), full.mesh, gait, per_period, 1e-7)
+    control = control_problem(problem)
+    error = mesh_error(control, control.in_phases(full.mesh, gait), gait, per_period, 1e-7)
     assert values["distance"] / values["work"] / fine.efficiency - 1 == pytest.approx(
         error.total, abs=3e-6
     )

@@ -245,7 +245,7 @@ def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_f
             },
             "run backwards",
         ),
-        ({"gait": colloc.FreePath(2.0)}, "leaves the pace open"),
+        ({"gait": colloc.Polygon(4)}, "leaves the pace open"),
         ({"body": colloc.ModalBody(), "guess": None}, "of a ModalBody"),
         ({"grade": 0.1, "rotation": 1.0}, "on a slope a body that a period turns"),
         ({"grade": 2.0, "rotation": 0.0}, "slides down for ever"),

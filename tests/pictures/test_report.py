@@ -15,9 +15,7 @@ import numpy as np
 import pytest
 
 from colloc.commands.report import main
-from colloc.gaits.free_path import FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
@@ -230,8 +228,6 @@ def test_every_check_of_a_certificate_is_put_in_plain_words(page, three_link):
         assert plain[check.name] in unescape(page)
     source = Path(certificate.__file__).read_text(encoding="utf-8")
     limits = {body.usual.limit_name for body in (Chain(), ModalBody(2))}
-    path = arcs_through(ellipse(0.0, 1.0, 1.0), FreePath(), np.linspace(0.0, 1.0, 41))
-    limits |= {name for name, *_ in FreePath().own_checks(path)}
     assert set(re.findall(r'Check\(\s*"([^"]+)"', source)) | limits == set(plain)
 
 

@@ -8,23 +8,19 @@ import pytest
 from scipy.optimize import linprog
 
 from colloc import (
+    BSpline,
     Chain,
     Fourier,
-    FreePath,
     Friction,
     Harmonic,
     ModalBody,
     Polygon,
     Problem,
     ellipse,
-    load,
-    replay,
-    save,
 )
 from colloc.reduced.program import ReducedProgram
-from colloc.results.solution import Solution
-from colloc.search.confirm import confirm, unconfirmed
-from colloc.search.converge import as_it_is, converged
+from colloc.search.confirm import confirm
+from colloc.search.converge import converged
 from colloc.search.effort import FINE
 from colloc.search.spaces import remeshed, space_near
 from tests.shared.stages import answer_near
@@ -43,37 +39,20 @@ CASES = {
         "guess": ellipse(0, 1.3, 0.8),
     },
     "shared nodes": {"gait": Harmonic(1, "none"), "scheme": "hermite-simpson"},
-    "free path": {"gait": FreePath(4.0, "none")},
-    "bilateral path": {
-        "gait": FreePath(4.0, "bilateral"),
-        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
-    },
-    "antipodal path": {"gait": FreePath(4.0, "antipodal")},
-    "bilateral path of three joints": {"gait": FreePath(6.0, "bilateral"), **FOUR},
-    "path of three joints": {"gait": FreePath(6.0, "none"), **WAVE},
-    "antipodal path of three joints": {"gait": FreePath(6.0, "antipodal"), **WAVE},
-    "path with two intervals an arc": {"gait": FreePath(4.0, "none"), "halved": True},
-    "path of three joints with two intervals an arc": {
-        "gait": FreePath(6.0, "bilateral"),
-        "halved": True,
-        **FOUR,
-    },
+    "splines of three joints": {"gait": BSpline(6), **WAVE},
     "polygon": {"gait": Polygon(4, "none"), "friction": Friction(mu_t=3, mu_f=1, mu_b=2)},
     "bilateral polygon": {"gait": Polygon(5, "bilateral")},
+    "polygon that ends its intervals with nodes": {"gait": Polygon(4), "scheme": "radau-3"},
+    "antipodal polygon of three joints": {"gait": BSpline(6, 1, "antipodal"), **WAVE},
+    "polygon with an axis through sides": {"gait": Polygon(4, "bilateral", "side"), **FOUR},
 }
 DELTA = 0.05
 
 
 def near_start(case, shake=1e-2):
     stated = {"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10} | CASES[case]
-    halved = stated.pop("halved", False)
     problem = Problem("p", **stated)
     space, v = space_near(problem, problem.guess)
-    if halved:
-        edges = space.mesh.edges
-        space, v = space_near(
-            problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))])
-        )
     v = v + shake * np.random.default_rng(0).normal(size=v.size)
     program = ReducedProgram(space, DELTA)
     program.place_rows(v)
@@ -106,22 +85,6 @@ def test_gradients_are_those_of_differences(case):
     np.testing.assert_allclose(program.row_slopes(v), rows, atol=2e-6)
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if "path" in case])
-def test_the_metric_of_paths_is_the_mean_square_that_a_step_moves_the_shapes_and_a_little_of_every_parameter(
-    case,
-):
-    space, v, _ = near_start(case)
-    metric, h = space.metric(v), 1e-6
-    slopes = [
-        (space.member(v + e).shapes - space.member(v - e).shapes).ravel() / (2 * h)
-        for e in h * np.eye(space.n)
-    ]
-    moved = np.inner(slopes, slopes) / space.member(v).edges.size
-    added = metric - moved
-    np.testing.assert_allclose(added, added[0, 0] * np.eye(space.n), atol=1e-8 * moved.max())
-    assert 0 < added[0, 0] < 0.2 * moved.max()
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_no_equation_among_the_rows_is_redundant(case):
     """An SQP step solves the linearised equations: dependent ones would have no solution."""
@@ -130,44 +93,13 @@ def test_no_equation_among_the_rows_is_redundant(case):
     assert np.linalg.matrix_rank(equations, tol=1e-6) == len(equations)
 
 
-def test_a_finer_mesh_on_the_same_arcs_has_the_same_parameters_and_a_smaller_error():
-    coarse, v, program = near_start("free path", shake=0.0)
-    fine, w, finer = near_start("path with two intervals an arc", shake=0.0)
-    np.testing.assert_allclose(w, v, atol=1e-12)
-    assert (fine.mesh.n, fine.n) == (2 * coarse.mesh.n, coarse.n)
-    exact = replay(
-        *coarse.control.dynamics[:2], coarse.member(v), DELTA * coarse.member(v).delta_unit
-    ).efficiency
-    assert abs(-finer.objective(w) - exact) < 0.2 * abs(-program.objective(v) - exact)
-
-
-def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
-    problem = Problem(
-        "p",
-        ellipse(1.0, 0.7, 1.1),
-        gait=FreePath(2.0, "bilateral"),
-        intervals=16,
-        delta=1e-2,
-        mesh_tolerance=0,
-    )
-    space, v = space_near(problem, problem.guess)
-    edges = space.mesh.edges
-    space, v = space_near(
-        problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))])
-    )
-    solution = Solution(problem, unconfirmed(as_it_is(space, v, problem.delta)))
-    again = load(save(solution, tmp_path / "path.h5"))
-    np.testing.assert_array_equal(again.answer.knots, edges)
-    np.testing.assert_array_equal(again.gait.shapes, solution.gait.shapes)
-
-
 @pytest.mark.parametrize(
     "gait",
     [
         Harmonic(1, "none"),
         Harmonic(2, "bilateral"),
         Polygon(4, "bilateral"),
-        FreePath(2.0, "bilateral"),
+        BSpline(8, symmetry="bilateral"),
     ],
 )
 def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
@@ -210,7 +142,9 @@ def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since()
     answer = confirm(found)
     assert answer.message == ""
     assert np.abs(found.gait.phases - ends).max() > 1e-6
-    np.testing.assert_allclose(answer.edges, space.phase_mesh(found.gait).edges, atol=1e-4)
+    np.testing.assert_allclose(
+        answer.edges, space.control.in_phases(space.mesh, found.gait).edges, atol=1e-4
+    )
 
 
 def test_amplitudes_of_modes_may_exceed_the_bound_on_the_tangent():

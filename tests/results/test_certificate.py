@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from colloc.commands.verify import main as recheck
-from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.objective import QUANTITIES
 from colloc.gaits.problem import Problem
@@ -220,31 +219,6 @@ def test_influence_of_delta(failures, replays, sign):
         )
 
     judged("delta influence", run)
-
-
-def circle(radius):
-    """A path of eight arcs."""
-    turn = 2 * np.pi * np.arange(9) / 8
-    shapes = radius * np.stack([np.cos(turn), np.sin(turn)])
-    return ArcPath(np.arange(9) / 8, shapes, turn[None] + 0.5 * np.pi, 2 * np.pi * radius)
-
-
-def of_path(gait, curvature):
-    stated = SimpleNamespace(gait=gait, problem=SimpleNamespace(gait=FreePath(curvature)))
-    return {check.name for check in verify._class(stated) if not check.passed}
-
-
-def test_curvature_between_the_nodes_of_a_free_path():
-    judged("curvature", lambda f: of_path(circle(0.5), 2.0 / (1 + f * 1e-6)))
-
-
-def test_joins_of_a_free_path(monkeypatch):
-    def run(f):
-        monkeypatch.setattr(ArcPath, "largest_jump", lambda gait: f * 1e-8)
-        return of_path(circle(0.5), 2.1)
-
-    assert circle(0.5).largest_jump() < 1e-9
-    judged("joins", run)
 
 
 def test_the_replay_is_as_accurate_as_was_asked_for(three_link, tmp_path, capsys):

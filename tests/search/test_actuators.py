@@ -8,11 +8,11 @@ from shared.instants import random_instants
 
 from colloc import (
     Chain,
-    FreePath,
     Friction,
     Harmonic,
     ModalBody,
     OwnLaw,
+    Polygon,
     PowerLaw,
     Problem,
     ProblemError,
@@ -266,7 +266,7 @@ SIZED = ("guess", "joint_limit", "delta", "delta_start", "intervals", "formulati
 """What has another usual value for another body."""
 REFUSED = {
     "pace open": (
-        {"power_limit": 1.0, "gait": FreePath(2.0, "none")},
+        {"power_limit": 1.0, "gait": Polygon(4)},
         "leaves the pace open, but the joints' power is limited",
     ),
     "smooth": (

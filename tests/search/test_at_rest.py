@@ -6,15 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import Friction, Harmonic, NotConvergedError, Polygon, Problem, ellipse
-from colloc.reduced.path_space import PathSpace
+from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.search.confirm import RADIUS, confirm
 from colloc.search.converge import at_rest, conditions_on_kink
-from colloc.search.descend import descend
 from colloc.search.effort import FINE
-from colloc.search.explore import begin_at
-from colloc.search.refine import refine
 from colloc.search.solve import solve
 from tests.shared.stages import optimum_near
 
@@ -104,20 +100,6 @@ def test_a_kink_may_be_missed_by_more_where_the_slopes_beside_it_are_small(slope
         gradient=lambda v: slope * np.sign(v),
     )  # fmt: skip
     assert (conditions_on_kink(vee, np.array([missed]), FINE) is not None) == kink
-
-
-def test_a_gait_that_a_finer_mesh_finds_no_member_near_goes_on_from_about_it(monkeypatch):
-    problem = Problem("sides", gait=Polygon(4, "bilateral"))
-    begun, asked = descend(begin_at(problem, problem.guess)), []
-
-    def near_none(space, gait):
-        asked.append(space)
-        raise NotConvergedError("found none near the guess.")
-
-    monkeypatch.setattr(PathSpace, "parameters", near_none)
-    found = refine(begun)
-    assert asked
-    assert (found.optimal, found.lacks) == (True, "")
 
 
 @pytest.mark.parametrize("changed", [{}, {"mu_b": 2.0}], ids=["symmetric", "unequal"])

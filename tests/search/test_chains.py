@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from colloc.gaits.bspline import Polygon
 from colloc.gaits.columns import Basis
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import (

@@ -148,7 +148,7 @@ def test_speed_under_a_limit_of_power_takes_all_of_it():
         ({"froude": (-1.0, 0.1)}, "above 0"),
         ({"froude": (0.1, np.inf)}, "two numbers"),
         ({"froude": (0.1, 1.0), "objective": "1 / length"}, "depends on it"),
-        ({"froude": (0.1, 1.0), "gait": colloc.FreePath(2.0)}, "of a class Harmonic"),
+        ({"froude": (0.1, 1.0), "gait": colloc.Polygon(4)}, "of a class Harmonic"),
         ({"froude": (0.1, 1.0, 2.0)}, "two numbers"),
     ],
 )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ProblemError
+from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, ProblemError
 from colloc.gaits.limits import under_one_limit
 from colloc.results.store import load, save
 from colloc.search.solve import solve
@@ -48,11 +48,8 @@ def test_mirrored_ranges_give_the_mirrored_gait(one_sided):
     assert mirrored.efficiency == pytest.approx(one_sided.efficiency, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    "gait",
-    [pytest.param(FreePath(2.0, "bilateral"), marks=pytest.mark.slow), Polygon(3, "bilateral")],
-)
-def test_paths_keep_both_sides_use_them_and_mirror(gait):
+def test_polygons_keep_both_sides_use_them_and_mirror():
+    gait = Polygon(3, "bilateral")
     aside = Fourier([0.5, -0.5], [[0.9], [-0.9]], [[0.5], [0.5]])
     stated = Problem("paths", gait=gait, delta=1e-2, mesh_tolerance=1e-2, smallest_shape_speed=0.4)
     here = solve(stated.with_(joint_limit=((-1, 2), (-2, 1)), guess=aside), starts=1)

@@ -7,10 +7,10 @@ import colloc
 from colloc import (
     BSpline,
     Chain,
-    FreePath,
     Friction,
     Harmonic,
     ModalBody,
+    Polygon,
     Problem,
     ProblemError,
     Serpenoid,
@@ -140,7 +140,7 @@ def test_it_is_kept_in_files(slow, tmp_path):
 @pytest.mark.parametrize(
     ("stated", "words"),
     [
-        ({"gait": FreePath(8.0)}, "leaves the pace open, but the joints' speed is limited"),
+        ({"gait": Polygon(3)}, "leaves the pace open, but the joints' speed is limited"),
         ({"speed_limit": 0.2}, "leaves no gait"),
         ({"speed_limit": 0.5}, "with speed_limit the usual first gait"),
         ({"body": Wave(), "gait": None}, "nothing is free in a prescribed motion"),

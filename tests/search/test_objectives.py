@@ -7,7 +7,6 @@ import pytest
 from colloc import (
     Chain,
     Fourier,
-    FreePath,
     Friction,
     Harmonic,
     Objective,
@@ -38,8 +37,8 @@ CASES = {
         "at_least": {"efficiency": 0.1},
     },
     "driven": {"gait": Harmonic(1, "none"), "objective": "driven efficiency"},
-    "driven path": {
-        "gait": FreePath(4.0, "bilateral"),
+    "driven bilateral polygon": {
+        "gait": Polygon(4, "bilateral"),
         "objective": "distance / (driven_work + length)",
     },
     "driven polygon": {
@@ -49,8 +48,8 @@ CASES = {
     },
     "polygon": {"gait": Polygon(4, "none"), "objective": TURNED, **FREE},
     "actuators": {"gait": Harmonic(2, "none"), "torque_limit": 0.05, "power_limit": (0.4, 0.9)},
-    "actuated path": {
-        "gait": FreePath(4.0, "bilateral"),
+    "actuated bilateral polygon": {
+        "gait": Polygon(5, "bilateral"),
         "torque_limit": 0.06,
         "at_least": {"efficiency": 0.0},
     },
@@ -60,8 +59,8 @@ CASES = {
         "torque_limit": (0.05, 0.06),
         **FREE,
     },
-    "bilateral path": {
-        "gait": FreePath(4.0, "bilateral"),
+    "bilateral polygon": {
+        "gait": Polygon(6, "bilateral", "side"),
         "objective": "speed",
         "at_least": {THRIFT: 0.1},
     },

@@ -14,7 +14,7 @@ import pytest
 
 import colloc
 from benchmarks.kills import contents, lost, stopped
-from colloc import Chain, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
+from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load
@@ -211,7 +211,7 @@ def test_a_kept_value_that_was_damaged_is_found_anew(tmp_path):
 def problems():
     yield QUICK
     yield Problem("series", series(), Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1), **AT)
-    yield Problem("path", ellipse(1.0, 0.7, 1.1), gait=FreePath(2.0, "bilateral"), **AT)
+    yield Problem("spline", ellipse(1.0, 0.7, 1.1), gait=BSpline(8, symmetry="bilateral"), **AT)
     yield Problem(
         "sides", ellipse(1.0, 0.7, 1.1), gait=Polygon(4, "bilateral"), **{**AT, "intervals": 24}
     )

@@ -280,16 +280,6 @@ def test_a_gait_on_file_that_is_asked_to_turn_is_paid_for_its_chord(of):
         )
 
 
-def test_slopes_of_paths_of_arcs_say_what_their_errors_leave_out(three_link):
-    assert not three_link.sensitivity().note
-    free = colloc.solve(
-        colloc.Problem("x", gait=colloc.FreePath(2, "bilateral"), delta=1e-2), starts=1
-    ).sensitivity()
-    assert "arcs" in free.note
-    assert free.note in str(free)
-    assert free.facts()["note"] == free.note
-
-
 @pytest.mark.parametrize(
     "changes",
     [
@@ -299,7 +289,7 @@ def test_slopes_of_paths_of_arcs_say_what_their_errors_leave_out(three_link):
         {"body": colloc.Chain(weights=(0.3, 0.3, 0.4), width=0.02), "grade": 0.1},
         {"body": colloc.Chain(feet=MIRRORED), "gait": colloc.Harmonic(1, "bilateral")},
         {"friction": colloc.PowerLaw(0.3), "gait": colloc.Harmonic(2)},
-        {"gait": colloc.FreePath(8.0)},
+        {"gait": colloc.Polygon(3)},
     ],
 )
 def test_every_number_can_change_and_nothing_else_does(changes):

@@ -10,7 +10,6 @@ from colloc import (
     Chain,
     CrawlerBody,
     Fourier,
-    FreePath,
     Friction,
     Harmonic,
     Polygon,
@@ -25,7 +24,6 @@ from colloc import (
 from colloc.commands import report, verify
 from colloc.commands import solve as solve_command
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.path_samples import path_length
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram
 from colloc.search.certify import _one_motion, gait_certificate
@@ -67,7 +65,7 @@ def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
 def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, capsys):
     found = solve(SIDES, 1)
     assert (found.status, found.answer.program) == ("solved", FULL), found.message
-    gait, delta = found.gait, found.answer.delta * found.gait.delta_unit
+    gait, delta = found.gait, found.answer.delta_per_period
     ran = slope_motion(
         Chain(), Friction(), gait, delta, 0.1, theta=gait.theta, breaks=gait.corner_phases
     )
@@ -78,21 +76,6 @@ def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, cap
     assert load(path).gait.theta == gait.theta
     assert verify.main([str(path)]) == 0
     assert "certified" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_a_free_path_climbs_better_than_a_harmonic_gait_that_it_contains():
-    harmonic = solve(PROBLEM.with_(delta=2e-3), 1)
-    delta = 2e-3 / path_length(harmonic.gait)
-    free = SIDES.with_(
-        name="free", gait=FreePath(6), guess=harmonic.gait, delta=delta, intervals=30
-    )
-    found = solve(free, 1)
-    assert found.status == "solved", found.message
-    ran = slope_motion(
-        Chain(), Friction(), found.gait, found.answer.delta * found.gait.delta_unit, 0.1
-    )
-    assert ran.climb[0] / ran.joint_work[0] > 2 * harmonic.certificate.value
 
 
 @pytest.mark.slow
@@ -281,8 +264,8 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
     ("changed", "said"),
     [
         (
-            {"gait": FreePath(symmetry="bilateral")},
-            "no part of a period follows from another: take FreePath",
+            {"gait": Polygon(symmetry="bilateral")},
+            "no part of a period follows from another: take Polygon",
         ),
         ({"body": CrawlerBody(), "gait": None, "guess": None}, "only a Chain"),
         ({"objective": "turning"}, "the objective speaks of the rotation"),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from colloc.commands.main import main as colloc_main
-from colloc.gaits.polygon import Corners, Polygon
+from colloc.gaits.bspline import Polygon
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram

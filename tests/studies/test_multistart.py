@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 
 from colloc.commands import multistart
-from colloc.gaits.free_path import FreePath
+from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
-from colloc.gaits.path_samples import arcs_through
-from colloc.gaits.polygon import Corners, Polygon
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
@@ -246,13 +245,13 @@ def test_an_archive_comes_back_as_it_was_written(tmp_path):
 @pytest.mark.parametrize(
     "gait",
     [
-        arcs_through(ellipse(0.2, 1.2, 0.8), FreePath(4), np.linspace(0, 1, 9)),
+        BSpline(6).member(np.linspace(0.1, 1.3, 12) ** 2, 2),
         Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]]),
     ],
-    ids=["path", "polygon"],
+    ids=["spline", "polygon"],
 )
-def test_gaits_that_are_no_series_are_kept_to_the_bit(gait, tmp_path):
-    stated = problem(gait=FreePath(4) if hasattr(gait, "length") else Polygon(3), guess=gait)
+def test_gaits_of_every_class_are_kept_to_the_bit(gait, tmp_path):
+    stated = problem(gait=Polygon(3) if isinstance(gait, Corners) else BSpline(6), guess=gait)
     name = StartName(SAMPLERS[0], 0, 0)
     open_archive(stated, tmp_path / "a.h5").add({name: outcome(0, gait)})
     back = open_archive(stated, tmp_path / "a.h5").outcomes[name].gait

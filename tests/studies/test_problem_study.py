@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 
 from colloc.commands import sweep as sweep_study
-from colloc.gaits.free_path import ArcPath, FreePath
+from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
-from colloc.gaits.polygon import Corners, Polygon
+from colloc.gaits.linear import Combination
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
@@ -484,7 +485,7 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
 CLASSES = {
     "ellipse": Harmonic(1, "bilateral"),
     "triangle": Polygon(3, "bilateral"),
-    "path": FreePath(4.0, "bilateral"),
+    "spline": BSpline(8, symmetry="bilateral"),
 }
 
 
@@ -505,7 +506,11 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
     study = Study("kinds", (Axis("kind", tuple(CLASSES)),), in_class, cold_starts=0)
     run = StudyRun(study, tmp_path)
     finished(run)
-    assert [type(run.cells[k,].best.outcome.gait) for k in range(3)] == [Fourier, Corners, ArcPath]
+    assert [type(run.cells[k,].best.outcome.gait) for k in range(3)] == [
+        Fourier,
+        Corners,
+        Combination,
+    ]
     # the ellipse was looked at in both other classes, as it is
     ellipses = run.cells[0,].best
     for k in (1, 2):
@@ -532,19 +537,19 @@ def test_a_study_over_classes_is_solved_and_certified(tmp_path):
     guesses = {
         "ellipse": ellipse(0.0, 2.8, 1.3),
         "triangle": corners,
-        "path": ellipse(0.0, 2.8, 1.3),
+        "spline": ellipse(0.0, 2.8, 1.3),
     }
     axis = Axis("kind", tuple(CLASSES), travels=False)
     study = Study(
         "kinds",
         (axis,),
-        lambda kind: in_class(kind, guesses[kind], 60 if kind == "path" else 24),
+        lambda kind: in_class(kind, guesses[kind], 60 if kind == "spline" else 24),
         cold_starts=0,
     )
     run = StudyRun(study, tmp_path)
     finished(run)
     efficiency = study_table(run).variables["efficiency"]
-    # harmonics, triangles and paths of curvature 4: docs/gait_classes.md
+    # harmonics, triangles and splines: docs/gait_classes.md
     assert efficiency[0] == pytest.approx(0.260, abs=2e-3)
     assert efficiency[1] > 0.39
     assert efficiency[2] > 0.36

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from colloc import (
     Chain,
     Coupled,
-    FreePath,
     Friction,
     Harmonic,
     Polygon,
@@ -70,7 +69,7 @@ def test_a_turn_to_the_right_is_the_mirror_image_of_that_to_the_left(family):
     )
 
 
-@pytest.mark.parametrize("kind", [Polygon(3, "bilateral"), FreePath(2, "bilateral")])
+@pytest.mark.parametrize("kind", [Polygon(3, "bilateral")])
 def test_gaits_of_every_class_have_a_mirror_image(kind):
     family = steer(
         Problem("p", gait=kind, friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2),

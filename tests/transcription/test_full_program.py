@@ -7,6 +7,7 @@ import pytest
 
 from colloc import (
     Chain,
+    Coupled,
     Elliptic,
     Foot,
     Fourier,
@@ -15,6 +16,7 @@ from colloc import (
     ModalBody,
     Objective,
     Pad,
+    Polygon,
     Problem,
     Quantity,
     Serpenoid,
@@ -52,6 +54,35 @@ CASES = {
     "width": {"body": Chain(SKEW.lengths, width=0.05)},
     "weights": {"body": Chain(SKEW.lengths, weights=(0.5, 0.2, 0.3))},
     "spline": {"gait": BSpline(8)},
+    "polygon": {"gait": Polygon(4), "guess": ellipse(0.1, 1.6, 1.1)},
+    "bilateral polygon": {"gait": Polygon(5, "bilateral"), "guess": ellipse(0.1, 1.6, 1.1)},
+    "polygon of three joints": {
+        "body": Chain((0.25,) * 4),
+        "gait": Polygon(6, "antipodal"),
+        "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]]),
+    },
+    "polygon by the velocity map": {
+        "gait": Polygon(4),
+        "guess": ellipse(0.1, 1.6, 1.1),
+        "formulation": "implicit velocity",
+    },
+    "polygon with motors": {
+        "gait": Polygon(4),
+        "guess": ellipse(0.1, 1.6, 1.1),
+        "torque_limit": 0.05,
+        "objective": "driven efficiency",
+    },
+    "coupled": {
+        "body": Chain((0.25,) * 4),
+        "gait": Coupled(Harmonic(1), gears=((1, 0), (0.5, 0.5), (0, 1))),
+        "guess": None,
+        "torque_limit": 0.05,
+    },
+    "stuck": {
+        "body": Chain((0.25,) * 4),
+        "gait": Coupled(Harmonic(1), stuck={1: 0.4}),
+        "guess": None,
+    },
     "serpenoid": {"body": Chain((0.2,) * 5), "gait": Serpenoid(), "guess": None},
     "uphill": {"grade": 0.1, "towards": 0.4},
     "uphill, any way": {"grade": 0.1},
@@ -95,14 +126,14 @@ def at_guess(problem, delta=0.1):
 
 
 def rows(full, x, delta=0.1):
-    return np.array(full.nlp.functions["jac_g"](x, delta / RADIANS)[0]).ravel()
+    return np.array(full.nlp.functions["jac_g"](x, delta / full.delta_unit)[0]).ravel()
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_it_has_the_value_and_the_rows_of_the_reduced_program(case):
     """Every equation holds at a gait in balance, but those that the gait has to be found for."""
     full, x, reduced, v = at_guess(stated(case))
-    value = float(full.nlp.functions["grad_f"](x, 0.1 / RADIANS)[0])
+    value = float(full.nlp.functions["grad_f"](x, 0.1 / full.delta_unit)[0])
     assert value == pytest.approx(reduced.objective(v), rel=1e-9)
     g = rows(full, x)
     equations = full.row_lower == full.row_upper
@@ -136,7 +167,7 @@ def test_it_has_the_value_and_the_rows_of_the_reduced_program(case):
 @pytest.mark.parametrize("case", CASES)
 def test_jacobian_and_hessian_are_differences_of_its_rows(case):
     full, x, *_ = at_guess(stated(case, intervals=6), 0.3)
-    assert_derivatives_are_differences(full.nlp, x, 0.3 / RADIANS, 3e-5)
+    assert_derivatives_are_differences(full.nlp, x, 0.3 / full.delta_unit, 3e-5)
 
 
 @pytest.mark.parametrize("name", ["radau-2", "trapezoid", "hermite-simpson"])
@@ -159,7 +190,7 @@ def test_moments_at_the_joints_are_those_that_the_power_of_single_joints_says(ca
     q, r = gait.angles(t), gait.rates(t) / RADIANS
     law = law.in_speeds_of(RADIANS)
     z, theta = full.layout.tail_velocity(body, x), x[full.layout.directions[:1]]
-    forces = body.forces(law, q, r, z, 0.1 / RADIANS)
+    forces = body.forces(law, q, r, z, 0.1 / full.delta_unit)
     expected = joint_moments(body, law, q, forces, 0.1 / RADIANS, regime.pull(theta))
     np.testing.assert_allclose(x[full.layout.moments], expected, atol=1e-12)
 
@@ -171,7 +202,7 @@ def test_half_a_period_with_a_symmetry_gives_the_same_efficiency_as_the_whole():
             "p", ellipse(0, 1.5, 0.8), gait=Harmonic(1, symmetry), intervals=intervals
         )
         full, x, *_ = at_guess(problem, 0.05)
-        values.append(float(full.nlp.functions["grad_f"](x, 0.05 / RADIANS)[0]))
+        values.append(float(full.nlp.functions["grad_f"](x, 0.05 / full.delta_unit)[0]))
     np.testing.assert_allclose(values, values[0], rtol=1e-6)
 
 
@@ -185,7 +216,7 @@ def test_schemes_converge_at_their_order_away_from_stick(name, order):
             "p", ellipse(0.2, 1.1, 0.7), gait=gait, scheme=scheme, intervals=intervals
         )
         full, x, *_ = at_guess(problem, 5.0)
-        return -float(full.nlp.functions["grad_f"](x, 5.0 / RADIANS)[0])
+        return -float(full.nlp.functions["grad_f"](x, 5.0 / full.delta_unit)[0])
 
     reference = efficiency("gauss-6", 30)
     coarse, fine = (abs(efficiency(name, n) - reference) for n in (12, 24))
@@ -196,7 +227,7 @@ def test_schemes_converge_at_their_order_away_from_stick(name, order):
 @pytest.mark.parametrize("case", ["lying", "symmetric", "antipodal", "inertia", "uphill", "modes"])
 def test_no_equation_is_redundant(case):
     full, x, *_ = at_guess(stated(case, intervals=6))
-    jacobian = np.array(ca.DM(full.nlp.functions["jac_g"](x, 0.1 / RADIANS)[1]))
+    jacobian = np.array(ca.DM(full.nlp.functions["jac_g"](x, 0.1 / full.delta_unit)[1]))
     equations = jacobian[full.row_lower == full.row_upper][:, full.lower < full.upper]
     singular = np.linalg.svd(equations, compute_uv=False)
     assert singular.min() > 1e-6 * singular.max()

@@ -18,7 +18,7 @@ def test_the_best_polygon_that_is_known_is_replayed_at_its_value():
     gait = Corners(stored["corners"], stored["symmetry"])
     assert len(gait.corner_phases) + 1 == 1940
     assert np.abs(gait.vertices).max() < 2.46
-    found = replay(Chain(), Friction(), gait, 1e-5 * gait.delta_unit, breaks=gait.corner_phases)
+    found = replay(Chain(), Friction(), gait, 1e-5 * gait.length, breaks=gait.corner_phases)
     assert found.efficiency == pytest.approx(0.448547, abs=2e-6)
     assert found.distance == pytest.approx(0.677236, abs=2e-6)
     assert Chain().crossing_depth(gait.angles(np.linspace(0, 1, 20001))).max() == 0

@@ -1,0 +1,243 @@
+"""Polygons: symmetries, the way into their class, what does not depend on the pace, and what is
+refused."""
+
+import numpy as np
+import pytest
+
+from colloc import (
+    BSpline,
+    Chain,
+    Corners,
+    Fourier,
+    Friction,
+    Harmonic,
+    Polygon,
+    Problem,
+    ellipse,
+)
+from colloc.gaits.gait import GaitFunction
+from colloc.gaits.harmonic import shifted
+from colloc.gaits.starts import prolonged
+from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
+from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.search.spaces import nearest_parameters, transcribed
+from colloc.system.errors import ProblemError
+from colloc.verification.replay import replay
+
+TRIANGLE = Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
+
+
+@pytest.mark.parametrize(
+    "gait",
+    [
+        TRIANGLE,
+        ellipse(0.1, 2.0, 1.2),
+        BSpline(6).member(np.linspace(-1, 1, 12), 2),
+    ],
+)
+def test_the_mirror_image_of_a_gait_is_one_of_its_class(gait):
+    t = np.linspace(0, 1, 97)
+    assert type(gait.mirrored) is type(gait)
+    np.testing.assert_allclose(gait.mirrored.angles(t), -gait.angles(t), atol=1e-12)
+    np.testing.assert_allclose(gait.mirrored.rates(t), -gait.rates(t), atol=1e-10)
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+def test_harmonics_survive_the_way_through_points(symmetry):
+    rng = np.random.default_rng(2)
+    drawn = Fourier(
+        0.3 * rng.normal(size=2), 0.3 * rng.normal(size=(2, 3)), 0.3 * rng.normal(size=(2, 3))
+    )
+    target = Harmonic(3, symmetry)
+    gait = target.fourier(target.parameters(drawn), 2)
+
+    class Opaque(GaitFunction):
+        n_joint = 2
+        angles, rates = staticmethod(gait.angles), staticmethod(gait.rates)
+
+    back = target.through(Opaque())
+    t = np.linspace(0, 1, 50)
+    np.testing.assert_allclose(back.angles(t), gait.angles(t), rtol=0, atol=1e-10)
+
+
+def test_a_symmetric_gait_is_recognised_whatever_phase_it_starts_at():
+    turned = ellipse(0.2, 1.3, 0.8)
+    for phase in (0.0, 0.13, 0.5, 0.61):
+        points = symmetric_samples(shifted(turned, phase), "bilateral")
+        np.testing.assert_allclose(points[:, 0], -points[::-1, 0], atol=1e-6)
+        half = turned.length / 2
+        assert np.linalg.norm(np.diff(points), axis=0).sum() == pytest.approx(half, rel=1e-5)
+
+
+def test_a_polygon_is_found_again_through_its_points_and_exactly_from_its_corners():
+    square = Corners(np.array([[1.0, -1.0, -1.0, 1.0], [1.0, 1.0, -1.0, -1.0]]))
+    for gait, kind in ((square, Polygon(4)), (TRIANGLE, Polygon(3, "bilateral"))):
+        found = kind.member(kind.parameters(gait), 2)
+        assert found.length == pytest.approx(gait.length, rel=0.02)
+        again = kind.member(kind.parameters(found), 2)
+        np.testing.assert_allclose(again.corners, found.corners, atol=1e-13)
+    np.testing.assert_allclose(
+        Polygon(4).member(Polygon(4).parameters(square), 2).corners, square.corners, atol=1e-13
+    )
+
+
+def test_a_polygon_is_a_spline_of_degree_1_whose_pace_does_not_matter():
+    for symmetry in SYMMETRIES:
+        kind, spline = Polygon(6, symmetry), BSpline(knots=6, degree=1, symmetry=symmetry)
+        v, t = np.linspace(-1.0, 1.0, kind.size(2)) ** 3, np.linspace(0.0, 1.0, 101)
+        gait, same, timed = kind.member(v, 2), spline.member(v, 2), kind.trajectory(v, 2)
+        np.testing.assert_array_equal(gait.corners, same.corners)
+        assert kind.relative_delta
+        assert spline.relative_delta
+        assert not BSpline(6, 2).relative_delta
+        # angles linear in the parameters at a program's times are those of the gait at its phases
+        part = t * kind.fraction
+        np.testing.assert_allclose(
+            gait.angles(kind.phases(gait, part)), timed.angles(part), atol=1e-12
+        )
+        edges = kind.edges(24)
+        np.testing.assert_allclose(kind.times(gait, kind.phases(gait, edges)), edges, atol=1e-12)
+        assert np.ptp(np.linalg.norm(gait.rates(t), axis=0)) < 1e-9
+        assert np.abs(edges[:, None] - kind.corners_in_time).min(axis=0).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("corners", "axis"), [(3, "corner"), (4, "corner"), (4, "side"), (5, "corner"), (6, "side")]
+)
+def test_polygons_have_the_corners_and_the_symmetry_they_promise(corners, axis):
+    problem = Problem(
+        "p", ellipse(0, 2.0, 1.2), gait=Polygon(corners, "bilateral", axis), intervals=40
+    )
+    program = transcribed(problem)
+    gait = program.member(nearest_parameters(program, problem.guess))
+    t = np.linspace(0, 1, 20001)[:-1] + 1e-6
+    heading = np.unwrap(np.arctan2(*gait.rates(t)[::-1]))
+    turns = np.abs(
+        np.diff(np.append(heading, heading[0] + 2 * np.pi * np.sign(heading[-1] - heading[0])))
+    )
+    assert np.sum(turns > 1e-6) == corners
+    np.testing.assert_allclose(gait.angles(-t), -gait.angles(t)[::-1], atol=1e-8)
+
+
+def test_replay_of_the_small_triangle_reaches_two_fifths():
+    """Joints moved one after the other and undone together: d = e/12, W = 5 e/24 (design notes,
+    section 5)."""
+    for c, e in ((2.2, 1e-3), (2.5, 1e-3)):
+        gait = Corners(np.array([[c + e, c, c], [-c, -c, -c - e]]))
+        assert gait.length == pytest.approx((2 + np.sqrt(2)) * e)
+        result = replay(
+            Chain(),
+            Friction(),
+            lambda t, g=gait: (g.angles(t), g.rates(t)),
+            1e-9 * gait.length,
+            breaks=gait.corner_phases,
+        )
+        assert result.efficiency == pytest.approx(0.4, rel=2e-3)
+        assert result.distance == pytest.approx(e / 12, rel=2e-3)
+        assert result.work == pytest.approx(5 * e / 24, rel=2e-3)
+
+
+def test_replay_does_not_depend_on_the_pace_of_a_polygon():
+    gait = Corners(np.array([[1.2, -0.8, -1.0], [1.0, 1.1, -1.3]]))
+
+    def slow_at_corners(t):
+        # phase s(t) with s' = 0 at the corners
+        breaks = gait.phases
+        k = np.clip(np.searchsorted(breaks, t, side="right") - 1, 0, 2)
+        h = np.diff(breaks)[k]
+        x = (t - breaks[k]) / h
+        inside = np.clip(
+            breaks[k] + h * (x - np.sin(2 * np.pi * x) / (2 * np.pi)), 1e-12, 1 - 1e-12
+        )
+        return gait.angles(inside), gait.rates(inside) * (1 - np.cos(2 * np.pi * x))
+
+    sharp = replay(
+        Chain(),
+        Friction(),
+        lambda t: (gait.angles(t), gait.rates(t)),
+        1e-8,
+        breaks=gait.corner_phases,
+    )
+    smooth = replay(Chain(), Friction(), slow_at_corners, 1e-8, instants=3200)
+    assert sharp.distance == pytest.approx(smooth.distance, rel=1e-5)
+    assert sharp.work == pytest.approx(smooth.work, rel=1e-5)
+    assert sharp.rotation == pytest.approx(smooth.rotation, abs=1e-5)
+
+
+def test_delta_keeps_its_meaning_from_class_to_class():
+    stated = Problem("p", ellipse(0, 1.5, 1.0), gait=Harmonic(1, "bilateral"), delta=1e-3)
+    path = prolonged(stated, stated.guess, Polygon(4, "bilateral"))
+    assert path.delta * stated.guess.length == pytest.approx(1e-3)
+    back = prolonged(path, stated.guess, Harmonic(2, "bilateral"))
+    assert back.delta == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize(
+    ("gait", "changes", "words"),
+    [
+        (Polygon(4), {"scheme": "trapezoid"}, "gauss-N or radau-N"),
+        (Polygon(6), {"intervals": 8}, "mesh is too small"),
+        (
+            Polygon(4),
+            {"body": Chain((0.5, 0.5)), "guess": Fourier([0.0], [[1.0]], [[0.0]])},
+            "three links",
+        ),
+        (Polygon(4), {"guess": Corners(np.array([[0.1, -0.1], [0.0, 0.0]]))}, "hardly moves"),
+        (Polygon(4, "bilateral"), {"body": Chain((0.2, 0.3, 0.5))}, "both ends"),
+    ],
+)
+def test_unusable_problems_are_refused_in_words(gait, changes, words):
+    with pytest.raises(ProblemError, match=words):
+        Problem("p", **({"guess": ellipse(0, 1.5, 1.0), "gait": gait} | changes))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Polygon(1), "corners"),
+        (lambda: Polygon(5, "antipodal"), "even"),
+        (lambda: Polygon(4, "bilateral", "edge"), "axis"),
+        (lambda: Corners(np.array([[1.0, 1.0], [0.0, 0.0]])), "equal neighbours"),
+        (lambda: Corners("triangle"), "numbers"),
+        (lambda: BSpline(6, 0), "degree"),
+        (lambda: BSpline(1, 1), "knots"),
+    ],
+)
+def test_unusable_classes_and_gaits_are_refused_in_words(make, words):
+    with pytest.raises(ProblemError, match=words):
+        make()
+
+
+def test_problems_of_every_class_survive_their_description():
+    for gait, guess in (
+        (BSpline(6, 1, "bilateral"), TRIANGLE),
+        (Polygon(4, "bilateral", "side"), ellipse(0, 2.0, 1.2)),
+    ):
+        problem = Problem("p", guess, gait=gait, intervals=40)
+        again = Problem.from_dict(problem.to_dict())
+        assert again.hash == problem.hash
+        assert again.gait == gait
+        assert again.delta_start == 0.01
+
+
+def test_a_pair_of_closed_joints_that_travels_along_a_folded_chain_wastes_nothing_in_the_limit():
+    """All joints are open by e but two neighbours, which are folded: W = e/5, d = W (1 - e^2/24).
+    No gait exceeds 1."""
+    links = 5
+    body, sign = (
+        Chain((1 / links,) * links),
+        np.array([[(-1.0) ** (j + 1)] for j in range(links - 1)]),
+    )
+    closed = [(), *((j, j + 1) for j in range(links - 2))]
+    open_by = np.array([[0.0 if j in pair else 1.0 for pair in closed] for j in range(links - 1)])
+    for e in (0.2, 0.1):
+        gait = Corners(sign * (np.pi - e * open_by))
+        fine = replay(body, Friction(), lambda t, g=gait: (g.angles(t), g.rates(t)),
+        1e-7 * gait.length, instants=800,
+                      tolerance=1e-4, breaks=gait.phases[1:-1])  # fmt: skip
+        assert fine.rotation == pytest.approx(0, abs=1e-12)
+        assert fine.work == pytest.approx(e / links, rel=1e-8)
+        assert 1 - fine.efficiency == pytest.approx(e**2 / 24, rel=0.02)
+        angles = gait.angles(np.linspace(0, 1, 4001))
+        assert crossing_depth(body, angles).max() < 1e-12
+        assert passing_depth(body, angles) < 1e-12
