@@ -43,10 +43,6 @@ SUBCOMMANDS = {
         "sensitivity",
         "what a wrong floor costs: how the best value changes with friction, lengths, feet, limits",
     ),
-    "referee": (
-        "referee",
-        "check the best gaits that are known from the gaits alone; take in better ones",
-    ),
 }
 """Name to module of this package with a ``main(arguments)`` that returns an exit code, and what it
 does."""
@@ -92,6 +88,10 @@ def _command(words: list[str]) -> int:
 
         print(", ".join(f"{name} {version}" for name, version in versions().items()))
         return OK
+    if words[0] == "referee":
+        raise ProblemError(
+            "the table of known gaits is a benchmark: python -m benchmarks.referee, in a clone."
+        )
     if words[0] not in SUBCOMMANDS:
         import difflib
 

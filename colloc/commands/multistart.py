@@ -27,7 +27,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import LARGEST_SEED, LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
 from colloc.results.distinct_optima import Basin, basins
-from colloc.results.outcome import RETRIED, STATUSES, Outcome, counts
+from colloc.results.outcome import STATUSES, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
@@ -139,7 +139,7 @@ def summary_lines(
 
 
 def summary_dict(
-    problem: Problem, outcomes: Sequence[Outcome], found: Sequence[Basin], path: Path
+    problem: Problem, outcomes: Sequence[Outcome], found: Sequence[Basin], path: Path | None
 ) -> dict:
     """The same as one JSON object."""
     return {
@@ -192,17 +192,12 @@ def main(options: argparse.Namespace) -> int:
     path = output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.results.archive import StartName, open_archive, save_archive
-    from colloc.studies.campaign import run_starts
+    from colloc.results.archive import open_archive, save_archive
+    from colloc.studies.multistart import run_archive
 
     quiet = options.quiet or options.json
     archive = open_archive(problem, path)  # or refused, before anything is solved
-    before = archive.of_search(options.sampler, options.seed)
-    done = {
-        k
-        for k, o in before.items()
-        if k < options.starts and not (options.retry and o.status in RETRIED)
-    }
+    done = archive.done(options.sampler, options.seed, options.starts, retry=options.retry)
     # there may be more than memory holds
     todo = (k for k in range(options.starts) if k not in done)
     to_go = options.starts - len(done)
@@ -220,9 +215,7 @@ def main(options: argparse.Namespace) -> int:
     try:
         with StatusLine(enabled=not quiet) as line:
             line.say(f"{problem.name}: 0 of {to_go} starts")
-            for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
-                # before it is reported
-                archive.add({StartName(options.sampler, options.seed, outcome.start): outcome})
+            for count, outcome in enumerate(run_archive(archive, todo, **settings), 1):
                 if not quiet:
                     line.clear()
                     print(outcome_line(outcome), flush=True)
@@ -231,9 +224,7 @@ def main(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         interrupted = True
     save_archive(archive, options.command)
-    outcomes = [
-        o for k, o in archive.of_search(options.sampler, options.seed).items() if k < options.starts
-    ]
+    outcomes = list(archive.of_search(options.sampler, options.seed, options.starts).values())
     found = basins(problem, outcomes)
     lines, bound = summary_lines(problem, outcomes, found), None
     if found:

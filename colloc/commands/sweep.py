@@ -134,7 +134,6 @@ def _announce(run) -> None:
 
 def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path]) -> bool:
     """Work until all is done, or interrupted."""
-    from colloc.studies.table import cell_text
     from colloc.system.task_pool import process_pool
 
     executor, workers = _executor(options)
@@ -154,7 +153,7 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
                     (time.perf_counter() - begin) / progress.done * (progress.total - progress.done)
                 )
                 print(
-                    f"{cell_text(run.study, progress.cell)}: {what}  ({told}; round {number}: "
+                    f"{run.study.label(progress.cell)}: {what}  ({told}; round {number}: "
                     f"{progress.done} of "
                     f"{progress.total}, {left:.0f} s left)",
                     flush=True,
@@ -173,8 +172,7 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
 def _save(run, out: Path, source: str, command: str) -> Path:
     from colloc.bounds.optimality_gap import upper_bound
     from colloc.gaits.problem import Problem
-    from colloc.studies.store import save_study
-    from colloc.studies.table import study_table
+    from colloc.studies.table import save_study, study_table
 
     def bound(problem: Problem) -> float | None:
         known = upper_bound(problem, out, compute=False)
@@ -209,8 +207,6 @@ def _summary(run, path: Path) -> dict:
 
 
 def _summary_lines(run, path: Path) -> list[str]:
-    from colloc.studies.table import cell_text
-
     counts = ", ".join(f"{n} {what}" for what, n in _summary(run, path)["counts"].items())
     lines = [f"{run.study.name}: {len(run.cells)} cells: {counts}; saved {path}"]
     below = [cell for cell in run.cells if run.below_neighbour(cell)]
@@ -222,8 +218,7 @@ def _summary_lines(run, path: Path) -> list[str]:
     for cell in below[:_MOST_FAILURES_SHOWN]:
         found, could = run.cells[cell].best.outcome.value, run.neighbour_value(cell)
         lines.append(
-            f"  {cell_text(run.study, cell)}: {found:.6f}, where a neighbour's gait achieves "
-            f"{could:.6f}"
+            f"  {run.study.label(cell)}: {found:.6f}, where a neighbour's gait achieves {could:.6f}"
         )
     failed = [
         (cell, state)
@@ -232,7 +227,7 @@ def _summary_lines(run, path: Path) -> list[str]:
     ]
     for cell, state in failed[:_MOST_FAILURES_SHOWN]:
         message = state.attempts[-1].outcome.message if state.attempts else state.message
-        lines.append(f"  {cell_text(run.study, cell)}: {message}")
+        lines.append(f"  {run.study.label(cell)}: {message}")
     if len(failed) > _MOST_FAILURES_SHOWN:
         lines.append(
             f"  ... and {len(failed) - _MOST_FAILURES_SHOWN} more; all are in the file, with their "

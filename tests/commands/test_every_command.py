@@ -139,13 +139,6 @@ REFUSED = {
         for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")
     ],
     "sensitivity": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --no-such"],
-    "referee": [
-        "--table nope.json",
-        "--table text.h5",
-        "--add good.h5",
-        "--add nope.h5 --by me",
-        "--only nobody",
-    ],
 }
 
 

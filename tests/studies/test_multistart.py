@@ -39,7 +39,8 @@ from colloc.results.solution import SOLVED, Solution
 from colloc.search import certify
 from colloc.search.certify import is_trivial
 from colloc.search.solve import solve
-from colloc.studies import calls, campaign
+from colloc.studies import calls
+from colloc.studies import multistart as campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
 from scripts.continue_delta import resolution_warning, value_at_zero_delta
@@ -532,7 +533,7 @@ def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(
             yield task, outcome(task.key, ellipse(0.2, 1.2, 0.8))
         raise _Enough
 
-    monkeypatch.setattr(campaign, "completed", solved)
+    monkeypatch.setattr(campaign, "run_tasks", solved)
     words = [str(path), "--starts", str(many), "--output", f"{tmp_path}/"]
     with pytest.raises(_Enough):
         multistart.main(words)

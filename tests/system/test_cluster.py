@@ -17,9 +17,9 @@ import pytest
 from shared.dask_cluster import DaskProcesses
 
 from colloc.studies.journal import read_journal
-from colloc.studies.store import load_study
+from colloc.studies.table import load_study
 from colloc.system.dask_pool import connected
-from colloc.system.task_pool import EngineGone, Task, completed
+from colloc.system.task_pool import EngineGone, Task, run_tasks
 
 pytestmark = [
     pytest.mark.slow,
@@ -40,7 +40,7 @@ def naps(dask, times, workers=2):
     """Tasks that sleep, by number, on a cluster; and a list that grows as they end."""
     executor, _ = connected(dask.address, workers, patience=20.0)
     waiting = iter([Task(k, (seconds,)) for k, seconds in enumerate(times)])
-    return completed(time.sleep, lambda: next(waiting, None), workers=workers, executor=executor)
+    return run_tasks(time.sleep, lambda: next(waiting, None), workers=workers, executor=executor)
 
 
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGSTOP])
@@ -81,7 +81,7 @@ def test_a_scheduler_that_is_stopped_ends_the_run():
         dask.worker()
         executor, _ = connected(dask.address, 1, patience=3.0)
         waiting = iter([Task(0, (0.0,)), Task(1, (1.0,))])
-        run = completed(time.sleep, lambda: next(waiting, None), workers=1, executor=executor)
+        run = run_tasks(time.sleep, lambda: next(waiting, None), workers=1, executor=executor)
         next(run)
         dask.scheduler.send_signal(signal.SIGSTOP)
         begin = time.monotonic()

@@ -28,11 +28,12 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.results import store
 from colloc.results.archive import Archive, open_archive
 from colloc.search.run import ROWS
-from colloc.studies import campaign, saved
+from colloc.studies import multistart as campaign
 from colloc.studies import run as study_run
-from colloc.studies import store as _  # noqa: F401  imported before any fork
+from colloc.studies import saved
+from colloc.studies import table as _  # noqa: F401  imported before any fork
 from colloc.studies.journal import read_journal
-from colloc.studies.store import load_study
+from colloc.studies.table import load_study
 from colloc.system import task_pool
 from colloc.system.row_file import read_rows
 
@@ -90,8 +91,8 @@ def child(kind, folder, pipe):
             [str(folder / "p.py"), "--output", str(folder), "--starts", "4", "--quiet"]
         )
     task_pool.process_pool = ThreadPoolExecutor
-    study_run.append_records = told(
-        say, kind, study_run.append_records, lambda folder, records: attempt_facts(records)
+    study_run.append_visits = told(
+        say, kind, study_run.append_visits, lambda folder, records: attempt_facts(records)
     )
     return sweep_study.main([str(folder / "s.py"), "--output", str(folder), "--quiet"])
 

@@ -21,7 +21,7 @@ from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, re
 from colloc.commands import open as show_archive
 from colloc.commands import sweep as sweep_study
 from colloc.results.archive import StartName, archive_at, open_archive
-from colloc.studies.journal import append_records, read_journal
+from colloc.studies.journal import append_visits, read_journal
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.replaced_file import alone_in, locked, replaced_file
 from colloc.system.row_file import CACHE, put_rows, read_rows
@@ -193,7 +193,7 @@ def test_two_users_go_on_from_each_other_in_a_folder_of_their_group(tmp_path, tm
         os.setuid(number)
         os.umask(0o002)
         with locked(folder / "x.study" / "lock"):
-            append_records(folder / "x.study", [record(number)])
+            append_visits(folder / "x.study", [record(number)])
         open_archive(problem(), folder / "a.h5").add(
             {StartName("sobol", 1, number): outcome(number, 0.1)}
         )
@@ -228,7 +228,7 @@ def _write_many(kind, folder, who, count):
                 {StartName("sobol", who, k): outcome(k, 0.1 + 0.001 * k)}
             )
         else:
-            append_records(folder, [record(1000 * who + k)])
+            append_visits(folder, [record(1000 * who + k)])
 
 
 @pytest.mark.parametrize("kind", ROW_KINDS)

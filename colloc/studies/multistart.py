@@ -12,14 +12,18 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.mechanics.native_kernel import native_kernel
+from colloc.results.archive import Archive, StartName
 from colloc.results.outcome import CRASHED, ERROR, PASSED_OVER, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
 from colloc.search.certify import is_trivial
 from colloc.search.optimum import Optimum
 from colloc.search.run import Progress
-from colloc.search.solve import FULL, REDUCED, solve
+from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
-from colloc.system.task_pool import Lost, Task, completed, process_pool
+from colloc.system.task_pool import Lost, Task, process_pool, run_tasks
+
+_NONE = "no optimum yet"
+_CERTIFIED = ("value", "efficiency", "distance", "work", "value_error", "efficiency_error")
 
 
 def run_start(
@@ -30,12 +34,7 @@ def run_start(
     time_limit: float,
     known: AnyGait | None = None,
 ) -> Outcome:
-    """Solve and certify one start. Whatever goes wrong becomes the outcome's status and message;
-    nothing is raised.
-
-    A start that takes longer than the time limit [s] is given up. A `known` gait takes the place of
-    the sample.
-    """
+    """Solve and certify one start of a sampler, or from a known gait in its place."""
     return run_guess(
         problem, lambda: known or start_gait(problem, sampler, seed, start), start, time_limit
     )
@@ -47,46 +46,39 @@ def run_guess(
     start: int,
     time_limit: float,
     *,
-    literal: bool = False,
     worth: Callable[[Optimum], bool] = lambda end: True,
 ) -> Outcome:
-    """Solve and certify a problem from the gait that `start_from` makes, as start number `start`;
-    raises nothing.
+    """Solve and certify a problem from the gait that `start_from` makes, as start number `start`.
 
-    With `literal`, IPOPT searches on the full program (`colloc.search.literal`). Where the search
-    ends at the final delta in what is not `worth` it, that is passed over.
+    Whatever goes wrong becomes the outcome's status and message; nothing is raised. A start that
+    takes longer than the time limit [s] is given up. Where the search ends at the final delta in an
+    optimum that is not `worth` it, that is passed over.
     """
-    begin, cpu, passed = time.perf_counter(), time.process_time(), list[Optimum]()
+    begin, cpu = time.perf_counter(), time.process_time()
+    passed, news = list[Optimum](), list[Progress]()
 
-    def counts(end: Optimum) -> bool:
+    def accept(end: Optimum) -> bool:
         if not worth(end):
             passed.append(end)
         return not passed
 
-    guess, seen = problem.guess, list[Progress]()
-    outcome = Outcome(start, ERROR, "", guess, guess)
+    guess = problem.guess
     try:
         guess = start_from()
-        outcome = Outcome(start, ERROR, "", guess, guess)
-        search = FULL if literal else REDUCED
-        how = {"search": search, "progress": seen.append, "worth": counts}
-        solution = solve(problem.with_(guess=guess), 1, seconds=time_limit, **how)  # type: ignore[arg-type]
-        if solution.interrupted:
-            if time.perf_counter() - begin < time_limit:
-                raise KeyboardInterrupt
-            where = (
-                f"the last optimum was at delta = {solution.answer.delta:.1e}"
-                if seen[-1].best
-                else "no optimum yet"
-            )
-            outcome = replace(
-                outcome, status=TIME_LIMIT, message=f"gave up after {time_limit:g} s; {where}."
-            )
-        else:
+        solution = solve(
+            problem.with_(guess=guess), 1, seconds=time_limit, progress=news.append, worth=accept
+        )
+        if not solution.interrupted:
             outcome = _outcome(start, guess, solution)
             outcome = replace(outcome, status=PASSED_OVER, message="") if passed else outcome
+        elif time.perf_counter() - begin < time_limit:
+            raise KeyboardInterrupt
+        else:
+            where = f"the last optimum was at delta = {solution.answer.delta:.1e}"
+            message = f"gave up after {time_limit:g} s; {where if news[-1].best else _NONE}."
+            outcome = Outcome(start, TIME_LIMIT, message, guess, guess)
     except Exception as error:
-        outcome = replace(outcome, status=ERROR, message=f"{type(error).__name__}: {error}")
+        outcome = Outcome(start, ERROR, f"{type(error).__name__}: {error}", guess, guess)
     return replace(
         outcome, seconds=time.perf_counter() - begin, cpu_seconds=time.process_time() - cpu
     )
@@ -99,16 +91,12 @@ def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
     iterations = sum(step.iterations for step in solution.history)
     outcome = Outcome(start, status, solution.message, guess, solution.gait, iterations=iterations)
     if certificate.replayed:
-        names = ("value", "efficiency", "distance", "work", "value_error", "efficiency_error")
-        return replace(
-            outcome,
-            delta=solution.answer.delta,
-            **{name: getattr(certificate, name) for name in names},
-        )
+        numbers = {name: getattr(certificate, name) for name in _CERTIFIED}
+        return replace(outcome, delta=solution.answer.delta, **numbers)
     if optimal:
         last = optimal[-1]
-        found = {name: getattr(last, name) for name in ("delta", "value", "distance", "work")}
-        return replace(outcome, efficiency=last.distance / last.work, **found)
+        numbers = {name: getattr(last, name) for name in ("delta", "value", "distance", "work")}
+        return replace(outcome, efficiency=last.distance / last.work, **numbers)
     return outcome
 
 
@@ -138,10 +126,8 @@ def run_starts(
     time_limit : float
         Seconds a start may take.
     executor : callable
-        Makes an executor for a number of workers: processes by default; threads, or the one a Dask
-        client gives (``lambda n: client.get_executor()``), will do. When a worker dies (killed, out
-        of memory) a new one is made, the starts under way are tried again one by one, and one that
-        kills its worker again is recorded as crashed.
+        As for `colloc.system.task_pool.run_tasks`. A start that kills its worker twice is recorded
+        as crashed.
     known : mapping of int to a gait, optional
         Gaits from which starts of these numbers begin instead of a sample: results of an earlier
         run to go on from.
@@ -156,19 +142,26 @@ def run_starts(
             "a prescribed motion is the same from every start; colloc solve measures it."
         )
     native_kernel()  # missed once for all workers, or there
-    waiting = iter(starts)
+    numbers, gaits = iter(starts), known or {}
 
     def ready() -> Task | None:
-        start = next(waiting, None)
-        return (
-            None
-            if start is None
-            else Task(start, (problem, sampler, seed, start, time_limit, (known or {}).get(start)))
-        )
+        number = next(numbers, None)
+        if number is None:
+            return None
+        return Task(number, (problem, sampler, seed, number, time_limit, gaits.get(number)))
 
-    for task, outcome in completed(run_start, ready, workers=workers, executor=executor):
+    for task, outcome in run_tasks(run_start, ready, workers=workers, executor=executor):
         if isinstance(outcome, Lost):
-            outcome = Outcome(
-                task.arguments[3], CRASHED, outcome.message, problem.guess, problem.guess
-            )
+            guess = problem.guess
+            outcome = Outcome(task.arguments[3], CRASHED, outcome.message, guess, guess)
+        yield outcome
+
+
+def run_archive(
+    archive: Archive, starts: Iterable[int], *, sampler: str, seed: int, **settings
+) -> Iterator[Outcome]:
+    """Outcomes of `run_starts` for the problem of an archive, each kept there before it is
+    yielded."""
+    for outcome in run_starts(archive.problem, starts, sampler=sampler, seed=seed, **settings):
+        archive.add({StartName(sampler, seed, outcome.start): outcome})
         yield outcome
