@@ -14,10 +14,9 @@ from pathlib import Path
 
 from benchmarks.known import known, row_of, save_known, with_row
 from colloc.commands.ending import FAILED, OK, run
-from colloc.commands.options import Parser, add_printing, tell
+from colloc.commands.options import PRINTING, Parser, flag, status_line, tell, text
 from colloc.results.store import load
 from colloc.system.errors import CollocError, ProblemError
-from colloc.system.progress import StatusLine
 from colloc.system.replaced_file import alone_in
 
 _EPILOG = """\
@@ -30,27 +29,19 @@ friction, class of gaits, objective, limits and delta.
   python -m benchmarks.referee --add results/mine.h5 --by "colloc solve mine.py"    into known.json"""
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="python -m benchmarks.referee",
-        description="Check the best gaits that are known, from the gaits alone; take in better ones.",
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    table = (
-        "another table than benchmarks/known.json; with --add (default: known.json) begun as a "
-        "copy of that"
-    )
-    parser.add_argument("--table", metavar="FILE.json", help=table)
-    parser.add_argument("--only", metavar="NAME", help="rows of the problem of this name")
-    parser.add_argument(
-        "--dry", action="store_true", help="check bounds under dry friction as well"
-    )
-    parser.add_argument("--add", metavar="FILE.h5", help="a result to take in")
-    parser.add_argument(
-        "--by", metavar="COMMAND", help="with --add: the command that anyone can find it with"
-    )
-    add_printing(parser)
+def _parser() -> Parser:
+    what = "Check the best gaits that are known, from the gaits alone; take in better ones."
+    parser = Parser("python -m benchmarks.referee", what, _EPILOG)
+    table = "another table than benchmarks/known.json; with --add (default: known.json) begun as a copy of that"
+    for name, settings in (
+        text("--table", "FILE.json", table),
+        text("--only", "NAME", "rows of the problem of this name"),
+        flag("--dry", "check bounds under dry friction as well"),
+        text("--add", "FILE.h5", "a result to take in"),
+        text("--by", "COMMAND", "with --add: the command that anyone can find it with"),
+        *PRINTING,
+    ):
+        parser.add_argument(name, **settings)
     return parser
 
 
@@ -69,7 +60,7 @@ def _checked(options: argparse.Namespace, rows: Sequence) -> int:
     if not chosen:
         raise ProblemError(f"the table has no row of {options.only}.")
     told, lines = [], []
-    with StatusLine(enabled=not (options.quiet or options.json)) as progress:
+    with status_line(options) as progress:
         for number, row in enumerate(chosen):
             name = row.statement["name"]
             progress.say(f"{name}: replaying, {number + 1} of {len(chosen)}")

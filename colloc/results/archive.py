@@ -4,22 +4,20 @@ file of all for users.
 An archive is about one problem. Its starts are told apart by sampler, seed and number, so searches
 with other seeds join it, also at the same time. The rows (NAME.sqlite beside NAME.h5) are what a
 search goes on from: they hold every gait as it is. The HDF5 file is made of them when a search
-ends; gaits that are no Fourier series are there by their series::
-
-    start, sampler, seed, status, message, iterations, cpu_seconds and the numbers of an outcome (start)
-    guess_mean, gait_mean (start, joint)         guess_cos, guess_sin, gait_cos, gait_sin (start, joint, harmonic)
-    basin_{row,count,frequency,value,efficiency,on_speed_floor} (basin)     distinct optima, best first; row: the best start
-    problem, versions: JSON texts; attributes problem_hash, command (the last one that added to it)
-"""  # noqa: E501
+ends: columns over ``start`` for numbers and texts of an outcome, ``guess_`` and ``gait_`` with
+``mean`` (start, joint), ``cos`` and ``sin`` (start, joint, harmonic) of the Fourier series that
+stand for gaits, and columns ``basin_...`` of the distinct optima, best first (``basin_row``: the
+row of the best start).
+"""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,14 +33,14 @@ from colloc.system.table import Table, save_table
 
 KIND, VERSION = "colloc archive", 4
 ROWS = "colloc starts 2"
-_PROBLEM = "problem"
-_TEXTS = ("sampler", "status", "message")
+_TEXTS = dict.fromkeys(("sampler", "status", "message"), "text")
 _COLUMNS = ("status", "message", *UNITS, "iterations", "cpu_seconds")
+_SERIES = {"mean": ("joint",), "cos": ("joint", "harmonic"), "sin": ("joint", "harmonic")}
 _UNITS = {
-    **dict.fromkeys(_TEXTS, "text"),
+    **_TEXTS,
     **UNITS,
     "cpu_seconds": "s",
-    **{f"{w}_{p}": "rad" for w in ("guess", "gait") for p in ("mean", "cos", "sin")},
+    **{f"{gait}_{part}": "rad" for gait in ("guess", "gait") for part in _SERIES},
     "basin_frequency": "share of starts",
     "basin_efficiency": "1/weight",
     "basin_value": "of the objective",
@@ -97,39 +95,30 @@ def _lock(path: Path) -> Path:
     return path.with_name(f".{path.name}.lock")
 
 
-def _read(path: Path) -> tuple[Problem, dict[StartName, Outcome]] | None:
-    """The problem and the outcomes on the disk; None if nothing is there."""
-    rows = read_rows(row_path(path), ROWS)
-    stated = rows.pop(_PROBLEM, None)
+def _stored(path: Path, problem: Problem | None = None) -> Archive | None:
+    """The archive on the disk, which has to be about a problem; None if nothing is there."""
+    rows_at = row_path(path)
+    rows = read_rows(rows_at, ROWS)
+    stated = rows.pop("problem", None)
     if stated is None:
         if rows:
             raise StoreError(
-                f"{row_path(path)} is damaged: it does not say what problem it is about; move "
-                f"it away."
+                f"{rows_at} is damaged: it does not say what problem it is about; move it away."
             )
         return None
-    outcomes = {}
+    archive = Archive(Problem.from_dict(stated), path)
+    if problem is not None and problem.hash != archive.problem.hash:
+        raise StoreError(
+            f"{rows_at} holds starts of another problem; choose another --output, or move it away."
+        )
     for key, value in rows.items():
         try:
             (sampler, seed, number), entry = value
-            outcomes[StartName(str(sampler), int(seed), int(number))] = outcome_from(entry)
+            name = StartName(str(sampler), int(seed), int(number))
+            archive.outcomes[name] = outcome_from(entry)
         except (KeyError, TypeError, ValueError, OverflowError, CollocError):
-            raise StoreError(
-                f"{row_path(path)} is damaged: {key} is no start; move it away."
-            ) from None
-    return Problem.from_dict(stated), outcomes
-
-
-def _outcomes_of(problem: Problem, path: Path) -> dict[StartName, Outcome] | None:
-    content = _read(path)
-    if content is None:
-        return None
-    if problem.hash != content[0].hash:
-        raise StoreError(
-            f"{row_path(path)} holds starts of another problem; choose another --output, or move "
-            f"it away."
-        )
-    return content[1]
+            raise StoreError(f"{rows_at} is damaged: {key} is no start; move it away.") from None
+    return archive
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
@@ -138,31 +127,31 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
     about another problem, or the folder cannot be written."""
     path = Path(path)
     with locked(_lock(path), wait=True):
-        outcomes = _outcomes_of(problem, path)
-        if outcomes is None:
+        archive = _stored(path, problem)
+        if archive is None:
             if path.exists():
                 raise StoreError(
                     f"{path} is there, but not {row_path(path).name}, which a search goes on from "
                     f"(older ones had none); choose another --output, or move it away."
                 )
-            put_rows(row_path(path), ROWS, {_PROBLEM: problem.to_dict()})
-    return Archive(problem, path, outcomes or {})
+            put_rows(row_path(path), ROWS, {"problem": problem.to_dict()})
+    return archive or Archive(problem, path)
 
 
 def archive_at(path: str | os.PathLike[str]) -> Archive:
     """The archive with this HDF5 file, whatever its problem is, to be read: nothing is written, and
     other runs may go on adding to it. `StoreError` if there is none, or it is damaged."""
-    path, rows = Path(path), row_path(path)
-    content = _read(path) if rows.exists() else None
-    if content is None:
+    path = Path(path)
+    archive = _stored(path.with_suffix(".h5"))
+    if archive is None:
         what = f"there is no archive of starts at {path}"
         if path.is_file():
             what = (
-                f"{path} is no archive of starts, or {rows.name}, which holds its rows, is not "
-                f"beside it"
+                f"{path} is no archive of starts, or {row_path(path).name}, which holds its rows, "
+                f"is not beside it"
             )
         raise StoreError(f"{what}; colloc multistart makes one.")
-    return Archive(content[0], path.with_suffix(".h5"), content[1])
+    return archive
 
 
 def save_archive(archive: Archive, command: str = "") -> Path:
@@ -171,51 +160,46 @@ def save_archive(archive: Archive, command: str = "") -> Path:
     left."""
     assert archive.path is not None
     with locked(_lock(archive.path), wait=True):
-        archive.outcomes |= _outcomes_of(archive.problem, archive.path) or {}
+        if stored := _stored(archive.path, archive.problem):
+            archive.outcomes |= stored.outcomes
         return save_table(_table(archive, command), archive.path, KIND, VERSION)
 
 
 def _table(archive: Archive, command: str) -> Table:
     problem, names = archive.problem, sorted(archive.outcomes)
     outcomes = [archive.outcomes[name] for name in names]
-    columns = {name: [getattr(o, name) for o in outcomes] for name in _COLUMNS}
-    columns |= {"seed": [n.seed for n in names], "sampler": [n.sampler for n in names]}
-    found = basins(problem, outcomes)
-    columns |= {
-        "basin_row": [next(k for k, o in enumerate(outcomes) if o is b.best) for b in found],
-        "basin_count": [len(b.starts) for b in found],
-        "basin_frequency": [b.frequency for b in found],
-        "basin_efficiency": [b.best.efficiency for b in found],
-        "basin_value": [b.best.value for b in found],
-        "basin_on_speed_floor": [int(on_speed_floor(problem, b.best.gait)) for b in found],
+    optima = basins(problem, outcomes)
+    starts = {name: [getattr(o, name) for o in outcomes] for name in _COLUMNS}
+    starts |= {"seed": [n.seed for n in names], "sampler": [n.sampler for n in names]}
+    rows = {id(o): row for row, o in enumerate(outcomes)}
+    of_basins = {
+        "row": [rows[id(b.best)] for b in optima],
+        "count": [len(b.starts) for b in optima],
+        "frequency": [b.frequency for b in optima],
+        "efficiency": [b.best.efficiency for b in optima],
+        "value": [b.best.value for b in optima],
+        "on_speed_floor": [int(on_speed_floor(problem, b.best.gait)) for b in optima],
     }
-    dimensions: dict[str, tuple[str, ...]] = {
-        name: ("basin",) if name.startswith("basin") else ("start",) for name in columns
-    }
-    variables = {
-        name: np.array(values, dtype=object if name in _TEXTS else None)
-        for name, values in columns.items()
+    texts = {"problem": json.dumps(problem.to_dict()), "versions": json.dumps(versions())}
+    columns = {
+        **{name: (text, ()) for name, text in texts.items()},
+        **{name: (column, ("start",)) for name, column in starts.items()},
+        **{f"basin_{name}": (column, ("basin",)) for name, column in of_basins.items()},
     }
     for which in ("guess", "gait") if outcomes else ():
-        for part, values in _series(problem, [getattr(o, which) for o in outcomes]).items():
-            variables[f"{which}_{part}"] = values
-            dimensions[f"{which}_{part}"] = ("start", "joint", "harmonic")[: values.ndim]
-    texts = {"problem": json.dumps(problem.to_dict()), "versions": json.dumps(versions())}
+        series = [fourier_series(problem, getattr(o, which)) for o in outcomes]
+        longest = max(each.n_harmonic for each in series)
+        for part, dimensions in _SERIES.items():
+            values = [getattr(each.resized(longest), part) for each in series]
+            columns[f"{which}_{part}"] = values, ("start", *dimensions)
     return Table(
         problem.name,
-        {"start": np.array([name.number for name in names], dtype=None)},
-        {name: np.array(text, dtype=object) for name, text in texts.items()} | variables,
-        dict.fromkeys(texts, ()) | dimensions,
+        {"start": np.array([name.number for name in names])},
+        {
+            name: np.array(column, dtype=object if name in _TEXTS or not dims else None)
+            for name, (column, dims) in columns.items()
+        },
+        {name: dims for name, (_, dims) in columns.items()},
         _UNITS,
         attributes={"problem_hash": problem.hash, "command": command},
     )
-
-
-def _series(problem: Problem, gaits: Sequence[Any]) -> dict[str, np.ndarray]:
-    """Means and coefficients of Fourier series that stand for gaits, as long as the longest."""
-    series = [fourier_series(problem, gait) for gait in gaits]
-    longest = max(each.n_harmonic for each in series)
-    series = [each.resized(longest) for each in series]
-    return {
-        part: np.array([getattr(each, part) for each in series]) for part in ("mean", "cos", "sin")
-    }

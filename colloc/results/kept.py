@@ -40,11 +40,7 @@ def save_result(solution: Solution, path: Path) -> list[Saved]:
     A result that is there already is replaced only by an answer to the same question that is as
     good, and only if nobody added anything to it. Else it is kept, with its figures, under the
     first free name of NAME.former-1.h5, NAME.former-2.h5, ... Ctrl-C waits until all is saved.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written; what was there is left as it was.
+    `StoreError` if the folder cannot be written; what was there is left as it was.
     """
     place = path
     if not solution.success:

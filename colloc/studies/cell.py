@@ -109,8 +109,7 @@ def value_of(problem: Problem, gait: AnyGait, instants: tuple[int, int] = _COARS
 
 
 def visit(work: Work, earlier: dict[Index, AnyGait]) -> Visit:
-    """Solve a cell from its starts; `earlier` holds the best gaits of cells solved before in the
-    same task.
+    """Solve a cell from its starts, among them gaits of cells solved `earlier` in the same task.
 
     A gait from elsewhere is a start while it does better, as it is, than all results so far; the
     best ones come first. What leads to the gait that is certified by then, or to no better one, is

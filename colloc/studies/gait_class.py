@@ -90,11 +90,7 @@ def wave_direction(gait: Fourier) -> float:
 
 def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
     """Mean velocity of the centre of mass along the body's mean direction, over its mean velocity;
-    1 is head first.
-
-    From the velocities in the frame of the body's mean direction; friction at a delta of 1e-3 is
-    enough for a sign.
-    """
+    1 is head first. Friction at a delta of 1e-3 is enough for a sign."""
     mesh = uniform_mesh(scheme("gauss-1"), _INSTANTS, 1.0)
     angles, rates = gait(mesh.times)
     z = body.solve(friction, angles, rates, _DELTA, tolerance=1e-8).z

@@ -34,7 +34,6 @@ class Attempt:
 
     @cached_property
     def gait_key(self) -> str:
-        """The key of the gait where it ended."""
         return start_key(self.outcome.gait)
 
 
@@ -75,13 +74,8 @@ def _visit_from(row: dict[str, Any]) -> Visit:
 
 
 def read_journal(folder: Path) -> list[Visit]:
-    """All visits of a folder, in order; none if there is no such folder.
-
-    Raises
-    ------
-    StoreError
-        If the journal cannot be read or is damaged.
-    """
+    """All visits of a folder, in order; none if there is no such folder. `StoreError` if the
+    journal cannot be read or is damaged."""
     try:
         return [_visit_from(row) for row in read_rows(folder / NAME, KIND).values()]
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError, ProblemError):
@@ -91,12 +85,6 @@ def read_journal(folder: Path) -> list[Visit]:
 
 
 def append_visits(folder: Path, visits: Iterable[Visit]) -> None:
-    """Put visits on the disk; when this returns they are there.
-
-    Raises
-    ------
-    StoreError
-        If that is not possible.
-    """
+    """Put visits on the disk; `StoreError` if that is not possible."""
     rows = map(_visit_fields, visits)
     put_rows(folder / NAME, KIND, {statement_hash(row): row for row in rows})

@@ -116,26 +116,19 @@ def run_starts(
     Parameters
     ----------
     problem : Problem
+        With something free: a prescribed motion is the same from every start.
     starts : iterable of int
         Start numbers, each taken when a worker is free for it. A start depends only on the problem,
         the sampler, the seed and its number.
     sampler : {"latin-hypercube", "perturbed"}
     seed : int
-    workers : int
-        Starts under way at a time.
-    time_limit : float
-        Seconds a start may take.
-    executor : callable
+    workers, executor
         As for `colloc.system.task_pool.run_tasks`. A start that kills its worker twice is recorded
         as crashed.
+    time_limit : float
+        Seconds a start may take.
     known : mapping of int to a gait, optional
-        Gaits from which starts of these numbers begin instead of a sample: results of an earlier
-        run to go on from.
-
-    Raises
-    ------
-    ProblemError
-        If nothing is free: a prescribed motion is the same from every start.
+        Gaits from which starts of these numbers begin instead of a sample.
     """
     if not problem.gait.free:
         raise ProblemError(

@@ -72,22 +72,11 @@ class Progress:
 
 
 class StudyRun:
-    """A study under way: the state of every cell, kept in a folder.
+    """A study under way: the state of every cell, kept in the journal of a folder; what that holds
+    already is not solved again, unless `retry` forgets it: errors, crashes and time limits.
 
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Of the journal. What it holds already is not solved again.
-    retry : bool
-        Forget attempts that ended in an error, a crash or the time limit.
-
-    Raises
-    ------
-    ProblemError
-        If the study's function gives no problem for any cell.
-    StoreError
-        If the journal cannot be read.
+    `ProblemError` if the study's function gives no problem for any cell, `StoreError` if the
+    journal cannot be read.
     """
 
     def __init__(self, study: Study, folder: Path, *, retry: bool = False) -> None:
@@ -128,11 +117,7 @@ class StudyRun:
 
     def neighbour_value(self, cell: Index) -> float:
         """The most that the best gait of a neighbour, moved into the cell's class and otherwise as
-        it is, achieves there.
-
-        NaN if there is none. Where it is more than the cell's own value, the search there has
-        missed something.
-        """
+        it is, achieves there; NaN if there is none."""
         known = self.cells[cell].scores
         scores = (known.get(best.gait_key, math.nan) for best in self.neighbours(cell))
         return max((score for score in scores if not math.isnan(score)), default=math.nan)
@@ -150,12 +135,8 @@ class StudyRun:
         executor: Callable[[int], Executor] = process_pool,
         ahead: int | None = None,
     ) -> Iterator[Progress]:
-        """Work on all that is missing; each cell is on the disk before it is yielded. Cells in
-        which nothing was tried are not.
-
-        Arguments are those of `colloc.system.task_pool.run_tasks`; `ahead` is a quarter of the
-        workers, and one, by default.
-        """
+        """Work on all that is missing (see `colloc.system.task_pool.run_tasks`); each cell is on
+        the disk before it is yielded. Cells in which nothing was tried are not."""
         native_kernel()  # missed once for all workers, or there
         ahead = 1 + workers // 4 if ahead is None else ahead
         number, chunks = 0, self._first_chunks()

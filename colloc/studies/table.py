@@ -127,24 +127,12 @@ def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
 def save_study(
     table: StudyTable, path: str | os.PathLike[str], *, source: str = "", command: str = ""
 ) -> Path:
-    """Write the results; an existing file is replaced only once the new one is complete.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be made or written.
-    """
+    """Write the results; an existing file is replaced only once the new one is complete."""
     facts = {"source": source, "command": command, "versions": json.dumps(versions())}
     stated = replace(table, attributes=facts | {"Conventions": "CF-1.8"})
     return save_table(stated, path, KIND, VERSION)
 
 
 def load_study(path: str | os.PathLike[str]) -> Table:
-    """The results in a file that `save_study` wrote.
-
-    Raises
-    ------
-    StoreError
-        If it is missing, damaged, or not the results of a study.
-    """
+    """The results in a file that `save_study` wrote."""
     return load_table(path, KIND, VERSION)

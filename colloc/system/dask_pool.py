@@ -25,25 +25,12 @@ _HOW = "dask worker ADDRESS --nthreads 1"
 def connected(
     address: str, workers: int, say: Callable[[str], None] = print, patience: float = PATIENCE
 ) -> tuple[Callable[[int], Executor], int]:
-    """What makes executors for `colloc.system.task_pool.run_tasks` of a cluster, and how many
-    workers it has.
+    """A maker of executors for `colloc.system.task_pool.run_tasks`, and the number of workers, of
+    the cluster at an address (``tcp://host:8786``; "local": so many processes on this machine).
 
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, ``tcp://host:8786``; or "local" for a cluster of processes on this
-        machine.
-    workers : int
-        Of a local cluster.
-    say : callable
-        Told that workers are waited for.
-    patience : float
-        Seconds to wait for a first worker, here and whenever there is none later.
-
-    Raises
-    ------
-    ProblemError
-        If Dask is not installed, there is no scheduler, or it has no workers in time.
+    Seconds of `patience` are waited for a first worker, which `say` is told, and whenever there is
+    none later. `ProblemError` if Dask is not installed, there is no scheduler, or no worker in
+    time.
     """
     try:
         from distributed import Client

@@ -30,21 +30,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns over named dimensions.
-
-    Attributes
-    ----------
-    name : str
-    coordinates : mapping of str to array
-        Values along a dimension, by its name.
-    variables : mapping of str to array
-    dimensions : mapping of str to tuple of str
-        Of each variable; a variable without any is a single value.
-    units, labels : mapping of str to str
-        Of coordinates and variables, as far as they have some.
-    attributes : mapping of str to number or str
-        Facts about the whole table.
-    """
+    """Columns over named dimensions: coordinates along dimensions, variables with the dimensions of
+    each, units and labels of both as far as they have some, attributes of the whole."""
 
     name: str
     coordinates: Mapping[str, np.ndarray]
@@ -64,13 +51,8 @@ class Table:
 
 
 def save_table(table: Table, path: str | os.PathLike[str], kind: str, version: int) -> Path:
-    """Write a table as HDF5, replacing a file only once the new one is complete.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be made or written.
-    """
+    """Write a table as HDF5, replacing a file only once the new one is complete. `StoreError` if
+    the folder cannot be made or written."""
     path = Path(path)
     dimensions = {name: (name,) for name in table.coordinates} | dict(table.dimensions)
     with new_file(path) as file:
@@ -93,13 +75,8 @@ def save_table(table: Table, path: str | os.PathLike[str], kind: str, version: i
 
 
 def load_table(path: str | os.PathLike[str], kind: str, version: int) -> Table:
-    """The table in a file that `save_table` wrote.
-
-    Raises
-    ------
-    StoreError
-        If the file is missing, damaged, or of another kind.
-    """
+    """The table in a file that `save_table` wrote. `StoreError` if the file is missing, damaged, or
+    of another kind."""
     with open_file(path, kind, version) as file:
         columns = {name: array(file, name) for name in file}
         dimensions = {

@@ -175,8 +175,8 @@ def run_tasks(
     Parameters
     ----------
     function : callable
-        Called as ``function(*task.arguments)`` on a worker. It must not raise: an exception counts
-        as a lost worker.
+        Called as ``function(*task.arguments)`` on a worker. An exception counts as a lost worker. A
+        task that was lost is tried again, alone; if it is lost again its result is `Lost`.
     ready : callable
         The next task, or None if there is none now. Asked again after each result has been taken;
         the run ends when there is none and nothing is under way.
@@ -187,12 +187,6 @@ def run_tasks(
         Makes an executor for a number of workers: processes by default; threads, or the one a Dask
         client gives (``lambda n: client.get_executor()``), will do. If it has a method `check`,
         that is called while nothing ends, and may raise `EngineGone`.
-
-    Yields
-    ------
-    Task, result
-        The result is `Lost` for a task whose worker died, which was tried again alone, and whose
-        worker died again.
 
     Raises
     ------

@@ -1,18 +1,14 @@
 """What holds for every command alike: options, and refusals in one sentence or one JSON object."""
 
-import importlib
 import json
 
 import pytest
 
-from colloc.commands.main import SUBCOMMANDS
+from colloc.commands.main import SUBCOMMANDS, command
 from colloc.commands.main import main as colloc
 from colloc.results.store import save
 
-PARSERS = {
-    name: importlib.import_module(f"colloc.commands.{module}")._parser()
-    for name, (module, _) in SUBCOMMANDS.items()
-}
+PARSERS = {name: command(name).parser() for name in SUBCOMMANDS}
 PROBLEM = "from colloc import *\nPROBLEM = Problem('quick', gait=Harmonic(1, 'bilateral'))\n"
 STUDY = """from colloc import *
 STUDY = Study("quick", (Axis("mu_t", (1, 2)),), lambda mu_t: Problem("q", friction=Friction(mu_t=mu_t)))

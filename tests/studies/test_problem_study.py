@@ -14,7 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from colloc.commands import sweep as sweep_study
+from colloc.commands.families import sweep as sweep_study
+from colloc.commands.families import sweep_summary
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
@@ -273,7 +274,7 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
     table = study_table(run).variables
     assert np.argwhere(table["below_neighbour"]).tolist() == [[1, 1]]
     assert table["neighbour_value"][1, 1] == pytest.approx(0.31)
-    lines = sweep_study._summary_lines(run, tmp_path)
+    lines = sweep_summary(run, tmp_path)[1]
     assert "1 of them below what a neighbour's gait achieves there" in lines[1]
     assert "x 2, y 2: 0.220000, where a neighbour's gait achieves 0.310000" in lines[2]
     # what was seen is in the journal
@@ -647,7 +648,7 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     path = tmp_path / "tiny.py"
     path.write_text(FILE, encoding="utf-8")
     out = tmp_path / "out put"
-    assert sweep_study.main([str(path), "--output", str(out)]) == 0
+    assert sweep_study([str(path), "--output", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "2 cells, 0 done already or without a problem, 2 to go" in printed
     assert "2 of 2, 0 s left" in printed
@@ -655,7 +656,7 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     # the isotropic optimum of problems/three_link.py at a delta a hundred times larger
     assert table["efficiency"][0, 0] == pytest.approx(0.2600, abs=2e-3)
     assert table["gait_class"][0, 0].endswith("both")
-    assert sweep_study.main([str(path), "--output", str(out), "--json"]) == 0
+    assert sweep_study([str(path), "--output", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
     np.testing.assert_array_equal(
         load_study(out / "tiny.nc").variables["efficiency"], table["efficiency"]
@@ -672,9 +673,9 @@ def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
         (["--output", str(tmp_path / "file" / "x")], "cannot make the folder"),
         (["--output", str(tmp_path / "z.nc")], "z.nc should be a folder"),
     ):
-        assert sweep_study.main([str(path), *options]) == 2
+        assert sweep_study([str(path), *options]) == 2
         assert text in capsys.readouterr().err
-    assert sweep_study.main([str(tmp_path / "none.py")]) == 2
+    assert sweep_study([str(tmp_path / "none.py")]) == 2
     assert "there is no study file" in capsys.readouterr().err
 
 
@@ -728,7 +729,7 @@ def test_without_a_dask_scheduler_or_a_journal_folder_the_error_is_clear(fake, t
     pytest.importorskip("distributed")
     path = tmp_path / "tiny.py"
     path.write_text(FILE, encoding="utf-8")
-    assert sweep_study.main([str(path), "--dask", "nonsense://x", "--output", str(tmp_path)]) == 2
+    assert sweep_study([str(path), "--dask", "nonsense://x", "--output", str(tmp_path)]) == 2
     assert "no Dask scheduler at nonsense://x" in capsys.readouterr().err
     with pytest.raises(StoreError, match="cannot write"):
         finished(StudyRun(grid(), path / "below a file"))

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from colloc.commands.families import sweep as main
 from colloc.commands.main import main as colloc_main
-from colloc.commands.sweep import main
 from colloc.studies.table import load_study
 
 STUDY = """
