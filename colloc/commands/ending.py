@@ -58,20 +58,20 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
             _end_workers()
         return code
     except CollocError as error:
-        return _ended(BAD_PROBLEM, "error", str(error), as_json)
+        return _end(BAD_PROBLEM, "error", str(error), as_json)
     except BrokenPipeError:
         _leave_output()
         sentence = "nobody reads the output any more; what was saved before is kept."
-        return _ended(UNREAD, "unread", sentence, as_json=False)
+        return _end(UNREAD, "unread", sentence, as_json=False)
     except OSError as error:
         if error.filename is None:
             _leave_output()
         what = f"{error.filename or 'the output'}: {error.strerror or error}"
-        return _ended(BAD_PROBLEM, "error", f"cannot read or write {what}.", as_json)
+        return _end(BAD_PROBLEM, "error", f"cannot read or write {what}.", as_json)
     except KeyboardInterrupt as stop:
         _end_workers()
         sentence = f"interrupted; {str(stop) or 'nothing was written.'}"
-        return _ended(INTERRUPTED, "interrupted", sentence, as_json)
+        return _end(INTERRUPTED, "interrupted", sentence, as_json)
 
 
 def show(text: str) -> None:
@@ -105,7 +105,7 @@ def _open_closed_streams() -> None:
 
 
 @contextlib.contextmanager
-def said_if_interrupted(saved: Sequence[str]) -> Iterator[None]:
+def naming_saved_files(saved: Sequence[str]) -> Iterator[None]:
     """A block in which Ctrl-C ends the command by saying which files are saved already."""
     try:
         yield
@@ -121,7 +121,7 @@ def _end_workers() -> None:
             child.terminate()
 
 
-def _ended(code: int, status: str, message: str, as_json: bool) -> int:
+def _end(code: int, status: str, message: str, as_json: bool) -> int:
     if as_json:
         with contextlib.suppress(OSError):
             show(json.dumps({"status": status, "message": message, "exit_code": code}))

@@ -16,7 +16,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, said_if_interrupted
+from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, naming_saved_files
 from colloc.commands.options import (
     BOUND,
     NO_FIGURE,
@@ -25,6 +25,7 @@ from colloc.commands.options import (
     WORKERS,
     check_least,
     check_positive,
+    choice,
     command,
     complain,
     count,
@@ -53,11 +54,14 @@ from colloc.system.replaced_file import locked, replaced_file
 if TYPE_CHECKING:
     from colloc.results.archive import Archive
     from colloc.results.kept import Saved
+    from colloc.studies.pareto import ParetoFront
     from colloc.studies.run import CellState, StudyRun
+    from colloc.studies.steering import Steering
 
 _MOST_SHOWN = 12
 _SAVE_EVERY = 60.0
 _POINTS = 9
+_AIMS, _PAIR = (SPEED.name, EFFICIENCY.name), ("FIRST", "SECOND")
 _TURNS = (-30.0, -15.0, 0.0, 15.0, 30.0)
 OUTCOME_HEADER = " start       value   iter  seconds  status"
 
@@ -116,13 +120,7 @@ problem holds already is not solved again: the same command goes on after Ctrl-C
     count("--starts", "N", "starts 0 to N-1 (default: 20)", 20),
     count("--seed", "N", "of the sampler (default: 0)", 0),
     WORKERS,
-    text(
-        "--sampler",
-        None,
-        "perturbed: near the problem's guess",
-        choices=SAMPLERS,
-        default=LATIN_HYPERCUBE,
-    ),
+    choice("--sampler", SAMPLERS, "perturbed: near the problem's guess", LATIN_HYPERCUBE),
     number("--time-limit", "S", "seconds for one start (default: 300)", 300.0),
     RETRY,
     BOUND,
@@ -246,9 +244,9 @@ def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], Pa
     executor: Callable[[int], Executor] = process_pool
     workers = options.workers
     if options.dask is not None:
-        from colloc.system.dask_pool import connected
+        from colloc.system.dask_pool import connect
 
-        executor, workers = connected(options.dask, workers, complain)
+        executor, workers = connect(options.dask, workers, complain)
     begin = time.perf_counter()
     due, number = begin + _SAVE_EVERY, 0
     try:
@@ -347,13 +345,25 @@ def _save_members(
     return paths, saved
 
 
-def _draw(options: argparse.Namespace, family: Any, table: Path, saved: str) -> list[Path]:
-    if options.no_figure:
-        return []
-    from colloc.pictures.style import save as save_figure
+def _tell_family(
+    options: argparse.Namespace,
+    family: ParetoFront | Steering,
+    table: Path,
+    points: str,
+    saved: Sequence[Saved],
+    facts: dict[str, Any],
+    lines: list[str],
+) -> int:
+    """Draw a family, print its table, and return the exit code; `points` names their files."""
+    files = [table]
+    if not options.no_figure:
+        from colloc.pictures.style import save as save_figure
 
-    with said_if_interrupted([saved]):
-        return save_figure(family.plot(), table.with_suffix(""), ("png",))
+        with naming_saved_files([f"{table}{points}"]):
+            files += save_figure(family.plot(), table.with_suffix(""), ("png",))
+    lines = [*lines, f"  saved {', '.join(map(str, files))}{points}", *kept_lines(saved)]
+    tell(options, facts | {"kept": kept_facts(saved)}, lines)
+    return OK if family.certified else FAILED
 
 
 @command(
@@ -367,13 +377,7 @@ not certified.
   colloc pareto problems/three_link.py
   colloc pareto mine.py --objectives distance "distance / work" --points 15""",
     *PROBLEM,
-    text(
-        "--objectives",
-        ("FIRST", "SECOND"),
-        f"default: {SPEED.name} {EFFICIENCY.name}",
-        nargs=2,
-        default=[SPEED.name, EFFICIENCY.name],
-    ),
+    text("--objectives", _PAIR, f"default: {' '.join(_AIMS)}", nargs=2, default=_AIMS),
     count("--points", "N", f"of the front, if none hardly differ (default: {_POINTS})", _POINTS),
     count("--starts", "N", "starts to find both ends of (default: 32)"),
     output("folder, or .csv file (default: results/NAME.front.csv)"),
@@ -389,9 +393,9 @@ def pareto(options: argparse.Namespace) -> int:
     folder = table.with_suffix("")
     from colloc.search.explore import STARTS
     from colloc.studies.pareto import pareto_front
-    from colloc.studies.saved import members_kept
+    from colloc.studies.saved import checkpoints_in
 
-    with members_kept(folder):
+    with checkpoints_in(folder):
         with status_line(options) as line:
             line.say(f"{problem.name}: the ends of the front")
 
@@ -418,24 +422,19 @@ def pareto(options: argparse.Namespace) -> int:
             open(temporary, "w", newline="", encoding="utf-8") as file,
         ):
             csv.writer(file).writerows([names, *rows])
-        files = [table, *_draw(options, front, table, f"{table}, {paths[0]} ...")]
         empty = {gap.after: f"\n       nothing was found between: {gap.why}" for gap in front.gaps}
         lines = [
-            f"{problem.name}: {first.name} against {second.name}, {len(rows)} points",
-            *(
-                f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}"
-                for k, a, b, _, _, status, _ in rows
-            ),
-            f"  saved {', '.join(map(str, files))}, {paths[0]} ...",
+            f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}"
+            for k, a, b, _, _, status, _ in rows
         ]
         facts = {
             "objectives": [aim.fields() for aim in aims],
             "points": [dict(zip(names, row, strict=True)) for row in rows],
             "gaps": [asdict(gap) for gap in front.gaps],
-            "kept": kept_facts(saved),
         }
-        tell(options, facts, lines + kept_lines(saved))
-        return OK if front.certified else FAILED
+        head = f"{problem.name}: {first.name} against {second.name}, {len(rows)} points"
+        points = f", {paths[0]} ..."
+        return _tell_family(options, front, table, points, saved, facts, [head, *lines])
 
 
 @command(
@@ -467,10 +466,10 @@ def steer(options: argparse.Namespace) -> int:
     table = output_path(options.output, Path("results") / f"{problem.name}.steer.json")
     folder = table.with_suffix("")
     from colloc.search.explore import STARTS
-    from colloc.studies.saved import members_kept
+    from colloc.studies.saved import checkpoints_in
     from colloc.studies.steering import steer as steer_problem
 
-    with members_kept(folder):
+    with checkpoints_in(folder):
         with status_line(options) as line:
             line.say(f"{problem.name}: the straight gait")
 
@@ -495,9 +494,6 @@ def steer(options: argparse.Namespace) -> int:
         facts = family.table() | {"efficiency": family.efficiency.tolist()}
         with replaced_file(table) as temporary:
             Path(temporary).write_text(json.dumps(facts) + "\n", encoding="utf-8")
-        files = [table, *_draw(options, family, table, str(table))]
-        saved_line = f"  saved {', '.join(map(str, files))}"
-        lines = [f"{problem.name}: {len(rows)} gaits that steer", *rows, saved_line]
-        facts |= {"file": str(table), "kept": kept_facts(saved)}
-        tell(options, facts, lines + kept_lines(saved))
-        return OK if family.certified else FAILED
+        head = f"{problem.name}: {len(rows)} gaits that steer"
+        facts |= {"file": str(table)}
+        return _tell_family(options, family, table, "", saved, facts, [head, *rows])

@@ -23,7 +23,7 @@ From a problem to a page to send:
 
 
 def help_text() -> str:
-    """What ``colloc --help`` prints."""
+    """The text of ``colloc --help``."""
     width = max(map(len, SUBCOMMANDS))
     head = (
         "usage: colloc COMMAND ...\n\nThe most efficient ways to crawl, found and certified.\n\n"
@@ -62,10 +62,10 @@ def _run(words: list[str]) -> int:
     if words[0] not in SUBCOMMANDS:
         import difflib
 
-        near = difflib.get_close_matches(words[0], SUBCOMMANDS, n=1)
+        hints = difflib.get_close_matches(words[0], SUBCOMMANDS, n=1)
         if words[0].endswith(".py"):
-            near = [f"solve {words[0]}"]
+            hints = [f"solve {words[0]}"]
         hint = f"choose one of {', '.join(SUBCOMMANDS)}."
-        hint = f"do you mean colloc {near[0]}?" if near else hint
+        hint = f"do you mean colloc {hints[0]}?" if hints else hint
         raise ProblemError(f"there is no command {words[0]!r}; {hint}")
     return command(words[0])(words[1:])

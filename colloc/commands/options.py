@@ -26,38 +26,19 @@ if TYPE_CHECKING:
 SUBCOMMANDS = {
     "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
     "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
-    "multistart": (
-        "families",
-        "solve a problem from many random starts; distinct optima with their frequencies",
-    ),
+    "multistart": ("families", "solve from many random starts; distinct optima, how often found"),
     "open": ("solve", "what an archive of starts holds; the whole result of one of them"),
-    "sweep": (
-        "families",
-        "solve a study: a grid of problems, over processes or a cluster; resumable",
-    ),
+    "sweep": ("families", "solve a study, a grid of problems, over processes or a cluster"),
     "pareto": ("families", "what two objectives cost each other: a front of certified gaits"),
-    "steer": (
-        "families",
-        "certified gaits from sharp right to sharp left, in one file that a controller can "
-        "interpolate",
-    ),
-    "evaluate": (
-        "solve",
-        "what a gait of your own achieves: joint angles from a CSV file, replayed and certified",
-    ),
+    "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
+    "evaluate": ("solve", "what a gait of your own achieves: joint angles from a CSV file"),
     "verify": ("verify", "check a result again by independent replay, without CasADi"),
     "compare": ("verify", "hold two results against each other"),
     "report": ("results", "one self-contained web page about a result, to read or to send"),
     "animate": ("results", "the motion as GIF or MP4"),
     "export": ("results", "joint angles over time for a robot, as CSV or JSON; or the robot"),
-    "robot": (
-        "results",
-        "speed, power and torques of a result on a robot of so many metres and kilograms",
-    ),
-    "sensitivity": (
-        "results",
-        "what a wrong floor costs: how the best value changes with friction, lengths, feet, limits",
-    ),
+    "robot": ("results", "speed, power and torques on a robot of so many metres and kilograms"),
+    "sensitivity": ("results", "how the best value changes with friction, lengths, feet, limits"),
 }
 """Name to module of this package and what the command does."""
 _LONGEST_NAME = 220
@@ -142,6 +123,10 @@ def number(name: str, metavar: Any, help: str, default: Any = None, **settings: 
 
 def count(name: str, metavar: Any, help: str, default: Any = None, **settings: Any) -> Option:
     return text(name, metavar, help, type=int, default=default, **settings)
+
+
+def choice(name: str, choices: Sequence[str], help: str, default: Any = None) -> Option:
+    return text(name, None, help, choices=choices, default=default)
 
 
 def flag(name: str, help: str) -> Option:
@@ -258,7 +243,7 @@ def output_kind(options: argparse.Namespace, kinds: Sequence[str]) -> str:
 
 
 def _is_folder(output: str | None) -> bool:
-    """Whether the user named a folder: by a separator at its end, by having no ending, or because
+    """True if the user named a folder: by a separator at its end, by having no ending, or because
     it is one."""
     if output is None or output.endswith(("/", os.sep)):
         return True

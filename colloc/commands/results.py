@@ -17,6 +17,7 @@ from colloc.commands.options import (
     PERIOD,
     RESULT,
     ROBOT,
+    choice,
     command,
     count,
     flag,
@@ -105,7 +106,7 @@ first two joint angles.
   colloc animate results/three_link.h5 --format mp4 --fps 50      needs ffmpeg
   colloc animate results/three_link.h5 --periods 4 --seconds 2 --no-arrows""",
     RESULT,
-    text("--format", None, "default: by the suffix of --output, else gif", choices=("gif", "mp4")),
+    choice("--format", ("gif", "mp4"), "default: by the suffix of --output, else gif"),
     count("--periods", "N", "periods in a row (default: 2)", 2),
     number("--seconds", "S", "a period takes (default: 4)", 4.0),
     number("--fps", "N", "pictures a second (default: 20)", 20.0),
@@ -155,17 +156,14 @@ from tail to head; angles are positive counter-clockwise.""",
     MAX_SPEED,
     *ROBOT,
     count("--periods", "N", "repeat the period N times (default: 1)", 1),
-    (
-        "--ramp",
-        {
-            "action": argparse.BooleanOptionalAction,
-            "default": True,
-            "help": "begin straight, at rest, before time 0 (default)",
-        },
-    ),
     text(
-        "--format", None, "default: --output's, else csv", choices=("csv", "json", "mjcf", "urdf")
+        "--ramp",
+        None,
+        "begin straight, at rest, before time 0 (default)",
+        action=argparse.BooleanOptionalAction,
+        default=True,
     ),
+    choice("--format", ("csv", "json", "mjcf", "urdf"), "default: --output's, else csv"),
     output("folder or file (default: beside the result)"),
 )
 def export(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from colloc.commands.ending import BAD_PROBLEM, NONE_FOUND, OK, said_if_interrupted
+from colloc.commands.ending import BAD_PROBLEM, NONE_FOUND, OK, naming_saved_files
 from colloc.commands.options import (
     BOUND,
     NO_FIGURE,
@@ -16,6 +16,7 @@ from colloc.commands.options import (
     VERBOSE,
     check_least,
     check_positive,
+    choice,
     command,
     complain,
     count,
@@ -65,13 +66,12 @@ from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
     output("folder, or .h5 file (default: results/NAME.h5)"),
     count("--starts", "N", "to find the best gait of, at least (default: 32); 1: the guess alone"),
     number("--seconds", "S", "wall time allowed; then the best gait so far counts", math.inf),
-    text(
+    choice(
         "--search",
-        None,
+        SEARCHES,
         "reduced: SQP on the gait's parameters, answered by IPOPT on the full program (default); "
         "full: IPOPT on the full program at every level of delta, from the guess alone",
-        choices=SEARCHES,
-        default=SEARCHES[0],
+        SEARCHES[0],
     ),
     BOUND,
     flag("--dry", "certify it also under dry friction, with no delta (a second)"),
@@ -86,7 +86,7 @@ def solve(options: argparse.Namespace) -> int:
     path = output_path(options.output, Path("results") / f"{problem.name}.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.studies.saved import resumed, save_end
+    from colloc.studies.saved import resume, save_and_clear
 
     if not quiet(options) and problem.intervals > _MANY_INTERVALS:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
@@ -95,7 +95,7 @@ def solve(options: argparse.Namespace) -> int:
             f"refines a small mesh where it has to be fine."
         )
     with status_line(options) as line:
-        solution = resumed(
+        solution = resume(
             replace(stated, problem=problem),
             path,
             # a gait that is given on the command line is to be improved, not left for another
@@ -103,19 +103,19 @@ def solve(options: argparse.Namespace) -> int:
             progress=lambda news: line.say(f"{problem.name}: {news}"),
             **values(options, "seconds", "search", "fresh"),
         )
-    bound, complaints, saved, kept = None, [], [], []
+    bound, complaints, saved, records = None, [], [], []
     if options.dry and solution.certificate.replayed:
         try:
             solution.certify_dry()
         except CollocError as error:  # what is solved is not lost for it
             complaints.append(f"no bounds under dry friction: {error}")
     try:
-        kept = save_end(solution, path)
-        path = kept[0].path
-        saved = [str(path), *(f"{one.path} (the gait that shrank)" for one in kept[1:])]
+        records = save_and_clear(solution, path)
+        path = records[0].path
+        saved = [str(path), *(f"{one.path} (the gait that shrank)" for one in records[1:])]
     except StoreError as error:  # the result is told all the same
         complaints.append(f"the result is not saved: {error}")
-    with said_if_interrupted(saved):
+    with naming_saved_files(saved):
         with status_line(options) as line:
             if options.bound:
                 line.say("computing an upper bound on every gait")
@@ -127,7 +127,7 @@ def solve(options: argparse.Namespace) -> int:
         facts = summary_dict(solution, path if saved else None, stated.reference, bound)
         lines = summary_lines(solution, stated.reference, verbose=options.verbose)
         gap = gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)
-        tell(options, facts | {"kept": kept_facts(kept)}, [*lines, gap])
+        tell(options, facts | {"kept": kept_facts(records)}, [*lines, gap])
         if saved and not options.no_figure and not solution.interrupted:
             with status_line(options) as line:
                 line.say("drawing")
@@ -136,7 +136,7 @@ def solve(options: argparse.Namespace) -> int:
                 except CollocError as error:
                     complaints.append(f"no figure: {error}")
     if saved and not options.json:
-        print("\n".join([f"  saved {', '.join(saved)}", *kept_lines(kept)]))
+        print("\n".join([f"  saved {', '.join(saved)}", *kept_lines(records)]))
     if solution.interrupted:
         complaints.append("interrupted; the same command goes on from there.")
     for complaint in complaints:
@@ -195,7 +195,7 @@ Without --start: the distinct optima of the archive. With it: that start, solved
     text("archive", "ARCHIVE.h5", "an archive that colloc multistart wrote"),
     count("--start", "N", "the start to make a result of"),
     count("--seed", "N", "of the sampler (default: 0)", 0),
-    text("--sampler", None, "of the start", choices=SAMPLERS, default=LATIN_HYPERCUBE),
+    choice("--sampler", SAMPLERS, "of the start", LATIN_HYPERCUBE),
     output("folder, or .h5 file (default: beside the archive)"),
     VERBOSE,
 )
@@ -221,9 +221,9 @@ def open_archive(options: argparse.Namespace) -> int:
     name = f"{problem.name}.start-{options.start}.h5"
     path = output_path(options.output, Path(options.archive).with_name(name))
     # heavy imports only now: a bad option is refused at once
-    from colloc.studies.calls import reopened
+    from colloc.studies.calls import reopen
 
     with status_line(options) as line:
         line.say(f"{problem.name}: start {options.start}")
-        solution = reopened(problem, archive.outcomes[start])
+        solution = reopen(problem, archive.outcomes[start])
     return save_and_tell(options, solution, path)

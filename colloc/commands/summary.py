@@ -75,7 +75,7 @@ def summary_lines(
 
 
 def _background(solution: Solution) -> list[str]:
-    """How the gait was found, where it moves, and the gait itself."""
+    """The search, the scene, and the gait itself."""
     problem = solution.problem
     paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
     gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
@@ -146,7 +146,7 @@ def _search_lines(solution: Solution) -> list[str]:
 def summary_dict(
     solution: Solution, path: Path | None, reference: Reference | None, bound: Bound | None
 ) -> dict:
-    """The same as one JSON object; without a path nothing is saved."""
+    """A solution as one JSON object; without a path it is not saved."""
     problem, answer, certificate = solution.problem, solution.answer, solution.certificate
     replayed = certificate.replayed
     numbers = ("value", "efficiency", "distance", "work", "travels")
@@ -192,5 +192,5 @@ def kept_lines(saved: Sequence[Saved]) -> list[str]:
 
 
 def kept_facts(saved: Sequence[Saved]) -> list[str]:
-    """The same, as the one JSON object lists them."""
+    """The places of former results, as the one JSON object lists them."""
     return [str(one.former) for one in saved if one.former is not None]

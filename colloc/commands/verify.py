@@ -26,9 +26,9 @@ from colloc.system.errors import ProblemError
 DIFFERENT = 1
 _TOLERANCE = 1e-6
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
-"""Certified and rechecked numbers may differ by so many times the sum of their estimated errors,
-and 1e-9; these errors by so many times the smaller one, and the tolerance: replays on other
-instants estimate them anew (measured: 2.2 and 8)."""
+"""Certified and new numbers may differ by so many times the sum of their estimated errors, and
+1e-9; these errors by so many times the smaller one, and the tolerance: replays on other instants
+estimate them anew (measured: 2.2 and 8)."""
 _MOST_INSTANTS = 100_000
 _NUMBERS = {
     "efficiency": ("efficiency_error", "an efficiency"),
@@ -79,7 +79,7 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
     return ""
 
 
-def rechecked(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
+def recheck_certificate(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
     """The solution with a new certificate, on other instants than before; first- and second-order
     conditions are those that the answer states."""
     before = min(solution.certificate.instants or 1600, _MOST_INSTANTS)
@@ -108,7 +108,7 @@ def verify(options: argparse.Namespace) -> int:
     problem, recorded = solution.problem, solution.certificate
     with status_line(options) as line:
         line.say(f"{problem.name}: replaying")
-        now = rechecked(solution, options.tolerance).certificate
+        now = recheck_certificate(solution, options.tolerance).certificate
     complaint = disagreement(recorded, now, options.tolerance)
     dry = solution.dry() if options.dry or recorded.dry is not None else None
     if (
@@ -160,15 +160,15 @@ def gait_distance(a: Solution, b: Solution) -> float | None:
 
 
 def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
-    """Whether the two are the same optimum, and why, in a sentence."""
+    """True if the two are the same optimum; and why, in a sentence."""
     what, other = a.problem.objective, b.problem.objective
     if other != what:
         return False, f"other objectives: {what.name} and {other.name}."
     values = [each.measured.value for each in (a, b)]
     difference = abs(values[0] - values[1]) / max(*map(abs, values), 1e-300)
     apart = gait_distance(a, b)
-    named = "efficiencies" if what == EFFICIENCY else f"values of {what.name}"
-    differ = f"{named} differ by {100 * difference:.3g} %"
+    values_of = "efficiencies" if what == EFFICIENCY else f"values of {what.name}"
+    differ = f"{values_of} differ by {100 * difference:.3g} %"
     if apart is None:
         return False, f"other bodies; {differ}."
     same = difference <= SAME_VALUE and apart < SAME_GAIT
@@ -219,7 +219,7 @@ def _outcome(solution: Solution) -> dict[str, str]:
     "compare",
     """\
 Joint angles are compared at the start phase, and in the mirror image, where they are nearest; of a
-symmetric body also named from the other end, under friction that is the same both ways also run
+symmetric body also values_of from the other end, under friction that is the same both ways also run
 backwards.
 
   colloc compare results/a.h5 results/b.h5""",

@@ -48,7 +48,7 @@ _UNITS = {
 
 
 class StartName(NamedTuple):
-    """What decides a start of a problem; in the order in which starts are listed."""
+    """A start of a problem; in the order in which starts are listed."""
 
     sampler: str
     seed: int
@@ -87,7 +87,7 @@ class Archive:
 
 
 def row_path(path: str | os.PathLike[str]) -> Path:
-    """Where the rows of the archive with this HDF5 file are."""
+    """The file with the rows of the archive with this HDF5 file."""
     return Path(path).with_suffix(".sqlite")
 
 
@@ -95,7 +95,7 @@ def _lock(path: Path) -> Path:
     return path.with_name(f".{path.name}.lock")
 
 
-def _stored(path: Path, problem: Problem | None = None) -> Archive | None:
+def _read(path: Path, problem: Problem | None = None) -> Archive | None:
     """The archive on the disk, which has to be about a problem; None if nothing is there."""
     rows_at = row_path(path)
     rows = read_rows(rows_at, ROWS)
@@ -127,7 +127,7 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
     about another problem, or the folder cannot be written."""
     path = Path(path)
     with locked(_lock(path), wait=True):
-        archive = _stored(path, problem)
+        archive = _read(path, problem)
         if archive is None:
             if path.exists():
                 raise StoreError(
@@ -142,7 +142,7 @@ def archive_at(path: str | os.PathLike[str]) -> Archive:
     """The archive with this HDF5 file, whatever its problem is, to be read: nothing is written, and
     other runs may go on adding to it. `StoreError` if there is none, or it is damaged."""
     path = Path(path)
-    archive = _stored(path.with_suffix(".h5"))
+    archive = _read(path.with_suffix(".h5"))
     if archive is None:
         what = f"there is no archive of starts at {path}"
         if path.is_file():
@@ -160,7 +160,7 @@ def save_archive(archive: Archive, command: str = "") -> Path:
     left."""
     assert archive.path is not None
     with locked(_lock(archive.path), wait=True):
-        if stored := _stored(archive.path, archive.problem):
+        if stored := _read(archive.path, archive.problem):
             archive.outcomes |= stored.outcomes
         return save_table(_table(archive, command), archive.path, KIND, VERSION)
 

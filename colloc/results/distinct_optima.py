@@ -49,7 +49,7 @@ def reversed_in_time(gait: Fourier) -> Fourier:
 
 
 def swapped(gait: Fourier, body: Body) -> Fourier:
-    """The same shapes with tail and head exchanged: of chains -q_(n+1-j)(t)."""
+    """The shapes with tail and head exchanged: of chains -q_(n+1-j)(t)."""
     return Fourier(*(body.swapped(rows) for rows in (gait.mean, gait.cos, gait.sin)))
 
 
@@ -94,7 +94,7 @@ def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
 
 
 def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, friction: Law) -> bool:
-    """Whether two gaits, each given by its value and its path, are the same gait."""
+    """True if two gaits, each by its value and its path, are the same gait."""
     (one, path), (other, near) = a, b
     close = abs(one - other) <= SAME_VALUE * max(abs(one), abs(other))
     return close and distance(path, near, body, friction) < SAME_GAIT

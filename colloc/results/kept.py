@@ -67,7 +67,7 @@ def _save(solution: Solution, path: Path) -> Saved:
         if not place.exists()
         or (there is not None and not _worth(_solution_at(place), there, place))
     )
-    with _moved(path, place):
+    with _set_aside(path, place):
         store.save(solution, path)
     return Saved(path, place, why)
 
@@ -103,7 +103,7 @@ def _worth(there: Solution | None, new: Solution, path: Path) -> str:
 
 
 @contextmanager
-def _moved(path: Path, place: Path) -> Iterator[None]:
+def _set_aside(path: Path, place: Path) -> Iterator[None]:
     """Keep a result under another name, with its figures and its gait that shrank; back again if
     the block fails.
 

@@ -25,7 +25,7 @@ from colloc.search.solve import solve as search_solve
 from colloc.studies.multistart import run_archive
 from colloc.studies.run import Progress as StudyProgress
 from colloc.studies.run import StudyRun
-from colloc.studies.saved import resumed, save_end
+from colloc.studies.saved import resume, save_and_clear
 from colloc.studies.study import Study, read_study_file
 from colloc.studies.table import StudyTable, study_table
 from colloc.system.arguments import check_count, is_whole, shown
@@ -88,14 +88,14 @@ def solve(
     >>> solution.success, round(solution.efficiency, 2)
     (True, 0.26)
     """
-    stated = _stated(problem)
+    stated = _read(problem)
     if starts is not None:
         check_count(starts=starts)
     if not seconds > 0:
         raise ProblemError(f"seconds must be positive, not {seconds:g}.")
     if output is not None and not Path(output).name:
         raise ProblemError(f"output must name a file, not {shown(str(output))}.")
-    solution = resumed(
+    solution = resume(
         stated,
         None if output is None else Path(output),
         starts=starts or stated.starts,
@@ -104,11 +104,11 @@ def solve(
         progress=_reporter(verbose, progress),
     )
     if output is not None:
-        save_end(solution, Path(output))
+        save_and_clear(solution, Path(output))
     return solution
 
 
-def _stated(problem: Stated) -> ProblemFile:
+def _read(problem: Stated) -> ProblemFile:
     if isinstance(problem, Problem):
         return ProblemFile(problem, None, "")
     if not isinstance(problem, (str, os.PathLike)):
@@ -166,12 +166,12 @@ class Starts:
             If no start was certified and none is named.
         """
         if start is not None:
-            return reopened(self.problem, next(o for o in self.outcomes if o.start == start))
+            return reopen(self.problem, next(o for o in self.outcomes if o.start == start))
         if not self.optima:
             raise NotConvergedError(
                 f"none of {len(self.outcomes)} starts of {self.problem.name} was certified."
             )
-        return reopened(self.problem, self.optima[0].best)
+        return reopen(self.problem, self.optima[0].best)
 
     def __repr__(self) -> str:
         tally = ", ".join(f"{n} {status}" for status, n in counts(self.outcomes).items())
@@ -181,7 +181,7 @@ class Starts:
         return f"<Starts of {self.problem.name}: {tally}; {len(self.optima)} distinct optima{best}>"
 
 
-def reopened(problem: Problem, outcome: Outcome) -> Solution:
+def reopen(problem: Problem, outcome: Outcome) -> Solution:
     """The solution that a start led to: solved at the final delta from its gait, or again from its
     guess if it failed."""
     if outcome.status != SOLVED:
@@ -237,12 +237,12 @@ def multistart(
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {shown(sampler)}.")
     if not time_limit > 0:
         raise ProblemError(f"time_limit must be positive, not {time_limit:g}.")
-    problem = _stated(problem).problem
-    kept = Archive(problem) if archive is None else open_archive(problem, archive)
-    done, report = kept.done(sampler, seed, starts), _reporter(verbose, progress)
+    problem = _read(problem).problem
+    store = Archive(problem) if archive is None else open_archive(problem, archive)
+    done, report = store.done(sampler, seed, starts), _reporter(verbose, progress)
     try:
         for outcome in run_archive(
-            kept,
+            store,
             (k for k in range(starts) if k not in done),
             sampler=sampler,
             seed=seed,
@@ -253,8 +253,8 @@ def multistart(
             report(outcome)
     finally:
         if archive is not None:
-            save_archive(kept, "colloc.multistart")
-    return Starts(problem, tuple(kept.of_search(sampler, seed, starts).values()))
+            save_archive(store, "colloc.multistart")
+    return Starts(problem, tuple(store.of_search(sampler, seed, starts).values()))
 
 
 def sweep(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,8 +72,8 @@ def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
     if gait.n_joint != body.n_joint or not gaits.free:
         return None
     try:
-        near = laid_into(gaits, gait, body, problem.joint_limit, problem.smallest_shape_speed)
-        space, v = space_near(problem, closed_gait(problem, near))
+        similar = laid_into(gaits, gait, body, problem.joint_limit, problem.smallest_shape_speed)
+        space, v = space_near(problem, closed_gait(problem, similar))
         projection = space.member(v)
         problem.with_(guess=projection)
     except CollocError:
@@ -108,8 +108,8 @@ def value_of(problem: Problem, gait: AnyGait, instants: tuple[int, int] = _COARS
     return float(value) if np.isfinite(value) else 0.0
 
 
-def visit(work: Work, earlier: dict[Index, AnyGait]) -> Visit:
-    """Solve a cell from its starts, among them gaits of cells solved `earlier` in the same task.
+def visit(work: Work) -> Visit:
+    """Solve a cell from its starts.
 
     A gait from elsewhere is a start while it does better, as it is, than all results so far; the
     best ones come first. What leads to the gait that is certified by then, or to no better one, is
@@ -117,8 +117,7 @@ def visit(work: Work, earlier: dict[Index, AnyGait]) -> Visit:
     once more from the problem's own delta_start.
     """
     problem, attempts = work.problem, list[Attempt]()
-    inside = (earlier[cell] for cell in work.inside if cell in earlier)
-    gaits = {start_key(gait): gait for gait in (*work.gaits, *inside)}
+    gaits = {start_key(gait): gait for gait in work.gaits}
     nearest = {key: member(problem, gait) for key, gait in gaits.items()}
     members = {key: gait for key, gait in nearest.items() if gait is not None}
     scores = {key: value_of(problem, members[key]) if key in members else 0.0 for key in gaits}
@@ -133,8 +132,8 @@ def visit(work: Work, earlier: dict[Index, AnyGait]) -> Visit:
             return best is None and not work.incumbent
         if best is None:
             return True
-        known, found = (fourier_series(problem, gait) for gait in (best.outcome.gait, end.gait))
-        return distance(known, found, problem.body, problem.law) > SAME_GAIT
+        before, now = (fourier_series(problem, gait) for gait in (best.outcome.gait, end.gait))
+        return distance(before, now, problem.body, problem.law) > SAME_GAIT
 
     def solve(origin: str, gait: AnyGait, delta_start: float) -> None:
         key = start_key(gait) + ("r" if origin == RESCUE else "")
@@ -144,7 +143,7 @@ def visit(work: Work, earlier: dict[Index, AnyGait]) -> Visit:
         outcome = run_guess(stated, lambda: gait, number, work.time_limit, worth=worth)
         attempts.append(Attempt(origin, key, outcome))
 
-    warm = _distinct_untried(work, members, scores)
+    warm = _new_starts(work, members, scores)
     if work.first:
         for key in warm[: work.warm_starts]:
             solve(WARM, members[key], problem.delta)
@@ -158,17 +157,15 @@ def visit(work: Work, earlier: dict[Index, AnyGait]) -> Visit:
     nothing = not (work.incumbent or best_attempt(attempts))
     if warm and (scores[warm[0]] > enough() or nothing):
         solve(RESCUE, members[warm[0]], problem.delta_start)
-    for key, near in members.items():
+    for key, gait in members.items():
         if scores[key] > enough():  # for good, then: measured as finely as a certificate does
-            scores[key] = value_of(problem, near, _FINE)
+            scores[key] = value_of(problem, gait, _FINE)
     return Visit(problem.hash, attempts, scores)
 
 
-def _distinct_untried(
-    work: Work, members: dict[str, AnyGait], scores: dict[str, float]
-) -> list[str]:
+def _new_starts(work: Work, members: dict[str, AnyGait], scores: dict[str, float]) -> list[str]:
     """Keys of the gaits that make different starts not solved before, the best first."""
-    paths = {key: fourier_series(work.problem, near) for key, near in members.items()}
+    paths = {key: fourier_series(work.problem, gait) for key, gait in members.items()}
     distinct: list[str] = []
     for key in sorted(members, key=lambda key: -scores[key]):
         new = all(phase_distance(paths[key], paths[other]) > _SAME_START for other in distinct)
@@ -182,8 +179,10 @@ def run_chunk(chunk: tuple[Work, ...]) -> list[Visit]:
     earlier: dict[Index, AnyGait] = {}
     visits = []
     for work in chunk:
+        inside = (earlier[cell] for cell in work.inside if cell in earlier)
+        work = replace(work, gaits=(*work.gaits, *inside))
         try:
-            visits.append(visit(work, earlier))
+            visits.append(visit(work))
         except Exception as error:
             visits.append(failed_visit(work, ERROR, f"{type(error).__name__}: {error}"))
         if best := best_attempt(visits[-1].attempts):

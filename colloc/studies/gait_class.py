@@ -88,7 +88,7 @@ def wave_direction(gait: Fourier) -> float:
     return float(travel / size) if size > 0 else 0.0
 
 
-def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
+def forward_share(gait: Fourier, body: Body, friction: Law) -> float:
     """Mean velocity of the centre of mass along the body's mean direction, over its mean velocity;
     1 is head first. Friction at a delta of 1e-3 is enough for a sign."""
     mesh = uniform_mesh(scheme("gauss-1"), _INSTANTS, 1.0)
@@ -116,5 +116,5 @@ def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
         retraced,
         0 if retraced else winding(gait),
         wave_direction(gait.mapped(body.bending)),
-        headed_displacement(gait, body, friction),
+        forward_share(gait, body, friction),
     )

@@ -91,7 +91,7 @@ class ParetoFront:
 
     @property
     def certified(self) -> bool:
-        """Whether every gait is that was found in its gaps, too."""
+        """True if the gaits that were found in its gaps are, too."""
         return all(gap.certified for gap in self.gaps)
 
     def plot(self, ax: Any = None) -> Any:
@@ -183,7 +183,7 @@ def pareto_front(
                 f"the gait of best {aim.name} is not certified, so there is no front: "
                 f"{solutions[k].message}"
             )
-    if len(_spaced(solutions.values(), aims, last)) > 1:
+    if len(_thin(solutions.values(), aims, last)) > 1:
         lowest, highest = (float(_measure(solutions[k], aims)[0][1]) for k in (0, last))
         levels = np.linspace(lowest, highest, points).tolist()
         backwards = range(last - 1, 0, -1)
@@ -195,7 +195,7 @@ def pareto_front(
             here, beside = (_measure(solutions[j], aims)[0][0] for j in (k, k + 1))
             if beside > here:
                 put(k, reach(1, levels[k], solutions[k + 1]))
-    front, empty = _spaced(solutions.values(), aims, last), {}
+    front, empty = _thin(solutions.values(), aims, last), {}
     for _ in range(2 * points):
         wide = {pair: size for pair, size in _wide(front, aims, last).items() if pair not in empty}
         if not wide:
@@ -212,7 +212,7 @@ def pareto_front(
                 failure = str(error)
                 continue
             put(len(solutions), attempts[-1])
-            front = _spaced(solutions.values(), aims, last)
+            front = _thin(solutions.values(), aims, last)
         if attempts:
             failure = "" if any(each.success for each in attempts) else attempts[0].message
         empty[pair] = failure or "the best gaits found there are those beside it", not failure
@@ -240,7 +240,7 @@ def _measure(solution: Solution, aims: Objectives) -> np.ndarray:
     return np.transpose(measured)
 
 
-def _spaced(solutions: Iterable[Solution], aims: Objectives, intervals: int) -> list[Solution]:
+def _thin(solutions: Iterable[Solution], aims: Objectives, intervals: int) -> list[Solution]:
     """Certified ones of which, by more than the errors, none is better in both objectives, without
     near duplicates; of those the first counts."""
     front: list[Solution] = []

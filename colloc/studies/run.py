@@ -38,7 +38,7 @@ Chunk = tuple[Index, ...]
 
 @dataclass(eq=False)
 class CellState:
-    """What is known about a cell: its problem (or why there is none), all attempts, and what gaits
+    """A cell: its problem (or why there is none), all attempts, and what gaits
     of others achieve there."""
 
     problem: Problem | None
@@ -123,7 +123,7 @@ class StudyRun:
         return max((score for score in scores if not math.isnan(score)), default=math.nan)
 
     def below_neighbour(self, cell: Index) -> bool:
-        """Whether a neighbour's gait does clearly better in the cell than its own best, though it
+        """True if a neighbour's gait does clearly better in the cell than its own best, though it
         was tried there."""
         best = self.cells[cell].best
         return best is not None and self.neighbour_value(cell) > (1 + BETTER) * best.outcome.value

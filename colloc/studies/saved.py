@@ -19,7 +19,7 @@ from colloc.system.result_names import run_file
 _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 
 
-def resumed(
+def resume(
     stated: ProblemFile, path: Path | None, *, fresh: bool = False, **settings: Any
 ) -> Solution:
     """The solution of a problem, from where an interrupted run left it; `fresh`: from the start.
@@ -37,7 +37,7 @@ def resumed(
     return solution
 
 
-def save_end(solution: Solution, path: Path) -> list[Saved]:
+def save_and_clear(solution: Solution, path: Path) -> list[Saved]:
     """Save a solution (`colloc.results.kept.save_result`); the run that led to it is kept only if
     it was interrupted. `StoreError` if a file cannot be written."""
     saved = save_result(solution, path)
@@ -47,7 +47,7 @@ def save_end(solution: Solution, path: Path) -> list[Saved]:
 
 
 @contextmanager
-def members_kept(folder: Path) -> Iterator[None]:
+def checkpoints_in(folder: Path) -> Iterator[None]:
     """A block that solves several problems (`solve_member`), of which each keeps its results in a
     folder until the block ends well. After Ctrl-C, which says so, or a power cut, the same block
     goes on from there."""

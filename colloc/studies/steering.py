@@ -56,7 +56,7 @@ class Steering:
 
     @property
     def certified(self) -> bool:
-        """Whether every gait is."""
+        """True if every gait is."""
         spot = self.on_the_spot is None or self.on_the_spot.certified
         return spot and all(point.success for point in self.points)
 
@@ -80,7 +80,7 @@ class Steering:
         return tuple(begins.values())
 
     def table(self, phases: int = 100) -> dict[str, Any]:
-        """What a controller needs, as plain numbers: the turns, their arcs, and joint angles at
+        """Plain numbers for a controller: the turns, their arcs, and joint angles at
         equal phases from those of `begins`; between two turns angles are interpolated linearly."""
         t, points = np.arange(phases) / phases, self.points
         radii = [point.arc.radius for point in points]

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Any
 
 from colloc.system.errors import ProblemError
-from colloc.system.task_pool import EngineGone, environment_of_workers
+from colloc.system.task_pool import EngineGone, worker_environment
 
 PATIENCE = 60.0
 """Seconds for which a scheduler may be without workers, or give no answer."""
@@ -22,7 +22,7 @@ _LOOK, _ANSWER = 1.0, 10.0
 _HOW = "dask worker ADDRESS --nthreads 1"
 
 
-def connected(
+def connect(
     address: str, workers: int, say: Callable[[str], None] = print, patience: float = PATIENCE
 ) -> tuple[Callable[[int], Executor], int]:
     """A maker of executors for `colloc.system.task_pool.run_tasks`, and the number of workers, of
@@ -43,7 +43,7 @@ def connected(
     if address == "local":  # any port that is free, for this machine alone
         how = {"n_workers": workers, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
     try:
-        with environment_of_workers():
+        with worker_environment():
             client = Client(**how, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ProblemError(f"no Dask scheduler at {address}: {error}") from None

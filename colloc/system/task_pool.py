@@ -55,11 +55,11 @@ class Lost:
 
 
 class EngineGone(CollocError, RuntimeError):
-    """What runs the tasks is gone as a whole, so no task is to blame."""
+    """The executor is gone as a whole, so no task is to blame."""
 
 
 @contextlib.contextmanager
-def environment_of_workers() -> Iterator[None]:
+def worker_environment() -> Iterator[None]:
     """Processes started inside use one BLAS thread each, and import no file of the folder instead
     of another module; the environment is put back afterwards."""
     before = {name: os.environ.get(name) for name in _ENVIRONMENT}
@@ -197,7 +197,7 @@ def run_tasks(
     """
     suspects: list[Task] = []  # under way when a worker died
     more = True
-    with environment_of_workers():
+    with worker_environment():
         while more or suspects:
             alone = bool(suspects)
             most = 1 if alone else workers + ahead

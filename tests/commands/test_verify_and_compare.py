@@ -1,4 +1,4 @@
-"""Results are rechecked without CasADi and compared as paths; tampering and differences show."""
+"""Results are recheck_certificate without CasADi and compared as paths; tampering and differences show."""
 
 import json
 import subprocess
@@ -47,7 +47,7 @@ def test_verify_certifies_without_loading_casadi_or_matplotlib(three_link, tmp_p
 
 
 def test_verify_uses_other_instants_and_agrees(three_link):
-    again = recheck.rechecked(three_link).certificate
+    again = recheck.recheck_certificate(three_link).certificate
     assert again.instants % three_link.certificate.instants
     assert again.passed
     assert abs(again.efficiency - three_link.certificate.efficiency) < 1e-6
@@ -130,7 +130,10 @@ def test_a_result_that_was_only_opened_is_still_exported(three_link, tmp_path, c
 
 def test_an_absurd_number_of_instants_in_a_file_costs_no_memory(three_link):
     boast = replace(three_link.certificate, instants=10**12)
-    assert recheck.rechecked(changed(three_link, certificate=boast)).certificate.instants < 10**6
+    assert (
+        recheck.recheck_certificate(changed(three_link, certificate=boast)).certificate.instants
+        < 10**6
+    )
 
 
 def test_verify_refuses_what_is_no_result(tmp_path, capsys):

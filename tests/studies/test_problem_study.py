@@ -381,11 +381,11 @@ def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path
     # or a gait from elsewhere
     stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
     work = Work((0,), stated, True, (), (elsewhere,), (0,), 0.0, frozenset(), 1, 300.0, 1)
-    first = study_cell.visit(work, {})
+    first = study_cell.visit(work)
     assert {a.origin for a in first.attempts} == {GUESS, "cold", WARM}
     for attempt in first.attempts:
         told = dataclasses.replace(work, tried=frozenset({attempt.key}))
-        again = {a.key for a in study_cell.visit(told, {}).attempts}
+        again = {a.key for a in study_cell.visit(told).attempts}
         assert again == {a.key for a in first.attempts} - {attempt.key}
 
 
@@ -395,7 +395,7 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
     )
     elsewhere = ellipse(0.0, 2.85, 1.3)
     work = Work((0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 300.0, 1)
-    done = study_cell.visit(work, {})
+    done = study_cell.visit(work)
     assert [a.outcome.status for a in done.attempts if a.origin == WARM] == [SOLVED]
     passed = [a for a in done.attempts if a.outcome.status == PASSED_OVER]
     assert GUESS in {a.origin for a in passed}
@@ -406,7 +406,7 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
     # a cell that was solved before is solved again for what does better, and for nothing else
     for incumbent, status in ((0.9 * best, SOLVED), (1.1 * best, PASSED_OVER)):
         again = dataclasses.replace(work, incumbent=incumbent, cold=())
-        attempts = {a.origin: a.outcome.status for a in study_cell.visit(again, {}).attempts}
+        attempts = {a.origin: a.outcome.status for a in study_cell.visit(again).attempts}
         assert attempts[WARM] == status
 
 
@@ -428,7 +428,7 @@ def test_a_gait_that_promises_more_than_was_found_is_measured_as_finely_as_a_cer
     )
     monkeypatch.setattr(study_cell, "value_of", lambda p, g, *grid: 0.2 if grid else 0.21)
     work = Work((0,), stated, True, (), (elsewhere,), (), 0.0, frozenset(), 1, 300.0, 1)
-    assert list(study_cell.visit(work, {}).scores.values()) == [0.2]
+    assert list(study_cell.visit(work).scores.values()) == [0.2]
 
 
 def test_a_task_whose_worker_dies_is_recorded_as_crashed(fake, tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from shared.dask_cluster import DaskProcesses
 
-from colloc.system.dask_pool import connected
+from colloc.system.dask_pool import connect
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import EngineGone, Lost, Task, process_pool, run_tasks
 
@@ -227,13 +227,13 @@ def test_a_dask_scheduler_without_workers_is_waited_for_a_stated_time_only(clust
     with pytest.raises(
         ProblemError, match=r"had no workers for 1 s; start some, for example: dask worker"
     ):
-        connected(cluster.scheduler_address, 1, said.append, patience=1.0)
+        connect(cluster.scheduler_address, 1, said.append, patience=1.0)
     assert "waiting for one, 1 s at most" in said[0]
 
 
 def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_task(cluster):
     cluster.scale(1)
-    executor, workers = connected(cluster.scheduler_address, 1, patience=1.0)
+    executor, workers = connect(cluster.scheduler_address, 1, patience=1.0)
     assert workers == 1
     run = run_tasks(
         doubled_in_the_end,
@@ -249,7 +249,7 @@ def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_ta
 
 def test_a_dask_scheduler_that_gives_no_answer_ends_the_run_and_blames_no_task(cluster):
     cluster.scale(1)
-    executor, _ = connected(cluster.scheduler_address, 1, patience=1.0)
+    executor, _ = connect(cluster.scheduler_address, 1, patience=1.0)
     run = run_tasks(
         doubled_in_the_end, listed([Task(0, (0,)), Task(1, (1,))]), workers=1, executor=executor
     )
@@ -263,7 +263,7 @@ def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task():
     pytest.importorskip("distributed")
     with DaskProcesses() as dask:
         dask.worker()
-        executor, _ = connected(dask.address, 1)
+        executor, _ = connect(dask.address, 1)
         # a function that other processes know as well
         run = run_tasks(
             time.sleep, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor
