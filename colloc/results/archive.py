@@ -17,7 +17,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from colloc.gaits.starts import on_speed_floor
 from colloc.results.distinct_optima import basins, fourier_series
 from colloc.results.outcome import RETRIED, UNITS, Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions
-from colloc.system.errors import CollocError, StoreError
+from colloc.system.errors import StoreError
 from colloc.system.replaced_file import locked
 from colloc.system.row_file import put_rows, read_rows
 from colloc.system.table import Table, save_table
@@ -97,28 +97,27 @@ def _lock(path: Path) -> Path:
 
 def _read(path: Path, problem: Problem | None = None) -> Archive | None:
     """The archive on the disk, which has to be about a problem; None if nothing is there."""
-    rows_at = row_path(path)
-    rows = read_rows(rows_at, ROWS)
-    stated = rows.pop("problem", None)
-    if stated is None:
-        if rows:
-            raise StoreError(
-                f"{rows_at} is damaged: it does not say what problem it is about; move it away."
-            )
+    rows = read_rows(row_path(path), ROWS, _row_from)
+    if not rows:
         return None
-    archive = Archive(Problem.from_dict(stated), path)
+    if "problem" not in rows:
+        raise StoreError(
+            f"{row_path(path)} is damaged: it does not say what problem it is about; move it away."
+        )
+    archive = Archive(rows.pop("problem"), path, dict(rows.values()))
     if problem is not None and problem.hash != archive.problem.hash:
         raise StoreError(
-            f"{rows_at} holds starts of another problem; choose another --output, or move it away."
+            f"{row_path(path)} holds starts of another problem; choose another --output, or move "
+            f"it away."
         )
-    for key, value in rows.items():
-        try:
-            (sampler, seed, number), entry = value
-            name = StartName(str(sampler), int(seed), int(number))
-            archive.outcomes[name] = outcome_from(entry)
-        except (KeyError, TypeError, ValueError, OverflowError, CollocError):
-            raise StoreError(f"{rows_at} is damaged: {key} is no start; move it away.") from None
     return archive
+
+
+def _row_from(row: Any) -> Problem | tuple[StartName, Outcome]:
+    if isinstance(row, dict):
+        return Problem.from_dict(row)
+    (sampler, seed, number), outcome = row
+    return StartName(str(sampler), int(seed), int(number)), outcome_from(outcome)
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:

@@ -13,7 +13,6 @@ from typing import Any
 from colloc.gaits.gait_fields import AnyGait, fields, statement_hash
 from colloc.results.outcome import Outcome, outcome_fields, outcome_from
 from colloc.results.solution import SOLVED
-from colloc.system.errors import ProblemError, StoreError
 from colloc.system.row_file import put_rows, read_rows
 
 KIND, NAME = "colloc journal 2", "journal.sqlite"
@@ -76,12 +75,7 @@ def _visit_from(row: dict[str, Any]) -> Visit:
 def read_journal(folder: Path) -> list[Visit]:
     """All visits of a folder, in order; none if there is no such folder. `StoreError` if the
     journal cannot be read or is damaged."""
-    try:
-        return [_visit_from(row) for row in read_rows(folder / NAME, KIND).values()]
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError, ProblemError):
-        raise StoreError(
-            f"{folder / NAME} is damaged: it holds something else than records; move it away."
-        ) from None
+    return [*read_rows(folder / NAME, KIND, _visit_from).values()]
 
 
 def append_visits(folder: Path, visits: Iterable[Visit]) -> None:

@@ -163,6 +163,10 @@ def test_what_is_wrong_is_named_without_words_of_programmers(place, capsys):
     for words, message in (
         ("solve problem.py --mesh x", "--mesh must be a whole number, not 'x'"),
         ("solve problem.py --delta x", "--delta must be a number, not 'x'"),
+        ("multistart problem.py --starts 0", "--starts must be at least 1"),
+        ("multistart problem.py --time-limit 0", "--time-limit must be positive, not 0"),
+        ("sweep study.py --chunk 0", "--chunk must be at least 1"),
+        ("sweep nope.py", "there is no study file"),
         (
             "export good.h5 --format x",
             "--format must be one of 'csv', 'json', 'mjcf', 'urdf', not 'x'",

@@ -220,6 +220,7 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
         (["repot"], "colloc report?"),
         (["x.py"], "colloc solve x.py?"),
         (["zzzz"], "choose one of init,"),
+        (["referee"], "python -m benchmarks.referee"),
     ):
         assert main(words) == 2
         assert hint in capsys.readouterr().err

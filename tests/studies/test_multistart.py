@@ -410,19 +410,6 @@ def test_of_two_runs_at_once_with_other_seeds_or_problems_neither_overwrites_the
     assert len(open_archive(problem(), tmp_path / "a.h5").outcomes) == 6
 
 
-def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
-    path = tmp_path / "quick.py"
-    path.write_text(FILE, encoding="utf-8")
-    for options, text in (
-        (["--starts", "0"], "--starts"),
-        (["--workers", "0"], "--workers"),
-        (["--time-limit", "0"], "time"),
-    ):
-        assert multistart([str(path), *options]) == 2
-        assert text in capsys.readouterr().err
-    assert multistart([str(tmp_path / "none.py")]) == 2
-
-
 def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
     limit = value_at_zero_delta(three_link)
     assert limit.error < 1e-3 * limit.value
