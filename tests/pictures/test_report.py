@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colloc.commands.report import main
+from colloc.commands.results import report as main
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_samples import arcs_through
