@@ -27,6 +27,7 @@ import casadi as ca
 import numpy as np
 
 import colloc
+from benchmarks.known import known
 from benchmarks.tables import cached, markdown_table
 from colloc import Chain, Fourier, Harmonic, Problem
 from colloc.commands.ending import OK, run
@@ -227,7 +228,7 @@ def row(name: str, outcomes: Sequence[dict]) -> list[object]:
     that holds, errors."""
     answers = [one for one in outcomes if "failed" not in one]
     hold = [one for one in answers if one["error"] < GOOD]
-    most = next(known.value for known in colloc.known() if known.problem.name == PROBLEM.name)
+    most = next(row.value for row in known() if row.problem.name == PROBLEM.name)
     good = sum(one["value"] > (1 - SAME) * most for one in hold)
     errors = [one["error"] for one in answers] or [np.nan]
     spent = sum(one["seconds"] for one in outcomes) / max(len(hold), 1)

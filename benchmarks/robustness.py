@@ -42,7 +42,7 @@ from colloc.results.archive import Archive, StartName, open_archive, save_archiv
 from colloc.results.distinct_optima import basins
 from colloc.results.outcome import Outcome, counts
 from colloc.results.solution import SOLVED
-from colloc.studies.campaign import process_pool, run_starts
+from colloc.studies.multistart import process_pool, run_starts
 from colloc.system.versions import versions
 from colloc.verification.replay import replay
 

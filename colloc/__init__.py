@@ -48,6 +48,8 @@ _GONE = {
     "ArcPath": "gaits are Fourier series, splines (BSpline(...).member) or polygons (Corners).",
     "Relaxed": "take Polygon(n) with many corners, which come as near as one likes "
     "(docs/known.md).",
+    "known": "the table of known gaits is a benchmark: python -m benchmarks.referee checks it "
+    "(docs/known.md).",
     "heading_map": "colloc.slope_motion and a root finder find headings that last "
     "(docs/howto/slopes.md).",
 }

@@ -39,7 +39,6 @@ from colloc.studies.calls import (
 from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.pareto import pareto_front as pareto_front
 from colloc.studies.steering import steer as steer
-from colloc.studies.known import known as known, Known as Known
 from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
 from colloc.search.evaluate import evaluate as evaluate

@@ -20,7 +20,6 @@ from __future__ import annotations
 import argparse
 import ast
 import contextlib
-import importlib
 import io
 import json
 import os
@@ -233,16 +232,14 @@ def commands_page() -> str:
     """What every subcommand says about itself."""
     sys.path.insert(0, str(ROOT))
     os.environ["COLUMNS"] = "100"
-    from colloc.commands.main import SUBCOMMANDS, help_text
+    from colloc.commands.main import SUBCOMMANDS, help_text, main
 
     parts = ["# Commands", f"```text\n{help_text()}\n```"]
-    for name, (module, summary) in SUBCOMMANDS.items():
+    for name in SUBCOMMANDS:
         text = io.StringIO()
         with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
-            importlib.import_module(f"colloc.commands.{module}").main(["--help"])
-        parts.append(
-            f"## colloc {name}\n\n{summary[:1].upper()}{summary[1:]}.\n\n```text\n{text.getvalue().rstrip()}\n```"
-        )
+            main([name, "--help"])
+        parts.append(f"## colloc {name}\n\n```text\n{text.getvalue().rstrip()}\n```")
     return "\n\n".join(parts) + "\n"
 
 

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
-from colloc.commands.report import main as report
-from colloc.commands.solve import main as solve
+from colloc.commands.results import report
+from colloc.commands.solve import solve
 from scripts.browser import BROWSERS, DARK, OPTIONS, browser
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -15,7 +15,7 @@ VALUES = {
     "FeetLaw", "Foot",
     "Friction", "GaitClass", "Harmonic", "JointMap", "Limit", "Links", "ModalBody", "Objective",
     "OwnLaw", "Period", "Polygon",
-    "Coupled", "Known", "Paced", "PacedOnSlope", "PathLimit", "PathLimits", "PotentialSpace",
+    "Coupled", "Paced", "PacedOnSlope", "PathLimit", "PathLimits", "PotentialSpace",
     "Quantity", "Regime", "Slope",
     "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Replay", "Saved",
     "TensorSpline",

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import xarray
 
-from colloc.commands.main import SUBCOMMANDS
+from colloc.commands.main import SUBCOMMANDS, main
 from colloc.results.store import save
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -43,7 +43,7 @@ def blocks(page, language):
 def options_of(command):
     text = io.StringIO()
     with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
-        importlib.import_module(f"colloc.commands.{SUBCOMMANDS[command][0]}").main(["--help"])
+        main([command, "--help"])
     return set(re.findall(r"--[a-z][a-z-]*", text.getvalue()))
 
 
@@ -91,7 +91,7 @@ def test_files_and_names_in_the_pages_exist(page):
 
 
 def test_the_problem_of_the_tutorial_is_solved_by_its_own_text(tmp_path, capsys):
-    from colloc.commands.solve import main
+    from colloc.commands.solve import solve as main
 
     text = next(
         block for block in blocks(ROOT / "docs/tutorial.md", "python") if "PROBLEM" in block
@@ -355,7 +355,7 @@ WITH_PYTHON = [page for page in PAGES if blocks(page, "python") and page.name no
 def results_of_a_reader(three_link, tmp_path, monkeypatch):
     """The files that pages speak of, in a folder of their own; the commands before a snippet would
     have made them."""
-    from colloc.commands.export import main
+    from colloc.commands.results import export as main
 
     monkeypatch.chdir(tmp_path)
     for name in ("mine", "three_link"):

@@ -24,7 +24,7 @@ MOST_ON_THE_WAY = 10
 ONLY = {
     "matplotlib": {"pictures"},
     "jinja2": {"pictures"},
-    "h5py": {"system", "results", "studies"},
+    "h5py": {"system", "results"},
     "casadi": {"numerics", "motion", "transcription", "reduced", "search"},
 }
 

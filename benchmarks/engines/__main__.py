@@ -1,7 +1,7 @@
 """Certified gaits in the physics engines: python -m benchmarks.engines [--engine MuJoCo] [--gait
 three_link_feet]
 
-Each engine in `benchmarks.engines.players` plays known gaits (`colloc.known`) on the same robot
+Each engine in `benchmarks.engines.players` plays known gaits (`benchmarks.known`) on the same robot
 (`benchmarks.engines.task`), at two steps. Its distance and work of a period are held against
 colloc's own motion with inertia. Writes results/engines.md and results/engines.png; outcomes are
 kept in results/engines.sqlite, so an interrupted run goes on where it stopped. ``--models FOLDER``
@@ -27,6 +27,7 @@ import numpy as np
 import colloc
 from benchmarks.engines import players
 from benchmarks.engines.task import Task, on_feet
+from benchmarks.known import known
 from benchmarks.tables import cached, markdown_table
 from colloc.commands.ending import OK, run
 from colloc.mechanics.inertia import GRAVITY
@@ -65,7 +66,7 @@ class Outcome(NamedTuple):
 
 
 def tasks(names: Sequence[str]) -> list[Task]:
-    rows = [row for row in colloc.known() if row.problem.name in names]
+    rows = [row for row in known() if row.problem.name in names]
     return [
         Task(row.problem.name, on_feet(row.problem.body, row.problem.law), row.gait, f)
         for row in rows

@@ -31,27 +31,19 @@ _page: list[TextIO] = []
 
 
 def run(parser: argparse.ArgumentParser, command: _Command, arguments: Sequence[str] | None) -> int:
-    """Parse the arguments (None: those of the process) and run a command on them, `options.command`
-    being all that was typed; returns the exit code."""
+    """The exit code of a command run on its arguments (None: those of the process);
+    `options.command` is all that was typed."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     typed = argparse.Namespace(command=" ".join([parser.prog, *words]))
     return exit_code(lambda: command(parser.parse_args(words, typed)), as_json="--json" in words)
 
 
-def command(
-    parser: Callable[[], argparse.ArgumentParser],
-) -> Callable[[_Command], Callable[..., int]]:
-    """Make ``main(arguments)``, see `run`, of what a command does with its options."""
-    return lambda main: lambda arguments=None: run(parser(), main, arguments)
-
-
 def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
-    """Run a command; errors made for people, and those of the system, become one sentence on
-    standard error and an exit code.
+    """The exit code of a command; errors made for people, and those of the system, become one
+    sentence on standard error.
 
     A KeyboardInterrupt may carry a sentence about what was kept. With `as_json` standard output is
-    kept for one JSON object (`show`), which the sentence is too; what anything else prints goes to
-    standard error.
+    kept for one JSON object (`show`), which the sentence is too; all else goes to standard error.
     """
     _open_closed_streams()
     _print_in_words()
@@ -66,33 +58,20 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
             _end_workers()
         return code
     except CollocError as error:
-        return _ended(BAD_PROBLEM, "error", str(error), as_json)
+        return _end(BAD_PROBLEM, "error", str(error), as_json)
     except BrokenPipeError:
         _leave_output()
-        return _ended(
-            UNREAD,
-            "unread",
-            "nobody reads the output any more; what was saved before is kept.",
-            as_json=False,
-        )
+        sentence = "nobody reads the output any more; what was saved before is kept."
+        return _end(UNREAD, "unread", sentence, as_json=False)
     except OSError as error:
-        where = error.filename or "the output"
         if error.filename is None:
             _leave_output()
-        return _ended(
-            BAD_PROBLEM,
-            "error",
-            f"cannot read or write {where}: {error.strerror or error}.",
-            as_json,
-        )
+        what = f"{error.filename or 'the output'}: {error.strerror or error}"
+        return _end(BAD_PROBLEM, "error", f"cannot read or write {what}.", as_json)
     except KeyboardInterrupt as stop:
         _end_workers()
-        return _ended(
-            INTERRUPTED,
-            "interrupted",
-            f"interrupted; {str(stop) or 'nothing was written.'}",
-            as_json,
-        )
+        sentence = f"interrupted; {str(stop) or 'nothing was written.'}"
+        return _end(INTERRUPTED, "interrupted", sentence, as_json)
 
 
 def show(text: str) -> None:
@@ -126,8 +105,8 @@ def _open_closed_streams() -> None:
 
 
 @contextlib.contextmanager
-def said_if_interrupted(saved: Sequence[str]) -> Iterator[None]:
-    """Ctrl-C in the block ends the command by saying which files are saved already."""
+def naming_saved_files(saved: Sequence[str]) -> Iterator[None]:
+    """A block in which Ctrl-C ends the command by saying which files are saved already."""
     try:
         yield
     except KeyboardInterrupt as stop:
@@ -136,14 +115,13 @@ def said_if_interrupted(saved: Sequence[str]) -> Iterator[None]:
 
 
 def _end_workers() -> None:
-    """End processes of this one that are still at work; what they were at is not kept, and Python
-    would wait for them."""
+    """End processes of this one that are still at work, for which Python would wait."""
     if "multiprocessing" in sys.modules:
         for child in sys.modules["multiprocessing"].active_children():
             child.terminate()
 
 
-def _ended(code: int, status: str, message: str, as_json: bool) -> int:
+def _end(code: int, status: str, message: str, as_json: bool) -> int:
     if as_json:
         with contextlib.suppress(OSError):
             show(json.dumps({"status": status, "message": message, "exit_code": code}))

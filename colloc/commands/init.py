@@ -1,4 +1,4 @@
-"""Command line: write a commented problem file that runs as it is, for a user to change."""
+"""The command init: write a commented problem file that runs as it is, for a user to change."""
 
 from __future__ import annotations
 
@@ -7,18 +7,14 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import OK, command
-from colloc.commands.options import add_printing, new_parser, tell
+from colloc.commands.ending import OK
+from colloc.commands.options import command, count, flag, number, tell, text
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6
-_EPILOG = """\
-  colloc init mine.py --links 4 --feet 1
-  colloc init mine.py --lengths 22 30 30 22 --wheels
-  colloc solve mine.py"""
 _FLOOR = {
     "": "    body=Chain({lengths}),",
     "feet": """\
@@ -57,40 +53,6 @@ PROBLEM = Problem(
     # guess=Fourier(mean, cos, sin) adds yours.
 )
 '''
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = new_parser(
-        "init", "Write a commented problem file for a chain of links; it runs as it is.", _EPILOG
-    )
-    parser.add_argument(
-        "problem",
-        type=Path,
-        metavar="FILE.py",
-        help="the file to write; an existing one is left alone",
-    )
-    chain = parser.add_mutually_exclusive_group()
-    chain.add_argument(
-        "--links", type=int, default=_FEWEST, metavar="N", help=f"equal links (default: {_FEWEST})"
-    )
-    chain.add_argument(
-        "--lengths",
-        type=float,
-        nargs="+",
-        metavar="L",
-        help="of the links, tail to head, in any unit",
-    )
-    floor = parser.add_mutually_exclusive_group()
-    floor.add_argument(
-        "--feet",
-        type=int,
-        default=0,
-        metavar="N",
-        help="feet on each link (default: none, it lies)",
-    )
-    floor.add_argument("--wheels", action="store_true", help="a wheel in the middle of each link")
-    add_printing(parser)
-    return parser
 
 
 def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bool = False) -> str:
@@ -134,11 +96,29 @@ def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bo
     )
 
 
-@command(_parser)
-def main(options: argparse.Namespace) -> int:
+@command(
+    "init",
+    """\
+The file runs as it is; one that is there already is left alone. Take --links or --lengths, --feet
+or --wheels.
+
+  colloc init mine.py --links 4 --feet 1
+  colloc init mine.py --lengths 22 30 30 22 --wheels
+  colloc solve mine.py""",
+    text("problem", "FILE.py", "the file to write", type=Path),
+    count("--links", "N", f"equal links (default: {_FEWEST})"),
+    number("--lengths", "L", "of the links, tail to head, in any unit", nargs="+"),
+    count("--feet", "N", "feet on each link (default: none, it lies)"),
+    flag("--wheels", "a wheel in the middle of each link"),
+)
+def init(options: argparse.Namespace) -> int:
     path: Path = options.problem
-    lengths = options.lengths or [1.0] * min(options.links, _MOST + 1)
-    text = problem_text(path, lengths, options.feet, options.wheels)
+    for one, other in (("links", "lengths"), ("feet", "wheels")):
+        if getattr(options, one) is not None and getattr(options, other):
+            raise ProblemError(f"--{one} and --{other} exclude each other; see colloc init --help.")
+    links = _FEWEST if options.links is None else min(options.links, _MOST + 1)
+    lengths = options.lengths or [1.0] * links
+    text = problem_text(path, lengths, options.feet or 0, options.wheels)
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)

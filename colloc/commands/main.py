@@ -1,5 +1,4 @@
-"""The entry point ``colloc``: one line per subcommand, whose module is only imported when it is
-asked for."""
+"""The entry point ``colloc``: a subcommand's module is only imported when it is asked for."""
 
 from __future__ import annotations
 
@@ -8,48 +7,9 @@ import sys
 from collections.abc import Sequence
 
 from colloc.commands.ending import BAD_PROBLEM, OK, exit_code
+from colloc.commands.options import COMMANDS, SUBCOMMANDS, Command
 from colloc.system.errors import ProblemError
 from colloc.system.processors import one_thread_each
-
-SUBCOMMANDS = {
-    "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
-    "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
-    "multistart": (
-        "multistart",
-        "solve a problem from many random starts; distinct optima with their frequencies",
-    ),
-    "open": ("open", "what an archive of starts holds; the whole result of one of them"),
-    "sweep": ("sweep", "solve a study: a grid of problems, over processes or a cluster; resumable"),
-    "pareto": ("pareto", "what two objectives cost each other: a front of certified gaits"),
-    "steer": (
-        "steer",
-        "certified gaits from sharp right to sharp left, in one file that a controller can "
-        "interpolate",
-    ),
-    "evaluate": (
-        "evaluate",
-        "what a gait of your own achieves: joint angles from a CSV file, replayed and certified",
-    ),
-    "verify": ("verify", "check a result again by independent replay, without CasADi"),
-    "compare": ("compare", "hold two results against each other"),
-    "report": ("report", "one self-contained web page about a result, to read or to send"),
-    "animate": ("animate", "the motion as GIF or MP4"),
-    "export": ("export", "joint angles over time for a robot, as CSV or JSON"),
-    "robot": (
-        "robot",
-        "speed, power and torques of a result on a robot of so many metres and kilograms",
-    ),
-    "sensitivity": (
-        "sensitivity",
-        "what a wrong floor costs: how the best value changes with friction, lengths, feet, limits",
-    ),
-    "referee": (
-        "referee",
-        "check the best gaits that are known from the gaits alone; take in better ones",
-    ),
-}
-"""Name to module of this package with a ``main(arguments)`` that returns an exit code, and what it
-does."""
 
 _EXAMPLE = """\
 From a problem to a page to send:
@@ -63,27 +23,30 @@ From a problem to a page to send:
 
 
 def help_text() -> str:
-    """What ``colloc --help`` prints."""
+    """The text of ``colloc --help``."""
     width = max(map(len, SUBCOMMANDS))
-    lines = [
-        "usage: colloc COMMAND ...",
-        "",
-        "The most efficient ways to crawl, found and certified.",
-        "",
-        "commands:",
-    ]
-    lines += [f"  {name:<{width}}  {summary}" for name, (_, summary) in SUBCOMMANDS.items()]
-    return "\n".join([*lines, "", _EXAMPLE])
+    head = (
+        "usage: colloc COMMAND ...\n\nThe most efficient ways to crawl, found and certified.\n\n"
+        "commands:\n"
+    )
+    lines = [f"  {name:<{width}}  {summary}" for name, (_, summary) in SUBCOMMANDS.items()]
+    return head + "\n".join([*lines, "", _EXAMPLE])
+
+
+def command(name: str) -> Command:
+    """The subcommand of that name."""
+    importlib.import_module(f"colloc.commands.{SUBCOMMANDS[name][0]}")
+    return COMMANDS[name]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``colloc``; returns the exit code."""
     one_thread_each()
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return exit_code(lambda: _command(words), as_json="--json" in words)
+    return exit_code(lambda: _run(words), as_json="--json" in words)
 
 
-def _command(words: list[str]) -> int:
+def _run(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help", "help"):
         print(help_text())
         return OK if words else BAD_PROBLEM
@@ -92,14 +55,17 @@ def _command(words: list[str]) -> int:
 
         print(", ".join(f"{name} {version}" for name, version in versions().items()))
         return OK
+    if words[0] == "referee":
+        raise ProblemError(
+            "the table of known gaits is a benchmark: python -m benchmarks.referee, in a clone."
+        )
     if words[0] not in SUBCOMMANDS:
         import difflib
 
-        near = difflib.get_close_matches(words[0], SUBCOMMANDS, n=1)
+        hints = difflib.get_close_matches(words[0], SUBCOMMANDS, n=1)
         if words[0].endswith(".py"):
-            near = [f"solve {words[0]}"]
-        hint = (
-            f"do you mean colloc {near[0]}?" if near else f"choose one of {', '.join(SUBCOMMANDS)}."
-        )
+            hints = [f"solve {words[0]}"]
+        hint = f"choose one of {', '.join(SUBCOMMANDS)}."
+        hint = f"do you mean colloc {hints[0]}?" if hints else hint
         raise ProblemError(f"there is no command {words[0]!r}; {hint}")
-    return importlib.import_module(f"colloc.commands.{SUBCOMMANDS[words[0]][0]}").main(words[1:])
+    return command(words[0])(words[1:])

@@ -1,5 +1,5 @@
-"""What the subcommands share: one way to refuse bad options, and to name the problem and the
-output."""
+"""Shared by the subcommands: their list, their options, one way to refuse bad ones, to name the
+output and to print the end."""
 
 from __future__ import annotations
 
@@ -7,22 +7,47 @@ import argparse
 import json
 import os
 import re
+import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from colloc.commands.ending import show
-from colloc.gaits.problem import Problem
-from colloc.mechanics.bodies import FORMULATIONS
+from colloc.commands.ending import run, show
 from colloc.system.errors import ProblemError
+from colloc.system.progress import StatusLine
 from colloc.system.result_names import SUFFIX, reserved_ending
 
+if TYPE_CHECKING:
+    from colloc.gaits.problem import Problem
+    from colloc.gaits.problem_file import ProblemFile
+
+SUBCOMMANDS = {
+    "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
+    "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
+    "multistart": ("families", "solve from many random starts; distinct optima, how often found"),
+    "open": ("solve", "what an archive of starts holds; the whole result of one of them"),
+    "sweep": ("families", "solve a study, a grid of problems, over processes or a cluster"),
+    "pareto": ("families", "what two objectives cost each other: a front of certified gaits"),
+    "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
+    "evaluate": ("solve", "what a gait of your own achieves: joint angles from a CSV file"),
+    "verify": ("verify", "check a result again by independent replay, without CasADi"),
+    "compare": ("verify", "hold two results against each other"),
+    "report": ("results", "one self-contained web page about a result, to read or to send"),
+    "animate": ("results", "the motion as GIF or MP4"),
+    "export": ("results", "joint angles over time for a robot, as CSV or JSON; or the robot"),
+    "robot": ("results", "speed, power and torques on a robot of so many metres and kilograms"),
+    "sensitivity": ("results", "how the best value changes with friction, lengths, feet, limits"),
+}
+"""Name to module of this package and what the command does."""
 _LONGEST_NAME = 220
 """Bytes of the name of an output: systems allow 255, and files under way have longer names than
 finished ones."""
-
-
+_MOST = 2**63 - 1
+_EXIT_CODES = """\
+Exit codes: 0 well; 1 different (compare); 2 bad problem, option or file; 3 nothing found; 4 a
+certificate failed; 130 interrupted."""
 _IN_WORDS = (
     (r"^argument (\S+): invalid int value: (.*)", r"\1 must be a whole number, not \2"),
     (r"^argument (\S+): invalid float value: (.*)", r"\1 must be a number, not \2"),
@@ -32,10 +57,15 @@ _IN_WORDS = (
     ),
 )
 """What argparse says, and how a person would."""
+Option = tuple[str, dict[str, Any]]
 
 
 class Parser(argparse.ArgumentParser):
-    """Refuses bad options in one sentence."""
+    """Refuses bad options in one sentence; line breaks of the epilog are kept."""
+
+    def __init__(self, prog: str, description: str, epilog: str) -> None:
+        style = argparse.RawDescriptionHelpFormatter
+        super().__init__(prog=prog, description=description, epilog=epilog, formatter_class=style)
 
     def error(self, message: str) -> NoReturn:
         for argparses, ours in _IN_WORDS:
@@ -43,176 +73,188 @@ class Parser(argparse.ArgumentParser):
         raise ProblemError(f"{message}; see {self.prog} --help.")
 
 
-def new_parser(command: str, description: str, epilog: str) -> Parser:
-    """The parser of ``colloc COMMAND``; line breaks of the epilog are kept."""
-    style = argparse.RawDescriptionHelpFormatter
-    return Parser(
-        prog=f"colloc {command}", description=description, epilog=epilog, formatter_class=style
-    )
+@dataclass(frozen=True, eq=False)
+class Command:
+    """A subcommand; called with its arguments it returns an exit code."""
+
+    name: str
+    epilog: str
+    options: Sequence[Option]
+    function: Callable[[argparse.Namespace], int]
+
+    def parser(self) -> Parser:
+        what = SUBCOMMANDS[self.name][1]
+        parser = Parser(
+            f"colloc {self.name}",
+            f"{what[0].upper()}{what[1:]}.",
+            f"{self.epilog}\n\n{_EXIT_CODES}",
+        )
+        for name, settings in (*self.options, *PRINTING):
+            parser.add_argument(name, **settings)
+        return parser
+
+    def __call__(self, arguments: Sequence[str] | None = None) -> int:
+        return run(self.parser(), self.function, arguments)
 
 
-def add_problem(parser: argparse.ArgumentParser) -> None:
-    """The problem file, and the changes to it that every solving command takes (see `changed`)."""
-    parser.add_argument(
-        "problem", help="a Python file that states PROBLEM, for example problems/three_link.py"
-    )
-    parser.add_argument(
-        "--delta", type=float, metavar="SPEED", help="final regularisation speed of friction"
-    )
-    parser.add_argument(
-        "--delta-start", type=float, metavar="SPEED", help="where the continuation in delta begins"
-    )
-    parser.add_argument(
-        "--mesh", dest="intervals", type=int, metavar="N", help="intervals of the first mesh"
-    )
-    parser.add_argument(
-        "--mesh-tolerance", type=float, metavar="TOL", help="relative error to refine to; 0: never"
-    )
-    parser.add_argument(
-        "--scheme", metavar="NAME", help="trapezoid, hermite-simpson, gauss-N or radau-N"
-    )
-    parser.add_argument(
-        "--formulation", choices=FORMULATIONS, help="how the balance becomes constraints"
-    )
+COMMANDS: dict[str, Command] = {}
+"""Those whose modules are imported."""
 
 
+def command(
+    name: str, epilog: str, *options: Option
+) -> Callable[[Callable[[argparse.Namespace], int]], Command]:
+    """Make a subcommand of what it does with its options."""
+
+    def register(function: Callable[[argparse.Namespace], int]) -> Command:
+        COMMANDS[name] = Command(name, epilog, options, function)
+        return COMMANDS[name]
+
+    return register
+
+
+def text(name: str, metavar: Any, help: str, **settings: Any) -> Option:
+    return name, {"metavar": metavar, "help": help, **settings}
+
+
+def number(name: str, metavar: Any, help: str, default: Any = None, **settings: Any) -> Option:
+    return text(name, metavar, help, type=float, default=default, **settings)
+
+
+def count(name: str, metavar: Any, help: str, default: Any = None, **settings: Any) -> Option:
+    return text(name, metavar, help, type=int, default=default, **settings)
+
+
+def choice(name: str, choices: Sequence[str], help: str, default: Any = None) -> Option:
+    return text(name, None, help, choices=choices, default=default)
+
+
+def flag(name: str, help: str) -> Option:
+    return name, {"action": "store_true", "help": help}
+
+
+def output(what: str) -> Option:
+    return text("--output", "PATH", what)
+
+
+PRINTING = (
+    flag("--json", "print one JSON object on standard output, and nothing else"),
+    flag("--quiet", "no progress, only the final summary"),
+)
+VERBOSE = flag("--verbose", "also tell the search, the gait and every check")
+NO_FIGURE = flag("--no-figure", "do not draw a figure")
+BOUND = flag("--bound", "compute an upper bound on every gait (a minute; kept in bounds.sqlite)")
+WORKERS = count("--workers", "N", "processes, one BLAS thread each (default: 1)", 1)
+RETRY = flag("--retry", "solve again what ended in an error, a crash or the time limit")
+RESULT = text("result", "FILE.h5", "a result that colloc solve wrote")
+PROBLEM = (
+    text("problem", None, "a Python file that states PROBLEM, for example problems/three_link.py"),
+    number("--delta", "SPEED", "final regularisation speed of friction"),
+    number("--delta-start", "SPEED", "where the continuation in delta begins"),
+    count("--mesh", "N", "intervals of the first mesh", dest="intervals"),
+    number("--mesh-tolerance", "TOL", "relative error to refine to; 0: never"),
+    text("--scheme", "NAME", "trapezoid, hermite-simpson, gauss-N or radau-N"),
+    text("--formulation", "NAME", "of the balance as constraints: full, or implicit velocity"),
+)
+"""The problem file, and the changes to it that every solving command takes."""
 _CHANGES = ("delta", "delta_start", "intervals", "mesh_tolerance", "scheme", "formulation")
+LENGTH = number("--length", "M", "of the robot, stretched [m]")
+MASS = number("--mass", "KG", "of the robot [kg]")
+ROBOT = (LENGTH, MASS, number("--gravity", "G", "default: 9.81 m/s^2", 9.81))
+PERIOD = number("--period", "S", "seconds a period takes")
+MAX_SPEED = number("--max-speed", "V", "of the joints [rad/s], one or one each", nargs="+")
+MAX_TORQUE = number("--max-torque", "M", "of the joints [N m], one or one each", nargs="+")
+PACE = (PERIOD, MAX_SPEED, MAX_TORQUE)
 
 
-def changed(problem: Problem, options: argparse.Namespace) -> Problem:
-    """The problem with the changes of `add_problem`, and with the gait of the result that
-    ``--start`` names as guess. `ProblemError` if a value cannot be used, or the gait cannot be the
-    guess; the message names the file."""
+def read_problem(options: argparse.Namespace) -> tuple[ProblemFile, Problem]:
+    """The contents of the problem file; and its problem with the changes of `PROBLEM`, and with the
+    gait of the result that ``--start`` names as guess."""
+    from colloc.gaits.problem_file import read_problem_file
+
+    stated = read_problem_file(options.problem)
     changes = {
         name: getattr(options, name) for name in _CHANGES if getattr(options, name) is not None
     }
-    problem = problem.with_(**changes) if changes else problem
+    problem = stated.problem.with_(**changes) if changes else stated.problem
     if getattr(options, "start", None) is None:
-        return problem
+        return stated, problem
     from colloc.results.store import load
 
     gait = load(options.start).gait
     try:
-        return problem.with_(guess=gait)
+        return stated, problem.with_(guess=gait)
     except ProblemError as error:
         raise ProblemError(f"the gait of {options.start} cannot be the guess: {error}") from None
 
 
-def add_result(parser: argparse.ArgumentParser) -> None:
-    """The results file that a command reads."""
-    parser.add_argument("result", metavar="FILE.h5", help="a result that colloc solve wrote")
+def robot_size(options: argparse.Namespace) -> dict[str, float]:
+    """Values of `ROBOT` by name; none where neither length nor mass was given."""
+    missing = [name for name in ("length", "mass") if getattr(options, name) is None]
+    if len(missing) == 1:
+        raise ProblemError(f"a robot needs --length and --mass; --{missing[0]} is missing.")
+    return {} if missing else values(options, "length", "mass", "gravity")
 
 
-def add_robot(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
-    """The size and mass of a robot, in SI units."""
-    parser.add_argument(
-        "--length", type=float, required=required, metavar="M", help="of the robot, stretched [m]"
-    )
-    parser.add_argument(
-        "--mass", type=float, required=required, metavar="KG", help="of the robot [kg]"
-    )
-    parser.add_argument(
-        "--gravity", type=float, default=9.81, metavar="G", help="default: 9.81 m/s^2"
-    )
+def values(options: argparse.Namespace, *names: str) -> dict[str, Any]:
+    return {name: getattr(options, name) for name in names}
 
 
-def robot_options(options: argparse.Namespace) -> dict[str, float]:
-    """Its values by name; none where neither was given. `ProblemError` where one is missing."""
-    if options.length is None and options.mass is None:
-        return {}
-    if options.length is None or options.mass is None:
-        raise ProblemError(
-            f"a robot needs --length and --mass; "
-            f"--{'length' if options.length is None else 'mass'} is missing."
-        )
-    return {name: getattr(options, name) for name in ("length", "mass", "gravity")}
+def check_least(options: argparse.Namespace, **least: int) -> None:
+    """A `ProblemError` for the first of some whole numbers that is too small, or too large."""
+    for name, smallest in least.items():
+        value = getattr(options, name)
+        if value is not None and not smallest <= value <= _MOST:
+            raise ProblemError(
+                f"--{name} must be at least {smallest}, and at most {_MOST}, not {value}."
+            )
 
 
-def add_pace(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
-    """The period of a robot, and what its motors can do."""
-    parser.add_argument(
-        "--period", type=float, required=required, metavar="S", help="seconds a period takes"
-    )
-    parser.add_argument(
-        "--max-speed",
-        type=float,
-        nargs="+",
-        metavar="V",
-        help="of the joints [rad/s], one or one each",
-    )
-    parser.add_argument(
-        "--max-torque",
-        type=float,
-        nargs="+",
-        metavar="M",
-        help="of the joints [N m], one or one each",
-    )
+def check_positive(options: argparse.Namespace, name: str) -> None:
+    if not (value := getattr(options, name)) > 0:
+        raise ProblemError(f"--{name.replace('_', '-')} must be positive, not {value:g}.")
 
 
-def pace_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Its values by name."""
-    return {name: getattr(options, name) for name in ("period", "max_speed", "max_torque")}
+def quiet(options: argparse.Namespace) -> bool:
+    return options.quiet or options.json
 
 
-def add_printing(parser: argparse.ArgumentParser) -> None:
-    """``--json`` and ``--quiet``."""
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help="print one JSON object on standard output, and nothing else",
-    )
-    parser.add_argument("--quiet", action="store_true", help="no progress, only the final summary")
+def status_line(options: argparse.Namespace) -> StatusLine:
+    """The line of progress, if it is wanted."""
+    return StatusLine(enabled=not quiet(options))
 
 
-def add_verbose(parser: argparse.ArgumentParser) -> None:
-    """``--verbose``, for commands that end in the summary of a result."""
-    parser.add_argument(
-        "--verbose", action="store_true", help="also tell the search, the gait and every check"
-    )
+def complain(sentence: str) -> None:
+    print(f"colloc: {sentence}", file=sys.stderr, flush=True)
 
 
 def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
-    """What a command ends with: one JSON object of the facts if that was asked for, else lines for
-    people."""
+    """Print the end of a command: one JSON object of the facts if that was asked for, else lines
+    for people."""
     show(json.dumps(facts) if options.json else "\n".join(lines))
 
 
-def add_bound(parser: argparse.ArgumentParser) -> None:
-    """``--bound``."""
-    parser.add_argument(
-        "--bound",
-        action="store_true",
-        help="compute an upper bound on every gait (a minute; kept in bounds.sqlite)",
-    )
-
-
 def output_kind(options: argparse.Namespace, kinds: Sequence[str]) -> str:
-    """Which of several kinds of files to write: ``--format``, else the ending of ``--output``, else
-    the first. `ProblemError` if ``--output`` ends in something else."""
-    ending = "" if _is_folder(options.output) else Path(options.output).suffix
-    if options.format is None and ending and ending.lstrip(".") not in kinds:
+    """The kind of file to write: ``--format``, else the ending of ``--output``, else the first."""
+    ending = "" if _is_folder(options.output) else Path(options.output).suffix.lstrip(".")
+    if options.format is None and ending and ending not in kinds:
         raise _wrong_ending(options.output, " or ".join(f".{kind}" for kind in kinds))
-    return options.format or ending.lstrip(".") or kinds[0]
+    return options.format or ending or kinds[0]
 
 
 def _is_folder(output: str | None) -> bool:
-    """Whether what the user named is a folder: by a separator at its end, by having no ending, or
-    because it is one."""
-    return (
-        output is None
-        or output.endswith(("/", os.sep))
-        or not Path(output).suffix
-        or os.path.isdir(output)
-    )
+    """True if the user named a folder: by a separator at its end, by having no ending, or because
+    it is one."""
+    if output is None or output.endswith(("/", os.sep)):
+        return True
+    return not Path(output).suffix or os.path.isdir(output)
 
 
 def output_folder(output: str) -> Path:
-    """The folder that the user named. `ProblemError` if it looks like a file."""
     if not _is_folder(output):
         raise ProblemError(
             f"--output {output} should be a folder, as files in it have their own names; a folder "
-            f"of that name is written "
-            f"{output}/."
+            f"of that name is written {output}/."
         )
     return Path(output)
 
@@ -225,15 +267,11 @@ def _wrong_ending(output: str, wanted: str) -> ProblemError:
 
 def output_path(output: str | None, default: Path) -> Path:
     """The file to write, in a folder that exists and can be written: what the user named, a folder
-    or a file with the suffix of `default`, or else that. `ProblemError` if nothing can be written
-    there, or it ends in another suffix, or like a file that another command makes."""
-    path = (
-        default
-        if output is None
-        else Path(output) / default.name
-        if _is_folder(output)
-        else Path(output)
-    )
+    or a file with the suffix of `default` that does not end like one that another command makes, or
+    else the default."""
+    path = default
+    if output is not None:
+        path = Path(output) / default.name if _is_folder(output) else Path(output)
     if path.suffix != default.suffix:
         raise _wrong_ending(str(path), default.suffix)
     ending = reserved_ending(path.stem) if path.suffix == SUFFIX else ""
@@ -255,8 +293,9 @@ def output_path(output: str | None, default: Path) -> Path:
         ) from None
     try:
         tempfile.TemporaryFile(dir=path.parent).close()
+        writable = not path.is_dir()
     except OSError:
-        raise ProblemError(f"cannot write {path}; choose another --output.") from None
-    if path.is_dir():
+        writable = False
+    if not writable:
         raise ProblemError(f"cannot write {path}; choose another --output.")
     return path

@@ -1,193 +1,229 @@
-"""Command line: solve a problem file, certify the result, save it and draw it."""
+"""Commands that end in one result: solve, evaluate, and open for a start of an archive."""
 
 from __future__ import annotations
 
 import argparse
 import math
-import sys
+import re
 from dataclasses import replace
 from pathlib import Path
 
-from colloc.commands import ending
-from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, command, said_if_interrupted
+from colloc.commands.ending import BAD_PROBLEM, NONE_FOUND, OK, naming_saved_files
 from colloc.commands.options import (
-    add_bound,
-    add_printing,
-    add_problem,
-    add_verbose,
-    changed,
-    new_parser,
+    BOUND,
+    NO_FIGURE,
+    PROBLEM,
+    VERBOSE,
+    check_least,
+    check_positive,
+    choice,
+    command,
+    complain,
+    count,
+    flag,
+    number,
+    output,
     output_path,
+    quiet,
+    read_problem,
+    status_line,
     tell,
+    text,
+    values,
 )
-from colloc.commands.summary import kept_facts, kept_lines, summary_dict, summary_lines
-from colloc.gaits.problem_file import read_problem_file
-from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
+from colloc.commands.summary import (
+    EXIT,
+    kept_facts,
+    kept_lines,
+    save_and_tell,
+    summary_dict,
+    summary_lines,
+)
+from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS
+from colloc.results.solution import Solution
 from colloc.system.errors import CollocError, ProblemError, StoreError
-from colloc.system.progress import StatusLine, duration
+from colloc.system.progress import duration
 
 _MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
 """Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000
 intervals."""
 SEARCHES = ("reduced", "full")
-EXIT = {
-    SOLVED: OK,
-    NOT_CONVERGED: NONE_FOUND,
-    CERTIFICATE_FAILED: FAILED,
-    INTERRUPTED: ending.INTERRUPTED,
-}
-_EPILOG = """\
-Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130
-interrupted.
 
-A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. A former result of
-another problem called NAME, or a better one of this problem, is kept as NAME.former-1.h5. What is
-found on the way is kept in NAME.run.sqlite; after Ctrl-C or a crash the same command goes on, and
-ends as if nothing had happened. Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
+
+@command(
+    "solve",
+    """\
+A failed solve is kept as NAME.failed.h5, a former result of another problem called NAME, or a
+better one of this problem, as NAME.former-1.h5. After Ctrl-C or a crash the same command goes on
+from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
 
   colloc solve problems/three_link.py
   colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
-  colloc solve mine.py --start results/three_link.h5      begin with the gait of another result"""
-
-
-def _parser() -> argparse.ArgumentParser:
-    what = (
-        "Find the best gait of a problem file, by default the most efficient, and certify "
-        "it by "
-        "an independent replay."
-    )
-    parser = new_parser("solve", what, _EPILOG)
-    add_problem(parser)
-    parser.add_argument(
-        "--start", metavar="FILE.h5", help="start from the gait of an earlier result"
-    )
-    parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
-    parser.add_argument(
-        "--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)"
-    )
-    parser.add_argument(
-        "--starts",
-        type=int,
-        metavar="N",
-        help="starts to find the best gait of, at least (default: 32); 1: the guess alone",
-    )
-    parser.add_argument(
-        "--seconds",
-        type=float,
-        default=math.inf,
-        metavar="S",
-        help="wall time allowed; then the best gait so far is the result",
-    )
-    parser.add_argument(
+  colloc solve mine.py --start results/three_link.h5      begin with the gait of another result""",
+    *PROBLEM,
+    text("--start", "FILE.h5", "start from the gait of an earlier result"),
+    flag("--fresh", "do not go on from an interrupted run"),
+    output("folder, or .h5 file (default: results/NAME.h5)"),
+    count("--starts", "N", "to find the best gait of, at least (default: 32); 1: the guess alone"),
+    number("--seconds", "S", "wall time allowed; then the best gait so far counts", math.inf),
+    choice(
         "--search",
-        choices=SEARCHES,
-        default=SEARCHES[0],
-        help="reduced: SQP on the gait's parameters, answered by IPOPT on the full program "
-        "(default); full: IPOPT on the full "
-        "program at every level of delta, from the guess alone",
-    )
-    add_bound(parser)
-    parser.add_argument(
-        "--dry",
-        action="store_true",
-        help="certify it also under dry friction, with no delta (a second)",
-    )
-    parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png")
-    parser.add_argument("--pdf", action="store_true", help="draw NAME.pdf too")
-    add_printing(parser)
-    add_verbose(parser)
-    return parser
-
-
-@command(_parser)
-def main(options: argparse.Namespace) -> int:
-    if options.starts is not None and options.starts < 1:
-        raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
-    if not options.seconds > 0:
-        raise ProblemError(f"--seconds must be positive, not {options.seconds:g}.")
-    stated = read_problem_file(options.problem)
-    problem = changed(stated.problem, options)
+        SEARCHES,
+        "reduced: SQP on the gait's parameters, answered by IPOPT on the full program (default); "
+        "full: IPOPT on the full program at every level of delta, from the guess alone",
+        SEARCHES[0],
+    ),
+    BOUND,
+    flag("--dry", "certify it also under dry friction, with no delta (a second)"),
+    NO_FIGURE,
+    flag("--pdf", "draw NAME.pdf too"),
+    VERBOSE,
+)
+def solve(options: argparse.Namespace) -> int:
+    check_least(options, starts=1)
+    check_positive(options, "seconds")
+    stated, problem = read_problem(options)
     path = output_path(options.output, Path("results") / f"{problem.name}.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.studies.saved import resumed, save_end
+    from colloc.studies.saved import resume, save_and_clear
 
-    quiet = options.quiet or options.json
-    if not quiet and problem.intervals > _MANY_INTERVALS:
+    if not quiet(options) and problem.intervals > _MANY_INTERVALS:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
-        hint = "mesh_tolerance refines a small mesh where it has to be fine"
-        print(
-            f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.",
-            file=sys.stderr,
+        complain(
+            f"{problem.intervals} intervals will take about {seconds} or more; mesh_tolerance "
+            f"refines a small mesh where it has to be fine."
         )
-    # a gait that is given on the command line is to be improved, not left for another
-    starts = options.starts or (1 if options.start else stated.starts)
-    with StatusLine(enabled=not quiet) as line:
-        solution = resumed(
+    with status_line(options) as line:
+        solution = resume(
             replace(stated, problem=problem),
             path,
-            starts=starts,
-            seconds=options.seconds,
-            search=options.search,
-            fresh=options.fresh,
+            # a gait that is given on the command line is to be improved, not left for another
+            starts=options.starts or (1 if options.start else stated.starts),
             progress=lambda news: line.say(f"{problem.name}: {news}"),
+            **values(options, "seconds", "search", "fresh"),
         )
-    bound, complaints, saved, kept = None, [], [], []
+    bound, complaints, saved, records = None, [], [], []
     if options.dry and solution.certificate.replayed:
         try:
             solution.certify_dry()
         except CollocError as error:  # what is solved is not lost for it
             complaints.append(f"no bounds under dry friction: {error}")
     try:
-        kept = save_end(solution, path)
-        path = kept[0].path
-        saved = [str(path), *(f"{one.path} (the gait that shrank)" for one in kept[1:])]
-    except StoreError as error:  # what was found is told all the same
+        records = save_and_clear(solution, path)
+        path = records[0].path
+        saved = [str(path), *(f"{one.path} (the gait that shrank)" for one in records[1:])]
+    except StoreError as error:  # the result is told all the same
         complaints.append(f"the result is not saved: {error}")
-    with said_if_interrupted(saved):
-        with StatusLine(enabled=not quiet) as line:
+    with naming_saved_files(saved):
+        with status_line(options) as line:
             if options.bound:
                 line.say("computing an upper bound on every gait")
             try:
-                bound = upper_bound(
-                    problem, path.parent, compute=options.bound and not solution.interrupted
-                )
-            except CollocError as error:  # what is solved is not lost for it
+                compute = options.bound and not solution.interrupted
+                bound = upper_bound(problem, path.parent, compute=compute)
+            except CollocError as error:
                 complaints.append(f"no bound: {error}")
-        facts = {
-            **summary_dict(solution, path if saved else None, stated.reference, bound),
-            "kept": kept_facts(kept),
-        }
-        said = summary_lines(solution, stated.reference, verbose=options.verbose)
-        tell(
-            options,
-            facts,
-            [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)],
-        )
+        facts = summary_dict(solution, path if saved else None, stated.reference, bound)
+        lines = summary_lines(solution, stated.reference, verbose=options.verbose)
+        gap = gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)
+        tell(options, facts | {"kept": kept_facts(records)}, [*lines, gap])
         if saved and not options.no_figure and not solution.interrupted:
-            with StatusLine(enabled=not quiet) as line:
+            with status_line(options) as line:
                 line.say("drawing")
                 try:
-                    saved += _drawn(solution, path, pdf=options.pdf)
+                    saved += _draw(solution, path, ("png", "pdf")[: 1 + options.pdf])
                 except CollocError as error:
                     complaints.append(f"no figure: {error}")
     if saved and not options.json:
-        print("\n".join([f"  saved {', '.join(saved)}", *kept_lines(kept)]))
+        print("\n".join([f"  saved {', '.join(saved)}", *kept_lines(records)]))
     if solution.interrupted:
         complaints.append("interrupted; the same command goes on from there.")
     for complaint in complaints:
-        print(f"colloc: {complaint}", file=sys.stderr)
+        complain(complaint)
     return BAD_PROBLEM if complaints and not solution.interrupted else EXIT[solution.status]
 
 
-def _drawn(solution: Solution, path: Path, *, pdf: bool) -> list[str]:
-    """Draw the figure beside a result; the files."""
+def _draw(solution: Solution, path: Path, kinds: tuple[str, ...]) -> list[str]:
     from colloc.pictures.solution_figure import solution_figure
     from colloc.pictures.style import save as save_figure
 
-    return [
-        str(file)
-        for file in save_figure(
-            solution_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + pdf]
+    return [*map(str, save_figure(solution_figure(solution), path.with_suffix(""), kinds))]
+
+
+@command(
+    "evaluate",
+    """\
+The file has a line for each instant: its time, then the angle of each joint. Columns are known by
+their names (joint_1 at the tail, joint_2, ...; units as _deg, [deg], time_ms); without names they
+go from tail to head. Angles are radians unless names or --degrees say otherwise. Errors hold what
+the samples are off by, with two standard deviations.
+
+  colloc evaluate problems/three_link.py mine.csv                          results/mine-evaluated.h5
+  colloc compare results/mine-evaluated.h5 results/three_link.h5
+  colloc animate results/mine-evaluated.h5""",
+    text("problem", None, "a Python file that states PROBLEM: body, friction and limits are meant"),
+    text("gait", "GAIT.csv", "times and joint angles"),
+    number("--period", "T", "in the file's unit of time (default: as it repeats itself)"),
+    count("--harmonics", "N", "of the fit (default: as many as the samples are worth)"),
+    flag("--degrees", "angles are degrees where names do not say what they are"),
+    output("folder or .h5 file (default: results/GAIT-evaluated.h5)"),
+    VERBOSE,
+)
+def evaluate(options: argparse.Namespace) -> int:
+    from colloc.gaits.problem_file import read_problem_file
+    from colloc.search.evaluate import evaluate as evaluate_gait
+
+    problem = read_problem_file(options.problem).problem
+    # of letters that a problem's name may have; not where the result is that it was exported from
+    name = re.sub(r"[^A-Za-z0-9_.-]", "_", Path(options.gait).stem) + "-evaluated"
+    given = values(options, "period", "harmonics", "degrees")
+    solution = evaluate_gait(problem.with_(name=name), options.gait, **given)
+    return save_and_tell(
+        options, solution, output_path(options.output, Path("results") / f"{name}.h5")
+    )
+
+
+@command(
+    "open",
+    """\
+Without --start: the distinct optima of the archive. With it: that start, solved again from its gait
+(from its guess, if it had failed) and saved as a result like any other.
+
+  colloc open results/three_link.starts.h5
+  colloc open results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
+    text("archive", "ARCHIVE.h5", "an archive that colloc multistart wrote"),
+    count("--start", "N", "the start to make a result of"),
+    count("--seed", "N", "of the sampler (default: 0)", 0),
+    choice("--sampler", SAMPLERS, "of the start", LATIN_HYPERCUBE),
+    output("folder, or .h5 file (default: beside the archive)"),
+    VERBOSE,
+)
+def open_archive(options: argparse.Namespace) -> int:
+    from colloc.commands.families import starts_summary
+    from colloc.results.archive import StartName, archive_at
+
+    archive = archive_at(options.archive)
+    problem = archive.problem
+    if options.start is None:
+        outcomes = list(archive.outcomes.values())
+        optima, facts, lines = starts_summary(problem, outcomes, archive.path)
+        tell(options, facts, lines)
+        return OK if optima else NONE_FOUND
+    start = StartName(options.sampler, options.seed, options.start)
+    if start not in archive.outcomes:
+        there = sorted({f"{name.sampler} seed {name.seed}" for name in archive.outcomes})
+        raise ProblemError(
+            f"{options.archive} holds no start {options.start} of {options.sampler} seed "
+            f"{options.seed}; it holds {len(archive.outcomes)} starts of "
+            f"{', '.join(there) or 'no sampler'}."
         )
-    ]
+    name = f"{problem.name}.start-{options.start}.h5"
+    path = output_path(options.output, Path(options.archive).with_name(name))
+    # heavy imports only now: a bad option is refused at once
+    from colloc.studies.calls import reopen
+
+    with status_line(options) as line:
+        line.say(f"{problem.name}: start {options.start}")
+        solution = reopen(problem, archive.outcomes[start])
+    return save_and_tell(options, solution, path)

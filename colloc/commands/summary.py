@@ -1,61 +1,81 @@
-"""What is said of a solution at its end: lines for people, and one JSON object."""
+"""The end of a command about a solution: lines for people, and one JSON object."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from colloc.commands import ending
+from colloc.commands.ending import FAILED, NONE_FOUND, OK
+from colloc.commands.options import tell
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
 from colloc.results import limit_use
 from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
 from colloc.results.checks import Certificate
-from colloc.results.solution import Solution
+from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import NotConvergedError
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
     from colloc.results.kept import Saved
 
+EXIT = {
+    SOLVED: OK,
+    NOT_CONVERGED: NONE_FOUND,
+    CERTIFICATE_FAILED: FAILED,
+    INTERRUPTED: ending.INTERRUPTED,
+}
+
+
+def save_and_tell(options: argparse.Namespace, solution: Solution, path: Path) -> int:
+    """Save a solution, print its summary, and return the exit code."""
+    from colloc.results.kept import save_result
+
+    saved = save_result(solution, path)
+    facts = {**summary_dict(solution, saved[0].path, None, None), "kept": kept_facts(saved)}
+    lines = summary_lines(solution, None, verbose=options.verbose)
+    tell(options, facts, [*lines, f"  saved {saved[0].path}", *kept_lines(saved)])
+    return EXIT[solution.status]
+
 
 def summary_lines(
     solution: Solution, reference: Reference | None, *, verbose: bool = False
 ) -> list[str]:
-    """What a person wants to know at the end: the result, whether the checks hold, and what failed;
-    with `verbose` also the search, the gait and every check."""
+    """The result, whether the checks hold, and what failed, for people; with `verbose` also the
+    search, the gait and every check."""
     verdict = f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"
-    certificate = solution.certificate
+    certificate, best = solution.certificate, solution.problem.objective
     lines = [verdict]
     if certificate.replayed:
         # what these are the best of, `_search_lines` tells
         alone = solution.answer.program in (PRESCRIBED, EVALUATED)
-        best = solution.problem.objective
         lines = [
             verdict if alone else f"{verdict} ({solution.standing[0]})",
             f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e} by "
-            f"independent replay "
-            f"({certificate.instants} instants); {certificate.value_at_zero_delta:.6f} +- "
+            f"independent replay ({certificate.instants} instants); "
+            f"{certificate.value_at_zero_delta:.6f} +- "
             f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
-            *_besides(solution),
+            *_quantities(solution),
             f"  distance d      {certificate.distance:.6f} +- "
-            f"{certificate.errors['distance']:.0e}      "
-            f"work W  {certificate.work:.6f} +- {certificate.errors['work']:.0e}      at delta "
-            f"{solution.answer.delta:.0e}",
+            f"{certificate.errors['distance']:.0e}      work W  {certificate.work:.6f} +- "
+            f"{certificate.errors['work']:.0e}      at delta {solution.answer.delta:.0e}",
+            *(_background(solution) if verbose else []),
+            *_check_lines(certificate, verbose),
         ]
-        lines += _background(solution) if verbose else []
-        lines += _check_lines(certificate, verbose)
         if reference is not None:
-            lines.append(f"  {reference.verdict(solution.certificate.efficiency)}")
+            lines.append(f"  {reference.verdict(certificate.efficiency)}")
     if solution.message:
         lines.append(f"  {solution.message}")
     return lines
 
 
 def _background(solution: Solution) -> list[str]:
-    """How the gait was found, where it moves, and the gait itself."""
+    """The search, the scene, and the gait itself."""
     problem = solution.problem
     paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
     gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
@@ -71,122 +91,94 @@ def _check_lines(certificate: Certificate, verbose: bool) -> list[str]:
     those that fail."""
     if verbose:
         return [f"  {check.line()}" for check in certificate.checks]
-    held = [check for check in certificate.checks if check.passed]
-    nearest = max(
-        held, key=lambda check: abs(check.value) / max(check.threshold, 1e-300), default=None
-    )
     lines = [f"  {check.line()}" for check in certificate.failures]
-    if nearest is not None:
-        largest = (
-            f"largest: {nearest.name}, {abs(nearest.value):.1e} where "
-            f"{nearest.threshold:.0e} is allowed"
+    passed = [check for check in certificate.checks if check.passed]
+    if passed:
+        nearest = max(passed, key=lambda check: abs(check.value) / max(check.threshold, 1e-300))
+        lines.insert(
+            0,
+            f"  {len(passed)} checks hold (largest: {nearest.name}, {abs(nearest.value):.1e} where "
+            f"{nearest.threshold:.0e} is allowed)",
         )
-        lines.insert(0, f"  {len(held)} checks hold ({largest})")
     return lines
 
 
-def _besides(solution: Solution) -> list[str]:
-    """What a period comes to that its objective, and what is asked for, make worth telling."""
-    found, problem, lines = solution.certificate, solution.problem, []
+def _quantities(solution: Solution) -> list[str]:
+    """Results of a period that its objective, and what is asked for, make worth telling."""
+    period, problem, rows = solution.certificate, solution.problem, []
     if problem.objective != EFFICIENCY:
-        lines.append(
-            f"  {EFFICIENCY.label:<15s} {found.efficiency:.6f} +- {found.efficiency_error:.0e}"
-        )
-    if found.dry is not None:
-        lines.append(
-            f"  dry friction    between {found.dry[0]:.8f} and {found.dry[1]:.8f}, with no delta"
-        )
-    lines += [
-        f"  {each.name.replace('_', ' '):<15s} {found.values[each.name]:.6f}"
-        for each in problem.integrals
-    ]
+        error = f"{period.efficiency_error:.0e}"
+        rows.append((EFFICIENCY.label, f"{period.efficiency:.6f} +- {error}"))
+    if period.dry is not None:
+        low, high = period.dry
+        rows.append(("dry friction", f"between {low:.8f} and {high:.8f}, with no delta"))
+    for each in problem.integrals:
+        rows.append((each.name.replace("_", " "), f"{period.values[each.name]:.6f}"))
     with suppress(NotConvergedError):  # of what a slope holds only while it moves
         if problem.froude:
-            slowly = (
-                f"{solution.played_slowly:.6f} ({problem.objective.short} of the same gait "
-                f"without inertia)"
-            )
-            lines.append(f"  played slowly   {slowly}")
+            what = f"({problem.objective.short} of the same gait without inertia)"
+            rows.append(("played slowly", f"{solution.played_slowly:.6f} {what}"))
     if (held := solution.share_held).any():
         shares = ", ".join(f"{100 * share:.0f}" for share in held)
-        lines.append(f"  feet hold       {shares} % of the period, from the tail")
+        rows.append(("feet hold", f"{shares} % of the period, from the tail"))
     if (travels := solution.travels) != "head first":
-        lines.append(f"  travels         {travels}")
-    lines += [f"  limits          {text}" for text in limit_use.lines(solution)]
+        rows.append(("travels", travels))
+    rows += [("limits", text) for text in limit_use.lines(solution)]
     if problem.rotation != 0:
-        lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
-    return lines
+        rows.append(("net rotation", f"{period.rotation:.6f} rad: {solution.turning}"))
+    return [f"  {name:<15s} {text}" for name, text in rows]
 
 
 def _search_lines(solution: Solution) -> list[str]:
-    """What was solved last, and what the gait is the best of."""
+    """The program that was solved last, and what the gait is the best of."""
     answer = solution.answer
+    measured = f"measured on a mesh of {answer.edges.size - 1} intervals"
     if answer.program == PRESCRIBED:
-        return [
-            f"nothing is free: the motion is prescribed, measured on a mesh of "
-            f"{answer.edges.size - 1} intervals"
-        ]
+        return [f"nothing is free: the motion is prescribed, {measured}"]
     if answer.program == EVALUATED:
-        return [
-            f"nothing is sought: the gait was given, measured on a mesh of {answer.edges.size - 1} "
-            f"intervals"
-        ]
+        return [f"nothing is sought: the gait was given, {measured}"]
     rows = f"{answer.x.size} variables, {answer.lam_g.size} constraints"
     how = f"{answer.iterations} iterations of IPOPT" if answer.program != REDUCED else answer.status
-    lines = [
-        f"{solution.problem.formulation} program: {rows}, {how}, KKT error {answer.kkt_error:.0e}"
-    ]
-    return [*lines, *solution.standing]
+    program = f"{solution.problem.formulation} program: {rows}, {how}"
+    return [f"{program}, KKT error {answer.kkt_error:.0e}", *solution.standing]
 
 
 def summary_dict(
     solution: Solution, path: Path | None, reference: Reference | None, bound: Bound | None
 ) -> dict:
-    """The same as one JSON object; without a path nothing is saved."""
-    certificate = solution.certificate
-    result: dict = {
-        "name": solution.problem.name,
+    """A solution as one JSON object; without a path it is not saved."""
+    problem, answer, certificate = solution.problem, solution.answer, solution.certificate
+    replayed = certificate.replayed
+    numbers = ("value", "efficiency", "distance", "work", "travels")
+    other = ("value", "delta", "starts", "on_speed_floor")
+    stated = ("efficiency", "tolerance", "source")
+    return {
+        "name": problem.name,
         "status": solution.status,
         "message": solution.message,
         "file": None if path is None else str(path),
-        "problem_hash": solution.problem.hash,
+        "problem_hash": problem.hash,
         "seconds": solution.seconds,
-        "delta": solution.answer.delta,
-        "objective": solution.problem.objective.fields(),
-        "value": solution.value,
-        "efficiency": solution.efficiency,
-        "distance": solution.distance,
-        "work": solution.work,
-        "travels": solution.travels,
+        "delta": answer.delta,
+        "objective": problem.objective.fields(),
+        **{name: getattr(solution, name) for name in numbers},
         "iterations": sum(step.iterations for step in solution.history),
-        "class": solution.problem.gait.describe(),
-        "program": solution.answer.program,
-        "variables": int(solution.answer.x.size),
-        "constraints": int(solution.answer.lam_g.size),
-        "kkt_error": solution.answer.kkt_error,
+        "class": problem.gait.describe(),
+        "program": answer.program,
+        "variables": int(answer.x.size),
+        "constraints": int(answer.lam_g.size),
+        "kkt_error": answer.kkt_error,
         "starts": solution.starts,
         "shrunk": None if solution.shrunk is None else solution.shrunk.value,
-        "limits": limit_use.shares(solution) if certificate.replayed else {},
-        "feet_hold": solution.share_held.tolist() if certificate.replayed else [],
-        "others": [
-            {
-                "value": a.value,
-                "delta": a.delta,
-                "starts": a.starts,
-                "on_speed_floor": a.on_speed_floor,
-            }
-            for a in solution.others
-        ],
+        "limits": limit_use.shares(solution) if replayed else {},
+        "feet_hold": solution.share_held.tolist() if replayed else [],
+        "others": [{name: getattr(each, name) for name in other} for each in solution.others],
         "gait": fields(solution.gait),
-        "certificate": certificate.facts() if certificate.replayed else None,
-        "reference": None,
+        "certificate": certificate.facts() if replayed else None,
+        "reference": reference and {name: getattr(reference, name) for name in stated},
         "bound": bound_facts(bound),
         "versions": solution.versions,
     }
-    if reference is not None:
-        keys = ("efficiency", "tolerance", "source")
-        result["reference"] = {key: getattr(reference, key) for key in keys}
-    return result
 
 
 def bound_facts(bound: Bound | None) -> dict | None:
@@ -195,10 +187,10 @@ def bound_facts(bound: Bound | None) -> dict | None:
 
 
 def kept_lines(saved: Sequence[Saved]) -> list[str]:
-    """What became of former results, for people."""
+    """The places of former results, for people."""
     return [f"  {one.why} is kept as {one.former}" for one in saved if one.former is not None]
 
 
 def kept_facts(saved: Sequence[Saved]) -> list[str]:
-    """Where former results are now, as the one JSON object lists them."""
+    """The places of former results, as the one JSON object lists them."""
     return [str(one.former) for one in saved if one.former is not None]

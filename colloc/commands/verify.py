@@ -1,4 +1,4 @@
-"""Command line: check a result again, from the file alone and without CasADi.
+"""Commands that hold a result against a new replay, or against another result; without CasADi.
 
 The gait is replayed anew by the NumPy solver, on other instants than before; optimality (KKT error,
 violation) is what the solver recorded, since it takes derivatives of the whole program.
@@ -7,125 +7,79 @@ violation) is what the solver recorded, since it takes derivatives of the whole 
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from colloc.commands.ending import FAILED, OK, command
-from colloc.commands.options import add_printing, add_result, new_parser, tell
+from colloc.commands.ending import FAILED, OK
+from colloc.commands.options import RESULT, command, flag, number, status_line, tell, text
+from colloc.gaits.objective import EFFICIENCY
 from colloc.results.checks import Certificate
+from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE, distance, fourier_series
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.search.certify import certify
 from colloc.system.errors import ProblemError
-from colloc.system.progress import StatusLine
 
-_EPILOG = """\
-Exit codes: 0 certified; 2 bad file; 4 a check fails, or the certificate in the file says something
-else.
-
-CasADi is not needed: the gait in the file is replayed with the NumPy solver on a grid of instants
-that no earlier replay used. KKT error and constraint violation are the solver's own record.
-
-  colloc verify results/three_link.h5
-  colloc verify results/three_link.h5 --tolerance 1e-8
-  colloc verify results/three_link.h5 --dry"""
+DIFFERENT = 1
 _TOLERANCE = 1e-6
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
-"""Certified and rechecked numbers may differ by so many times the sum of their estimated errors,
-and 1e-9; these errors by so many times the smaller one, and the tolerance: replays on other
-instants estimate them anew (measured: 2.2 and 8)."""
+"""Certified and new numbers may differ by so many times the sum of their estimated errors, and
+1e-9; these errors by so many times the smaller one, and the tolerance: replays on other instants
+estimate them anew (measured: 2.2 and 8)."""
 _MOST_INSTANTS = 100_000
-_NUMBERS = (
-    ("efficiency", "efficiency_error", "an efficiency"),
-    ("value", "value_error", "a value"),
-    ("distance", "distance_error", "a distance"),
-    ("work", "work_error", "a work"),
-    ("efficiency_at_zero_delta", "error_at_zero_delta", "an efficiency for delta -> 0"),
-    ("value_at_zero_delta", "value_error_at_zero_delta", "a value for delta -> 0"),
-    ("rotation", "", "a rotation"),
-)
-"""What a certificate states: its number, the error of it, and words. What has no error of its own
-is known to the tolerance."""
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = new_parser(
-        "verify", "Check a result again by independent replay, without CasADi.", _EPILOG
-    )
-    add_result(parser)
-    parser.add_argument(
-        "--tolerance",
-        type=float,
-        default=_TOLERANCE,
-        metavar="TOL",
-        help="of the replayed efficiency, relative",
-    )
-    parser.add_argument(
-        "--dry", action="store_true", help="also bounds under dry friction, with no delta"
-    )
-    add_printing(parser)
-    return parser
+_NUMBERS = {
+    "efficiency": ("efficiency_error", "an efficiency"),
+    "value": ("value_error", "a value"),
+    "distance": ("distance_error", "a distance"),
+    "work": ("work_error", "a work"),
+    "efficiency_at_zero_delta": ("error_at_zero_delta", "an efficiency for delta -> 0"),
+    "value_at_zero_delta": ("value_error_at_zero_delta", "a value for delta -> 0"),
+    "rotation": ("", "a rotation"),
+}
+"""Numbers of a certificate: the error of each, and words. What has no error of its own is known to
+the tolerance."""
 
 
 def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TOLERANCE) -> str:
-    """A sentence if the certificate in a file is not what a new one says, in any of its numbers;
-    empty if they agree."""
+    """A sentence if the certificate in a file is not what a new one says; empty if they agree."""
     if not recorded.replayed:
         return "the file holds no certificate."
     recorded, now = recorded.by_replay, now.by_replay  # what samples are off by is not found anew
-    besides = [
-        (name, "", f"a {name.replace('_', ' ')}")
-        for name in recorded.values
-        if name not in dict.fromkeys(n for n, *_ in _NUMBERS)
-    ]
-    for name, error, words in (*_NUMBERS, *besides):
-        stated, found = recorded.numbers[name], now.numbers.get(name, float("nan"))
-        own = max(tolerance, _TOLERANCE) * max(abs(found), 1.0)
-        errors = [each.numbers[error] for each in (recorded, now)] if error else [own, 0.0]
-        if error and not max(errors) <= _SAME_SIZE * min(errors) + own:
+    others = (name for name in recorded.values if name not in _NUMBERS)
+    numbers = _NUMBERS | {name: ("", f"a {name.replace('_', ' ')}") for name in others}
+    for name, (error, words) in numbers.items():
+        stated, value = recorded.numbers[name], now.numbers.get(name, float("nan"))
+        rounding = max(tolerance, _TOLERANCE) * max(abs(value), 1.0)
+        errors = [each.numbers[error] for each in (recorded, now)] if error else [rounding, 0.0]
+        if error and not max(errors) <= _SAME_SIZE * min(errors) + rounding:
             return (
                 f"the file certifies {words} with an error of {errors[0]:.0e}, where "
                 f"{errors[1]:.0e} is found."
             )
-        if not abs(found - stated) <= _AGREEMENT * sum(errors) + 1e-9:
+        if not abs(value - stated) <= _AGREEMENT * sum(errors) + 1e-9:
             return (
-                f"the file certifies {words} of {stated:.8f}, which is off by {stated - found:.1e}."
+                f"the file certifies {words} of {stated:.8f}, which is off by {stated - value:.1e}."
             )
-    return _other_checks(recorded, now)
-
-
-def _other_checks(recorded: Certificate, now: Certificate) -> str:
-    """A sentence if a file's checks are not those of a new certificate, or end otherwise."""
     before, after = ({check.name: check for check in each.checks} for each in (recorded, now))
     if before.keys() != after.keys():
         missing = ", ".join(sorted(before.keys() ^ after.keys()))
         return f"the file's certificate has not the checks of a new one: {missing}."
-    for name, check in before.items():
-        if (
-            name != "replay error" and check.threshold != after[name].threshold
-        ):  # that one is as large as asked for
+    for name, check in before.items():  # the replay error may be as large as asked for
+        allowed = after[name].threshold
+        if name != "replay error" and check.threshold != allowed:
             return (
                 f"the file allows {check.threshold:.0e} for the check {name!r}, and "
-                f"{after[name].threshold:.0e} is allowed."
+                f"{allowed:.0e} is allowed."
             )
     if recorded.passed and not now.passed:
         return "the file's certificate passed all checks, the new one does not."
     return ""
 
 
-def _dry_disagreement(recorded: tuple[float, float] | None, now: tuple[float, float]) -> str:
-    """A sentence if a file states other bounds under dry friction than there are; empty if it
-    states none."""
-    if recorded is None or np.allclose(recorded, now, rtol=_TOLERANCE, atol=0):
-        return ""
-    return (
-        f"the file certifies between {recorded[0]:.8f} and {recorded[1]:.8f} under dry "
-        f"friction, which is not what is found."
-    )
-
-
-def rechecked(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
+def recheck_certificate(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
     """The solution with a new certificate, on other instants than before; first- and second-order
     conditions are those that the answer states."""
     before = min(solution.certificate.instants or 1600, _MOST_INSTANTS)
@@ -134,46 +88,160 @@ def rechecked(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
     return replace(solution, certificate=certificate.with_samples(solution.certificate.of_samples))
 
 
-@command(_parser)
-def main(options: argparse.Namespace) -> int:
+@command(
+    "verify",
+    """\
+The gait in the file is replayed with the NumPy solver on a grid of instants that no earlier replay
+used. KKT error and constraint violation are the solver's own record.
+
+  colloc verify results/three_link.h5
+  colloc verify results/three_link.h5 --tolerance 1e-8
+  colloc verify results/three_link.h5 --dry""",
+    RESULT,
+    number("--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE),
+    flag("--dry", "also bounds under dry friction, with no delta"),
+)
+def verify(options: argparse.Namespace) -> int:
     if not 0 < options.tolerance < 1:
         raise ProblemError(f"--tolerance must lie between 0 and 1, not {options.tolerance:g}.")
     solution = load(options.result)
-    with StatusLine(enabled=not (options.quiet or options.json)) as line:
-        line.say(f"{solution.problem.name}: replaying")
-        again = rechecked(solution, options.tolerance)
-    certificate = again.certificate
-    complaint = disagreement(solution.certificate, certificate, options.tolerance)
-    good = certificate.passed and not complaint and solution.success
-    facts = {
-        "file": options.result, "objective": solution.problem.objective.name,
-        "name": solution.problem.name,
-        "certified": good, "complaint": complaint,
-    }  # fmt: skip
-    dry = solution.dry() if options.dry or solution.certificate.dry is not None else None
-    if dry is not None:
-        complaint = complaint or _dry_disagreement(solution.certificate.dry, dry.efficiency)
-        good = good and not complaint
-        facts |= {"dry": dry.facts(), "certified": good, "complaint": complaint}
-    lines = [
-        f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}",
-        f"  {solution.problem.objective.label:<15s} {certificate.value:.8f} +- "
-        f"{certificate.value_error:.0e} by replay "
-        f"({certificate.instants} instants)",
-    ]
-    if solution.certificate.replayed:
-        recorded = solution.certificate
-        lines.append(
-            f"  in the file     {recorded.value:.8f} +- {recorded.value_error:.0e} "
-            f"({recorded.instants} instants)"
+    problem, recorded = solution.problem, solution.certificate
+    with status_line(options) as line:
+        line.say(f"{problem.name}: replaying")
+        now = recheck_certificate(solution, options.tolerance).certificate
+    complaint = disagreement(recorded, now, options.tolerance)
+    dry = solution.dry() if options.dry or recorded.dry is not None else None
+    if (
+        dry is not None
+        and recorded.dry is not None
+        and not np.allclose(recorded.dry, dry.efficiency, rtol=_TOLERANCE, atol=0)
+    ):
+        complaint = complaint or (
+            f"the file certifies between {recorded.dry[0]:.8f} and {recorded.dry[1]:.8f} under dry "
+            f"friction, which is not what is found."
         )
+    good = now.passed and not complaint and solution.success
+    lines = [
+        f"{problem.name}: {'certified' if good else 'NOT CERTIFIED'}",
+        f"  {problem.objective.label:<15s} {now.value:.8f} +- {now.value_error:.0e} by replay "
+        f"({now.instants} instants)",
+    ]
+    if recorded.replayed:
+        value = f"{recorded.value:.8f} +- {recorded.value_error:.0e}"
+        lines.append(f"  in the file     {value} ({recorded.instants} instants)")
     if not options.quiet:
-        lines += [f"  {check.line()}" for check in certificate.checks]
+        lines += [f"  {check.line()}" for check in now.checks]
     if complaint:
         lines.append(f"  {complaint}")
-    if solution.status != "solved" and certificate.passed:
+    if solution.status != "solved" and now.passed:
         lines.append(f"  the solve itself ended as: {solution.status}. {solution.message}")
     if dry is not None:
         lines.append(f"  dry friction: {dry}")
-    tell(options, {**facts, **certificate.facts()}, lines)
+    facts = {
+        "file": options.result,
+        "objective": problem.objective.name,
+        "name": problem.name,
+        "certified": good,
+        "complaint": complaint,
+        **({} if dry is None else {"dry": dry.facts()}),
+    }
+    tell(options, facts | now.facts(), lines)
     return OK if good else FAILED
+
+
+def gait_distance(a: Solution, b: Solution) -> float | None:
+    """Root-mean-square distance [rad] of the joint angles of two gaits, where start phase and the
+    symmetries of body and friction bring them nearest; None for other bodies."""
+    if a.problem.body != b.problem.body:
+        return None
+    law = b.problem.law if a.problem.law.reversible else a.problem.law
+    first, second = (fourier_series(each.problem, each.gait) for each in (a, b))
+    return distance(first, second, a.problem.body, law)
+
+
+def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
+    """True if the two are the same optimum; and why, in a sentence."""
+    what, other = a.problem.objective, b.problem.objective
+    if other != what:
+        return False, f"other objectives: {what.name} and {other.name}."
+    values = [each.measured.value for each in (a, b)]
+    difference = abs(values[0] - values[1]) / max(*map(abs, values), 1e-300)
+    apart = gait_distance(a, b)
+    values_of = "efficiencies" if what == EFFICIENCY else f"values of {what.name}"
+    differ = f"{values_of} differ by {100 * difference:.3g} %"
+    if apart is None:
+        return False, f"other bodies; {differ}."
+    same = difference <= SAME_VALUE and apart < SAME_GAIT
+    return same, (
+        f"{'the same optimum' if same else 'different'}: {differ}, joint angles by {apart:.3g} rad "
+        f"(root mean square)."
+    )
+
+
+def _changed_fields(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
+    """Fields of the two problems that differ, as text."""
+    first, second = a.problem.to_dict(), b.problem.to_dict()
+    names = [name for name in {**first, **second} if first.get(name) != second.get(name)]
+    return [(name, _short(first.get(name)), _short(second.get(name))) for name in names]
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 44 else text[:41] + "..."
+
+
+def _outcome(solution: Solution) -> dict[str, str]:
+    """Results of a solution, as text."""
+    answer, certificate, measured = solution.answer, solution.certificate, solution.measured
+    error, value_error, limit = " (not replayed)", "-", "-"
+    if certificate.replayed:
+        error = f" +- {certificate.efficiency_error:.0e}"
+        value_error = f"{certificate.value_error:.0e}"
+        limit = f"{certificate.efficiency_at_zero_delta:.6f}"
+    return {
+        "": solution.problem.name,
+        "status": solution.status,
+        "objective": solution.problem.objective.name,
+        "value": f"{measured.value:.6f}",
+        "  error": value_error,
+        "efficiency": f"{measured.efficiency:.6f}{error}",
+        "  at delta -> 0": limit,
+        "distance d": f"{measured.distance:.6f}",
+        "work W": f"{measured.work:.6f}",
+        "delta": f"{answer.delta:.1e}",
+        "intervals": str(answer.edges.size - 1),
+        "iterations": str(sum(step.iterations for step in solution.history)),
+        "seconds": f"{solution.seconds:.1f}",
+    }
+
+
+@command(
+    "compare",
+    """\
+Joint angles are compared at the start phase, and in the mirror image, where they are nearest; of a
+symmetric body also values_of from the other end, under friction that is the same both ways also run
+backwards.
+
+  colloc compare results/a.h5 results/b.h5""",
+    text("first", "A.h5", "a result that colloc solve wrote"),
+    text("second", "B.h5", "another one"),
+)
+def compare(options: argparse.Namespace) -> int:
+    a, b = load(options.first), load(options.second)
+    same, sentence = verdict(a, b)
+    changes, second = _changed_fields(a, b), _outcome(b)
+    rows = [(name, value, second[name]) for name, value in _outcome(a).items()]
+    facts = {
+        "same": same,
+        "verdict": sentence,
+        "results": {name.strip() or "name": [x, y] for name, x, y in rows},
+        "problem": {name: [x, y] for name, x, y in changes},
+    }
+    lines = [("", Path(options.first).name, Path(options.second).name), *rows]
+    if changes and not options.quiet:
+        lines += [("", "", ""), ("problem:", "", "")]
+        lines += [(f"  {name}", x, y) for name, x, y in changes]
+    widths = [max(len(line[k]) for line in lines) for k in range(2)]
+    table = [f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines]
+    tell(options, facts, [*table, sentence])
+    return OK if same else DIFFERENT

@@ -1,5 +1,4 @@
-"""When two gaits are the same (start phase, symmetries of body and friction), and the distinct
-optima among many starts.
+"""Symmetry images of gaits, and the distinct optima among many starts.
 
 With X(s, t) the position of the body, the following map motions in balance to motions in balance
 with the same distance and work. All are statements about joint angles q_j, counted from the tail, n
@@ -8,18 +7,19 @@ of them:
 - *phase*   q_j(t + a), for every body and friction.
 - *mirror*  -q_j(t), for every body and friction.
 - *reversal*  q_j(-t), if mu_b = mu_f: velocities and forces change sign.
-- *swap*    -q_(n+1-j)(t), the body named from its other end, if it reads the same from there and mu_b = mu_f.
-- *reversed swap*  -q_(n+1-j)(-t), if the body reads the same from both ends, for *every* friction: X(1 - s, -t) has the
-  opposite tangent and the opposite velocity, so every link slides forwards where it did and all
-  forces change sign.
+- *swap*    -q_(n+1-j)(t), the body named from its other end, if it reads the same from there and
+  mu_b = mu_f.
+- *reversed swap*  -q_(n+1-j)(-t), if the body reads the same from both ends, for *every* friction:
+  X(1 - s, -t) has the opposite tangent and the opposite velocity, so every link slides forwards
+  where it did and all forces change sign.
 
 The last one is why a gait of bilateral symmetry closes its rotation whatever mu_b / mu_f is: it is
 its own image, and the image turns the other way.
-"""  # noqa: E501
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -33,9 +33,14 @@ from colloc.mechanics.law import Law
 from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
 
-Image = Callable[[Fourier], Fourier]
 _GRID = 64
 _NEWTON_STEPS = 6
+SAME_VALUE, SAME_GAIT = 1e-3, 0.05
+"""Two gaits are one if their values differ by less than this relative amount and their paths by
+less than this root-mean-square distance [rad], modulo symmetries. The objective is flat at its
+maximum, so the path is the laxer."""
+SERIES_HARMONICS = 16
+"""Free paths and polygons are tabulated and told apart by their Fourier series in arc length."""
 
 
 def reversed_in_time(gait: Fourier) -> Fourier:
@@ -44,7 +49,7 @@ def reversed_in_time(gait: Fourier) -> Fourier:
 
 
 def swapped(gait: Fourier, body: Body) -> Fourier:
-    """The same shapes with tail and head exchanged: of chains -q_(n+1-j)(t)."""
+    """The shapes with tail and head exchanged: of chains -q_(n+1-j)(t)."""
     return Fourier(*(body.swapped(rows) for rows in (gait.mean, gait.cos, gait.sin)))
 
 
@@ -53,9 +58,7 @@ def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
     start phase."""
     result = []
     for mirror, reversal, swap in product((False, True), repeat=3):
-        if swap and not body.symmetric:
-            continue
-        if reversal != swap and not friction.reversible:
+        if (swap and not body.symmetric) or (reversal != swap and not friction.reversible):
             continue
         image = gait.mirrored if mirror else gait
         image = reversed_in_time(image) if reversal else image
@@ -90,21 +93,11 @@ def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
     return min(phase_distance(a, image) for image in images(b, body, friction))
 
 
-SAME_VALUE, SAME_GAIT = 1e-3, 0.05
-"""Two gaits are one if their values differ by less than this relative amount and their paths by
-less than this root-mean-square distance [rad], modulo symmetries. The objective is flat at its
-maximum, so the path is the laxer."""
-
-
 def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, friction: Law) -> bool:
-    """Whether two gaits, each given by its value and its path, are the same gait."""
+    """True if two gaits, each by its value and its path, are the same gait."""
     (one, path), (other, near) = a, b
     close = abs(one - other) <= SAME_VALUE * max(abs(one), abs(other))
     return close and distance(path, near, body, friction) < SAME_GAIT
-
-
-SERIES_HARMONICS = 16
-"""Polygons are tabulated and told apart by their Fourier series in arc length."""
 
 
 def series_class(problem: Problem) -> Harmonic:
@@ -145,16 +138,15 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     Outcomes join the first, better, optimum they agree with in value and in gait modulo start phase
     and the symmetries of body and friction (see `images`).
     """
-    solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value)
-    found: list[tuple[list[Outcome], Fourier]] = []
-    for outcome in solved:
+    groups: list[tuple[list[Outcome], Fourier]] = []
+    for outcome in sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value):
         path = fourier_series(problem, outcome.gait)
-        for members, near in found:
+        for members, near in groups:
             if are_one((members[0].value, near), (outcome.value, path), problem.body, problem.law):
                 members.append(outcome)
                 break
         else:
-            found.append(([outcome], path))
+            groups.append(([outcome], path))
     return [
-        Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m, _ in found
+        Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m, _ in groups
     ]

@@ -15,26 +15,17 @@ from colloc.results.solution import Solution
 from colloc.system.errors import StoreError
 from colloc.system.interruption import interruptible
 from colloc.system.replaced_file import alone_in
-from colloc.system.result_names import FAILED, INTERRUPTED, SHRUNK, beside, former
+from colloc.system.result_names import FAILED, INTERRUPTED, SHRUNK, beside
 
-_HOW = ("guess", "intervals", "scheme", "formulation", "mesh_tolerance", "delta_start")
+_HOW = {"guess", "intervals", "scheme", "formulation", "mesh_tolerance", "delta_start"}
 """Fields of a problem that say how it is solved: results that differ in these alone answer the same
 question."""
 
 
 @dataclass(frozen=True)
 class Saved:
-    """A result that was saved, and what became of the one that was there.
-
-    Attributes
-    ----------
-    path : Path
-        Of the result.
-    former : Path, optional
-        Where the former one is kept now; None if there was none, or none worth it.
-    why : str
-        What the former one is, in words.
-    """
+    """A result that was saved at `path`; where the former one is kept now, if it is, and what that
+    one is, in words."""
 
     path: Path
     former: Path | None = None
@@ -43,48 +34,45 @@ class Saved:
 
 def save_result(solution: Solution, path: Path) -> list[Saved]:
     """Save a solution at `path` (NAME.h5), or beside it if it failed (NAME.failed.h5) or was
-    interrupted (NAME.interrupted.h5); and the better gait that shrank, if there is one, as
+    interrupted (NAME.interrupted.h5); then the better gait that shrank, if there is one, as
     NAME.shrunk.h5.
 
     A result that is there already is replaced only by an answer to the same question that is as
     good, and only if nobody added anything to it. Else it is kept, with its figures, under the
     first free name of NAME.former-1.h5, NAME.former-2.h5, ... Ctrl-C waits until all is saved.
-
-    Returns
-    -------
-    list of Saved
-        The solution first.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written; what was there is left as it was.
+    `StoreError` if the folder cannot be written; what was there is left as it was.
     """
     place = path
     if not solution.success:
         place = beside(path, INTERRUPTED if solution.interrupted else FAILED)
     with interruptible(), alone_in(path.parent):
-        saved = [_saved(solution, place)]
+        saved = [_save(solution, place)]
         if solution.shrunk is not None:
-            saved.append(_saved(solution.shrunk, beside(path, SHRUNK)))
+            saved.append(_save(solution.shrunk, beside(path, SHRUNK)))
         if solution.success:  # it is the end of what was interrupted
             beside(path, INTERRUPTED).unlink(missing_ok=True)
     return saved
 
 
-def _saved(solution: Solution, path: Path) -> Saved:
+def _save(solution: Solution, path: Path) -> Saved:
     there = _solution_at(path)
     why = _worth(there, solution, path)
     if not why:
         return Saved(store.save(solution, path))
-    place = next(place for k in itertools.count(1) if _may_go(there, place := former(path, k)))
-    with _moved(path, place):
+    places = (beside(path, f"former-{k}") for k in itertools.count(1))
+    # a free one, or one whose result the one that is there could replace
+    place = next(
+        place
+        for place in places
+        if not place.exists()
+        or (there is not None and not _worth(_solution_at(place), there, place))
+    )
+    with _set_aside(path, place):
         store.save(solution, path)
     return Saved(path, place, why)
 
 
 def _solution_at(path: Path) -> Solution | None:
-    """The result in a file; None if there is none that can be read."""
     try:
         return store.load(path)
     except StoreError:
@@ -92,46 +80,30 @@ def _solution_at(path: Path) -> Solution | None:
 
 
 def _question(solution: Solution) -> dict:
-    """What was asked, without how it was to be found."""
     return {name: value for name, value in solution.problem.to_dict().items() if name not in _HOW}
 
 
 def _worth(there: Solution | None, new: Solution, path: Path) -> str:
-    """What there is at a path that the new solution must not replace, in words; "" if there is no
-    such thing."""
+    """The result at a path that the new solution must not replace, in words; "" if there is no such
+    thing."""
     if there is None:
         return "what was there and cannot be read" if path.exists() else ""
     if _question(there) != _question(new):
         return f"the former result, of another problem called {there.problem.name},"
-    if there.success and not (new.success and _is_as_good(new, there)):
+    old, now = there.certificate, new.certificate
+    # as far as both values are known
+    as_good = now.value + now.value_error >= old.value - old.value_error
+    if there.success and not (new.success and as_good):
         return (
-            f"the former result, which is better ({there.certificate.value:.6g}, best of "
-            f"{there.starts} starts),"
+            f"the former result, which is better ({old.value:.6g}, best of {there.starts} starts),"
         )
-    return (
-        "the former result, which holds more than colloc wrote,"
-        if store.holds_more(path, there)
-        else ""
-    )
-
-
-def _is_as_good(a: Solution, b: Solution) -> bool:
-    """Whether the certified value of `a` is no less than that of `b`, as far as both are known."""
-    return (
-        a.certificate.value + a.certificate.value_error
-        >= b.certificate.value - b.certificate.value_error
-    )
-
-
-def _may_go(there: Solution | None, place: Path) -> bool:
-    """Whether a result may be kept at a place: a free one, or one whose result it could replace."""
-    return not place.exists() or (
-        there is not None and not _worth(_solution_at(place), there, place)
-    )
+    if store.holds_more(path, there):
+        return "the former result, which holds more than colloc wrote,"
+    return ""
 
 
 @contextmanager
-def _moved(path: Path, place: Path) -> Iterator[None]:
+def _set_aside(path: Path, place: Path) -> Iterator[None]:
     """Keep a result under another name, with its figures and its gait that shrank; back again if
     the block fails.
 
@@ -141,31 +113,22 @@ def _moved(path: Path, place: Path) -> Iterator[None]:
     pairs = [(path.with_suffix(kind), place.with_suffix(kind)) for kind in (".png", ".pdf")]
     pairs.append((beside(path, SHRUNK), beside(place, SHRUNK)))
     try:
-        _give_name(path, place)
+        place.unlink(missing_ok=True)
+        try:
+            os.link(path, place)
+        except OSError:  # a file system without a second name for a file
+            os.replace(path, place)
         for old, new in pairs:
             if old.exists():
                 os.replace(old, new)
         yield
     except BaseException as error:
         for old, new in [(path, place), *pairs]:
-            _take_back(old, new)
+            with suppress(FileNotFoundError):
+                if not old.exists():
+                    os.replace(new, old)
+                elif old.samefile(new):
+                    new.unlink()
         if isinstance(error, OSError) and not isinstance(error, StoreError):
             raise StoreError(f"cannot keep {path} as {place}: {error.strerror or error}.") from None
         raise
-
-
-def _give_name(path: Path, place: Path) -> None:
-    """Another name for a file, which keeps its own too where the file system can do that."""
-    place.unlink(missing_ok=True)
-    try:
-        os.link(path, place)
-    except OSError:
-        os.replace(path, place)
-
-
-def _take_back(old: Path, new: Path) -> None:
-    with suppress(FileNotFoundError):
-        if not old.exists():
-            os.replace(new, old)
-        elif old.samefile(new):
-            new.unlink()

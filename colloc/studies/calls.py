@@ -15,19 +15,19 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.gaits.starts import LARGEST_SEED, LATIN_HYPERCUBE, SAMPLERS
-from colloc.results.archive import StartName, open_archive, save_archive
+from colloc.results.archive import Archive, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import Outcome, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.run import Progress
 from colloc.search.solve import REDUCED
 from colloc.search.solve import solve as search_solve
-from colloc.studies.campaign import run_starts
+from colloc.studies.multistart import run_archive
 from colloc.studies.run import Progress as StudyProgress
 from colloc.studies.run import StudyRun
-from colloc.studies.saved import resumed, save_end
+from colloc.studies.saved import resume, save_and_clear
 from colloc.studies.study import Study, read_study_file
-from colloc.studies.table import StudyTable, cell_text, study_table
+from colloc.studies.table import StudyTable, study_table
 from colloc.system.arguments import check_count, is_whole, shown
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.task_pool import pool_for
@@ -88,24 +88,27 @@ def solve(
     >>> solution.success, round(solution.efficiency, 2)
     (True, 0.26)
     """
-    stated = _stated(problem)
+    stated = _read(problem)
     if starts is not None:
         check_count(starts=starts)
     if not seconds > 0:
         raise ProblemError(f"seconds must be positive, not {seconds:g}.")
-    how = {"seconds": seconds, "search": search, "progress": _told(verbose, progress)}
-    if output is None:
-        solution = search_solve(stated.problem, starts or stated.starts, **how)  # type: ignore[arg-type]
-        solution.source = stated.source
-        return solution
-    if not Path(output).name:
+    if output is not None and not Path(output).name:
         raise ProblemError(f"output must name a file, not {shown(str(output))}.")
-    solution = resumed(stated, Path(output), starts=starts or stated.starts, **how)  # type: ignore[arg-type]
-    save_end(solution, Path(output))
+    solution = resume(
+        stated,
+        None if output is None else Path(output),
+        starts=starts or stated.starts,
+        seconds=seconds,
+        search=search,
+        progress=_reporter(verbose, progress),
+    )
+    if output is not None:
+        save_and_clear(solution, Path(output))
     return solution
 
 
-def _stated(problem: Stated) -> ProblemFile:
+def _read(problem: Stated) -> ProblemFile:
     if isinstance(problem, Problem):
         return ProblemFile(problem, None, "")
     if not isinstance(problem, (str, os.PathLike)):
@@ -116,19 +119,19 @@ def _stated(problem: Stated) -> ProblemFile:
     return read_problem_file(problem)
 
 
-def _told(verbose: bool, progress: Callable[..., object] | None) -> Callable[..., None]:
-    def told(news: object) -> None:
+def _reporter(verbose: bool, progress: Callable[..., object] | None) -> Callable[..., None]:
+    def report(news: object) -> None:
         if verbose:
             print(news, flush=True)
         if progress is not None:
             progress(news)
 
-    return told
+    return report
 
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """What a search over many starts found.
+    """Results of a search over many starts.
 
     Attributes
     ----------
@@ -162,25 +165,23 @@ class Starts:
         NotConvergedError
             If no start was certified and none is named.
         """
-        if start is None:
-            if not self.optima:
-                raise NotConvergedError(
-                    f"none of {len(self.outcomes)} starts of {self.problem.name} was certified."
-                )
-            return reopened(self.problem, self.optima[0].best)
-        return reopened(self.problem, next(o for o in self.outcomes if o.start == start))
+        if start is not None:
+            return reopen(self.problem, next(o for o in self.outcomes if o.start == start))
+        if not self.optima:
+            raise NotConvergedError(
+                f"none of {len(self.outcomes)} starts of {self.problem.name} was certified."
+            )
+        return reopen(self.problem, self.optima[0].best)
 
     def __repr__(self) -> str:
         tally = ", ".join(f"{n} {status}" for status, n in counts(self.outcomes).items())
-        best = (
-            f"; best {self.problem.objective.short} = {self.optima[0].best.value:.6g}"
-            if self.optima
-            else ""
-        )
+        best = ""
+        if self.optima:
+            best = f"; best {self.problem.objective.short} = {self.optima[0].best.value:.6g}"
         return f"<Starts of {self.problem.name}: {tally}; {len(self.optima)} distinct optima{best}>"
 
 
-def reopened(problem: Problem, outcome: Outcome) -> Solution:
+def reopen(problem: Problem, outcome: Outcome) -> Solution:
     """The solution that a start led to: solved at the final delta from its gait, or again from its
     guess if it failed."""
     if outcome.status != SOLVED:
@@ -207,7 +208,7 @@ def multistart(
     problem : Problem or path-like
         A problem, or a problem file.
     starts, seed, sampler, time_limit
-        As for `colloc.studies.campaign.run_starts`; starts 0 to `starts` - 1.
+        As for `colloc.studies.multistart.run_starts`; starts 0 to `starts` - 1.
     workers : int
         Processes; with one everything runs in this process. They import the script that asks for
         more only if it defines a part of the problem; it has to be safe to import then (``if
@@ -236,23 +237,24 @@ def multistart(
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {shown(sampler)}.")
     if not time_limit > 0:
         raise ProblemError(f"time_limit must be positive, not {time_limit:g}.")
-    problem = _stated(problem).problem
-    told = _told(verbose, progress)
-    kept = None if archive is None else open_archive(problem, archive)
-    done = {} if kept is None else kept.of_search(sampler, seed)
-    before = frozenset(done)  # starts that end meanwhile are added to `done`
-    todo = (k for k in range(starts) if k not in before)
+    problem = _read(problem).problem
+    store = Archive(problem) if archive is None else open_archive(problem, archive)
+    done, report = store.done(sampler, seed, starts), _reporter(verbose, progress)
     try:
-        settings = {"sampler": sampler, "seed": seed, "workers": workers, "time_limit": time_limit}
-        for outcome in run_starts(problem, todo, **settings, executor=pool_for):  # type: ignore[arg-type]
-            done[outcome.start] = outcome
-            if kept is not None:
-                kept.add({StartName(sampler, seed, outcome.start): outcome})
-            told(outcome)
+        for outcome in run_archive(
+            store,
+            (k for k in range(starts) if k not in done),
+            sampler=sampler,
+            seed=seed,
+            workers=workers,
+            time_limit=time_limit,
+            executor=pool_for,
+        ):
+            report(outcome)
     finally:
-        if kept is not None:
-            save_archive(kept, "colloc.multistart")
-    return Starts(problem, tuple(done[k] for k in sorted(done) if k < starts))
+        if archive is not None:
+            save_archive(store, "colloc.multistart")
+    return Starts(problem, tuple(store.of_search(sampler, seed, starts).values()))
 
 
 def sweep(
@@ -299,15 +301,13 @@ def sweep(
     """
     check_count(workers=workers)
     study = study if isinstance(study, Study) else read_study_file(study)[0]
-    told = _told(False, progress)
     with tempfile.TemporaryDirectory() as scratch:
         run = StudyRun(study, Path(folder or scratch))
         for news in run.run(workers=workers, executor=pool_for):
             if verbose:
                 best = news.state.best
-                print(
-                    f"{cell_text(study, news.cell)}: {best.outcome.value if best else np.nan:.6f}",
-                    flush=True,
-                )
-            told(news)
+                value = best.outcome.value if best else np.nan
+                print(f"{study.label(news.cell)}: {value:.6f}", flush=True)
+            if progress is not None:
+                progress(news)
         return study_table(run)

@@ -1,5 +1,5 @@
-"""What kind of gait an optimum is: its symmetry, and how its path runs around the plane of the two
-joint angles.
+"""The kind of a gait: its symmetry, and how its path runs around the plane of the first two joint
+angles.
 
 A wave of curvature travels along the body where the joints bend one after the other. With the
 displacement along the body's axis that gives the classes of the paper's figure 1: *retrograde*
@@ -88,44 +88,33 @@ def wave_direction(gait: Fourier) -> float:
     return float(travel / size) if size > 0 else 0.0
 
 
-def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
+def forward_share(gait: Fourier, body: Body, friction: Law) -> float:
     """Mean velocity of the centre of mass along the body's mean direction, over its mean velocity;
-    1 is head first.
-
-    From the velocities in the frame of the body's mean direction; friction at a delta of 1e-3 is
-    enough for a sign.
-    """
+    1 is head first. Friction at a delta of 1e-3 is enough for a sign."""
     mesh = uniform_mesh(scheme("gauss-1"), _INSTANTS, 1.0)
     angles, rates = gait(mesh.times)
     z = body.solve(friction, angles, rates, _DELTA, tolerance=1e-8).z
     centre = body.sliding(friction, angles, rates, z, np.full((1, _INSTANTS), _DELTA)).centre
     pose = CollocatedPose.on_mesh(mesh, z[2], centre)
     head_x, head_y = (points[-1] for points in body.outline(angles))
-    moved, axis = (
-        pose.place[-1],
-        np.mean(np.exp(1j * pose.stage_theta[:, 0]) * (head_x + 1j * head_y)),
-    )
-    size = abs(moved) * abs(axis)
-    return float((moved * np.conj(axis)).real / size) if size > 0 else 0.0
+    displacement = pose.place[-1]
+    axis = np.mean(np.exp(1j * pose.stage_theta[:, 0]) * (head_x + 1j * head_y))
+    size = abs(displacement) * abs(axis)
+    return float((displacement * np.conj(axis)).real / size) if size > 0 else 0.0
 
 
 def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     """The kind of a gait of a body with at least two joints or modes."""
     amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
     close = _SAME * max(amplitude, 1e-12)
-    bilateral = (
-        body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait, body))) < close
-    )
+    image = reversed_in_time(swapped(gait, body)) if body.symmetric else None
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
-    antipodal = np.linalg.norm(even) < close
     retraced = phase_distance(gait, reversed_in_time(gait)) < close
-    turns = 0 if retraced else winding(gait)
-    ahead = headed_displacement(gait, body, friction)
     return GaitClass(
-        bool(bilateral),
-        bool(antipodal),
-        bool(retraced),
-        turns,
+        image is not None and phase_distance(gait, image) < close,
+        bool(np.linalg.norm(even) < close),
+        retraced,
+        0 if retraced else winding(gait),
         wave_direction(gait.mapped(body.bending)),
-        ahead,
+        forward_share(gait, body, friction),
     )

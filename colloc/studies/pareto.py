@@ -1,9 +1,9 @@
-"""What two objectives cost each other: certified gaits of which none is better in both.
+"""Trade-offs between two objectives: certified gaits of which none is better in both.
 
 The ends of the front are the best gaits by one objective alone. Between them the first objective is
 maximised while the second is kept at a value (an epsilon constraint), which finds the front where
-it is not convex, too. Every point is begun at the gait of a neighbour, from both ends, and the
-better one counts: so the front may pass from one kind of gait to another.
+it is not convex, too. Every point begins at the gait of a neighbour, from both ends, and the better
+one counts: so the front may pass from one kind of gait to another.
 
 Evenly spaced in the second objective, points may lie far apart in the first. Wherever neighbours
 are too far apart, a gait halfway is sought in the objective in which they are, from both of them,
@@ -26,25 +26,25 @@ from colloc.gaits.period import Period
 from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
-from colloc.search.solve import solve
-from colloc.studies.saved import member_file
+from colloc.studies.saved import solve_member
 from colloc.system.arguments import check_count
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.late_binding import bound
 from colloc.verification.replayer import replayer
 
-POINTS = 9
-_MOST_POINTS = 1000
+POINTS, _MOST_POINTS = 9, 1000
 _BETTER = 1e-6
 """Relative gain for which a point is replaced."""
 _CLOSE, _APART = 0.1, 2.0
 """Neighbours are nearer than this part of the even spacing, in both objectives, or farther apart
 than that in either."""
 
+Objectives = tuple[Objective, Objective]
+
 
 @dataclass(frozen=True)
 class Gap:
-    """Where a front is empty for more than twice the even spacing of its points.
+    """A place where a front is empty for more than twice the even spacing of its points.
 
     Attributes
     ----------
@@ -80,18 +80,18 @@ class ParetoFront:
     """
 
     problem: Problem
-    objectives: tuple[Objective, Objective]
+    objectives: Objectives
     points: tuple[Solution, ...]
     gaps: tuple[Gap, ...] = ()
 
     @property
     def values(self) -> np.ndarray:
         """Both objectives of every point, replayed, ``(n, 2)``."""
-        return np.array([[_value(point, aim) for aim in self.objectives] for point in self.points])
+        return np.array([_measure(point, self.objectives)[0] for point in self.points])
 
     @property
     def certified(self) -> bool:
-        """Whether every gait is that was found in its gaps, too."""
+        """True if the gaits that were found in its gaps are, too."""
         return all(gap.certified for gap in self.gaps)
 
     def plot(self, ax: Any = None) -> Any:
@@ -153,111 +153,99 @@ def pareto_front(
     check_count(starts=starts)
     if not 2 <= points <= _MOST_POINTS:
         raise ProblemError(f"a front has 2 to {_MOST_POINTS} points, not {points}.")
-    found: dict[int, Solution] = {}
+    last = points - 1
+    solutions: dict[int, Solution] = {}
 
     def put(k: int, solution: Solution) -> None:
         """Keep what is the better solution of a point."""
-        value = solution.measured.value
-        if k not in found or (solution.success, value) > (
-            found[k].success,
-            found[k].measured.value + _BETTER * abs(value),
+        value, before = solution.measured.value, solutions.get(k)
+        if before is None or (solution.success, value) > (
+            before.success,
+            before.measured.value + _BETTER * abs(value),
         ):
-            found[k] = solution
+            solutions[k] = solution
             if progress is not None:
                 progress(k, solution)
 
-    def reaching(which: int, level: float, begin: Solution | None) -> Solution:
-        """The best by the other objective of what reaches a level of one, begun at a gait; without
-        one from starts."""
-        reached = (*problem.at_least, (aims[which], level))
-        stated = problem.with_(objective=aims[1 - which], at_least=reached)
+    def reach(which: int, level: float, begin: Solution | None) -> Solution:
+        """Solve for the best by the other objective of what reaches a level of one, begun at a
+        gait; without one from starts."""
+        limits = (*problem.at_least, (aims[which], level))
+        stated = problem.with_(objective=aims[1 - which], at_least=limits)
         if begin is None:
-            return _uninterrupted(stated, starts)
-        return _uninterrupted(stated.with_(guess=begin.gait, delta_start=problem.delta), 1)
+            return solve_member(stated, starts)
+        return solve_member(stated.with_(guess=begin.gait, delta_start=problem.delta), 1)
 
-    last = points - 1
     for k, aim in zip((0, last), aims, strict=True):
-        put(k, _uninterrupted(problem.with_(objective=aim), starts))
-        if not found[k].success:
+        put(k, solve_member(problem.with_(objective=aim), starts))
+        if not solutions[k].success:
             raise ProblemError(
                 f"the gait of best {aim.name} is not certified, so there is no front: "
-                f"{found[k].message}"
+                f"{solutions[k].message}"
             )
-    if len(_spaced(found.values(), aims, last)) > 1:
-        levels = np.linspace(_value(found[0], aims[1]), _value(found[last], aims[1]), points)
-        for k in range(last - 1, 0, -1):
-            put(k, reaching(1, float(levels[k]), found[k + 1]))
+    if len(_thin(solutions.values(), aims, last)) > 1:
+        lowest, highest = (float(_measure(solutions[k], aims)[0][1]) for k in (0, last))
+        levels = np.linspace(lowest, highest, points).tolist()
+        backwards = range(last - 1, 0, -1)
+        for k in backwards:
+            put(k, reach(1, levels[k], solutions[k + 1]))
         for k in range(1, last):
-            put(k, reaching(1, float(levels[k]), found[k - 1]))
-        for k in range(
-            last - 1, 0, -1
-        ):  # what reaches more of the second objective and of the first is better here, too
-            if _value(found[k + 1], aims[0]) > _value(found[k], aims[0]):
-                put(k, reaching(1, float(levels[k]), found[k + 1]))
-    front, empty = _spaced(found.values(), aims, last), {}
+            put(k, reach(1, levels[k], solutions[k - 1]))
+        for k in backwards:  # more of the second objective, and of the first, is better here, too
+            here, beside = (_measure(solutions[j], aims)[0][0] for j in (k, k + 1))
+            if beside > here:
+                put(k, reach(1, levels[k], solutions[k + 1]))
+    front, empty = _thin(solutions.values(), aims, last), {}
     for _ in range(2 * points):
         wide = {pair: size for pair, size in _wide(front, aims, last).items() if pair not in empty}
         if not wide:
             break
         pair = max(wide, key=lambda each: wide[each].max())
-        which, tried, failure = int(wide[pair].argmax()), [], ""
-        level = 0.5 * sum(_value(each, aims[which]) for each in pair)
+        which, attempts, failure = int(wide[pair].argmax()), [], ""
+        level = 0.5 * sum(float(_measure(each, aims)[0][which]) for each in pair)
         for begin in (*pair, None):
             if begin is None and pair not in pairwise(front):
                 break  # a neighbour led into the gap
             try:
-                tried.append(reaching(which, level, begin))
+                attempts.append(reach(which, level, begin))
             except NotConvergedError as error:
                 failure = str(error)
                 continue
-            put(len(found), tried[-1])
-            front = _spaced(found.values(), aims, last)
-        if tried:
-            failure = "" if any(each.success for each in tried) else tried[0].message
+            put(len(solutions), attempts[-1])
+            front = _thin(solutions.values(), aims, last)
+        if attempts:
+            failure = "" if any(each.success for each in attempts) else attempts[0].message
         empty[pair] = failure or "the best gaits found there are those beside it", not failure
-    unknown = "not sought: ask for more points", True
-    wide = _wide(front, aims, last)
-    gaps = [
+    unknown, wide = ("not sought: ask for more points", True), _wide(front, aims, last)
+    gaps = (
         Gap(k, *empty.get(pair, unknown)) for k, pair in enumerate(pairwise(front)) if pair in wide
-    ]
+    )
     return ParetoFront(problem, aims, tuple(front), tuple(gaps))
 
 
-def _uninterrupted(problem: Problem, starts: int) -> Solution:
-    solution = solve(problem, starts, keep=member_file(problem))
-    if solution.interrupted:
-        raise KeyboardInterrupt
-    return solution
-
-
-def _value(solution: Solution, aim: Objective) -> float:
-    """An objective of a solution."""
-    return _measured(solution, aim)[0]
-
-
 @lru_cache(maxsize=256)
-def _measured(solution: Solution, aim: Objective) -> tuple[float, float]:
-    """An objective of a solution and its error, of its certificate or, where that does not hold
-    what it takes, of a replay."""
-    known: Period = solution.certificate
-    problem, gait = solution.problem, solution.gait
-    if not set(aim.uses) <= set(known.values):
-        at: Any = (problem.body, problem.law, gait, solution.delta_per_period)
-        known = replayer(problem.regime)(
-            *at, breaks=gait.corner_phases, objective=aim, turn=problem.rotation or 0.0
-        )
-    value = aim(known.values)
-    return value, abs(value) * known.error_of(aim)
+def _measure(solution: Solution, aims: Objectives) -> np.ndarray:
+    """Objectives of a solution and their errors, ``(2, 2)``: of its certificate or, where that does
+    not hold what it takes, of a replay."""
+    problem, gait, measured = solution.problem, solution.gait, []
+    for aim in aims:
+        period: Period = solution.certificate
+        if not set(aim.uses) <= set(period.values):
+            at: Any = (problem.body, problem.law, gait, solution.delta_per_period)
+            period = replayer(problem.regime)(
+                *at, breaks=gait.corner_phases, objective=aim, turn=problem.rotation or 0.0
+            )
+        value = aim(period.values)
+        measured.append((value, abs(value) * period.error_of(aim)))
+    return np.transpose(measured)
 
 
-def _spaced(
-    solutions: Iterable[Solution], aims: tuple[Objective, Objective], intervals: int
-) -> list[Solution]:
+def _thin(solutions: Iterable[Solution], aims: Objectives, intervals: int) -> list[Solution]:
     """Certified ones of which, by more than the errors, none is better in both objectives, without
     near duplicates; of those the first counts."""
     front: list[Solution] = []
     for each in (solution for solution in solutions if solution.success):
-        (values, errors), others = _both(each, aims), [_both(other, aims) for other in front]
+        (values, errors), others = _measure(each, aims), [_measure(other, aims) for other in front]
         if any((values <= other + errors + error).all() for other, error in others):
             continue
         left = [
@@ -271,23 +259,14 @@ def _spaced(
         ):
             continue
         front = [*left, each]
-    return sorted(front, key=lambda each: -_value(each, aims[0]))
-
-
-def _both(solution: Solution, aims: tuple[Objective, Objective]) -> np.ndarray:
-    """Two objectives of a solution and their errors, ``(2, 2)``."""
-    return np.transpose([_measured(solution, aim) for aim in aims])
+    return sorted(front, key=lambda each: -_measure(each, aims)[0][0])
 
 
 def _wide(
-    front: list[Solution], aims: tuple[Objective, Objective], intervals: int
+    front: list[Solution], aims: Objectives, intervals: int
 ) -> dict[tuple[Solution, Solution], np.ndarray]:
     """Neighbours that are too far apart, and how far in each objective, as a share of the whole
     front."""
-    apart = np.abs(np.diff([_both(each, aims)[0] for each in front], axis=0))
-    shares = apart / apart.sum(axis=0)
-    return {
-        pair: size
-        for pair, size in zip(pairwise(front), shares, strict=True)
-        if size.max() * intervals > _APART
-    }
+    apart = np.abs(np.diff([_measure(each, aims)[0] for each in front], axis=0))
+    shares = zip(pairwise(front), apart / apart.sum(axis=0), strict=True)
+    return {pair: size for pair, size in shares if size.max() * intervals > _APART}

@@ -1,8 +1,8 @@
 """Run a study: a wavefront of tasks over any executor, then rounds in which good gaits spread to
 all their neighbours.
 
-A task waits for the cells its warm starts come from, and takes from nowhere else. So what a study
-finds does not depend on how many workers there are or which is faster. Rounds end when no gait does
+A task waits for the cells its warm starts come from, and takes from nowhere else. So the results of
+a study do not depend on how many workers there are or which is faster. Rounds end when no gait does
 better in a neighbouring cell, as it is, than what is known there; a cell of which that cannot be
 said although it was tried is marked (`StudyRun.neighbour_value`).
 """
@@ -11,32 +11,34 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.native_kernel import native_kernel
 from colloc.results.outcome import CRASHED, RETRIED
-from colloc.studies.cell import (
-    BETTER,
+from colloc.studies.cell import BETTER, Work, failed_visit, run_chunk
+from colloc.studies.journal import (
     Attempt,
-    Work,
+    Visit,
+    append_visits,
     best_attempt,
-    failed_visit,
-    run_chunk,
+    read_journal,
     start_key,
 )
-from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.study import Index, Study
 from colloc.system.errors import ProblemError
-from colloc.system.task_pool import Lost, Task, completed, process_pool
+from colloc.system.task_pool import Lost, Task, process_pool, run_tasks
+
+Chunk = tuple[Index, ...]
 
 
 @dataclass(eq=False)
 class CellState:
-    """What is known about a cell: its problem (or why there is none), all attempts, and what gaits
+    """A cell: its problem (or why there is none), all attempts, and what gaits
     of others achieve there."""
 
     problem: Problem | None
@@ -52,6 +54,10 @@ class CellState:
     def tried(self) -> frozenset[str]:
         return frozenset(a.key for a in self.attempts)
 
+    def add(self, visit: Visit) -> None:
+        self.attempts += visit.attempts
+        self.scores |= visit.scores
+
 
 @dataclass(frozen=True, eq=False)
 class Progress:
@@ -66,43 +72,29 @@ class Progress:
 
 
 class StudyRun:
-    """A study under way: the state of every cell, kept in a folder.
+    """A study under way: the state of every cell, kept in the journal of a folder; what that holds
+    already is not solved again, unless `retry` forgets it: errors, crashes and time limits.
 
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Of the journal. What it holds already is not solved again.
-    retry : bool
-        Forget attempts that ended in an error, a crash or the time limit.
-
-    Raises
-    ------
-    ProblemError
-        If the study's function gives no problem for any cell.
-    StoreError
-        If the journal cannot be read.
+    `ProblemError` if the study's function gives no problem for any cell, `StoreError` if the
+    journal cannot be read.
     """
 
     def __init__(self, study: Study, folder: Path, *, retry: bool = False) -> None:
         self.study, self.folder = study, folder
-        attempts: dict[str, list[Attempt]] = {}
-        scores: dict[str, dict[str, float]] = {}
-        for record in read_journal(folder):
-            kept = [a for a in record.attempts if not (retry and a.outcome.status in RETRIED)]
-            attempts.setdefault(record.problem_hash, []).extend(kept)
-            scores.setdefault(record.problem_hash, {}).update(record.scores)
+        visits: dict[str, list[Visit]] = {}
+        for visit in read_journal(folder):
+            visits.setdefault(visit.problem_hash, []).append(visit)
         self.cells: dict[Index, CellState] = {}
         for cell in study.cells():
             try:
-                problem = study.problem_at(cell)
+                state = CellState(study.problem_at(cell))
             except ProblemError as error:
-                self.cells[cell] = CellState(None, str(error))
-            else:
-                known = problem.hash
-                self.cells[cell] = CellState(
-                    problem, "", list(attempts.get(known, [])), dict(scores.get(known, {}))
-                )
+                state = CellState(None, str(error))
+            for visit in visits.get(state.problem.hash, []) if state.problem else ():
+                state.add(visit)
+            if retry:
+                state.attempts = [a for a in state.attempts if a.outcome.status not in RETRIED]
+            self.cells[cell] = state
         if all(state.problem is None for state in self.cells.values()):
             raise ProblemError(
                 f"the study {study.name} has no problem in any cell; "
@@ -112,33 +104,26 @@ class StudyRun:
     @property
     def missing(self) -> list[Index]:
         """Cells with a problem whose own guess was not tried yet."""
-        cells = self.cells.items()
         return [
-            c
-            for c, state in cells
+            cell
+            for cell, state in self.cells.items()
             if state.problem is not None and start_key(state.problem.guess) not in state.tried
         ]
 
     def neighbours(self, cell: Index) -> list[Attempt]:
         """The best attempts of the cells around one, as far as there are any."""
-        return [
-            best for near in self.study.around(cell) if (best := self.cells[near].best) is not None
-        ]
+        bests = (self.cells[other].best for other in self.study.around(cell))
+        return [best for best in bests if best is not None]
 
     def neighbour_value(self, cell: Index) -> float:
         """The most that the best gait of a neighbour, moved into the cell's class and otherwise as
-        it is, achieves there.
-
-        NaN if there is none. Where it is more than the cell's own value, the search there has
-        missed something.
-        """
-        scores = [
-            self.cells[cell].scores.get(near.gait_key, math.nan) for near in self.neighbours(cell)
-        ]
+        it is, achieves there; NaN if there is none."""
+        known = self.cells[cell].scores
+        scores = (known.get(best.gait_key, math.nan) for best in self.neighbours(cell))
         return max((score for score in scores if not math.isnan(score)), default=math.nan)
 
     def below_neighbour(self, cell: Index) -> bool:
-        """Whether a neighbour's gait does clearly better in the cell than its own best, though it
+        """True if a neighbour's gait does clearly better in the cell than its own best, though it
         was tried there."""
         best = self.cells[cell].best
         return best is not None and self.neighbour_value(cell) > (1 + BETTER) * best.outcome.value
@@ -150,116 +135,92 @@ class StudyRun:
         executor: Callable[[int], Executor] = process_pool,
         ahead: int | None = None,
     ) -> Iterator[Progress]:
-        """Work on all that is missing; each cell is on the disk before it is yielded. Cells in
-        which nothing was tried are not.
-
-        Arguments are those of `colloc.system.task_pool.completed`; `ahead` is a quarter of the
-        workers, and one, by default.
-        """
+        """Work on all that is missing (see `colloc.system.task_pool.run_tasks`); each cell is on
+        the disk before it is yielded. Cells in which nothing was tried are not."""
         native_kernel()  # missed once for all workers, or there
         ahead = 1 + workers // 4 if ahead is None else ahead
         number, chunks = 0, self._first_chunks()
         while number == 0 or chunks:
-            yield from self._round(number, chunks, workers, executor, ahead)
+            tasks = _Round(self, number, chunks)
+            total, done = sum(map(len, chunks)), 0
+            for task, result in run_tasks(
+                run_chunk, tasks.ready, workers=workers, executor=executor, ahead=ahead
+            ):
+                (works,) = task.arguments
+                if isinstance(result, Lost):
+                    result = [failed_visit(work, CRASHED, result.message) for work in works]
+                append_visits(self.folder, [v for v in result if v.attempts or v.scores])
+                for work, visit in zip(works, result, strict=True):
+                    self.cells[work.cell].add(visit)
+                tasks.order.done(tuple(work.cell for work in works))
+                for work, visit in zip(works, result, strict=True):
+                    done += 1
+                    if visit.attempts:
+                        state = self.cells[work.cell]
+                        yield Progress(work.cell, state, visit.attempts, number, done, total)
             number, chunks = number + 1, self._improvable()
 
-    def _first_chunks(self) -> list[tuple[Index, ...]]:
+    def _first_chunks(self) -> list[Chunk]:
         """Missing cells in runs along the last axis."""
         size = self.study.chunk
-        grouped: dict[Index, list[Index]] = {}
+        groups: dict[Index, list[Index]] = {}
         for cell in self.missing:
-            grouped.setdefault((*cell[:-1], cell[-1] // size), []).append(cell)
-        return [tuple(cells) for cells in grouped.values()]
+            groups.setdefault((*cell[:-1], cell[-1] // size), []).append(cell)
+        return [tuple(cells) for cells in groups.values()]
 
-    def _improvable(self) -> list[tuple[Index, ...]]:
+    def _improvable(self) -> list[Chunk]:
         """Cells with a neighbour whose best gait was not looked at there."""
         return [
             (cell,)
             for cell, state in self.cells.items()
             if state.problem is not None
-            and any(near.gait_key not in state.scores for near in self.neighbours(cell))
+            and any(best.gait_key not in state.scores for best in self.neighbours(cell))
         ]
 
-    def _round(
-        self,
-        number: int,
-        chunks: Sequence[tuple[Index, ...]],
-        workers: int,
-        executor: Callable[[int], Executor],
-        ahead: int,
-    ) -> Iterator[Progress]:
-        waiting: dict[int, set[Index]] = {}
-        free: deque[int] = deque()
-        unlocks: dict[Index, list[int]] = {}
-        todo = {cell for chunk in chunks for cell in chunk}
-        for k, chunk in enumerate(chunks):
-            needs = (
-                {c for cell in chunk for c in self.study.before(cell)} & todo - set(chunk)
-                if number == 0
-                else set()
-            )
-            waiting[k] = needs
-            for c in needs:
-                unlocks.setdefault(c, []).append(k)
-            if not needs:
-                free.append(k)
-        # in later rounds all cells start from what is known now, whatever order they come in
-        known = {cell: state.best for cell, state in self.cells.items()} if number else None
 
-        def ready() -> Task | None:
-            if not free:
-                return None
-            k = free.popleft()
-            return Task(k, (tuple(self._work(cell, chunks[k], known) for cell in chunks[k]),))
+class _Round:
+    """Tasks of one round, each ready when those that its warm starts come from are done.
 
-        done = 0
-        for task, result in completed(
-            run_chunk, ready, workers=workers, executor=executor, ahead=ahead
-        ):
-            works = task.arguments[0]
-            visits = (
-                [failed_visit(w, CRASHED, result.message) for w in works]
-                if isinstance(result, Lost)
-                else result
-            )
-            hashes = {work.cell: work.problem.hash for work in works}
-            told = [v for v in visits if v.attempts or v.scores]
-            append_records(
-                self.folder, [Record(hashes[v.cell], tuple(v.attempts), v.scores) for v in told]
-            )
-            for found in visits:
-                state = self.cells[found.cell]
-                state.attempts += found.attempts
-                state.scores |= found.scores
-                for k in unlocks.get(found.cell, []):
-                    waiting[k].discard(found.cell)
-                    if not waiting[k]:
-                        free.append(k)
-                done += 1
-                if found.attempts:
-                    yield Progress(found.cell, state, found.attempts, number, done, len(todo))
+    In the first round gaits come from the cells before, as the tasks end. In later ones all cells
+    start from what is known when the round begins, whatever order they come in.
+    """
 
-    def _work(
-        self, cell: Index, chunk: tuple[Index, ...], known: dict[Index, Attempt | None] | None
-    ) -> Work:
-        study, state = self.study, self.cells[cell]
+    def __init__(self, run: StudyRun, number: int, chunks: list[Chunk]) -> None:
+        self.study, self.cells, self.first = run.study, run.cells, number == 0
+        self.known = {cell: state.best for cell, state in run.cells.items()} if number else None
+        where = {cell: chunk for chunk in chunks for cell in chunk}
+        self.order: TopologicalSorter[Chunk] = TopologicalSorter()
+        for chunk in chunks:
+            before = {c for cell in chunk for c in self.study.before(cell)} & where.keys()
+            self.order.add(chunk, *({where[c] for c in before - set(chunk)} if self.first else ()))
+        self.order.prepare()
+        self.queue: deque[Chunk] = deque()
+
+    def ready(self) -> Task | None:
+        """The next task, if there is one now."""
+        self.queue.extend(self.order.get_ready())
+        if not self.queue:
+            return None
+        chunk = self.queue.popleft()
+        return Task(chunk, (tuple(self._work(cell, chunk) for cell in chunk),))
+
+    def _best(self, cell: Index) -> Attempt | None:
+        return self.cells[cell].best if self.known is None else self.known[cell]
+
+    def _work(self, cell: Index, chunk: Chunk) -> Work:
+        study, state, best = self.study, self.cells[cell], self._best(cell)
         assert state.problem is not None
-        first = known is None
-        inside = tuple(c for c in study.before(cell) if c in chunk) if first else ()
-        near = study.before(cell) if first else study.around(cell)
-        best = (self.cells[c].best if known is None else known[c] for c in near if c not in inside)
-        gaits = tuple(
-            a.outcome.gait for a in best if a is not None and a.gait_key not in state.scores
-        )
-        own = state.best if known is None else known[cell]
+        sources = study.before(cell) if self.first else study.around(cell)
+        inside = tuple(c for c in sources if c in chunk) if self.first else ()
+        others = (self._best(c) for c in sources if c not in inside)
         return Work(
             cell,
             state.problem,
-            first,
+            self.first,
             inside,
-            gaits,
-            study.cold_numbers(cell) if first else (),
-            0.0 if own is None else own.outcome.value,
+            tuple(a.outcome.gait for a in others if a and a.gait_key not in state.scores),
+            study.cold_numbers(cell) if self.first else (),
+            best.outcome.value if best else 0.0,
             state.tried,
             study.warm_starts,
             study.time_limit,

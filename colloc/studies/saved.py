@@ -3,72 +3,43 @@ interrupted, and their end removes what was kept for that."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile
 from colloc.results.kept import Saved, save_result
 from colloc.results.solution import Solution
-from colloc.search.run import Progress
-from colloc.search.solve import REDUCED, solve
+from colloc.search.solve import solve
 from colloc.system.result_names import run_file
 
 _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 
 
-def resumed(
-    stated: ProblemFile,
-    path: Path,
-    *,
-    starts: int | None = None,
-    seconds: float = np.inf,
-    search: str = REDUCED,
-    fresh: bool = False,
-    progress: Callable[[Progress], object] = lambda news: None,
+def resume(
+    stated: ProblemFile, path: Path | None, *, fresh: bool = False, **settings: Any
 ) -> Solution:
-    """The solution of a problem, from where an interrupted run left it.
+    """The solution of a problem, from where an interrupted run left it; `fresh`: from the start.
 
-    Parameters
-    ----------
-    stated : ProblemFile
-    path : path
-        Of the result, ``NAME.h5``: beside it the run is kept.
-    starts, seconds, search, progress
-        As for `colloc.search.solve.solve`.
-    fresh : bool
-        Do not go on from an interrupted run.
-
-    Raises
-    ------
-    StoreError
-        If what an earlier run left cannot be read.
+    The run is kept beside the path of the result, ``NAME.h5``. Settings are those of
+    `colloc.search.solve.solve`. `StoreError` if what an earlier run left cannot be read.
     """
-    if fresh:
-        run_file(path).unlink(missing_ok=True)
-    keep = run_file(path)
-    solution = solve(
-        stated.problem, starts, seconds=seconds, search=search, keep=keep, progress=progress
-    )
-    solution.source = stated.source
-    if solution.shrunk is not None:
-        solution.shrunk.source = stated.source
+    keep = None if path is None else run_file(path)
+    if fresh and keep is not None:
+        keep.unlink(missing_ok=True)
+    solution = solve(stated.problem, keep=keep, **settings)
+    for one in (solution, solution.shrunk):
+        if one is not None:
+            one.source = stated.source
     return solution
 
 
-def save_end(solution: Solution, path: Path) -> list[Saved]:
+def save_and_clear(solution: Solution, path: Path) -> list[Saved]:
     """Save a solution (`colloc.results.kept.save_result`); the run that led to it is kept only if
-    it was interrupted.
-
-    Raises
-    ------
-    StoreError
-        If a file cannot be written.
-    """
+    it was interrupted. `StoreError` if a file cannot be written."""
     saved = save_result(solution, path)
     if not solution.interrupted:
         run_file(path).unlink(missing_ok=True)
@@ -76,10 +47,10 @@ def save_end(solution: Solution, path: Path) -> list[Saved]:
 
 
 @contextmanager
-def members_kept(folder: Path) -> Iterator[None]:
-    """A block that solves several problems, of which each keeps what it finds in a folder
-    (`member_file`) until the block ends well. After Ctrl-C, which says so, or a power cut, the same
-    block goes on from there."""
+def checkpoints_in(folder: Path) -> Iterator[None]:
+    """A block that solves several problems (`solve_member`), of which each keeps its results in a
+    folder until the block ends well. After Ctrl-C, which says so, or a power cut, the same block
+    goes on from there."""
     token = _FOLDER.set(folder)
     try:
         yield
@@ -92,7 +63,11 @@ def members_kept(folder: Path) -> Iterator[None]:
         file.unlink(missing_ok=True)
 
 
-def member_file(problem: Problem) -> Path | None:
-    """Where a solve within `members_kept` keeps what it finds; None outside."""
+def solve_member(problem: Problem, starts: int) -> Solution:
+    """The solution of a problem of several that belong together; Ctrl-C is raised."""
     folder = _FOLDER.get()
-    return None if folder is None else run_file(folder / f"member-{problem.hash[:16]}.h5")
+    keep = None if folder is None else run_file(folder / f"member-{problem.hash[:16]}.h5")
+    solution = solve(problem, starts, keep=keep)
+    if solution.interrupted:
+        raise KeyboardInterrupt
+    return solution

@@ -11,7 +11,7 @@ neighbours turn by about as much as lies between, so that a controller can inter
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,18 +23,15 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
-from colloc.search.solve import solve
-from colloc.studies.saved import member_file
+from colloc.studies.saved import solve_member
 from colloc.system.arguments import check_count, is_number
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 
-_LARGEST = math.pi
-"""By more than half a turn a period the body could as well turn the other way."""
 LEAST_WORK = Objective("1 / work", "least work")
 """Of gaits that turn by a given angle: on the spot, for going anywhere takes work."""
-_BEGINS = 1000
-"""Phases that are tried."""
+_PHASES = 1000
+"""That are tried for the begin of a gait."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +56,9 @@ class Steering:
 
     @property
     def certified(self) -> bool:
-        """Whether every gait is."""
-        return all(point.success for point in self.points) and (
-            self.on_the_spot is None or self.on_the_spot.certified
-        )
+        """True if every gait is."""
+        spot = self.on_the_spot is None or self.on_the_spot.certified
+        return spot and all(point.success for point in self.points)
 
     @property
     def efficiency(self) -> np.ndarray:
@@ -74,58 +70,55 @@ class Steering:
     def begins(self) -> tuple[float, ...]:
         """Phases at which to begin the gaits, each as near as can be to its neighbour that turns
         less: where a period begins matters for nothing else."""
-        t = np.arange(_BEGINS) / _BEGINS
-        found = dict.fromkeys(self.turns, 0.0)
-        straight = min(self.turns, key=abs)
+        t, straight = np.arange(_PHASES) / _PHASES, min(self.turns, key=abs)
+        begins = dict.fromkeys(self.turns, 0.0)
         gaits = {turn: point.gait for turn, point in zip(self.turns, self.points, strict=True)}
-        for side in (
-            [turn for turn in self.turns if turn > straight],
-            [turn for turn in self.turns[::-1] if turn < straight],
-        ):
-            near = straight
-            for turn in side:
-                known, own = gaits[near].angles(t + found[near]), gaits[turn].angles(t)
-                matched = np.fft.ifft(
-                    (np.fft.fft(own) * np.conj(np.fft.fft(known))).sum(axis=0)
-                ).real
-                found[turn], near = float(t[matched.argmax()]), turn
-        return tuple(found[turn] for turn in self.turns)
+        for turn, inner in _outwards(self.turns, straight):
+            known, angles = gaits[inner].angles(t + begins[inner]), gaits[turn].angles(t)
+            overlap = (np.fft.fft(angles) * np.conj(np.fft.fft(known))).sum(axis=0)
+            begins[turn] = float(t[np.fft.ifft(overlap).real.argmax()])
+        return tuple(begins.values())
 
     def table(self, phases: int = 100) -> dict[str, Any]:
-        """What a controller needs, as plain numbers: the turns, their arcs, and joint angles at
+        """Plain numbers for a controller: the turns, their arcs, and joint angles at
         equal phases from those of `begins`; between two turns angles are interpolated linearly."""
-        t = np.arange(phases) / phases
-        arcs = [point.arc for point in self.points]
+        t, points = np.arange(phases) / phases, self.points
+        radii = [point.arc.radius for point in points]
         more = {} if self.on_the_spot is None else {"on_the_spot": self.on_the_spot.table(phases)}
         return more | {
             "name": self.problem.name,
             "turn_rad": list(self.turns),
-            "chord_body_lengths": [each.chord for each in arcs],
-            "radius_body_lengths": [
-                each.radius if math.isfinite(each.radius) else None for each in arcs
-            ],
-            "work_per_period_weight_times_length": [point.work for point in self.points],
-            "status": [point.status for point in self.points],
+            "chord_body_lengths": [point.arc.chord for point in points],
+            "radius_body_lengths": [radius if math.isfinite(radius) else None for radius in radii],
+            "work_per_period_weight_times_length": [point.work for point in points],
+            "status": [point.status for point in points],
             "phase": t.tolist(),
-            f"{self.points[0].gait.driven.coordinate}_angles_rad": [
+            f"{points[0].gait.driven.coordinate}_angles_rad": [
                 point.gait.driven.angles(t + begin).T.tolist()
-                for point, begin in zip(self.points, self.begins, strict=True)
+                for point, begin in zip(points, self.begins, strict=True)
             ],
         }
 
     def plot(self, ax: Any = None, panel: str = "cost") -> Any:
         """Efficiency against the turn, and the tracks, as a matplotlib Figure; with `ax`, a
         matplotlib Axes, one of them there, "cost" or "tracks", and the Axes is returned."""
-        return (
-            bound("plot_steering")(self)
-            if ax is None
-            else bound("plot_steering_panel")(ax, self, panel)
-        )
+        if ax is None:
+            return bound("plot_steering")(self)
+        return bound("plot_steering_panel")(ax, self, panel)
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)
+        turns = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)
         verdict = "all certified" if self.certified else "NOT all certified"
-        return f"<Steering of {self.problem.name}: {told} degrees a period, {verdict}>"
+        return f"<Steering of {self.problem.name}: {turns} degrees a period, {verdict}>"
+
+
+def _outwards(turns: Sequence[float], middle: float) -> Iterator[tuple[float, float]]:
+    """Turns to the left of the middle, then to the right, each with its neighbour inwards."""
+    for side in (
+        [turn for turn in turns if turn > middle],
+        [turn for turn in reversed(turns) if turn < middle],
+    ):
+        yield from zip(side, (middle, *side), strict=False)
 
 
 def steer(
@@ -170,68 +163,50 @@ def steer(
             "steering begins at a gait that is free and goes straight on the level: rotation 0, "
             "grade 0."
         )
-    if (
-        not len(turns)
-        or not all(is_number(turn) and abs(turn) < _LARGEST for turn in (*turns, *spot))
-        or 0 in spot
-    ):
+    # by more than half a turn a period the body could as well turn the other way
+    possible = all(is_number(turn) and abs(turn) < math.pi for turn in (*turns, *spot))
+    if not len(turns) or not possible or 0 in spot:
         raise ProblemError(
             f"turns must be angles of less than half a turn a period, and not 0 on the spot; not "
             f"{[*turns, *spot]!r}."
         )
     check_count(starts=starts)
 
-    def solved(turn: float, stated: Problem, starts: int) -> Solution:
-        solution = solve(stated, starts, keep=member_file(stated))
-        if solution.interrupted:
-            raise KeyboardInterrupt
+    def member(turn: float, stated: Problem, starts: int = starts) -> Solution:
+        solution = solve_member(stated, starts)
         if progress is not None:
             progress(turn, solution)
         return solution
 
-    straight = solved(0.0, problem, starts)
+    straight = member(0.0, problem)
     if not straight.success:
         raise ProblemError(
             f"the straight gait is not certified, so there is nothing to steer: {straight.message}"
         )
-    free = {"gait": problem.gait.with_symmetry(NONE)}
-    from_neighbour = free | {"delta_start": problem.delta}
+    anywhere = problem.gait.with_symmetry(NONE)
     bent = problem.joint_map is not None and any(problem.joint_map.rest)
     mirrors = (
         ANTIPODAL in problem.body.symmetries and not one_sided(problem.joint_limit) and not bent
     )
 
-    def turned(
+    def family(
         stated: Problem, wanted: Sequence[float], known: dict[float, Solution]
     ) -> tuple[Solution, ...]:
         """Outwards from those that are known, to the left first; from all starts if there is
         none."""
-        for side in (
-            [turn for turn in wanted if turn > 0],
-            [turn for turn in reversed(wanted) if turn < 0],
-        ):
-            near = known.get(0.0)
-            for turn in side:
-                if -turn in known and mirrors:
-                    guess = known[-turn].gait.mirrored
-                    near = solved(
-                        turn, stated.with_(rotation=turn, guess=guess, **from_neighbour), 1
-                    )
-                elif near is not None:
-                    near = solved(
-                        turn, stated.with_(rotation=turn, guess=near.gait, **from_neighbour), 1
-                    )
-                else:
-                    near = solved(
-                        turn,
-                        stated.with_(rotation=turn, guess=None, delta_start=None, **free),
-                        starts,
-                    )
-                known[turn] = near
+        for turn, inner in _outwards(wanted, 0.0):
+            begin = known[inner].gait if inner in known else None
+            if -turn in known and mirrors:
+                begin = known[-turn].gait.mirrored
+            asked = {"gait": anywhere, "rotation": turn, "guess": begin}
+            if begin is None:
+                known[turn] = member(turn, stated.with_(**asked, delta_start=None))
+            else:
+                known[turn] = member(turn, stated.with_(**asked, delta_start=problem.delta), 1)
         return tuple(known[turn] for turn in wanted)
 
     turns, spot = (sorted({float(turn) for turn in each}) for each in (turns, spot))
-    points = turned(problem, turns, {0.0: straight})
-    cheapest = problem.with_(**free, objective=LEAST_WORK, rotation=1.0)
-    places = Steering(cheapest, tuple(spot), turned(cheapest, spot, {})) if spot else None
+    points = family(problem, turns, {0.0: straight})
+    cheapest = problem.with_(gait=anywhere, objective=LEAST_WORK, rotation=1.0)
+    places = Steering(cheapest, tuple(spot), family(cheapest, spot, {})) if spot else None
     return Steering(problem, tuple(turns), points, places)

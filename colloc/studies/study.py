@@ -1,9 +1,7 @@
-"""A study: a grid of problems. Study files are plain Python that states ``STUDY``; they are code,
-and are executed.
+"""A study: a grid of problems over named axes, and how hard to search each cell.
 
-A cell of the grid is a point, one value of every axis. Starts travel between neighbours: along an
-axis of numbers from the value before, along an axis of texts (a class of gaits, say) from every
-value before.
+A cell is an index into the axes. Good starts travel between neighbours: along an axis of numbers
+from the value before, along an axis of texts (a class of gaits, say) from every value before.
 """
 
 from __future__ import annotations
@@ -26,21 +24,17 @@ from colloc.system.result_names import check_name
 
 Index = tuple[int, ...]
 NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
-COUNTS = (
-    "bilateral",
-    "antipodal",
-    "retraced",
-    "at_slowest",
-    "winding",
-    "below_neighbour",
-    "starts",
-    "starts_certified",
-)
-OTHERS = ("delta", "trivial_bound", "upper_bound", "neighbour_value", "seconds", "wave", "forward")
-TEXTS = ("status", "message", "origin", "gait_class", "problem_hash")
+KINDS = ("bilateral", "antipodal", "retraced", "winding", "wave", "forward")
+COLUMNS: dict[str, float | str] = {
+    **dict.fromkeys((*NUMBERS, "delta", "trivial_bound", "upper_bound"), math.nan),
+    **dict.fromkeys(("neighbour_value", "seconds", "wave", "forward"), math.nan),
+    **dict.fromkeys(("bilateral", "antipodal", "retraced", "at_slowest", "winding"), 0),
+    **dict.fromkeys(("below_neighbour", "starts", "starts_certified"), 0),
+    **dict.fromkeys(("status", "message", "origin", "gait_class", "problem_hash"), ""),
+}
+"""Results of a cell, one value each, as they are where there is none."""
 ARRAYS = {"mean": ("joint",), "cos": ("joint", "harmonic"), "sin": ("joint", "harmonic")}
-COLUMNS = {*NUMBERS, *COUNTS, *OTHERS, *TEXTS, *ARRAYS, "joint", "harmonic"}
-"""What the table of a study holds of every cell (`colloc.studies.store`), and its dimensions."""
+_RESERVED = {*COLUMNS, *ARRAYS, "joint", "harmonic"}
 MOST_CELLS = 1_000_000
 
 
@@ -75,8 +69,8 @@ class Axis:
 
     def __post_init__(self) -> None:
         try:
-            given = (self.values,) if isinstance(self.values, str) else self.values
-            values = tuple(v if isinstance(v, str) else float(v) for v in given)
+            stated = (self.values,) if isinstance(self.values, str) else self.values
+            values = tuple(v if isinstance(v, str) else float(v) for v in stated)
         except (TypeError, ValueError, OverflowError):
             raise ProblemError(
                 f"values of an axis must be numbers or names, not {self.values!r}."
@@ -86,16 +80,15 @@ class Axis:
             raise ProblemError(
                 f"the name of an axis must be a Python name, not {shown(self.name)}."
             )
-        if self.name in COLUMNS:
+        if self.name in _RESERVED:
             raise ProblemError(
                 f"an axis cannot be called {self.name}, as a column of the results is: take "
                 f"another name."
             )
         if not values or len(set(values)) != len(values):
             raise ProblemError(f"axis {self.name}: values must be distinct, and at least one.")
-        if len({isinstance(v, str) for v in values}) > 1 or not all(
-            isinstance(v, str) or math.isfinite(v) for v in values
-        ):
+        texts = [isinstance(v, str) for v in values]
+        if any(texts) != all(texts) or (not all(texts) and not np.isfinite(values).all()):
             raise ProblemError(
                 f"axis {self.name}: values must be finite numbers, or texts, not a mixture."
             )
@@ -124,8 +117,8 @@ class Study:
         search over the grid.
     warm_starts : int
         Of the warm starts that reach a cell first so many are solved: those whose gaits do best
-        there as they are. Any other is solved only if its gait, as it is, does better than all that
-        was found.
+        there as they are. Any other is solved only if its gait, as it is, does better than all
+        results so far.
     chunk : int
         Cells along the last axis that make one task, with warm starts travelling inside. More cells
         cost less scheduling.
@@ -154,12 +147,11 @@ class Study:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "axes", tuple(self.axes) if isinstance(self.axes, Iterable) else (self.axes,)
-        )
-        if not self.axes or not all(isinstance(axis, Axis) for axis in self.axes):
+        axes = tuple(self.axes) if isinstance(self.axes, Iterable) else (self.axes,)
+        object.__setattr__(self, "axes", axes)
+        if not axes or not all(isinstance(axis, Axis) for axis in axes):
             raise ProblemError("a study needs at least one Axis.")
-        if len({axis.name for axis in self.axes}) != len(self.axes):
+        if len({axis.name for axis in axes}) != len(axes):
             raise ProblemError("two axes of a study have the same name.")
         check_name(self.name)
         if not callable(self.problem):
@@ -171,16 +163,11 @@ class Study:
                     f"{field} must be a whole number from {least} to {LARGEST_SEED}, not "
                     f"{shown(value)}."
                 )
-        if (
-            isinstance(self.time_limit, bool)
-            or not isinstance(self.time_limit, (int, float))
-            or not self.time_limit > 0
-        ):
-            raise ProblemError(f"time_limit must be positive, not {self.time_limit!r}.")
-        if math.prod(self.shape) > MOST_CELLS:
-            raise ProblemError(
-                f"a study may have {MOST_CELLS} cells, not {math.prod(self.shape)}; split it."
-            )
+        limit = self.time_limit
+        if isinstance(limit, bool) or not isinstance(limit, (int, float)) or not limit > 0:
+            raise ProblemError(f"time_limit must be positive, not {limit!r}.")
+        if (cells := math.prod(self.shape)) > MOST_CELLS:
+            raise ProblemError(f"a study may have {MOST_CELLS} cells, not {cells}; split it.")
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -194,6 +181,13 @@ class Study:
         """Values of the axes at a cell, by name."""
         return {axis.name: axis.values[i] for axis, i in zip(self.axes, cell, strict=True)}
 
+    def label(self, cell: Index) -> str:
+        """Coordinates of a cell for people."""
+        return ", ".join(
+            f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
+            for name, value in self.coordinates(cell).items()
+        )
+
     def problem_at(self, cell: Index) -> Problem:
         """The problem of a cell.
 
@@ -202,9 +196,10 @@ class Study:
         ProblemError
             Whatever the study's function raises, with the coordinates, its file and the line.
         """
-        where = ", ".join(f"{k} = {v}" for k, v in self.coordinates(cell).items())
+        coordinates = self.coordinates(cell)
+        where = ", ".join(f"{name} = {value}" for name, value in coordinates.items())
         try:
-            problem = self.problem(**self.coordinates(cell))
+            problem = self.problem(**coordinates)
         except Exception as error:
             place = place_of(error)
             raise ProblemError(
@@ -225,19 +220,17 @@ class Study:
         return self._neighbours(cell, (-1, 1))
 
     def _neighbours(self, cell: Index, steps: tuple[int, ...]) -> list[Index]:
-        found = []
+        neighbours = []
         for a, axis in enumerate(self.axes):
-            if not axis.travels:
-                continue
-            near: Iterable[int] = (cell[a] + step for step in steps)
+            places: Iterable[int] = (cell[a] + step for step in steps)
             if axis.of_texts:
-                near = range(self.shape[a] if 1 in steps else cell[a])
-            found += [
+                places = range(self.shape[a] if 1 in steps else cell[a])
+            neighbours += [
                 (*cell[:a], i, *cell[a + 1 :])
-                for i in near
-                if 0 <= i < self.shape[a] and i != cell[a]
+                for i in places
+                if axis.travels and 0 <= i < self.shape[a] and i != cell[a]
             ]
-        return found
+        return neighbours
 
     def cold_numbers(self, cell: Index) -> tuple[int, ...]:
         """Numbers of the seeded starts of a cell."""
@@ -246,15 +239,17 @@ class Study:
 
 
 def read_study_file(path: str | os.PathLike[str]) -> tuple[Study, str]:
-    """Execute a study file; its study and its text. `ProblemError` if there is no such file, it
-    fails (with the line), or states no ``STUDY``."""
+    """Execute a study file; its study and its text.
+
+    Raises
+    ------
+    ProblemError
+        If there is no such file, it fails (with the line), or states no ``STUDY``.
+    """
     path, names, source = stated_names(path, "study")
     study = names.get("STUDY")
-    if not isinstance(study, Study):
-        what = (
-            "states no STUDY"
-            if study is None
-            else f"STUDY must be a Study, not {type(study).__name__}"
-        )
-        raise ProblemError(f"{path}: {what}; end it with STUDY = Study(...).")
-    return study, source
+    if isinstance(study, Study):
+        return study, source
+    what = f"STUDY must be a Study, not {type(study).__name__}"
+    what = "states no STUDY" if study is None else what
+    raise ProblemError(f"{path}: {what}; end it with STUDY = Study(...).")

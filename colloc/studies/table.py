@@ -1,11 +1,21 @@
-"""The cells of a study as labelled arrays: best certified gait of each, its class and its
-bounds."""
+"""Results of a study as labelled arrays over its axes: the best certified gait of each cell, its
+kind and its bounds; and the netCDF-4 file that holds them.
+
+Numbers of cells without a certified gait are NaN, and ``status`` and ``message`` say why. ``delta``
+is per period for every class; ``mean``, ``cos`` and ``sin`` are the Fourier series of a gait, cut
+(the journal has the gait itself). ``below_neighbour`` is 1 where a neighbour's gait, as it is, does
+better (``neighbour_value``) than the cell's own. Attributes of the file: name, source, command,
+versions (JSON).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,121 +24,88 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.law import rate_independent
 from colloc.results.distinct_optima import fourier_series, series_class
-from colloc.results.outcome import UNITS as OF_OUTCOMES
-from colloc.results.outcome import Outcome
-from colloc.results.solution import SOLVED
-from colloc.studies.gait_class import GaitClass, gait_class
+from colloc.results.outcome import UNITS, Outcome
+from colloc.results.solution import SOLVED, versions
+from colloc.studies.gait_class import gait_class
 from colloc.studies.run import StudyRun
-from colloc.studies.study import ARRAYS, COUNTS, NUMBERS, OTHERS, TEXTS, Index, Study
-from colloc.system.late_binding import optional
+from colloc.studies.study import ARRAYS, COLUMNS, KINDS, NUMBERS, Index
+from colloc.system.table import Table, load_table, save_table
 
-if TYPE_CHECKING:
-    import xarray
-
+KIND, VERSION = "colloc study", 2
 NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
-UNITS = {
-    **OF_OUTCOMES,
-    "trivial_bound": "1/weight",
-    "upper_bound": "1/weight",
+_UNITS = {
+    **UNITS,
+    **dict.fromkeys(("trivial_bound", "upper_bound"), "1/weight"),
     "neighbour_value": "of the objective",
-    **dict.fromkeys(("mean", "cos", "sin"), "rad"),
+    **dict.fromkeys(ARRAYS, "rad"),
 }
 KnownBound = Callable[[Problem], float | None]
 
 
 @dataclass(frozen=True, eq=False)
-class StudyTable:
-    """Labelled arrays: coordinates and variables by name, with the dimensions of each variable."""
-
-    name: str
-    coordinates: Mapping[str, np.ndarray]
-    units: Mapping[str, str]
-    labels: Mapping[str, str]
-    variables: Mapping[str, np.ndarray]
-    dimensions: Mapping[str, tuple[str, ...]]
+class StudyTable(Table):
+    """Labelled arrays over the axes of a study."""
 
     def __repr__(self) -> str:
         status = self.variables["status"]
         certified = int((status == SOLVED).sum())
         return f"<StudyTable {self.name}: {certified} of {status.size} cells have a certified gait>"
 
-    def to_xarray(self) -> xarray.Dataset:
-        """The arrays as an xarray Dataset."""
-        arrays = optional("xarray")
-        found = {
-            k: (self.dimensions[k], v, {"units": UNITS.get(k, "1")})
-            for k, v in self.variables.items()
-        }
-        return arrays.Dataset(found, dict(self.coordinates), {"name": self.name})
-
 
 def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> StudyTable:
     """All cells of a run; `known_bound` gives an upper bound on the efficiency of every gait of a
     problem's body, if one is known."""
     study = run.study
-    axes = tuple(axis.name for axis in study.axes)
     problems = [state.problem for state in run.cells.values() if state.problem is not None]
-    joints, harmonics = (
-        max(p.body.n_joint for p in problems),
-        max(series_class(p).harmonics for p in problems),
-    )
+    sizes = {
+        "joint": max(p.body.n_joint for p in problems),
+        "harmonic": max(series_class(p).harmonics for p in problems),
+    }
     variables: dict[str, np.ndarray] = {}
-    dimensions: dict[str, tuple[str, ...]] = {}
-
-    def variable(name: str, kind: type, empty: object, extra: tuple[str, ...] = ()) -> None:
-        sizes = {"joint": joints, "harmonic": harmonics}
-        variables[name] = np.full((*study.shape, *(sizes[e] for e in extra)), empty, dtype=kind)
-        dimensions[name] = (*axes, *extra)
-
-    for name in (*NUMBERS, *OTHERS):
-        variable(name, float, np.nan)
-    for name in COUNTS:
-        variable(name, int, 0)
-    for name in TEXTS:
-        variable(name, object, "")
+    for name, empty in COLUMNS.items():
+        kind = object if isinstance(empty, str) else type(empty)
+        variables[name] = np.full(study.shape, empty, dtype=kind)
     for name, extra in ARRAYS.items():
-        variable(name, float, np.nan, extra)
+        variables[name] = np.full((*study.shape, *(sizes[e] for e in extra)), np.nan)
     for cell in run.cells:
-        for name, value in _cell(run, cell, known_bound).items():
-            here = variables[name][cell]
-            if isinstance(here, np.ndarray):
-                here[tuple(slice(0, n) for n in np.shape(value))] = value
+        for name, value in _row(run, cell, known_bound).items():
+            if name in ARRAYS:
+                variables[name][cell][tuple(map(slice, np.shape(value)))] = value
             else:
                 variables[name][cell] = value
-    coordinates = {axis.name: _coordinate(axis.values) for axis in study.axes}
-    coordinates |= {"joint": np.arange(1, joints + 1), "harmonic": np.arange(1, harmonics + 1)}
-    units, labels = (
-        {axis.name: axis.units for axis in study.axes},
-        {axis.name: axis.label or axis.name for axis in study.axes},
+    axes = tuple(axis.name for axis in study.axes)
+    coordinates = {
+        axis.name: np.array(axis.values, dtype=object if axis.of_texts else float)
+        for axis in study.axes
+    }
+    return StudyTable(
+        study.name,
+        coordinates | {name: np.arange(1, size + 1) for name, size in sizes.items()},
+        variables,
+        {name: (*axes, *ARRAYS.get(name, ())) for name in variables},
+        _UNITS | {axis.name: axis.units for axis in study.axes},
+        {**{n: n for n in sizes}, **{axis.name: axis.label or axis.name for axis in study.axes}},
     )
-    return StudyTable(study.name, coordinates, units, labels, variables, dimensions)
 
 
-def _coordinate(values: tuple) -> np.ndarray:
-    return np.array(values, dtype=object if isinstance(values[0], str) else float)
-
-
-def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]:
+def _row(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]:
     state = run.cells[cell]
-    problem = state.problem
+    problem, best = state.problem, state.best
     if problem is None:
         return {"status": NO_PROBLEM, "message": state.message}
     outcomes = [a.outcome for a in state.attempts]
+    bound = known_bound(problem)
     row: dict[str, Any] = {
         "problem_hash": problem.hash,
         "starts": len(outcomes),
+        "starts_certified": sum(o.status == SOLVED for o in outcomes),
+        "seconds": sum(o.seconds for o in outcomes),
+        "trivial_bound": 1.0 / problem.law.smallest if rate_independent(problem.law) else np.nan,
+        "upper_bound": np.nan if bound is None else bound,
+        "neighbour_value": run.neighbour_value(cell),
+        "below_neighbour": int(run.below_neighbour(cell)),
         "status": NOT_TRIED,
     }
-    row["starts_certified"] = sum(o.status == SOLVED for o in outcomes)
-    row["seconds"] = sum(o.seconds for o in outcomes)
-    row["trivial_bound"] = 1.0 / problem.law.smallest if rate_independent(problem.law) else np.nan
-    bound = known_bound(problem)
-    row["upper_bound"] = np.nan if bound is None else bound
-    row["neighbour_value"], row["below_neighbour"] = (
-        run.neighbour_value(cell),
-        int(run.below_neighbour(cell)),
-    )
-    best = state.best
     if best is not None:
         row |= {"status": SOLVED, "origin": best.origin} | _gait_row(problem, best.outcome)
     elif outcomes:
@@ -139,22 +116,24 @@ def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]
 def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     gait = fourier_series(problem, outcome.gait)
     row: dict[str, Any] = {name: getattr(outcome, name) for name in NUMBERS}
+    row |= {name: getattr(gait, name) for name in ARRAYS}
     row["delta"] = delta_per_period(problem.gait, outcome.gait, outcome.delta)
-    row |= {"mean": gait.mean, "cos": gait.cos, "sin": gait.sin}
     row["at_slowest"] = int(on_speed_floor(problem, outcome.gait))
     if problem.body.n_joint > 1:
-        kind: GaitClass = gait_class(gait, problem.body, problem.law)
-        row |= {
-            name: getattr(kind, name)
-            for name in ("bilateral", "antipodal", "retraced", "winding", "wave", "forward")
-        }
-        row["gait_class"] = kind.label
+        kind = gait_class(gait, problem.body, problem.law)
+        row |= {name: getattr(kind, name) for name in KINDS} | {"gait_class": kind.label}
     return row
 
 
-def cell_text(study: Study, cell: Index) -> str:
-    """Coordinates of a cell for people."""
-    return ", ".join(
-        f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}"
-        for k, v in study.coordinates(cell).items()
-    )
+def save_study(
+    table: StudyTable, path: str | os.PathLike[str], *, source: str = "", command: str = ""
+) -> Path:
+    """Write the results; an existing file is replaced only once the new one is complete."""
+    facts = {"source": source, "command": command, "versions": json.dumps(versions())}
+    stated = replace(table, attributes=facts | {"Conventions": "CF-1.8"})
+    return save_table(stated, path, KIND, VERSION)
+
+
+def load_study(path: str | os.PathLike[str]) -> Table:
+    """The results in a file that `save_study` wrote."""
+    return load_table(path, KIND, VERSION)

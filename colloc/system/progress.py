@@ -1,5 +1,5 @@
-"""What a person sees while they wait: one line that is rewritten, with the time left; nothing where
-nobody watches."""
+"""Progress in a terminal: one line that is rewritten, with the time left; nothing where nobody
+watches."""
 
 from __future__ import annotations
 
@@ -45,13 +45,9 @@ class StatusLine:
         self.clear()
 
     def say(self, text: str, left: float = 0.0) -> None:
-        """Show a text from now on; `left` are the seconds it will probably take from now, 0 if
-        nobody knows."""
-        self._text, self._left, self._since = (
-            text,
-            left if math.isfinite(left) else 0.0,
-            time.monotonic(),
-        )
+        """Show a text from now on; `left` are the seconds it will probably take, 0 if unknown."""
+        self._text, self._since = text, time.monotonic()
+        self._left = left if math.isfinite(left) else 0.0
         if not self._shown:
             return
         if self._live is None:

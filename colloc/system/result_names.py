@@ -1,5 +1,4 @@
-"""Where results lie: which files are named after a problem, and which names a problem cannot have
-for that.
+"""Names of files of results, and which names a problem cannot have for that.
 
 The result of the problem NAME is NAME.h5. What else colloc makes of it is told apart by an ending
 of its own before the suffix: NAME.failed.h5, NAME.shrunk.h5, NAME.starts.h5. So no problem's own
@@ -14,22 +13,11 @@ from pathlib import Path
 from colloc.system.errors import ProblemError
 
 SUFFIX = ".h5"
-FAILED, INTERRUPTED, SHRUNK, RUN, STARTS, FRONT = (
-    "failed",
-    "interrupted",
-    "shrunk",
-    "run",
-    "starts",
-    "front",
-)
+FAILED, INTERRUPTED, SHRUNK, RUN = "failed", "interrupted", "shrunk", "run"
 """A solve that failed, or was interrupted; the better gait that shrank, beside the best one of
-finite size; a run under way; an archive of starts; a front of two objectives."""
-_NUMBERED = ("start", "former")
-"""One start of an archive; a result that another one took the place of."""
+finite size; a run under way."""
 _ENDING = re.compile(
-    rf"\.({'|'.join((FAILED, INTERRUPTED, SHRUNK, RUN, STARTS, FRONT))}"
-    rf"|(?:{'|'.join(_NUMBERED)})-\d+)$",
-    re.IGNORECASE,
+    r"\.(failed|interrupted|shrunk|run|starts|front|(?:start|former)-\d+)$", re.IGNORECASE
 )
 _NAME, LONGEST_NAME = re.compile(r"[A-Za-z0-9_.-]+"), 200
 """File systems allow 255 bytes, and results of a problem add endings to its name."""
@@ -38,8 +26,8 @@ _NAME, LONGEST_NAME = re.compile(r"[A-Za-z0-9_.-]+"), 200
 def reserved_ending(name: str) -> str:
     """The ending of a name, without its dot, that files which colloc makes beside results have; ""
     if it has none."""
-    found = _ENDING.search(name)
-    return found[1] if found else ""
+    match = _ENDING.search(name)
+    return match[1] if match else ""
 
 
 def check_name(name: object) -> None:
@@ -76,11 +64,6 @@ def beside(path: Path, ending: str) -> Path:
     return path.with_name(f"{path.stem}.{ending}{path.suffix}")
 
 
-def former(path: Path, number: int) -> Path:
-    """Where a result is kept that another one took the place of."""
-    return beside(path, f"former-{number}")
-
-
 def run_file(path: Path) -> Path:
-    """Where the run is kept, while it is under way, whose result goes to a path."""
+    """The file that keeps the run, while it is under way, whose result goes to a path."""
     return beside(path, RUN).with_suffix(".sqlite")

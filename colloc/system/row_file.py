@@ -12,15 +12,19 @@ import json
 import os
 import sqlite3
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from colloc.system.errors import StoreError
+from colloc.system.errors import CollocError, StoreError
 from colloc.system.replaced_file import NO_LOCKS
 
 CACHE = "colloc cache 2"
+_UNREADABLE = (
+    *(sqlite3.Error, OSError, TypeError, ValueError, RecursionError),
+    *(KeyError, AttributeError, OverflowError, CollocError),
+)
 _PATIENCE = 60.0
 """Seconds to wait for other writers, each of which takes milliseconds."""
 
@@ -71,8 +75,10 @@ def _table(kind: str) -> str:
     return f'CREATE TABLE "{kind}" (key TEXT PRIMARY KEY, value TEXT)'
 
 
-def read_rows(path: Path, kind: str) -> dict[str, Any]:
-    """Values by key, in the order in which the keys came; none if there is no such file.
+def read_rows(
+    path: Path, kind: str, decode: Callable[[Any], Any] = lambda value: value
+) -> dict[str, Any]:
+    """Decoded values by key, in the order in which the keys came; none if there is no such file.
     `StoreError` if the file cannot be read, is damaged or of another kind."""
     if not path.exists():
         return {}
@@ -83,10 +89,10 @@ def read_rows(path: Path, kind: str) -> dict[str, Any]:
                 if filled
                 else ()
             )
-            return {key: json.loads(text) for key, text in rows}
+            return {key: decode(json.loads(text)) for key, text in rows}
     except StoreError:
         raise
-    except (sqlite3.Error, OSError, TypeError, ValueError, RecursionError) as error:
+    except _UNREADABLE as error:
         raise StoreError(
             f"{path} cannot be read as a {kind} ({error}); move it away, or have sqlite3 "
             f"recover it."

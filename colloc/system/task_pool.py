@@ -48,18 +48,18 @@ class Task:
 
 @dataclass(frozen=True)
 class Lost:
-    """In place of a result: the engine failed twice to give one (worker killed, out of memory, lost
-    connection)."""
+    """In place of a result: the executor failed twice to give one (worker killed, out of memory,
+    lost connection)."""
 
     message: str
 
 
 class EngineGone(CollocError, RuntimeError):
-    """What runs the tasks is gone as a whole, so no task is to blame."""
+    """The executor is gone as a whole, so no task is to blame."""
 
 
 @contextlib.contextmanager
-def environment_of_workers() -> Iterator[None]:
+def worker_environment() -> Iterator[None]:
     """Processes started inside use one BLAS thread each, and import no file of the folder instead
     of another module; the environment is put back afterwards."""
     before = {name: os.environ.get(name) for name in _ENVIRONMENT}
@@ -74,7 +74,7 @@ def environment_of_workers() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def _started() -> None:
+def _begin_worker() -> None:
     """A worker leaves interrupts and standard output to its parent, and does not outlive it."""
     signal(SIGINT, SIG_IGN)
     with contextlib.suppress(OSError):
@@ -94,19 +94,12 @@ class _Processes(ProcessPoolExecutor):
     defines: so it needs no ``if __name__ == "__main__"`` for those of colloc alone."""
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future:
-        with (
-            contextlib.nullcontext()
-            if _is_of_script((function, arguments, named))
-            else _without_script()
-        ):
+        try:
+            of_script = b"__main__" in pickle.dumps((function, arguments, named))
+        except Exception:
+            of_script = True  # the executor says what is wrong
+        with contextlib.nullcontext() if of_script else _without_script():
             return super().submit(function, *arguments, **named)
-
-
-def _is_of_script(task: tuple) -> bool:
-    try:
-        return b"__main__" in pickle.dumps(task)
-    except Exception:
-        return True  # which the executor is to say
 
 
 @contextlib.contextmanager
@@ -128,12 +121,11 @@ def process_pool(workers: int) -> Executor:
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         # a worker, in a script without that line: the process that began it does its task itself
         sys.exit(1)
-    return _Processes(
-        workers, mp_context=multiprocessing.get_context("spawn"), initializer=_started
-    )
+    spawn = multiprocessing.get_context("spawn")
+    return _Processes(workers, mp_context=spawn, initializer=_begin_worker)
 
 
-class InThisProcess(Executor):
+class _InThisProcess(Executor):
     """Runs every task at once where it is handed over."""
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future:
@@ -147,31 +139,30 @@ class InThisProcess(Executor):
 
 def pool_for(workers: int) -> Executor:
     """Fresh processes, or this one if one worker is enough."""
-    return process_pool(workers) if workers > 1 else InThisProcess()
+    return process_pool(workers) if workers > 1 else _InThisProcess()
 
 
-def _failure(future: Future) -> BaseException | None:
-    try:
-        return future.exception()
-    except CancelledError as cancelled:
-        return cancelled
-
-
-def _first_done(pending: dict[Future, Task]) -> set[Future]:
-    """Those that are done, as soon as one is.
+def _first_done(pool: Executor, pending: dict[Future, Task]) -> set[Future]:
+    """Futures that are done, as soon as one is.
 
     Ctrl-C is held back while an executor's locks are taken, here and where tasks are handed over:
     it could fall between a lock and the block that would open it again, and the executor's own
     thread, which Python joins at its end, would wait for ever.
     """
-    done: set[Future] = set()
-    while not done:
+    while True:
         with interruptible():
             done = wait(pending, timeout=_MOMENT, return_when=FIRST_COMPLETED).done
-    return done
+        if done:
+            return done
+        _check(pool)
 
 
-def completed(
+def _check(pool: Executor) -> None:
+    if hasattr(pool, "check"):
+        pool.check()
+
+
+def run_tasks(
     function: Callable[..., Any],
     ready: Callable[[], Task | None],
     *,
@@ -184,8 +175,8 @@ def completed(
     Parameters
     ----------
     function : callable
-        Called as ``function(*task.arguments)`` on a worker. It must not raise: an exception counts
-        as a lost worker.
+        Called as ``function(*task.arguments)`` on a worker. An exception counts as a lost worker. A
+        task that was lost is tried again, alone; if it is lost again its result is `Lost`.
     ready : callable
         The next task, or None if there is none now. Asked again after each result has been taken;
         the run ends when there is none and nothing is under way.
@@ -194,13 +185,8 @@ def completed(
         has to.
     executor : callable
         Makes an executor for a number of workers: processes by default; threads, or the one a Dask
-        client gives (``lambda n: client.get_executor()``), will do.
-
-    Yields
-    ------
-    Task, result
-        The result is `Lost` for a task whose worker died, which was tried again alone, and whose
-        worker died again.
+        client gives (``lambda n: client.get_executor()``), will do. If it has a method `check`,
+        that is called while nothing ends, and may raise `EngineGone`.
 
     Raises
     ------
@@ -209,61 +195,57 @@ def completed(
     EngineGone
         If the executor says that of itself: nothing is tried again, and no task recorded as lost.
     """
-    suspects: list[Task] = []
+    suspects: list[Task] = []  # under way when a worker died
     more = True
-    with environment_of_workers():
+    with worker_environment():
         while more or suspects:
             alone = bool(suspects)
+            most = 1 if alone else workers + ahead
             pool = executor(1 if alone else workers)
             pending: dict[Future, Task] = {}
-            submitted, listened = False, True
+            any_begun, listened = False, True
             try:
                 while True:
-                    while len(pending) < (1 if alone else workers + ahead):
-                        task = (suspects[-1] if suspects else None) if alone else ready()
+                    while len(pending) < most:
+                        task = ready() if not alone else suspects.pop() if suspects else None
                         if task is None:
                             break
                         try:
                             with interruptible():
                                 pending[pool.submit(function, *task.arguments)] = task
                         except BrokenExecutor:
-                            if not alone:
-                                suspects.append(task)
+                            suspects.append(task)
                             raise
-                        if alone:
-                            suspects.pop()
-                        submitted = True
+                        any_begun = True
                     if not pending:
                         more = alone or bool(suspects)
                         break
-                    for future in _first_done(pending):
-                        error = _failure(future)
+                    for future in _first_done(pool, pending):
+                        error = CancelledError() if future.cancelled() else future.exception()
                         if isinstance(error, (BrokenExecutor, EngineGone)):
                             raise error
+                        if error is not None:
+                            _check(pool)
                         task = pending.pop(future)
                         if error is None:
                             yield task, future.result()
                         elif alone:
-                            yield (
-                                task,
-                                Lost(f"its worker failed twice ({type(error).__name__}: {error})."),
-                            )
+                            why = f"{type(error).__name__}: {error}"
+                            yield task, Lost(f"its worker failed twice ({why}).")
                         else:
                             suspects.append(task)
             except BrokenExecutor:
-                if not submitted:
+                if not any_begun:
                     listened = False
                     raise
-                if alone:
-                    for task in pending.values():
-                        yield (
-                            task,
-                            Lost("its worker process died twice (killed, or out of memory)."),
-                        )
-                else:
+                if not alone:
                     suspects += pending.values()
-            except BaseException:
+                for task in pending.values() if alone else ():
+                    yield task, Lost("its worker process died twice (killed, or out of memory).")
+            except BaseException as error:
                 listened = False
+                if isinstance(error, EngineGone):
+                    pending.clear()  # nobody answers
                 raise
             finally:
                 # interrupted, or nobody listens any more: do not wait for what is under way

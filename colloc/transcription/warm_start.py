@@ -74,7 +74,8 @@ def balanced_variables(
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     else:
-        x[layout.speed] = speed
+        if relative:
+            x[layout.speed] = speed
         slows = slow * speed if relative else np.full(mesh.n_point, slow)
         _lift(control, layout, x, (angles, rates, z), slows, theta_0 + pose.theta_on(mesh))
     return x

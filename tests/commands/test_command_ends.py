@@ -419,7 +419,7 @@ def test_many_intervals_are_announced(quick, tmp_path, capsys, monkeypatch):
     def begun(*_, **__):
         raise _Begun
 
-    monkeypatch.setattr("colloc.studies.saved.resumed", begun)
+    monkeypatch.setattr("colloc.studies.saved.resume", begun)
     for intervals, said in ((5000, "5000 intervals will take about 1 min 40 s"), (60, "")):
         with pytest.raises(_Begun):
             colloc(["solve", quick, "--mesh", str(intervals), "--output", f"{tmp_path}/"])
@@ -488,7 +488,7 @@ def stated(folder, text):
 def test_what_results_could_not_keep_is_refused_before_the_search(
     large, tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setattr("colloc.studies.saved.resumed", lambda *_, **__: pytest.fail("searched"))
+    monkeypatch.setattr("colloc.studies.saved.resume", lambda *_, **__: pytest.fail("searched"))
     text = QUICK + "# " + "x" * 2**20 + "\n"
     if large == "description":
         text = (

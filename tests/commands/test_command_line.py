@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from colloc.commands.solve import main
+from colloc.commands.solve import solve as main
 
 GOOD = """
 from colloc import *

@@ -10,7 +10,7 @@ import pandas
 import pytest
 from scipy.interpolate import CubicSpline
 
-from colloc.commands.export import main
+from colloc.commands.results import export as main
 from colloc.commands.summary import summary_lines
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem

@@ -7,7 +7,7 @@ import pytest
 
 from colloc import Chain, Wheel, solve
 from colloc.commands.ending import BAD_PROBLEM, OK
-from colloc.commands.init import main
+from colloc.commands.init import init as main
 from colloc.gaits.problem_file import read_problem_file
 
 

@@ -41,7 +41,6 @@ COMMANDS = {
     "export": "quick.h5 --period 4 --output other.csv",
     "robot": "quick.h5 --length 1 --mass 1 --period 4 --figure",
     "sensitivity": "quick.h5",
-    "referee": "--only inchworm",
 }
 LONG = ("sweep", "multistart", "pareto")
 CLOCK = re.compile(r"   \d+ s(, about \d+ s left)?$")

@@ -1,4 +1,4 @@
-"""Results are rechecked without CasADi and compared as paths; tampering and differences show."""
+"""Results are recheck_certificate without CasADi and compared as paths; tampering and differences show."""
 
 import json
 import subprocess
@@ -10,9 +10,9 @@ import h5py
 import numpy as np
 import pytest
 
-from colloc.commands import compare, export
 from colloc.commands import verify as recheck
 from colloc.commands.main import SUBCOMMANDS, main
+from colloc.commands.results import export
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
@@ -47,7 +47,7 @@ def test_verify_certifies_without_loading_casadi_or_matplotlib(three_link, tmp_p
 
 
 def test_verify_uses_other_instants_and_agrees(three_link):
-    again = recheck.rechecked(three_link).certificate
+    again = recheck.recheck_certificate(three_link).certificate
     assert again.instants % three_link.certificate.instants
     assert again.passed
     assert abs(again.efficiency - three_link.certificate.efficiency) < 1e-6
@@ -56,7 +56,7 @@ def test_verify_uses_other_instants_and_agrees(three_link):
 def test_verify_finds_a_tampered_certificate_and_a_tampered_gait(three_link, tmp_path, capsys):
     boast = replace(three_link.certificate, value=three_link.certificate.value + 1e-3)
     file = save(changed(three_link, certificate=boast), tmp_path / "boast.h5")
-    assert recheck.main([str(file), "--json"]) == 4
+    assert recheck.verify([str(file), "--json"]) == 4
     report = json.loads(capsys.readouterr().out)
     assert not report["certified"]
     assert "is off by" in report["complaint"]
@@ -64,7 +64,7 @@ def test_verify_finds_a_tampered_certificate_and_a_tampered_gait(three_link, tmp
     x = three_link.answer.x.copy()
     x[three_link.layout.parameters[1, 0]] += 0.05
     file = save(changed(three_link, answer=replace(three_link.answer, x=x)), tmp_path / "gait.h5")
-    assert recheck.main([str(file)]) == 4
+    assert recheck.verify([str(file)]) == 4
     assert "NOT CERTIFIED" in capsys.readouterr().out
 
 
@@ -91,7 +91,7 @@ def test_every_number_of_a_certificate_is_held_against_a_new_one(
     by_another_program(
         path, lambda group: group.attrs.modify(name, 0.01 + 1.01 * group.attrs[name])
     )
-    assert recheck.main([str(path), "--json"]) == 4
+    assert recheck.verify([str(path), "--json"]) == 4
     told = json.loads(capsys.readouterr().out)
     assert told["complaint"].startswith("the file certifies ")
     assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
@@ -100,7 +100,7 @@ def test_every_number_of_a_certificate_is_held_against_a_new_one(
 def test_a_number_that_no_replay_was_asked_for_is_believed_of_nobody(three_link, tmp_path, capsys):
     path = save(three_link, tmp_path / "x.h5")
     by_another_program(path, lambda group: group.attrs.update({"driven_work": 1.1}))
-    assert recheck.main([str(path), "--json"]) == 4
+    assert recheck.verify([str(path), "--json"]) == 4
     assert "a driven work of 1.1" in json.loads(capsys.readouterr().out)["complaint"]
 
 
@@ -117,25 +117,28 @@ def test_what_is_no_number_of_a_replay_is_held_against_it_too(three_link, tmp_pa
             changed(three_link, certificate=replace(three_link.certificate, checks=other)),
             tmp_path / "x.h5",
         )
-        assert recheck.main([str(file), "--json"]) == 4
+        assert recheck.verify([str(file), "--json"]) == 4
         assert said in json.loads(capsys.readouterr().out)["complaint"]
 
 
 def test_a_result_that_was_only_opened_is_still_exported(three_link, tmp_path, capsys):
     path = save(three_link, tmp_path / "x.h5")
     by_another_program(path, lambda group: None)
-    assert export.main([str(path), "--period", "4"]) == 0
+    assert export([str(path), "--period", "4"]) == 0
     assert (tmp_path / "x.csv").exists()
 
 
 def test_an_absurd_number_of_instants_in_a_file_costs_no_memory(three_link):
     boast = replace(three_link.certificate, instants=10**12)
-    assert recheck.rechecked(changed(three_link, certificate=boast)).certificate.instants < 10**6
+    assert (
+        recheck.recheck_certificate(changed(three_link, certificate=boast)).certificate.instants
+        < 10**6
+    )
 
 
 def test_verify_refuses_what_is_no_result(tmp_path, capsys):
     (tmp_path / "x.h5").write_text("nothing")
-    assert recheck.main([str(tmp_path / "x.h5")]) == 2
+    assert recheck.verify([str(tmp_path / "x.h5")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 
@@ -158,22 +161,22 @@ def test_gaits_are_compared_where_start_phase_and_the_symmetries_of_body_and_fri
 
     # the mirror image, begun elsewhere
     gait, later = (found(mean, cos, sin), found(-mean, -sin, cos))
-    assert compare.gait_distance(gait, later) < 1e-9
+    assert recheck.gait_distance(gait, later) < 1e-9
     turned = -mean[::-1], -cos[::-1], -sin[::-1]
     others = {"turned": turned, "backwards": (mean, cos, -sin), "both": (*turned[:2], -turned[2])}
     assert {
-        name for name, other in others.items() if compare.gait_distance(gait, found(*other)) < 1e-9
+        name for name, other in others.items() if recheck.gait_distance(gait, found(*other)) < 1e-9
     } == alike
 
 
 def test_gaits_of_other_bodies_are_not_compared(three_link):
     other = SimpleNamespace(problem=Problem("p", body=Chain((0.2, 0.5, 0.3))))
-    assert compare.gait_distance(three_link, other) is None
+    assert recheck.gait_distance(three_link, other) is None
 
 
 def test_the_same_gait_found_for_another_objective_is_not_the_same_optimum(three_link):
     fast = replace(three_link, problem=three_link.problem.with_(objective="speed"))
-    assert compare.verdict(three_link, fast) == (False, "other objectives: efficiency and speed.")
+    assert recheck.verdict(three_link, fast) == (False, "other objectives: efficiency and speed.")
 
 
 def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_path, capsys):
@@ -181,15 +184,15 @@ def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_pat
     a, b = save(three_link, tmp_path / "a.h5"), save(offset, tmp_path / "b.h5")
     mirror = three_link.problem.with_(intervals=30)
     other = save(Solution(mirror, three_link.answer, three_link.certificate), tmp_path / "c.h5")
-    assert compare.main([str(a), str(b)]) == 1
+    assert recheck.compare([str(a), str(b)]) == 1
     printed = capsys.readouterr().out
     assert "different: efficiencies differ by 20" in printed
     assert "guess" in printed
-    assert compare.main([str(a), str(other), "--json"]) == 0
+    assert recheck.compare([str(a), str(other), "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["same"]
     assert report["problem"] == {"intervals": ["24", "30"]}
-    assert compare.main([str(a), str(tmp_path / "none.h5")]) == 2
+    assert recheck.compare([str(a), str(tmp_path / "none.h5")]) == 2
 
 
 def test_every_subcommand_answers_help_without_casadi():
@@ -217,6 +220,7 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
         (["repot"], "colloc report?"),
         (["x.py"], "colloc solve x.py?"),
         (["zzzz"], "choose one of init,"),
+        (["referee"], "python -m benchmarks.referee"),
     ):
         assert main(words) == 2
         assert hint in capsys.readouterr().err

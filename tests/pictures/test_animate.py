@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from colloc.commands.animate import main
+from colloc.commands.results import animate as main
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain

@@ -8,7 +8,7 @@ import pytest
 
 import colloc
 from colloc import Chain, Coupled, Foot, Friction, Harmonic, Pad, Problem, ProblemError, Wheel
-from colloc.commands.export import main
+from colloc.commands.results import export as main
 from colloc.mechanics.inertia import kinetic_energy
 from colloc.pictures.robot_model import mjcf, urdf
 from colloc.results.solution import direction_of_travel

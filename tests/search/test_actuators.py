@@ -22,7 +22,7 @@ from colloc import (
     replay,
     save,
 )
-from colloc.commands import verify
+from colloc.commands.verify import verify
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import instant
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
@@ -189,7 +189,7 @@ def test_limits_are_kept_in_files_and_verified(weak, tmp_path, capsys):
     assert Problem.from_dict(again.problem.to_dict()).path_limits == PathLimits(
         torque_and_power((), (0.6, 0.6))
     )
-    assert verify.main([str(path)]) == 0
+    assert verify([str(path)]) == 0
     assert "actuators" in capsys.readouterr().out
 
 

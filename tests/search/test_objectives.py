@@ -18,7 +18,7 @@ from colloc import (
     replay,
     save,
 )
-from colloc.commands import verify
+from colloc.commands.verify import verify
 from colloc.gaits.objective import EFFICIENCY, SPEED
 from colloc.mechanics.densities import DRIVEN_WORK, Instants
 from colloc.reduced.program import ReducedProgram
@@ -139,7 +139,7 @@ def test_a_result_says_what_it_is_best_at_and_comes_back_from_its_file(fast, tmp
     assert again.value == fast.value
     assert again.certificate == fast.certificate
     assert "d/L = 0.014" in repr(again)
-    assert verify.main([str(tmp_path / "fast.h5")]) == 0
+    assert verify([str(tmp_path / "fast.h5")]) == 0
     assert "speed d/L" in capsys.readouterr().out
 
 

@@ -276,7 +276,7 @@ def test_solves_on_two_threads_end_as_one_after_another():
 def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_again(
     tmp_path, capsys
 ):
-    from colloc.commands.solve import main
+    from colloc.commands.solve import solve as main
 
     (tmp_path / "quick.py").write_text(FILE.replace("delta=1e-3", "delta=0.1"), encoding="utf-8")
     run = run_file(tmp_path / "quick.h5")

@@ -21,8 +21,9 @@ from colloc import (
     load,
     save,
 )
-from colloc.commands import report, verify
-from colloc.commands import solve as solve_command
+from colloc.commands.results import report
+from colloc.commands.solve import solve as solve_command
+from colloc.commands.verify import verify
 from colloc.gaits.control_problem import control_problem
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram
@@ -74,7 +75,7 @@ def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, cap
     assert found.certificate.value > 1.4 * uphill.certificate.value
     path = save(found, tmp_path / "sides.h5")
     assert load(path).gait.theta == gait.theta
-    assert verify.main([str(path)]) == 0
+    assert verify([str(path)]) == 0
     assert "certified" in capsys.readouterr().out
 
 
@@ -125,9 +126,9 @@ def test_it_is_kept_verified_reported_and_summarised_like_any_other(uphill, tmp_
     assert again.certificate == uphill.certificate
     assert again.problem.hash == PROBLEM.hash
     assert again.gait.theta == uphill.gait.theta
-    assert verify.main([str(path)]) == 0
+    assert verify([str(path)]) == 0
     assert "certified" in capsys.readouterr().out
-    assert report.main([str(path)]) == 0
+    assert report([str(path)]) == 0
     assert "slope of grade 0.1" in path.with_suffix(".html").read_text(encoding="utf-8")
 
 
@@ -139,10 +140,7 @@ def test_the_command_line_solves_a_problem_file_with_a_grade(tmp_path, capsys):
         "PROBLEM = Problem('up', ellipse(0, 2.8, 1.3), gait=Harmonic(1, 'bilateral'), delta=1e-2, "
         "grade=0.1)\n"
     )
-    assert (
-        solve_command.main([str(file), "--starts", "2", "--verbose", "--output", f"{tmp_path}/"])
-        == 0
-    )
+    assert solve_command([str(file), "--starts", "2", "--verbose", "--output", f"{tmp_path}/"]) == 0
     out = capsys.readouterr().out
     assert "slope of grade 0.1: d is the climb, W the work of the joints" in out
     assert (tmp_path / "up.png").exists()

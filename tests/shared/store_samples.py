@@ -10,12 +10,10 @@ from colloc.gaits.problem import Problem
 from colloc.results.archive import Archive, StartName, open_archive
 from colloc.results.outcome import Outcome
 from colloc.results.store import load, save
-from colloc.studies.cell import Attempt
-from colloc.studies.journal import NAME, Record, append_records, read_journal
+from colloc.studies.journal import NAME, Attempt, Visit, append_visits, read_journal
 from colloc.studies.run import StudyRun
-from colloc.studies.store import load_study, save_study
 from colloc.studies.study import Axis, Study
-from colloc.studies.table import study_table
+from colloc.studies.table import load_study, save_study, study_table
 from colloc.system.row_file import CACHE, put_rows, read_rows
 from scripts.paper.array_store import read_arrays, write_arrays
 
@@ -41,7 +39,7 @@ def archive(path, starts=range(3)) -> Archive:
 
 
 def record(k=0):
-    return Record(problem(1.0 + 0.01 * k).hash, (Attempt("warm", f"key{k}", outcome(k)),))
+    return Visit(problem(1.0 + 0.01 * k).hash, (Attempt("warm", f"key{k}", outcome(k)),))
 
 
 def table(folder):
@@ -80,7 +78,7 @@ class Samples:
         elif kind == "study":
             save_study(self.table, path, source=str(version) * 10)
         elif kind == "journal":
-            append_records(
+            append_visits(
                 self.folder,
                 [record(5 + version)] if path.exists() else [record(k) for k in range(5)],
             )

@@ -4,7 +4,7 @@ gaits that were searched."""
 import numpy as np
 import pytest
 
-from colloc.commands.export import main as export
+from colloc.commands.results import export
 from colloc.gaits.gait_fields import body_from, class_from, fields
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.prescribed import Prescribed

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from colloc.commands import multistart
+from colloc.commands.families import multistart, starts_summary
 from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
@@ -38,7 +38,8 @@ from colloc.results.solution import SOLVED, Solution
 from colloc.search import certify
 from colloc.search.certify import is_trivial
 from colloc.search.solve import solve
-from colloc.studies import calls, campaign
+from colloc.studies import calls
+from colloc.studies import multistart as campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
 from scripts.continue_delta import resolution_warning, value_at_zero_delta
@@ -198,7 +199,7 @@ def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
     assert "smallest_shape_speed = 2" in solution.message
     assert not on_speed_floor(stated, ellipse(0.0, 2.0, 1.2))
     found = [outcome(0, solution.gait), outcome(1, ellipse(0.0, 2.0, 1.2))]
-    lines = multistart.summary_lines(stated, found, basins(stated, found))
+    lines = starts_summary(stated, found, None)[2]
     assert sum("on the bound smallest_shape_speed" in line for line in lines) == 1
 
 
@@ -349,7 +350,7 @@ PROBLEM = Problem(name="quick", gait=Harmonic(1, "bilateral"), guess=ellipse(0.2
 def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, capsys, monkeypatch):
     path, out = tmp_path / "quick.py", tmp_path / "out"
     path.write_text(FILE, encoding="utf-8")
-    multistart.main([str(path), "--starts", "2", "--output", str(out)])
+    multistart([str(path), "--starts", "2", "--output", str(out)])
     printed = capsys.readouterr().out
     assert "0 starts done already, 2 to go" in printed
     kept = lambda: open_archive(read_problem_file(path).problem, out / "quick.starts.h5")  # noqa: E731
@@ -362,18 +363,18 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
             yield outcome(k, ellipse(0.2, 1.2, 0.8))
 
     monkeypatch.setattr(campaign, "run_starts", run)
-    assert multistart.main([str(path), "--starts", "4", "--output", str(out), "--json"]) == 0
+    assert multistart([str(path), "--starts", "4", "--output", str(out), "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert asked == [2, 3]
     assert summary["starts"] == 4
     assert sum(summary["counts"].values()) == 4
     assert summary["optima"][0]["efficiency"] >= 0.2 - 1e-12
     # of fewer starts than are there so many count as were asked for
-    assert multistart.main([str(path), "--starts", "3", "--output", str(out)]) == 0
+    assert multistart([str(path), "--starts", "3", "--output", str(out)]) == 0
     assert "3 starts done already, 0 to go" in capsys.readouterr().out
     # another seed joins the same archive, and says what else is there
     assert (
-        multistart.main(
+        multistart(
             [str(path), "--starts", "2", "--seed", "1", "--output", str(out / "quick.starts.h5")]
         )
         == 0
@@ -385,7 +386,7 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert sorted(archive.of_search(SAMPLERS[0], 1)) == [0, 1]
     # another problem of the same name does not
     path.write_text(FILE.replace("delta=0.1", "delta=0.2"), encoding="utf-8")
-    assert multistart.main([str(path), "--output", str(out)]) == 2
+    assert multistart([str(path), "--output", str(out)]) == 2
     assert "holds starts of another problem" in capsys.readouterr().err
     assert asked == [2, 3, 0, 1]
     path.write_text(FILE, encoding="utf-8")
@@ -406,19 +407,6 @@ def test_of_two_runs_at_once_with_other_seeds_or_problems_neither_overwrites_the
     with pytest.raises(StoreError, match="another problem"):
         open_archive(problem(delta=0.2), tmp_path / "a.h5")
     assert len(open_archive(problem(), tmp_path / "a.h5").outcomes) == 6
-
-
-def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
-    path = tmp_path / "quick.py"
-    path.write_text(FILE, encoding="utf-8")
-    for options, text in (
-        (["--starts", "0"], "--starts"),
-        (["--workers", "0"], "--workers"),
-        (["--time-limit", "0"], "time"),
-    ):
-        assert multistart.main([str(path), *options]) == 2
-        assert text in capsys.readouterr().err
-    assert multistart.main([str(tmp_path / "none.py")]) == 2
 
 
 def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
@@ -531,15 +519,15 @@ def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(
             yield task, outcome(task.key, ellipse(0.2, 1.2, 0.8))
         raise _Enough
 
-    monkeypatch.setattr(campaign, "completed", solved)
+    monkeypatch.setattr(campaign, "run_tasks", solved)
     words = [str(path), "--starts", str(many), "--output", f"{tmp_path}/"]
     with pytest.raises(_Enough):
-        multistart.main(words)
+        multistart(words)
     told = capsys.readouterr().out
     assert f"0 starts done already, {many} to go" in told
     assert told.count("  solved\n") == 3
     with pytest.raises(_Enough):
-        multistart.main(words)
+        multistart(words)
     told = capsys.readouterr().out
     assert f"3 starts done already, {many - 3} to go" in told
     assert [line.split()[0] for line in told.splitlines() if line.endswith("solved")] == [
@@ -549,7 +537,7 @@ def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(
     ]
     tracemalloc.start()
     for begun in (
-        lambda: multistart.main([*words, "--quiet"]),
+        lambda: multistart([*words, "--quiet"]),
         lambda: calls.multistart(problem(), many),
     ):
         with pytest.raises(_Enough):

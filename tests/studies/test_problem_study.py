@@ -14,7 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from colloc.commands import sweep as sweep_study
+from colloc.commands.families import sweep as sweep_study
+from colloc.commands.families import sweep_summary
 from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
@@ -27,7 +28,7 @@ from colloc.results.distinct_optima import reversed_in_time, swapped
 from colloc.results.outcome import CRASHED, PASSED_OVER, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
-from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, Work, start_key, value_as_it_is
+from colloc.studies.cell import GUESS, RESCUE, WARM, Work, value_of
 from colloc.studies.gait_class import (
     DIRECT,
     RETROGRADE,
@@ -37,11 +38,17 @@ from colloc.studies.gait_class import (
     wave_direction,
     winding,
 )
-from colloc.studies.journal import Record, append_records, read_journal
+from colloc.studies.journal import (
+    Attempt,
+    Visit,
+    append_visits,
+    best_attempt,
+    read_journal,
+    start_key,
+)
 from colloc.studies.run import StudyRun
-from colloc.studies.store import load_study, save_study
 from colloc.studies.study import Axis, Study, read_study_file
-from colloc.studies.table import NO_PROBLEM, study_table
+from colloc.studies.table import NO_PROBLEM, load_study, save_study, study_table
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
 
@@ -96,7 +103,7 @@ def fake(monkeypatch):
     monkeypatch.setattr(study_cell, "run_guess", landscape)
     monkeypatch.setattr(
         study_cell,
-        "value_as_it_is",
+        "value_of",
         lambda p, g, *_: (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t,
     )
     monkeypatch.setattr(
@@ -243,7 +250,7 @@ def test_cells_that_an_earlier_colloc_finished_without_their_guess_are_missing(f
     gait = ellipse(0.0, 1.2, 0.4)
     for cell in grid().cells():
         attempt = Attempt("cold", start_key(gait), outcome(0, gait, gait, 0.2))
-        append_records(tmp_path, [Record(grid().problem_at(cell).hash, (attempt,))])
+        append_visits(tmp_path, [Visit(grid().problem_at(cell).hash, (attempt,))])
     run = StudyRun(grid(cold_starts=0), tmp_path)
     assert len(run.missing) == 12
     finished(run)
@@ -268,7 +275,7 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
     table = study_table(run).variables
     assert np.argwhere(table["below_neighbour"]).tolist() == [[1, 1]]
     assert table["neighbour_value"][1, 1] == pytest.approx(0.31)
-    lines = sweep_study._summary_lines(run, tmp_path)
+    lines = sweep_summary(run, tmp_path)[1]
     assert "1 of them below what a neighbour's gait achieves there" in lines[1]
     assert "x 2, y 2: 0.220000, where a neighbour's gait achieves 0.310000" in lines[2]
     # what was seen is in the journal
@@ -282,7 +289,7 @@ def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     exact = replay(stated.body, stated.friction, path, stated.delta)
     assert abs(exact.rotation) > 0.01
     sure = (exact.distance - 0.5 * abs(exact.rotation)) / exact.work
-    assert study_cell.value_as_it_is(stated, gait) == pytest.approx(
+    assert study_cell.value_of(stated, gait) == pytest.approx(
         max(sure, 0.0), abs=1e-3 * exact.efficiency
     )
     # where it could add all of it nothing counts, not even by the square of what is less than
@@ -292,7 +299,7 @@ def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
         stated.body, stated.friction, turning, stated.delta, instants=200, tolerance=1e-3
     )
     assert 0.5 * abs(turned.rotation) > turned.distance > 0.01
-    assert study_cell.value_as_it_is(stated.with_(objective="towing"), turning) == 0.0
+    assert study_cell.value_of(stated.with_(objective="towing"), turning) == 0.0
     closed = study_cell.member(stated, gait)
     again = replay(
         stated.body, stated.friction, lambda t: (closed.angles(t), closed.rates(t)), stated.delta
@@ -347,7 +354,7 @@ def test_what_was_solved_stays_when_the_rest_is_tried_again(fake, tmp_path, monk
     died = Attempt(
         GUESS, "0", outcome(0, ellipse(0.0, 1.2, 0.4), ellipse(0.0, 1.2, 0.4), np.nan, CRASHED)
     )
-    append_records(tmp_path, [Record(grid().problem_at((0, 0)).hash, (died,))])
+    append_visits(tmp_path, [Visit(grid().problem_at((0, 0)).hash, (died,))])
     kept, forgotten = (
         StudyRun(grid(cold_starts=0), tmp_path, retry=retry) for retry in (False, True)
     )
@@ -375,11 +382,11 @@ def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path
     # or a gait from elsewhere
     stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
     work = Work((0,), stated, True, (), (elsewhere,), (0,), 0.0, frozenset(), 1, 300.0, 1)
-    first = study_cell.visit(work, {})
+    first = study_cell.visit(work)
     assert {a.origin for a in first.attempts} == {GUESS, "cold", WARM}
     for attempt in first.attempts:
         told = dataclasses.replace(work, tried=frozenset({attempt.key}))
-        again = {a.key for a in study_cell.visit(told, {}).attempts}
+        again = {a.key for a in study_cell.visit(told).attempts}
         assert again == {a.key for a in first.attempts} - {attempt.key}
 
 
@@ -389,25 +396,23 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
     )
     elsewhere = ellipse(0.0, 2.85, 1.3)
     work = Work((0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 300.0, 1)
-    done = study_cell.visit(work, {})
+    done = study_cell.visit(work)
     assert [a.outcome.status for a in done.attempts if a.origin == WARM] == [SOLVED]
     passed = [a for a in done.attempts if a.outcome.status == PASSED_OVER]
     assert GUESS in {a.origin for a in passed}
-    best = study_cell.best_attempt(done.attempts).outcome.value
+    best = best_attempt(done.attempts).outcome.value
     alone = [study_cell.run_guess(stated, lambda a=a: a.outcome.guess, 0, 300.0) for a in passed]
     assert {end.status for end in alone} == {SOLVED}
     assert max(end.value for end in alone) <= best * (1 + study_cell.BETTER)
     # a cell that was solved before is solved again for what does better, and for nothing else
     for incumbent, status in ((0.9 * best, SOLVED), (1.1 * best, PASSED_OVER)):
         again = dataclasses.replace(work, incumbent=incumbent, cold=())
-        attempts = {a.origin: a.outcome.status for a in study_cell.visit(again, {}).attempts}
+        attempts = {a.origin: a.outcome.status for a in study_cell.visit(again).attempts}
         assert attempts[WARM] == status
 
 
 def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
-    append_records(
-        tmp_path, [Record("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})]
-    )
+    append_visits(tmp_path, [Visit("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})])
     (kept,) = read_journal(tmp_path)
     assert kept.scores == {"known": 0.2}
 
@@ -422,21 +427,21 @@ def test_a_gait_that_promises_more_than_was_found_is_measured_as_finely_as_a_cer
         "run_guess",
         lambda s, start, number, limit, **_: outcome(number, start(), start(), 0.01),
     )
-    monkeypatch.setattr(study_cell, "value_as_it_is", lambda p, g, *grid: 0.2 if grid else 0.21)
+    monkeypatch.setattr(study_cell, "value_of", lambda p, g, *grid: 0.2 if grid else 0.21)
     work = Work((0,), stated, True, (), (elsewhere,), (), 0.0, frozenset(), 1, 300.0, 1)
-    assert list(study_cell.visit(work, {}).scores.values()) == [0.2]
+    assert list(study_cell.visit(work).scores.values()) == [0.2]
 
 
 def test_a_task_whose_worker_dies_is_recorded_as_crashed(fake, tmp_path, monkeypatch):
     from colloc.studies import run as study_run
     from colloc.system.task_pool import Lost
 
-    def completed(function, ready, **_):
+    def run_tasks(function, ready, **_):
         while (task := ready()) is not None:
             first = task.arguments[0][0].cell == (0, 1) and not task.arguments[0][0].tried
             yield task, Lost("its worker died") if first else function(*task.arguments)
 
-    monkeypatch.setattr(study_run, "completed", completed)
+    monkeypatch.setattr(study_run, "run_tasks", run_tasks)
     run = StudyRun(grid(), tmp_path)
     finished(run)
     assert study_table(run).variables["starts"].min() >= 1
@@ -500,7 +505,7 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
     def next_to(stated, start_from, start, time_limit, **_):
         guess = start_from()
         gait = study_cell.member(stated, guess)
-        return outcome(start, guess, gait, study_cell.value_as_it_is(stated, gait))
+        return outcome(start, guess, gait, study_cell.value_of(stated, gait))
 
     monkeypatch.setattr(study_cell, "run_guess", next_to)
     study = Study("kinds", (Axis("kind", tuple(CLASSES)),), in_class, cold_starts=0)
@@ -637,7 +642,7 @@ def test_the_displacement_that_decides_the_class_is_that_of_the_replay():
 def test_the_name_of_a_gait_is_the_same_in_every_process():
     gait = Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [0.4]])
     given = f"from colloc.gaits.gait_fields import gait_from; gait = gait_from({fields(gait)})"
-    code = f"{given}; from colloc.studies.cell import start_key; print(start_key(gait))"
+    code = f"{given}; from colloc.studies.journal import start_key; print(start_key(gait))"
     other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (
         other.stdout.strip()
@@ -650,7 +655,7 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     path = tmp_path / "tiny.py"
     path.write_text(FILE, encoding="utf-8")
     out = tmp_path / "out put"
-    assert sweep_study.main([str(path), "--output", str(out)]) == 0
+    assert sweep_study([str(path), "--output", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "2 cells, 0 done already or without a problem, 2 to go" in printed
     assert "2 of 2, 0 s left" in printed
@@ -658,27 +663,23 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     # the isotropic optimum of problems/three_link.py at a delta a hundred times larger
     assert table["efficiency"][0, 0] == pytest.approx(0.2600, abs=2e-3)
     assert table["gait_class"][0, 0].endswith("both")
-    assert sweep_study.main([str(path), "--output", str(out), "--json"]) == 0
+    assert sweep_study([str(path), "--output", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
     np.testing.assert_array_equal(
         load_study(out / "tiny.nc").variables["efficiency"], table["efficiency"]
     )
 
 
-def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
+def test_an_output_that_is_no_folder_is_refused_in_a_sentence(tmp_path, capsys):
     path = tmp_path / "tiny.py"
     path.write_text(FILE, encoding="utf-8")
     (tmp_path / "file").write_text("")
     for options, text in (
-        (["--workers", "0"], "--workers"),
-        (["--chunk", "0"], "--chunk"),
         (["--output", str(tmp_path / "file" / "x")], "cannot make the folder"),
         (["--output", str(tmp_path / "z.nc")], "z.nc should be a folder"),
     ):
-        assert sweep_study.main([str(path), *options]) == 2
+        assert sweep_study([str(path), *options]) == 2
         assert text in capsys.readouterr().err
-    assert sweep_study.main([str(tmp_path / "none.py")]) == 2
-    assert "there is no study file" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -731,7 +732,7 @@ def test_without_a_dask_scheduler_or_a_journal_folder_the_error_is_clear(fake, t
     pytest.importorskip("distributed")
     path = tmp_path / "tiny.py"
     path.write_text(FILE, encoding="utf-8")
-    assert sweep_study.main([str(path), "--dask", "nonsense://x", "--output", str(tmp_path)]) == 2
+    assert sweep_study([str(path), "--dask", "nonsense://x", "--output", str(tmp_path)]) == 2
     assert "no Dask scheduler at nonsense://x" in capsys.readouterr().err
     with pytest.raises(StoreError, match="cannot write"):
         finished(StudyRun(grid(), path / "below a file"))
@@ -741,5 +742,5 @@ def test_a_start_that_turns_as_it_should_is_worth_the_same_whatever_phase_it_beg
     turning = Fourier([1.2, 0.6], [[0.9], [0.1]], [[0.1], [0.9]])
     turned = replay(Chain(), Friction(), turning, 1e-2).rotation
     problem = Problem("turning", gait=Harmonic(1), delta=1e-2, rotation=turned)
-    values = [value_as_it_is(problem, shifted(turning, phase)) for phase in (0.0, 0.3, 0.6)]
+    values = [value_of(problem, shifted(turning, phase)) for phase in (0.0, 0.3, 0.6)]
     np.testing.assert_allclose(values, values[0], rtol=2e-3)

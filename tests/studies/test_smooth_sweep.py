@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+from colloc.commands.families import sweep as main
 from colloc.commands.main import main as colloc_main
-from colloc.commands.sweep import main
-from colloc.studies.store import load_study
+from colloc.studies.table import load_study
 
 STUDY = """
 from colloc import Axis, Friction, Harmonic, ModalBody, Problem, Study

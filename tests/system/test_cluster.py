@@ -17,9 +17,9 @@ import pytest
 from shared.dask_cluster import DaskProcesses
 
 from colloc.studies.journal import read_journal
-from colloc.studies.store import load_study
-from colloc.system.dask_pool import connected
-from colloc.system.task_pool import EngineGone, Task, completed
+from colloc.studies.table import load_study
+from colloc.system.dask_pool import connect
+from colloc.system.task_pool import EngineGone, Task, run_tasks
 
 pytestmark = [
     pytest.mark.slow,
@@ -38,9 +38,9 @@ STUDY = Study("tiny", (Axis("mu_t", tuple(1 + k / 50 for k in range(CELLS)), tra
 
 def naps(dask, times, workers=2):
     """Tasks that sleep, by number, on a cluster; and a list that grows as they end."""
-    executor, _ = connected(dask.address, workers, patience=20.0)
+    executor, _ = connect(dask.address, workers, patience=20.0)
     waiting = iter([Task(k, (seconds,)) for k, seconds in enumerate(times)])
-    return completed(time.sleep, lambda: next(waiting, None), workers=workers, executor=executor)
+    return run_tasks(time.sleep, lambda: next(waiting, None), workers=workers, executor=executor)
 
 
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGSTOP])
@@ -62,7 +62,7 @@ def test_the_task_of_a_worker_that_is_killed_or_does_not_answer_goes_to_another(
 
 def test_a_local_cluster_listens_to_this_machine_alone():
     psutil = pytest.importorskip("psutil")
-    executor, _ = connected("local", 1)
+    executor, _ = connect("local", 1)
     try:
         processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
         listening = [
@@ -79,9 +79,9 @@ def test_a_local_cluster_listens_to_this_machine_alone():
 def test_a_scheduler_that_is_stopped_ends_the_run():
     with DaskProcesses() as dask:
         dask.worker()
-        executor, _ = connected(dask.address, 1, patience=3.0)
+        executor, _ = connect(dask.address, 1, patience=3.0)
         waiting = iter([Task(0, (0.0,)), Task(1, (1.0,))])
-        run = completed(time.sleep, lambda: next(waiting, None), workers=1, executor=executor)
+        run = run_tasks(time.sleep, lambda: next(waiting, None), workers=1, executor=executor)
         next(run)
         dask.scheduler.send_signal(signal.SIGSTOP)
         begin = time.monotonic()

@@ -22,17 +22,19 @@ import h5py
 import numpy as np
 import pytest
 
-from colloc.commands import multistart, solve
-from colloc.commands import sweep as sweep_study
+from colloc.commands.families import multistart
+from colloc.commands.families import sweep as sweep_study
+from colloc.commands.solve import solve
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results import store
 from colloc.results.archive import Archive, open_archive
 from colloc.search.run import ROWS
-from colloc.studies import campaign, saved
+from colloc.studies import multistart as campaign
 from colloc.studies import run as study_run
-from colloc.studies import store as _  # noqa: F401  imported before any fork
+from colloc.studies import saved
+from colloc.studies import table as _  # noqa: F401  imported before any fork
 from colloc.studies.journal import read_journal
-from colloc.studies.store import load_study
+from colloc.studies.table import load_study
 from colloc.system import task_pool
 from colloc.system.row_file import read_rows
 
@@ -80,20 +82,20 @@ def child(kind, folder, pipe):
     os.dup2(null, 2)
     if kind == "solve":
         saved.save_result = told(say, kind, saved.save_result, solve_facts)
-        return solve.main([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
+        return solve([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
     if kind == "multistart":
         campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)
         Archive.add = told(
             say, kind, Archive.add, lambda archive, outcomes: start_facts(archive.outcomes)
         )
-        return multistart.main(
+        return multistart(
             [str(folder / "p.py"), "--output", str(folder), "--starts", "4", "--quiet"]
         )
     task_pool.process_pool = ThreadPoolExecutor
-    study_run.append_records = told(
-        say, kind, study_run.append_records, lambda folder, records: attempt_facts(records)
+    study_run.append_visits = told(
+        say, kind, study_run.append_visits, lambda folder, records: attempt_facts(records)
     )
-    return sweep_study.main([str(folder / "s.py"), "--output", str(folder), "--quiet"])
+    return sweep_study([str(folder / "s.py"), "--output", str(folder), "--quiet"])
 
 
 def solve_facts(solution, path):

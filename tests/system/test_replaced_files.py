@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, record
 
-from colloc.commands import open as show_archive
-from colloc.commands import sweep as sweep_study
+from colloc.commands.families import sweep as sweep_study
+from colloc.commands.solve import open_archive as show_archive
 from colloc.results.archive import StartName, archive_at, open_archive
-from colloc.studies.journal import append_records, read_journal
+from colloc.studies.journal import append_visits, read_journal
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.replaced_file import alone_in, locked, replaced_file
 from colloc.system.row_file import CACHE, put_rows, read_rows
@@ -145,7 +145,7 @@ def test_an_archive_is_read_where_nothing_can_be_written(tmp_path, tmp_path_fact
             os.chmod(folder, 0o555)
         said = io.StringIO()
         with contextlib.redirect_stdout(said):
-            code = show_archive.main([str(folder / "a.h5")])
+            code = show_archive([str(folder / "a.h5")])
         return 10 * (code == 0) + ("4 starts: 4 solved" in said.getvalue())
 
     with open_to_others(tmp_path, tmp_path_factory.getbasetemp()):
@@ -158,7 +158,7 @@ def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
     (tmp_path / "s.py").write_text(STUDY)
     folder = tmp_path / "out" / "tiny.study"
     with locked(folder / "lock"):
-        assert sweep_study.main([str(tmp_path / "s.py"), "--output", str(tmp_path / "out")]) == 2
+        assert sweep_study([str(tmp_path / "s.py"), "--output", str(tmp_path / "out")]) == 2
     assert f"in use by process {os.getpid()} on" in capsys.readouterr().err
     with locked(folder / "lock"):
         pass
@@ -193,7 +193,7 @@ def test_two_users_go_on_from_each_other_in_a_folder_of_their_group(tmp_path, tm
         os.setuid(number)
         os.umask(0o002)
         with locked(folder / "x.study" / "lock"):
-            append_records(folder / "x.study", [record(number)])
+            append_visits(folder / "x.study", [record(number)])
         open_archive(problem(), folder / "a.h5").add(
             {StartName("sobol", 1, number): outcome(number, 0.1)}
         )
@@ -228,7 +228,7 @@ def _write_many(kind, folder, who, count):
                 {StartName("sobol", who, k): outcome(k, 0.1 + 0.001 * k)}
             )
         else:
-            append_records(folder, [record(1000 * who + k)])
+            append_visits(folder, [record(1000 * who + k)])
 
 
 @pytest.mark.parametrize("kind", ROW_KINDS)

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from shared.dask_cluster import DaskProcesses
 
-from colloc.system.dask_pool import connected
+from colloc.system.dask_pool import connect
 from colloc.system.errors import ProblemError
-from colloc.system.task_pool import EngineGone, Lost, Task, completed, process_pool
+from colloc.system.task_pool import EngineGone, Lost, Task, process_pool, run_tasks
 
 ENDED = threading.Event()
 
@@ -59,7 +59,7 @@ def test_a_worker_killed_mid_run_loses_nothing_and_one_that_always_dies_is_named
     tasks = [Task(x, (x, str(tmp_path))) for x in range(9)]
     found = {
         task.key: result
-        for task, result in completed(dying_once, listed(tasks), workers=2, ahead=2)
+        for task, result in run_tasks(dying_once, listed(tasks), workers=2, ahead=2)
     }
     assert {x: r for x, r in found.items() if x != 5} == {x: 2 * x for x in range(9) if x != 5}
     assert isinstance(found[5], Lost)
@@ -69,7 +69,7 @@ def test_a_worker_killed_mid_run_loses_nothing_and_one_that_always_dies_is_named
 @pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="counts threads in /proc")
 def test_blas_threads_do_not_multiply_with_processes(monkeypatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
-    ((_, (count, setting)),) = completed(threads_in_use, listed([Task(0, (600,))]), workers=1)
+    ((_, (count, setting)),) = run_tasks(threads_in_use, listed([Task(0, (600,))]), workers=1)
     assert setting == "1"
     # the main thread, the one that watches the parent, and the queue's feeder if it has started
     assert count <= 3
@@ -86,9 +86,9 @@ UNGUARDED = {
 def test_a_script_without_a_main_guard_runs_tasks_on_processes_without_a_word(tmp_path, whose):
     (tmp_path / "script.py").write_text(
         f"""{UNGUARDED[whose]}
-from colloc.system.task_pool import Task, completed, pool_for
+from colloc.system.task_pool import Task, run_tasks, pool_for
 waiting = iter([Task(x, (x,)) for x in range(3)])
-print(sorted(result for _, result in completed(task, lambda: next(waiting, None), workers=2, executor=pool_for)))
+print(sorted(result for _, result in run_tasks(task, lambda: next(waiting, None), workers=2, executor=pool_for)))
 """,
         encoding="utf-8",
     )
@@ -113,7 +113,7 @@ def test_a_task_may_wait_for_the_result_of_another():
         )
 
     asked = set()
-    for task, result in completed(doubled, ready, workers=3, executor=ThreadPoolExecutor):
+    for task, result in run_tasks(doubled, ready, workers=3, executor=ThreadPoolExecutor):
         known[task.key] = result
     assert known == {k: 2**k for k in range(7)}
 
@@ -144,7 +144,7 @@ def test_what_a_cluster_gives_up_on_is_tried_again_alone_and_then_named():
     Unreliable.failed.clear()
     found = {
         t.key: r
-        for t, r in completed(
+        for t, r in run_tasks(
             doubled, listed(Task(x, (x,)) for x in range(6)), workers=2, executor=Unreliable
         )
     }
@@ -160,11 +160,11 @@ class Broken(Executor):
 
 def test_a_pool_that_never_starts_is_an_error_and_not_an_endless_loop():
     with pytest.raises(BrokenProcessPool):
-        list(completed(doubled, listed([Task(0, (0,))]), workers=2, executor=lambda n: Broken()))
+        list(run_tasks(doubled, listed([Task(0, (0,))]), workers=2, executor=lambda n: Broken()))
 
 
 def test_nobody_waits_for_work_under_way_once_the_run_is_left():
-    run = completed(
+    run = run_tasks(
         time.sleep,
         listed([Task(0, (0.0,)), Task(1, (5.0,))]),
         workers=2,
@@ -205,7 +205,7 @@ def test_what_the_environment_says_of_threads_is_the_same_after_a_run(monkeypatc
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     before = dict(os.environ)
-    for _ in completed(doubled, listed([Task(1, (1,))]), workers=1, executor=ThreadPoolExecutor):
+    for _ in run_tasks(doubled, listed([Task(1, (1,))]), workers=1, executor=ThreadPoolExecutor):
         assert os.environ["MKL_NUM_THREADS"] == os.environ["OMP_NUM_THREADS"] == "1"
     assert dict(os.environ) == before
 
@@ -227,15 +227,15 @@ def test_a_dask_scheduler_without_workers_is_waited_for_a_stated_time_only(clust
     with pytest.raises(
         ProblemError, match=r"had no workers for 1 s; start some, for example: dask worker"
     ):
-        connected(cluster.scheduler_address, 1, said.append, patience=1.0)
+        connect(cluster.scheduler_address, 1, said.append, patience=1.0)
     assert "waiting for one, 1 s at most" in said[0]
 
 
 def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_task(cluster):
     cluster.scale(1)
-    executor, workers = connected(cluster.scheduler_address, 1, patience=1.0)
+    executor, workers = connect(cluster.scheduler_address, 1, patience=1.0)
     assert workers == 1
-    run = completed(
+    run = run_tasks(
         doubled_in_the_end,
         listed([Task(0, (0,)), Task(1, (0,)), Task(2, (1,))]),
         workers=1,
@@ -249,8 +249,8 @@ def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_ta
 
 def test_a_dask_scheduler_that_gives_no_answer_ends_the_run_and_blames_no_task(cluster):
     cluster.scale(1)
-    executor, _ = connected(cluster.scheduler_address, 1, patience=1.0)
-    run = completed(
+    executor, _ = connect(cluster.scheduler_address, 1, patience=1.0)
+    run = run_tasks(
         doubled_in_the_end, listed([Task(0, (0,)), Task(1, (1,))]), workers=1, executor=executor
     )
     assert next(run)[1] == 0
@@ -263,9 +263,9 @@ def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task():
     pytest.importorskip("distributed")
     with DaskProcesses() as dask:
         dask.worker()
-        executor, _ = connected(dask.address, 1)
+        executor, _ = connect(dask.address, 1)
         # a function that other processes know as well
-        run = completed(
+        run = run_tasks(
             time.sleep, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor
         )
         assert next(run)[1] is None
@@ -288,5 +288,5 @@ def test_ctrl_c_while_a_task_is_handed_over_leaves_the_executors_locks_open():
             return super().submit(*arguments)
 
     with pytest.raises(KeyboardInterrupt):
-        list(completed(doubled, listed([Task(1, (1,))]), workers=1, executor=Locked))
+        list(run_tasks(doubled, listed([Task(1, (1,))]), workers=1, executor=Locked))
     assert not Locked.lock.locked()

@@ -11,12 +11,13 @@ from threading import Barrier, BrokenBarrierError
 import pytest
 
 import colloc
-from colloc.commands.main import main
-from colloc.studies.known import known, markdown, row_of, save_known, with_row
+from benchmarks.known import known, markdown, row_of, save_known, with_row
+from benchmarks.referee import main
+from colloc.commands.main import main as colloc_main
 from colloc.system.errors import ProblemError, StoreError
 
 ROWS = known()
-PAGE = Path(__file__).parents[2] / "docs" / "known.md"
+PAGE = Path(__file__).parents[1] / "docs" / "known.md"
 QUICK = [
     row
     for row in ROWS
@@ -95,7 +96,7 @@ def test_the_referee_takes_a_result_and_holds_it(best, tmp_path, capsys):
     table, result = tmp_path / "known.json", tmp_path / "quick.h5"
     save_known([], table)
     colloc.save(best, result)
-    arguments = ["referee", "--table", str(table)]
+    arguments = ["--table", str(table)]
     assert main([*arguments, "--add", str(result), "--by", "colloc solve quick.py"]) == 0
     assert main(arguments) == 0
     assert "1 of 1 rows hold" in capsys.readouterr().out
@@ -116,7 +117,7 @@ def test_without_a_table_the_referee_begins_a_copy_of_its_own_where_it_is_called
 ):
     monkeypatch.chdir(tmp_path)
     colloc.save(best, "quick.h5")
-    arguments = ["referee", "--add", "quick.h5", "--by", "colloc solve quick.py"]
+    arguments = ["--add", "quick.h5", "--by", "colloc solve quick.py"]
     assert main(arguments) == 0
     assert main([*arguments, "--table", "mine.json"]) == 0
     assert known() == ROWS
@@ -139,7 +140,6 @@ def test_two_that_are_taken_in_at_once_are_both_there(best, tmp_path, monkeypatc
         result = colloc.save(solution, tmp_path / f"{solution.problem.name}.h5")
         return main(
             [
-                "referee",
                 "--table",
                 str(table),
                 "--add",
@@ -149,7 +149,7 @@ def test_two_that_are_taken_in_at_once_are_both_there(best, tmp_path, monkeypatc
             ]
         )
 
-    monkeypatch.setattr("colloc.studies.known.save_known", after_both_have_read)
+    monkeypatch.setattr("benchmarks.referee.save_known", after_both_have_read)
     other = colloc.solve(
         PROBLEM.with_(name="other", friction=colloc.Friction(mu_t=2, mu_f=1, mu_b=1)), starts=1
     )
@@ -169,13 +169,13 @@ def test_bounds_under_dry_friction_are_saved_and_checked_again(tmp_path, capsys)
     assert again.dry[1] > again.efficiency_at_zero_delta - again.error_at_zero_delta
     row = row_of(solution, "colloc solve quick.py --dry")
     save_known([row], table)
-    assert main(["referee", "--table", str(table), "--dry"]) == 0
+    assert main(["--table", str(table), "--dry"]) == 0
     save_known([replace(row, dry=(row.dry[0], row.dry[1] - 1e-4))], table)
-    assert main(["referee", "--table", str(table), "--dry"]) == 4
-    assert main(["verify", str(result)]) == 0
+    assert main(["--table", str(table), "--dry"]) == 4
+    assert colloc_main(["verify", str(result)]) == 0
     solution.certificate = replace(solution.certificate, dry=(0.1, 0.2))
     colloc.save(solution, result)
-    assert main(["verify", str(result)]) == 4
+    assert colloc_main(["verify", str(result)]) == 4
     assert "under dry friction, which is not what is found" in capsys.readouterr().out
 
 
@@ -194,5 +194,5 @@ def test_bounds_under_dry_friction_are_saved_and_checked_again(tmp_path, capsys)
 def test_a_table_with_a_row_that_is_none_is_refused_in_a_sentence(broken, tmp_path, capsys):
     row = next(row for row in ROWS if row.statement["name"] == "three_link")
     (tmp_path / "mine.json").write_text(json.dumps([asdict(row) | broken]))
-    assert main(["referee", "--table", str(tmp_path / "mine.json")]) == 2
+    assert main(["--table", str(tmp_path / "mine.json")]) == 2
     assert "is no table of known gaits" in capsys.readouterr().err

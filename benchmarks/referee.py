@@ -1,4 +1,5 @@
-"""Command line: check the table of known gaits from the gaits alone, and take in what is better.
+"""Check the table of known gaits from the gaits alone, and take in better ones: python -m
+benchmarks.referee [--only NAME] [--add FILE.h5 --by COMMAND].
 
 Exit codes: 0 every row holds, 2 bad table or result, or one that is not better, 4 a row does not
 hold, 130 interrupted.
@@ -7,53 +8,50 @@ hold, 130 interrupted.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import FAILED, OK, command
-from colloc.commands.options import add_printing, new_parser, tell
+from benchmarks.known import known, row_of, save_known, with_row
+from colloc.commands.ending import FAILED, OK, run
+from colloc.commands.options import PRINTING, Parser, flag, status_line, tell, text
+from colloc.results.store import load
 from colloc.system.errors import CollocError, ProblemError
-from colloc.system.progress import StatusLine
+from colloc.system.replaced_file import alone_in
 
 _EPILOG = """\
 A row is a problem, a gait and a value; the referee replays the gait, and believes nothing else. A
 result is taken in if it is certified, and better than what is known of the same question: body,
 friction, class of gaits, objective, limits and delta.
 
-  colloc referee
-  colloc referee --only three_link
-  colloc referee --add results/mine.h5 --by "colloc solve mine.py"    into known.json"""
+  python -m benchmarks.referee
+  python -m benchmarks.referee --only three_link
+  python -m benchmarks.referee --add results/mine.h5 --by "colloc solve mine.py"    into known.json"""
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = new_parser(
-        "referee",
-        "Check the best gaits that are known, from the gaits alone; take in better ones.",
-        _EPILOG,
-    )
-    table = (
-        "another table than the one that comes with colloc; with --add (default: known.json) "
-        "begun as a copy of that"
-    )
-    parser.add_argument("--table", metavar="FILE.json", help=table)
-    parser.add_argument("--only", metavar="NAME", help="rows of the problem of this name")
-    parser.add_argument(
-        "--dry", action="store_true", help="check bounds under dry friction as well"
-    )
-    parser.add_argument("--add", metavar="FILE.h5", help="a result to take in")
-    parser.add_argument(
-        "--by", metavar="COMMAND", help="with --add: the command that anyone can find it with"
-    )
-    add_printing(parser)
+def _parser() -> Parser:
+    what = "Check the best gaits that are known, from the gaits alone; take in better ones."
+    parser = Parser("python -m benchmarks.referee", what, _EPILOG)
+    table = "another table than benchmarks/known.json; with --add (default: known.json) begun as a copy of that"
+    for name, settings in (
+        text("--table", "FILE.json", table),
+        text("--only", "NAME", "rows of the problem of this name"),
+        flag("--dry", "check bounds under dry friction as well"),
+        text("--add", "FILE.h5", "a result to take in"),
+        text("--by", "COMMAND", "with --add: the command that anyone can find it with"),
+        *PRINTING,
+    ):
+        parser.add_argument(name, **settings)
     return parser
 
 
-@command(_parser)
-def main(options: argparse.Namespace) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
+    return run(_parser(), _referee, arguments)
+
+
+def _referee(options: argparse.Namespace) -> int:
     if (options.add is None) != (options.by is None):
         raise ProblemError("--add and --by go together: a result, and the command that finds it.")
-    from colloc.studies.known import known
-
     return _taken_in(options) if options.add else _checked(options, known(options.table))
 
 
@@ -62,7 +60,7 @@ def _checked(options: argparse.Namespace, rows: Sequence) -> int:
     if not chosen:
         raise ProblemError(f"the table has no row of {options.only}.")
     told, lines = [], []
-    with StatusLine(enabled=not (options.quiet or options.json)) as progress:
+    with status_line(options) as progress:
         for number, row in enumerate(chosen):
             name = row.statement["name"]
             progress.say(f"{name}: replaying, {number + 1} of {len(chosen)}")
@@ -91,10 +89,6 @@ def _checked(options: argparse.Namespace, rows: Sequence) -> int:
 
 
 def _taken_in(options: argparse.Namespace) -> int:
-    from colloc.results.store import load
-    from colloc.studies.known import known, row_of, save_known, with_row
-    from colloc.system.replaced_file import alone_in
-
     solution = load(options.add)
     new = row_of(solution, options.by)
     table = Path(options.table or "known.json")
@@ -107,3 +101,7 @@ def _taken_in(options: argparse.Namespace) -> int:
     )
     tell(options, {"name": new.statement["name"], "value": new.value, "table": str(table)}, [said])
     return OK
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,5 +1,5 @@
 """The best gaits that are known, as a table that a referee checks from the gaits alone, and that
-anyone can beat.
+anyone can beat (``python -m benchmarks.referee``).
 
 A row states a problem, a member of its class of gaits by the class's own parameters, and what the
 gait achieves. Nothing that a solver said is in it: `Known.certificate` replays the gait, and that
@@ -12,7 +12,6 @@ import json
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from colloc.system.replaced_file import replaced_file
 from colloc.system.versions import version_of
 from colloc.verification.dry_friction import dry_friction
 
+TABLE = Path(__file__).with_name("known.json")
 _HOW = (
     "name",
     "guess",
@@ -73,8 +73,7 @@ class Known:
 
     Examples
     --------
-    >>> import colloc
-    >>> row = next(row for row in colloc.known() if row.statement["name"] == "three_link")
+    >>> row = next(row for row in known() if row.statement["name"] == "three_link")
     >>> row.complaint(row.certificate())
     ''
     """
@@ -155,7 +154,7 @@ def known(table: str | os.PathLike[str] | None = None) -> tuple[Known, ...]:
     Parameters
     ----------
     table : path-like, optional
-        Another table than the one that comes with colloc.
+        Another table than `TABLE`.
 
     Raises
     ------
@@ -164,12 +163,11 @@ def known(table: str | os.PathLike[str] | None = None) -> tuple[Known, ...]:
 
     Examples
     --------
-    >>> import colloc
-    >>> row = next(row for row in colloc.known() if row.problem.name == "three_link")
+    >>> row = next(row for row in known() if row.problem.name == "three_link")
     >>> round(row.value, 4), row.command
     (0.26, 'colloc solve problems/three_link.py')
     """
-    path = resources.files("colloc.studies") / "known.json" if table is None else Path(table)
+    path = TABLE if table is None else Path(table)
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
         return tuple(_row(row) for row in rows)

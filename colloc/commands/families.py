@@ -1,0 +1,499 @@
+"""Commands that solve many problems: many starts, a grid, a front of two objectives, gaits that
+steer."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import math
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import BrokenExecutor, Executor
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, naming_saved_files
+from colloc.commands.options import (
+    BOUND,
+    NO_FIGURE,
+    PROBLEM,
+    RETRY,
+    WORKERS,
+    check_least,
+    check_positive,
+    choice,
+    command,
+    complain,
+    count,
+    number,
+    output,
+    output_folder,
+    output_path,
+    quiet,
+    read_problem,
+    status_line,
+    tell,
+    text,
+    values,
+)
+from colloc.commands.summary import bound_facts, kept_facts, kept_lines
+from colloc.gaits.gait_fields import fields
+from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
+from colloc.gaits.problem import Problem
+from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
+from colloc.results.distinct_optima import Basin, basins
+from colloc.results.outcome import STATUSES, Outcome, counts
+from colloc.results.solution import SOLVED, Solution
+from colloc.system.errors import ProblemError, StoreError
+from colloc.system.replaced_file import locked, replaced_file
+
+if TYPE_CHECKING:
+    from colloc.results.archive import Archive
+    from colloc.results.kept import Saved
+    from colloc.studies.pareto import ParetoFront
+    from colloc.studies.run import CellState, StudyRun
+    from colloc.studies.steering import Steering
+
+_MOST_SHOWN = 12
+_SAVE_EVERY = 60.0
+_POINTS = 9
+_AIMS, _PAIR = (SPEED.name, EFFICIENCY.name), ("FIRST", "SECOND")
+_TURNS = (-30.0, -15.0, 0.0, 15.0, 30.0)
+OUTCOME_HEADER = " start       value   iter  seconds  status"
+
+
+def starts_summary(
+    problem: Problem, outcomes: Sequence[Outcome], path: Path | None
+) -> tuple[list[Basin], dict[str, Any], list[str]]:
+    """The distinct optima of starts, facts about all of them, and lines for people."""
+    optima, tally = basins(problem, outcomes), counts(outcomes)
+    failures = [o for o in outcomes if o.status != SOLVED]
+    floors = [on_speed_floor(problem, basin.best.gait) for basin in optima]
+    facts = {
+        "name": problem.name,
+        "problem_hash": problem.hash,
+        "file": str(path),
+        "starts": len(outcomes),
+        "counts": {status: tally.get(status, 0) for status in STATUSES},
+        "optima": [
+            {
+                "value": basin.best.value,
+                "efficiency": basin.best.efficiency,
+                "frequency": basin.frequency,
+                "starts": list(basin.starts),
+                "on_speed_floor": floor,
+                "gait": fields(basin.best.gait),
+            }
+            for basin, floor in zip(optima, floors, strict=True)
+        ],
+        "failures": [
+            {name: getattr(o, name) for name in ("start", "status", "message")} for o in failures
+        ],
+    }
+    ends = ", ".join(f"{n} {status}" for status, n in tally.items())
+    lines = [f"{problem.name}: {len(outcomes)} starts: {ends}; {len(optima)} distinct optima"]
+    for basin, floor in zip(optima[:_MOST_SHOWN], floors, strict=False):
+        share = f"{len(basin.starts)} of {len(outcomes)} starts"
+        lines.append(
+            f"  {problem.objective.name} {basin.best.value:.6f}  {share:<20s} best: start "
+            f"{basin.best.start}{'  on the bound smallest_shape_speed' * floor}"
+        )
+    if len(optima) > _MOST_SHOWN:
+        lines.append(f"  ... and {len(optima) - _MOST_SHOWN} more")
+    lines += [f"  start {o.start}: {o.status}: {o.message}" for o in failures[:_MOST_SHOWN]]
+    return optima, facts, lines
+
+
+@command(
+    "multistart",
+    """\
+Start k of a seed is the same gait whatever --starts and --workers are. What the archive of the
+problem holds already is not solved again: the same command goes on after Ctrl-C, and a larger
+--starts or another --seed adds to it.
+
+  colloc multistart problems/three_link.py --starts 100 --workers 2""",
+    *PROBLEM,
+    count("--starts", "N", "starts 0 to N-1 (default: 20)", 20),
+    count("--seed", "N", "of the sampler (default: 0)", 0),
+    WORKERS,
+    choice("--sampler", SAMPLERS, "perturbed: near the problem's guess", LATIN_HYPERCUBE),
+    number("--time-limit", "S", "seconds for one start (default: 300)", 300.0),
+    RETRY,
+    BOUND,
+    output("folder, or .h5 file (default: results/NAME.starts.h5)"),
+)
+def multistart(options: argparse.Namespace) -> int:
+    check_least(options, starts=1, workers=1, seed=0)
+    check_positive(options, "time_limit")
+    problem = read_problem(options)[1]
+    path = output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
+    # heavy imports only now: a bad problem is refused at once
+    from colloc.bounds.optimality_gap import gap_line, upper_bound
+    from colloc.results.archive import open_archive, save_archive
+
+    archive = open_archive(problem, path)  # or refused, before anything is solved
+    interrupted = _run_starts(archive, options)
+    save_archive(archive, options.command)
+    outcomes = list(archive.of_search(options.sampler, options.seed, options.starts).values())
+    optima, facts, lines = starts_summary(problem, outcomes, path)
+    bound = upper_bound(problem, path.parent, compute=options.bound) if optima else None
+    if optima:
+        lines.append(gap_line(problem, max(basin.best.efficiency for basin in optima), bound))
+        which = f" --seed {options.seed}" if options.seed else ""
+        which += f" --sampler {options.sampler}" if options.sampler != LATIN_HYPERCUBE else ""
+        start = f"--start {optima[0].best.start}{which}"
+        lines.append(f"  colloc open {path} {start}   makes a result of the best")
+    if others := len(archive.outcomes) - len(outcomes):
+        solved = {name: o.value for name, o in archive.outcomes.items() if o.status == SOLVED}
+        line = f"  starts in the file besides: {others}"
+        if solved:
+            best = max(solved, key=lambda name: solved[name])
+            where = f"start {best.number} of seed {best.seed} ({best.sampler})"
+            line += f"; the best of all, {solved[best]:.6f}, is {where}"
+        lines.append(line)
+    lines.append(f"  saved {path}")
+    tell(options, facts | {"bound": bound_facts(bound), "interrupted": interrupted}, lines)
+    if interrupted:
+        complain("interrupted; run the same command again to go on.")
+        return INTERRUPTED
+    return OK if optima else NONE_FOUND
+
+
+def _run_starts(archive: Archive, options: argparse.Namespace) -> bool:
+    """Solve the starts that are asked for and missing; whether Ctrl-C came."""
+    from colloc.studies.multistart import run_archive
+
+    done = archive.done(options.sampler, options.seed, options.starts, retry=options.retry)
+    # there may be more than memory holds
+    todo = (k for k in range(options.starts) if k not in done)
+    to_go, name = options.starts - len(done), archive.problem.name
+    settings = values(options, "sampler", "seed", "workers", "time_limit")
+    if not quiet(options):
+        print(f"{len(done)} starts done already, {to_go} to go\n{OUTCOME_HEADER}", flush=True)
+    begin = time.perf_counter()
+    try:
+        with status_line(options) as line:
+            line.say(f"{name}: 0 of {to_go} starts")
+            for k, o in enumerate(run_archive(archive, todo, **settings), 1):
+                if not quiet(options):
+                    line.clear()
+                    numbers = f"{o.start:6d} {o.value:11.6f} {o.iterations:6d} {o.seconds:8.2f}"
+                    print(f"{numbers}  {o.status}", flush=True)
+                left = (time.perf_counter() - begin) / k * (to_go - k)
+                line.say(f"{name}: {k} of {to_go} starts", left)
+    except KeyboardInterrupt:
+        return True
+    return False
+
+
+@command(
+    "sweep",
+    """\
+Starts travel between neighbours. What is done is kept, and not solved again. A study file is Python
+code, and is executed. Exit code 3: some cells have no certified gait.""",
+    text("study", None, "a Python file that states STUDY, for example studies/friction_plane.py"),
+    WORKERS,
+    text("--dask", "ADDRESS", "scheduler of a Dask cluster (tcp://host:8786), or 'local'"),
+    count("--chunk", "N", "cells to a task, instead of the study's own number"),
+    RETRY,
+    text("--output", "FOLDER", "for NAME.nc and NAME.study/ (default: results)", default="results"),
+)
+def sweep(options: argparse.Namespace) -> int:
+    from colloc.studies.study import read_study_file
+
+    check_least(options, workers=1, chunk=1)
+    study, source = read_study_file(options.study)
+    if options.chunk is not None:
+        study = replace(study, chunk=options.chunk)
+    # heavy imports only now: a bad study is refused at once
+    from colloc.studies.run import StudyRun
+
+    out = output_folder(options.output)
+    folder = out / f"{study.name}.study"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"cannot make the folder {folder}: {error.strerror or error}.") from None
+    if not (os.access(folder, os.W_OK) and os.access(out, os.W_OK)):
+        raise StoreError(f"cannot write in {out}; choose another --output.")
+    with locked(folder / "lock"):
+        run = StudyRun(study, folder, retry=options.retry)
+        todo, total = len(run.missing), len(run.cells)
+        if not quiet(options):
+            done = f"{total - todo} done already or without a problem"
+            print(f"{study.name}: {total} cells, {done}, {todo} to go", flush=True)
+        try:
+            interrupted = _run_cells(run, options, lambda: _save(run, out, source, options.command))
+        finally:
+            path = _save(run, out, source, options.command)
+    tell(options, *sweep_summary(run, path))
+    if interrupted:
+        complain("interrupted; what is done is kept, and the same command goes on from there.")
+        return INTERRUPTED
+    return OK if all(state.best for state in run.cells.values()) else NONE_FOUND
+
+
+def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], Path]) -> bool:
+    """Work until all is done; whether Ctrl-C came."""
+    from colloc.system.task_pool import process_pool
+
+    executor: Callable[[int], Executor] = process_pool
+    workers = options.workers
+    if options.dask is not None:
+        from colloc.system.dask_pool import connect
+
+        executor, workers = connect(options.dask, workers, complain)
+    begin = time.perf_counter()
+    due, number = begin + _SAVE_EVERY, 0
+    try:
+        for news in run.run(workers=workers, executor=executor):
+            if news.round != number:
+                number, begin = news.round, time.perf_counter()
+            if not quiet(options):
+                best = news.state.best
+                value = f"{best.outcome.value:9.6f}" if best else "     none"
+                tally = Counter(a.outcome.status for a in news.new)
+                tries = ", ".join(f"{n} {status}" for status, n in tally.items())
+                left = (time.perf_counter() - begin) / news.done * (news.total - news.done)
+                print(
+                    f"{run.study.label(news.cell)}: {value}  ({tries}; round {number}: "
+                    f"{news.done} of {news.total}, {left:.0f} s left)",
+                    flush=True,
+                )
+            if time.perf_counter() > due:
+                saving = time.perf_counter()
+                save()
+                due = time.perf_counter() + max(_SAVE_EVERY, 20 * (time.perf_counter() - saving))
+    except KeyboardInterrupt:
+        return True
+    except BrokenExecutor as error:
+        raise StoreError(f"no worker could be started ({error}); what is done is kept.") from None
+    return False
+
+
+def _save(run: StudyRun, out: Path, source: str, command: str) -> Path:
+    from colloc.bounds.optimality_gap import upper_bound
+    from colloc.studies.table import save_study, study_table
+
+    def bound(problem: Problem) -> float | None:
+        known = upper_bound(problem, out, compute=False)
+        return None if known is None else known.sampled
+
+    path = out / f"{run.study.name}.nc"
+    return save_study(study_table(run, bound), path, source=source, command=command)
+
+
+def _verdict(state: CellState) -> str:
+    if state.best:
+        return "solved"
+    if state.problem is None:
+        return "no problem"
+    return "no certified gait" if state.attempts else "not tried yet"
+
+
+def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]:
+    """Facts about a study at its end, and lines for people."""
+    study, cells = run.study, run.cells
+    tally = Counter(map(_verdict, cells.values()))
+    below = [cell for cell in cells if run.below_neighbour(cell)]
+    facts = {
+        "name": study.name,
+        "file": str(path),
+        "cells": len(cells),
+        "counts": dict(tally),
+        "below_neighbour": [study.coordinates(cell) for cell in below],
+    }
+    shares = ", ".join(f"{n} {what}" for what, n in tally.items())
+    lines = [f"{study.name}: {len(cells)} cells: {shares}; saved {path}"]
+    if below:
+        lines.append(
+            f"  {len(below)} of them below what a neighbour's gait achieves there as it is: more "
+            f"starts may find more"
+        )
+    for cell in below[:_MOST_SHOWN]:
+        best, could = cells[cell].best, run.neighbour_value(cell)
+        assert best is not None
+        value = f"{best.outcome.value:.6f}, where a neighbour's gait achieves {could:.6f}"
+        lines.append(f"  {study.label(cell)}: {value}")
+    failed = [
+        f"  {study.label(cell)}: "
+        f"{state.attempts[-1].outcome.message if state.attempts else state.message}"
+        for cell, state in cells.items()
+        if not state.best and (state.attempts or state.message)
+    ]
+    if len(failed) > _MOST_SHOWN:
+        more = len(failed) - _MOST_SHOWN
+        failed[_MOST_SHOWN:] = [f"  ... and {more} more; all are in the file, with their messages"]
+    return facts, lines + failed
+
+
+def _save_members(
+    members: Iterable[tuple[str, Solution]], folder: Path, source: str
+) -> tuple[list[Path], list[Saved]]:
+    """Save solutions that belong together by their names; their files, and all that was saved."""
+    from colloc.results.kept import save_result
+
+    paths, saved = [], []
+    for name, solution in members:
+        solution.source = source
+        saved += (one := save_result(solution, folder / f"{name}.h5"))
+        paths.append(one[0].path)
+    return paths, saved
+
+
+def _tell_family(
+    options: argparse.Namespace,
+    family: ParetoFront | Steering,
+    table: Path,
+    points: str,
+    saved: Sequence[Saved],
+    facts: dict[str, Any],
+    lines: list[str],
+) -> int:
+    """Draw a family, print its table, and return the exit code; `points` names their files."""
+    files = [table]
+    if not options.no_figure:
+        from colloc.pictures.style import save as save_figure
+
+        with naming_saved_files([f"{table}{points}"]):
+            files += save_figure(family.plot(), table.with_suffix(""), ("png",))
+    lines = [*lines, f"  saved {', '.join(map(str, files))}{points}", *kept_lines(saved)]
+    tell(options, facts | {"kept": kept_facts(saved)}, lines)
+    return OK if family.certified else FAILED
+
+
+@command(
+    "pareto",
+    """\
+An objective is "efficiency", "speed", "turning", or an expression of distance, work, rotation and
+length of a period. Every point is a result like any other: NAME.front/00.h5 is the best by the
+first objective, the last one the best by the second. Exit code 4: a gap is left where gaits are
+not certified.
+
+  colloc pareto problems/three_link.py
+  colloc pareto mine.py --objectives distance "distance / work" --points 15""",
+    *PROBLEM,
+    text("--objectives", _PAIR, f"default: {' '.join(_AIMS)}", nargs=2, default=_AIMS),
+    count("--points", "N", f"of the front, if none hardly differ (default: {_POINTS})", _POINTS),
+    count("--starts", "N", "starts to find both ends of (default: 32)"),
+    output("folder, or .csv file (default: results/NAME.front.csv)"),
+    NO_FIGURE,
+)
+def pareto(options: argparse.Namespace) -> int:
+    check_least(options, starts=1)
+    if options.points < 2:
+        raise ProblemError(f"a front has at least 2 points, not {options.points}.")
+    stated, problem = read_problem(options)
+    first, second = aims = [objective_from(text) for text in options.objectives]
+    table = output_path(options.output, Path("results") / f"{problem.name}.front.csv")
+    folder = table.with_suffix("")
+    from colloc.search.explore import STARTS
+    from colloc.studies.pareto import pareto_front
+    from colloc.studies.saved import checkpoints_in
+
+    with checkpoints_in(folder):
+        with status_line(options) as line:
+            line.say(f"{problem.name}: the ends of the front")
+
+            def report(k: int, point: Solution) -> None:
+                last = options.points - 1
+                what = f"point {k} of {last}" if k <= last else "in a gap"
+                line.say(f"{problem.name}: {what}: {point}")
+
+            starts = options.starts or stated.starts or STARTS
+            front = pareto_front(
+                problem, first, second, options.points, starts=starts, progress=report
+            )
+        members = [(f"{k:02d}", point) for k, point in enumerate(front.points)]
+        paths, saved = _save_members(members, folder, stated.source)
+        names = ["point", *(aim.expression for aim in aims), "distance", "work", "status", "file"]
+        rows = [
+            [k, *both, point.measured.distance, point.measured.work, point.status, str(path)]
+            for k, (point, both, path) in enumerate(
+                zip(front.points, front.values.tolist(), paths, strict=True)
+            )
+        ]
+        with (
+            replaced_file(table) as temporary,
+            open(temporary, "w", newline="", encoding="utf-8") as file,
+        ):
+            csv.writer(file).writerows([names, *rows])
+        empty = {gap.after: f"\n       nothing was found between: {gap.why}" for gap in front.gaps}
+        lines = [
+            f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}"
+            for k, a, b, _, _, status, _ in rows
+        ]
+        facts = {
+            "objectives": [aim.fields() for aim in aims],
+            "points": [dict(zip(names, row, strict=True)) for row in rows],
+            "gaps": [asdict(gap) for gap in front.gaps],
+        }
+        head = f"{problem.name}: {first.name} against {second.name}, {len(rows)} points"
+        points = f", {paths[0]} ..."
+        return _tell_family(options, front, table, points, saved, facts, [head, *lines])
+
+
+@command(
+    "steer",
+    """\
+Positive angles turn left, counter-clockwise. The problem states the gait that goes straight. Every
+gait is a result like any other: NAME.steer/00.h5 turns right the most. NAME.steer.json holds all
+their joint angles at equal phases: a controller interpolates between two turns. --spot adds the
+gaits of least work for their turn, NAME.steer/spot_00.h5 and so on. Chord and radius are those of
+the arc that a period crawls.
+
+  colloc steer problems/three_link.py
+  colloc steer mine.py --turn -40 -20 -10 0 10 20 40 --spot -30 30""",
+    *PROBLEM,
+    number("--turn", "DEG", "of a period (default: -30 -15 0 15 30)", list(_TURNS), nargs="+"),
+    number("--spot", "DEG", "turns on the spot, with the least work", [], nargs="+"),
+    count("--starts", "N", "starts to find the straight gait of (default: 32)"),
+    output("folder, or .json file (default: results/NAME.steer.json)"),
+    NO_FIGURE,
+)
+def steer(options: argparse.Namespace) -> int:
+    check_least(options, starts=1)
+    if not all(abs(turn) < 180 for turn in (*options.turn, *options.spot)) or 0 in options.spot:
+        raise ProblemError(
+            "--turn and --spot take degrees between -180 and 180, --spot not 0: by more a body "
+            "could turn the other way."
+        )
+    stated, problem = read_problem(options)
+    table = output_path(options.output, Path("results") / f"{problem.name}.steer.json")
+    folder = table.with_suffix("")
+    from colloc.search.explore import STARTS
+    from colloc.studies.saved import checkpoints_in
+    from colloc.studies.steering import steer as steer_problem
+
+    with checkpoints_in(folder):
+        with status_line(options) as line:
+            line.say(f"{problem.name}: the straight gait")
+
+            def report(turn: float, point: Solution) -> None:
+                line.say(f"{problem.name}: {math.degrees(turn):+.4g} degrees a period: {point}")
+
+            turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))
+            starts = options.starts or stated.starts or STARTS
+            family = steer_problem(problem, turns, spot=spot, starts=starts, progress=report)
+        spots = () if family.on_the_spot is None else family.on_the_spot.points
+        members = [(f"{k:02d}", point) for k, point in enumerate(family.points)]
+        members += [(f"spot_{k:02d}", point) for k, point in enumerate(spots)]
+        paths, saved = _save_members(members, folder, stated.source)
+        rows = []
+        for (_, point), path in zip(members, paths, strict=True):
+            arc = point.arc
+            radius = f"{arc.radius:8.4f}" if math.isfinite(arc.radius) else "       -"
+            rows.append(
+                f"  {math.degrees(arc.angle):+7.2f}°  radius {radius}  chord {arc.chord:.6f}  work "
+                f"{point.work:.6f}  efficiency {arc.chord / point.work:.6f}  {point.status}  {path}"
+            )
+        facts = family.table() | {"efficiency": family.efficiency.tolist()}
+        with replaced_file(table) as temporary:
+            Path(temporary).write_text(json.dumps(facts) + "\n", encoding="utf-8")
+        head = f"{problem.name}: {len(rows)} gaits that steer"
+        facts |= {"file": str(table)}
+        return _tell_family(options, family, table, "", saved, facts, [head, *rows])
