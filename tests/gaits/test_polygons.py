@@ -20,7 +20,7 @@ from colloc.gaits.harmonic import shifted
 from colloc.gaits.starts import prolonged
 from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
-from colloc.search.spaces import nearest_parameters, transcribed
+from colloc.search.spaces import space_near
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 
@@ -108,8 +108,8 @@ def test_polygons_have_the_corners_and_the_symmetry_they_promise(corners, axis):
     problem = Problem(
         "p", ellipse(0, 2.0, 1.2), gait=Polygon(corners, "bilateral", axis), intervals=40
     )
-    program = transcribed(problem)
-    gait = program.member(nearest_parameters(program, problem.guess))
+    space, v = space_near(problem, problem.guess)
+    gait = space.member(v)
     t = np.linspace(0, 1, 20001)[:-1] + 1e-6
     heading = np.unwrap(np.arctan2(*gait.rates(t)[::-1]))
     turns = np.abs(

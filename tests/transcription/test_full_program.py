@@ -166,7 +166,7 @@ def test_it_has_the_value_and_the_rows_of_the_reduced_program(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_jacobian_and_hessian_are_differences_of_its_rows(case):
-    full, x, *_ = at_guess(stated(case, intervals=6), 0.3)
+    full, x, *_ = at_guess(stated(case), 0.3)
     assert_derivatives_are_differences(full.nlp, x, 0.3 / full.delta_unit, 3e-5)
 
 
