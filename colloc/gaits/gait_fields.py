@@ -16,12 +16,7 @@ import numpy as np
 
 from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.columns import Basis
-<<<<<<< HEAD
-from colloc.gaits.coupled import Coupled, CoupledGait
-=======
 from colloc.gaits.coupled import Coupled
-from colloc.gaits.free_path import ArcPath, FreePath
->>>>>>> w-coupled
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.linear import Combination
 from colloc.gaits.polygon import Corners
@@ -50,15 +45,8 @@ AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
 # what files can hold, and is asked for; parts of your own making are added to these lists
-<<<<<<< HEAD
-GAITS: list[type] = [Fourier, Combination, Corners, CoupledGait, Phases, SerpenoidSeries]
+GAITS: list[type] = [Fourier, Combination, Corners, Phases, SerpenoidSeries]
 CLASSES: list[type] = [Harmonic, BSpline, Basis, Coupled, Polygon, Prescribed, Serpenoid]
-=======
-GAITS: list[type] = [Fourier, ArcPath, Combination, Corners, Phases, SerpenoidSeries]
-CLASSES: list[type] = [
-    Harmonic, BSpline, Basis, Coupled, FreePath, Polygon, Prescribed, Serpenoid
-]  # fmt: skip
->>>>>>> w-coupled
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 MOTIONS: list[type] = []

@@ -20,11 +20,8 @@ from scipy.linalg import qr
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.mechanics.bodies import Body
-<<<<<<< HEAD
-from colloc.numerics.mesh import Mesh
-=======
 from colloc.mechanics.joint_map import JointMap
->>>>>>> w-coupled
+from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import STATED_IF_SET, named_arguments
 from colloc.system.errors import ProblemError
 
