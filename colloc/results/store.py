@@ -47,7 +47,7 @@ from colloc.system.store_file import (
 )
 from colloc.transcription.layout import layout_of
 
-FORMAT, FORMAT_VERSION = "colloc solution", 5
+FORMAT, FORMAT_VERSION = "colloc solution", 6
 _LAYOUT = "see colloc.transcription.layout"
 _ANSWER_ARRAYS = {
     "edges": ("period", "edge"),
