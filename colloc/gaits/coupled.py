@@ -10,66 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.joint_map import JointMap
 from colloc.system.arguments import is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
-
-_PHASES = np.arange(2000) / 2000
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class CoupledGait(GaitFunction):
-    """Joint angles that follow from a gait of the motors."""
-
-    motors: Any
-    joint_map: JointMap
-
-    is_series = True
-
-    @property
-    def n_joint(self) -> int:
-        return len(self.joint_map.rest)
-
-    @property
-    def driven(self) -> Any:
-        return self.motors.named("motor")
-
-    @property
-    def rest(self) -> np.ndarray:  # type: ignore[override]
-        return self.joint_map.offset
-
-    @property
-    def mean(self) -> np.ndarray:
-        return self.angles(_PHASES).mean(axis=1)
-
-    @property
-    def shape_speed(self) -> float:
-        return float(np.sqrt((self.rates(_PHASES) ** 2).sum(axis=0).mean()) / (2 * np.pi))
-
-    def angles(self, t: np.ndarray) -> np.ndarray:
-        return np.asarray(self.joint_map.joint_angles(self.motors.angles(t)))
-
-    def rates(self, t: np.ndarray) -> np.ndarray:
-        return np.asarray(self.joint_map.joint_rates(self.motors.rates(t)))
-
-    def lines(self) -> list[str]:
-        joints = enumerate(zip(self.joint_map.gears, self.joint_map.rest, strict=True), 1)
-        stuck = [f"joint {j}: {angle:+.4f}" for j, (row, angle) in joints if not any(row)]
-        return [*self.driven.lines(), *stuck]
-
-    def mapped(self, matrix: np.ndarray) -> Any:
-        """The gait of the joints that move, multiplied by a matrix."""
-        return self.motors.mapped(matrix @ self.joint_map.matrix)
-
-    def scaled(self, factor: float) -> CoupledGait:
-        return replace(self, motors=self.motors.scaled(factor))
-
-    def grown(self, factor: float) -> CoupledGait:
-        return replace(self, motors=self.motors.grown(factor))
 
 
 @named_arguments
@@ -169,6 +115,10 @@ class Coupled(LinearClass):
         stuck = "".join(f", joint {j + 1} stuck at {angle:.4g} rad" for j, angle in self.stuck)
         return f"{self.gait.describe()}{motors}{stuck}"
 
+    def lines(self, gait: Any) -> list[str]:
+        stuck = [f"joint {j + 1}: {angle:+.4f}" for j, angle in self.stuck]
+        return [*self.driven(gait).lines(), *stuck]
+
     def offset(self, n_joint: int) -> np.ndarray:
         return self.joint_map(n_joint).offset
 
@@ -181,28 +131,22 @@ class Coupled(LinearClass):
             )
         ).reshape(-1, of_motors.shape[1])
 
-    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Any:
-        joints = self.joint_map(n_joint)
-        return CoupledGait(self.gait.member(parameters, joints.n_motor), joints)
-
-    def driven_by(self, motors: Any, n_joint: int) -> CoupledGait:
-        """The gait of so many joints that follows from one of the motors."""
-        return CoupledGait(motors, self.joint_map(n_joint))
-
     def _motors(self, gait: Any) -> Any:
         """The gait of the motors that comes nearest to one of the joints."""
         joints = self.joint_map(gait.n_joint)
-        near = gait.motors if gait.joint_map == joints else gait.mapped(joints.inverse)
-        return self.gait.through(near)
+        if getattr(gait, "basis", None) == self:
+            return self.gait.member(self.nearest(gait), joints.n_motor)
+        return self.gait.through(gait.mapped(joints.inverse))
+
+    def driven(self, gait: Any) -> Any:
+        return self._motors(gait).named("motor")
+
+    def driven_by(self, motors: Any, n_joint: int) -> Any:
+        """The member, of so many joints, that is nearest to a gait of the motors."""
+        return self.member(self.gait.parameters(self.gait.through(motors)), n_joint)
 
     def parameters(self, gait: Any) -> np.ndarray:
         return self.gait.parameters(self._motors(gait))
-
-    def nearest(self, gait: Any) -> np.ndarray:
-        return self.gait.nearest(self._motors(gait))
-
-    def in_phase(self, gait: Any) -> bool:
-        return self.gait.in_phase(self._motors(gait))
 
     def dimension(self, n_joint: int) -> int:
         return self.gait.dimension(self.joint_map(n_joint).n_motor)

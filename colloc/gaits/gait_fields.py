@@ -16,7 +16,7 @@ import numpy as np
 
 from colloc.gaits.bspline import BSpline
 from colloc.gaits.columns import Basis
-from colloc.gaits.coupled import Coupled, CoupledGait
+from colloc.gaits.coupled import Coupled
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.linear import Combination
@@ -31,7 +31,6 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.feet import FeetLaw, Foot
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import CrawlerBody
@@ -47,7 +46,7 @@ AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
 # what files can hold, and is asked for; parts of your own making are added to these lists
-GAITS: list[type] = [Fourier, ArcPath, Combination, Corners, CoupledGait, Phases, SerpenoidSeries]
+GAITS: list[type] = [Fourier, ArcPath, Combination, Corners, Phases, SerpenoidSeries]
 CLASSES: list[type] = [
     Harmonic, BSpline, Basis, Coupled, FreePath, Polygon, Prescribed, Serpenoid
 ]  # fmt: skip
@@ -56,8 +55,8 @@ LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 MOTIONS: list[type] = []
 """Kinds of motion, `colloc.gaits.regime.Regime`, other than those that a grade and a Froude number
 ask for."""
-PARTS: list[type] = [Foot, FeetLaw, JointMap]
-"""What bodies, laws and gaits hold."""
+PARTS: list[type] = [Foot, FeetLaw]
+"""What bodies and laws hold."""
 
 
 def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None) -> None:
@@ -101,7 +100,7 @@ def _revived(value: Any) -> Any:
     if isinstance(value, list) and any(isinstance(part, dict) for part in value):
         return tuple(_revived(part) for part in value)
     return (
-        _from([*LAWS, *PARTS, *CLASSES, *GAITS], value)
+        _from([*LAWS, *PARTS, *CLASSES, *BODIES], value)
         if isinstance(value, dict) and KIND in value
         else value
     )

@@ -20,6 +20,7 @@ from scipy.linalg import qr
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.joint_map import JointMap
 from colloc.system.arguments import STATED_IF_SET, named_arguments
 from colloc.system.errors import ProblemError
 
@@ -92,13 +93,30 @@ class Combination(GaitFunction):
         )
 
     def angles(self, t: np.ndarray) -> np.ndarray:
-        return self.table @ self.basis.functions(np.asarray(t, dtype=float))
+        return self.table @ self.basis.functions(np.asarray(t, dtype=float)) + self.rest
 
     def rates(self, t: np.ndarray) -> np.ndarray:
         return self.table @ self.basis.functions(np.asarray(t, dtype=float), 1)
 
+    @property
+    def rest(self) -> np.ndarray:  # type: ignore[override]
+        return np.asarray(self.basis.offset(self.n_joint))
+
+    @property
+    def joint_map(self) -> JointMap | None:  # type: ignore[override]
+        found: JointMap | None = self.basis.joint_map(self.n_joint)
+        return found
+
+    @property
+    def driven(self) -> Any:
+        return self.basis.driven(self)
+
     def lines(self) -> list[str]:
-        """The formula, joint by joint, or mode by mode."""
+        """The formula, joint by joint, or mode by mode; of the motors, where joints hang on
+        them."""
+        if self.joint_map is not None:
+            lines: list[str] = self.basis.lines(self)
+            return lines
         table, names = (
             np.round(self.table, 4) + 0.0,
             [self.basis.label(i) for i in range(self.table.shape[1])],
@@ -179,6 +197,10 @@ class LinearClass(ClassOfGaits):
             edges[0], edges[-1], max(int(_COARSE * self.fraction), 2 * self.harmonics) + 1
         )
 
+    def driven(self, gait: Any) -> Any:
+        """The gait of what has motors, of a member."""
+        return gait
+
     def offset(self, n_joint: int) -> np.ndarray:
         """Joint angles ``(n_joint, 1)`` that all members have besides."""
         return np.zeros((n_joint, 1))
@@ -216,7 +238,7 @@ class LinearClass(ClassOfGaits):
         if getattr(gait, "basis", None) == self:
             return np.linalg.lstsq(self._basis(gait.n_joint), gait.table.ravel(), rcond=None)[0]
         matrix = self.angle_matrix(self.instants, gait.n_joint)
-        angles = gait.angles(self.instants).T
+        angles = (gait.angles(self.instants) - self.offset(gait.n_joint)).T
         return np.linalg.lstsq(matrix.reshape(angles.size, -1), angles.ravel(), rcond=None)[0]
 
     def through(self, gait: Any) -> Any:

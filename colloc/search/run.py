@@ -22,7 +22,6 @@ from typing import Any, TypeVar
 from colloc.gaits import gait_fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import is_visible
-from colloc.mechanics.joint_map import JointMap
 from colloc.reduced.given import Given
 from colloc.results.answer import Answer, SecondOrder, Step
 from colloc.results.checks import Certificate, Check
@@ -122,7 +121,7 @@ class Run:
         self._stated = self.problem.to_dict()
         stages = [Answer, Certificate, Check, Effort, Given, Optimum, SecondOrder, Step]
         self._codec = Codec(
-            [*stages, *gait_fields.GAITS, *gait_fields.CLASSES, JointMap],
+            [*stages, *gait_fields.GAITS, *gait_fields.CLASSES],
             {Problem: Own(self._changes, self._with_changes)},
         )
         if self.path is None:
