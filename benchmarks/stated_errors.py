@@ -117,7 +117,7 @@ def slope(case: Case) -> Row:
     """On a slope."""
     on = gait_on_slope(*case[:4], case.grade, ())
     ran = replayer(Slope(case.grade))(*case[:4], tolerance=case.tolerance)
-    states = on.followed(np.array([case.gait.theta]), _finer(ran.errors), 1e-3).states
+    states = on.integrate(np.array([case.gait.theta]), _finer(ran.errors), 1e-3).states
     theta, climb, _, spent, *_ = states[:, -1] - states[:, 0]
     return _row(
         ran.values,

@@ -21,7 +21,7 @@ from colloc import (
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.smooth.motion import Motion
 from colloc.verification.slope import checked_chain
-from colloc.verification.trajectory import timed
+from colloc.verification.trajectory import plan_trajectory
 
 GAIT = ellipse(0.0, 1.2, 0.8)
 TINY = 1e-9
@@ -36,7 +36,7 @@ def replayed(instants):
 
 
 def samples(count, rate=2.0, limits=None):
-    return timed(GAIT, rate, period=count / rate, limits=limits)
+    return plan_trajectory(GAIT, rate, period=count / rate, limits=limits)
 
 
 def bound(limit, **changes):

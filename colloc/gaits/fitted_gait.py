@@ -97,7 +97,7 @@ class FittedGait:
         if not self.samples:
             return "the series as it was given"
         many = f"{self.gait.n_harmonic} harmonic{'s' * (self.gait.n_harmonic > 1)}"
-        rms, largest = (_told(a, self.degrees, ".1e") for a in (self.rms, self.largest))
+        rms, largest = (_shown(a, self.degrees, ".1e") for a in (self.rms, self.largest))
         text = f"{self.taken}; " if self.taken else ""
         if self.centre:
             text += f"all joints move about {self.centre}°, which servos may count from; "
@@ -105,11 +105,11 @@ class FittedGait:
         if self.periods > SEVERAL:
             text += f" of {self.periods:.3g} periods of {self.period:.4g}"
         if self.drift:
-            text += f", a drift of {_told(self.drift, self.degrees)} a period taken out"
+            text += f", a drift of {_shown(self.drift, self.degrees)} a period taken out"
         return f"{text}: off by {rms} r.m.s., {largest} at most"
 
 
-def _told(angle: float, degrees: bool, digits: str = ".3g") -> str:
+def _shown(angle: float, degrees: bool, digits: str = ".3g") -> str:
     return f"{np.degrees(angle):{digits}}°" if degrees else f"{angle:{digits}} rad"
 
 
@@ -282,33 +282,37 @@ class _Samples(NamedTuple):
         self.check(period, harmonics)
         time, step = self.time, self.step
 
-        def tried(
+        def fit_up_to(
             period: float, drifts: bool, chosen: int = 0, most: int = _MOST_HARMONICS
         ) -> list[_Fit]:
             many = min(time.size, int(period / step))  # samples of a period
             most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
             return self.fits(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
 
-        def missed(period: float) -> float:
-            return _best(tried(period, False, most=_ROUGH))
+        def smallest_score(period: float) -> float:
+            return _best(fit_up_to(period, False, most=_ROUGH))
 
-        def nearest(low: float, high: float) -> float:
+        def best_period(low: float, high: float) -> float:
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
-            return float(minimize_scalar(missed, bounds=(low, high), **how).x)
+            return float(minimize_scalar(smallest_score, bounds=(low, high), **how).x)
 
-        def both(period: float, chosen: int) -> list[_Fit]:
-            return [*tried(period, False, chosen), *tried(period, True, chosen)]
+        def both_fits(period: float, chosen: int) -> list[_Fit]:
+            return [*fit_up_to(period, False, chosen), *fit_up_to(period, True, chosen)]
 
-        found = both(period, 0) if period else [*both(time[-1], 0), *both(time[-1] + step, 0)]
+        found = (
+            both_fits(period, 0)
+            if period
+            else [*both_fits(time[-1], 0), *both_fits(time[-1] + step, 0)]
+        )
         if period is None:
             grid = time[-1] + step * np.linspace(0.0, _GAP, _GAPS)
-            near = min(grid, key=missed)
+            near = min(grid, key=smallest_score)
             around = max(near - grid[1] + grid[0], grid[0]), near + grid[1] - grid[0]
-            repeats = [nearest(low, high) for low, high in self.repeats()]
-            found += both(nearest(*around), 1)
+            repeats = [best_period(low, high) for low, high in self.find_repeats()]
+            found += both_fits(best_period(*around), 1)
             for each in repeats:
-                found += tried(each, False, 1) if each > _TOLD * time[-1] else []
-            several = [both(each, 1) for each in sorted(repeats) if each <= _TOLD * time[-1]]
+                found += fit_up_to(each, False, 1) if each > _TOLD * time[-1] else []
+            several = [both_fits(each, 1) for each in sorted(repeats) if each <= _TOLD * time[-1]]
             best = min(map(_best, (found, *several)))
             slow = min(_SLOW * best, _SMALL * float(self.angles.var(axis=1).mean()))
             enough = max(_REPEATED * best, slow) + _EXACT
@@ -327,7 +331,7 @@ class _Samples(NamedTuple):
         waves = _series(table[:, int(fit.drifts) :]).angles(np.arange(_PHASES) / _PHASES)
         return table, np.abs(table[:, 0]) * fit.drifts, np.ptp(waves, axis=1)
 
-    def repeats(self) -> list[tuple[float, float]]:
+    def find_repeats(self) -> list[tuple[float, float]]:
         """Between what lengths of time a record may repeat itself, the likeliest ones: where it
         differs least from itself that much later. Of many periods a length is told by as many as
         there are."""
@@ -365,8 +369,8 @@ class _Samples(NamedTuple):
         if not _closes(drift, moves):
             raise ProblemError(
                 f"{self.name} does not close: after a period joint {joint + 1} is off by "
-                f"{_told(drift[joint], self.degrees)}, and it moves through "
-                f"{_told(moves[joint], self.degrees)}. Give one whole period, or say how long it "
+                f"{_shown(drift[joint], self.degrees)}, and it moves through "
+                f"{_shown(moves[joint], self.degrees)}. Give one whole period, or say how long it "
                 f"is (period=, --period)."
             )
         off = gait.angles(self.time / fit.period) - self.angles

@@ -109,10 +109,10 @@ def _with(part: Any, path: tuple[str, ...], new: Callable[[float], Any], by: flo
     return part.with_(guess=None, **value) if isinstance(part, Problem) else replace(part, **value)
 
 
-def _grown(stated: Any, by: float) -> Any:
+def _scale(stated: Any, by: float) -> Any:
     """A limit may be one number, one for each joint, or a least and a largest angle of each."""
     if isinstance(stated, tuple):
-        return tuple(_grown(each, by) for each in stated)
+        return tuple(_scale(each, by) for each in stated)
     return stated * (1 + by)
 
 
@@ -124,18 +124,18 @@ def _of_floor(problem: Problem, feet: tuple[Foot, ...]) -> Iterator[_Number]:
     if not feet or any(foot.friction is None for foot in feet):
         for field, value in _coefficients(problem.friction):
             path = ("friction", field)
-            yield _Number(_COEFFICIENTS[field], value, path, partial(_grown, value))
+            yield _Number(_COEFFICIENTS[field], value, path, partial(_scale, value))
     for law in dict.fromkeys(foot.friction for foot in feet if foot.friction is not None):
         standing = [k for k, foot in enumerate(feet) if foot.friction == law]
         for field, value in _coefficients(law):
-
-            def on_other(by: float, law: Law = law, field: str = field, v: float = value) -> Any:
-                other = replace(law, **{field: _grown(v, by)})  # type: ignore[type-var]
-                changed = (replace(x, friction=other) if x.friction == law else x for x in feet)
-                return tuple(changed)
-
             name = f"{_COEFFICIENTS[field]} of {_counted('foot', standing)}"
+            on_other = partial(_on_other_friction, feet, law, field)
             yield _Number(name, value, ("body", "feet"), on_other)
+
+
+def _on_other_friction(feet: tuple[Foot, ...], law: Any, field: str, by: float) -> tuple[Foot, ...]:
+    other = replace(law, **{field: _scale(getattr(law, field), by)})
+    return tuple(replace(foot, friction=other) if foot.friction == law else foot for foot in feet)
 
 
 def _coefficients(law: Law) -> list[tuple[str, float]]:
@@ -155,28 +155,28 @@ def _of_chain(chain: Chain, mirrored: bool) -> Iterator[_Number]:
             links = sorted({k, count - 1 - k}) if mirrored else [k]
             if len(links) < count:
                 name = f"{words} of {_counted('link', links)}"
-                changed = partial(_changed_shares, shares, links)
+                changed = partial(_change_shares, shares, links)
                 yield _Number(name, shares[k], ("body", field), changed)
     if chain.width:
-        yield _Number("width", chain.width, ("body", "width"), partial(_grown, chain.width))
+        yield _Number("width", chain.width, ("body", "width"), partial(_scale, chain.width))
     feet = chain.standing_on
     weights = [foot.weight or 0.0 for foot in feet]
 
-    def moved(group: dict[int, float], by: float) -> tuple[Foot, ...]:
+    def move(group: dict[int, float], by: float) -> tuple[Foot, ...]:
         places = (foot.place + by * group.get(k, 0.0) for k, foot in enumerate(feet))
         return _with_each(feet, "place", places)
 
-    def reweighted(group: dict[int, float], by: float) -> tuple[Foot, ...]:
-        return _with_each(feet, "weight", _changed_shares(weights, [*group], by))
+    def reweigh(group: dict[int, float], by: float) -> tuple[Foot, ...]:
+        return _with_each(feet, "weight", _change_shares(weights, [*group], by))
 
     for group in _feet_alike(feet, chain.n_link, mirrored):
         which, first = _counted("foot", sorted(group)), min(group)
         at = ("body", "feet")
         if any(group.values()):
             place = feet[first].place
-            yield _Number(f"place of {which}", place, at, partial(moved, group), relative=False)
+            yield _Number(f"place of {which}", place, at, partial(move, group), relative=False)
         if len(group) < len(feet):
-            yield _Number(f"weight of {which}", weights[first], at, partial(reweighted, group))
+            yield _Number(f"weight of {which}", weights[first], at, partial(reweigh, group))
 
 
 def _with_each(feet: tuple[Foot, ...], field: str, values: Iterable[Any]) -> tuple[Foot, ...]:
@@ -190,7 +190,7 @@ def _counted(what: str, which: Sequence[int]) -> str:
     return f"{many} {', '.join(others)} and {last}" if others else f"{what} {last}"
 
 
-def _changed_shares(shares: Sequence[float], which: Sequence[int], by: float) -> tuple[float, ...]:
+def _change_shares(shares: Sequence[float], which: Sequence[int], by: float) -> tuple[float, ...]:
     """Parts of 1, some of them larger by a part of themselves, the others smaller in proportion."""
     whole = sum(shares[k] for k in which)
     factor = (1 - whole * (1 + by)) / (1 - whole)
@@ -218,19 +218,19 @@ def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dic
 def _of_limits(problem: Problem) -> Iterator[_Number]:
     for field, words in _NUMBERS.items():
         if stated := getattr(problem, field):
-            yield _Number(words, _first(stated), (field,), partial(_grown, stated))
+            yield _Number(words, _first(stated), (field,), partial(_scale, stated))
     for k, (aim, least) in enumerate(problem.at_least):
         if least:
-            before, after = problem.at_least[:k], problem.at_least[k + 1 :]
-
-            def changed(
-                by: float, x: Any = (aim, least), before: Any = before, after: Any = after
-            ) -> Any:
-                return (*before, (x[0], _grown(x[1], by)), *after)
-
+            changed = partial(_with_least, problem.at_least, k)
             yield _Number(f"least {aim.name}", least, ("at_least",), changed)
     if problem.rotation:
-        turned = partial(_grown, problem.rotation)
+        turned = partial(_scale, problem.rotation)
         yield _Number("net rotation", problem.rotation, ("rotation",), turned)
     if bent := getattr(problem.gait, "curvature", None):
-        yield _Number("curvature of paths", bent, ("gait", "curvature"), partial(_grown, bent))
+        yield _Number("curvature of paths", bent, ("gait", "curvature"), partial(_scale, bent))
+
+
+def _with_least(at_least: Sequence[Any], which: int, by: float) -> tuple[Any, ...]:
+    return tuple(
+        (aim, _scale(least, by) if k == which else least) for k, (aim, least) in enumerate(at_least)
+    )

@@ -28,7 +28,7 @@ from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import rate_independent
 from colloc.pictures.robot_model import FORMATS, floor_of, note_of
 from colloc.results.motion import RigidMotion
-from colloc.results.robot import Robot, joint_torques, pressing, slow_torques
+from colloc.results.robot import Robot, joint_torques, pressing, quasi_static_torques
 from colloc.results.solution import Solution
 from colloc.system.arguments import check_count
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -40,7 +40,7 @@ from colloc.verification.trajectory import (
     Trajectory,
     approach,
     one_each,
-    timed,
+    plan_trajectory,
 )
 
 KINDS = ".csv", ".json", *FORMATS
@@ -126,7 +126,8 @@ def write_export(
         return _write_model(Robot(solution, length, mass, period, gravity), path)  # type: ignore[arg-type]
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
     gait = solution.gait.driven
-    trajectory = timed(gait, rate, period, limits, keep_pace=bool(problem.paced_by))
+    own_pace = bool(problem.paced_by)  # which matters
+    trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=own_pace)
     facts = _about(solution, trajectory, rate, limits) | _pace(solution, trajectory.period, gravity)
     way = _approach(solution, trajectory, rate, limits) if ramp else None
     parts: list[Approach | Trajectory] = [trajectory] if way is None else [way, trajectory]
@@ -137,11 +138,15 @@ def write_export(
             raise ProblemError("torques need both the length and the mass of the robot.")
         # the period as it is asked for: that of whole samples may be another pace
         robot = Robot(solution, length, mass, period or trajectory.period, gravity)
-        at_pace = robot if limits is None or problem.paced_by else None
-        torques = [_torques(robot, trajectory, at_pace is not None)]
+        at_pace = robot if limits is None or own_pace else None
+        if at_pace is None:  # what inertia does at another pace is not known
+            there = joint_torques(solution, trajectory.phase, froude=solution.froude)
+            torques = [robot.torque_unit * there]
+        else:
+            torques = [robot.torques(trajectory.phase)]
         if way is not None:
             joints = problem.joint_path(way.angles, trajectory.period * way.speeds)
-            slow = slow_torques(solution, *joints, _pull(solution, way.time.size))
+            slow = quasi_static_torques(solution, *joints, _pull(solution, way.time.size))
             torques.insert(0, robot.torque_unit * slow)
         for part, row, torque in zip(parts, rows, torques, strict=True):
             row += [torque, torque * part.speeds]
@@ -164,14 +169,6 @@ def write_export(
     write = _csv if path.suffix == ".csv" else _json
     _write(path, write(facts, time, table, gait.coordinate))
     return facts
-
-
-def _torques(robot: Robot, trajectory: Trajectory, own_pace: bool) -> np.ndarray:
-    """What inertia does at another pace than the gait's own is not known."""
-    if own_pace:
-        return robot.torques(trajectory.phase)
-    froude = robot.solution.froude
-    return robot.torque_unit * joint_torques(robot.solution, trajectory.phase, froude=froude)
 
 
 def _write(path: Path, text: str) -> None:

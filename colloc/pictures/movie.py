@@ -129,11 +129,11 @@ def write_movie(
         solution, count, periods, arrows=arrows, width=2 * (width // 2), from_rest=from_rest
     )
     with StatusLine(enabled=not quiet) as line:
-        writers[path.suffix](path, _announced(drawn, periods * count, line), fps)
+        writers[path.suffix](path, _with_progress(drawn, periods * count, line), fps)
     return path
 
 
-def _announced(
+def _with_progress(
     pictures: Iterator[np.ndarray], total: int, line: StatusLine
 ) -> Iterator[np.ndarray]:
     begin = time.monotonic()

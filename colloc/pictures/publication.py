@@ -112,10 +112,10 @@ def panels(solution: Solution) -> dict[str, Panel]:
 def draw_panel(axes: Axes, solution: Solution, panel: str = "gait") -> Axes:
     """Draw the panel of that name, and return the axes. `ProblemError` if there is none."""
     gait = Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))
-    return chosen({"gait": gait} | panels(solution), panel).draw_on(axes)
+    return find_panel({"gait": gait} | panels(solution), panel).draw_on(axes)
 
 
-def chosen(panels: dict[str, Panel], name: str) -> Panel:
+def find_panel(panels: dict[str, Panel], name: str) -> Panel:
     if name not in panels:
         raise ProblemError(f"there is no panel {name!r}; there are {', '.join(panels)}.")
     return panels[name]

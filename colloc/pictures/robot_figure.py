@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from colloc.pictures.figure import draw_key, draw_series
-from colloc.pictures.publication import COLUMN, Panel, chosen
+from colloc.pictures.publication import COLUMN, Panel, find_panel
 from colloc.pictures.style import Picture, styled
 from colloc.results.robot import Robot
 
@@ -28,7 +28,7 @@ def robot_figure(robot: Robot) -> Figure:
 
 
 def draw_robot(axes: Axes, robot: Robot, panel: str = "torque") -> Axes:
-    return chosen(robot_panels(robot), panel).draw_on(axes)
+    return find_panel(robot_panels(robot), panel).draw_on(axes)
 
 
 def robot_panels(robot: Robot) -> dict[str, Panel]:

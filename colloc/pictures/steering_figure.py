@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from colloc.pictures.publication import COLUMN, Panel, chosen
+from colloc.pictures.publication import COLUMN, Panel, find_panel
 from colloc.pictures.style import BLUE, VERMILION, snapshot_colours, styled
 from colloc.studies.steering import Steering
 
@@ -29,7 +29,7 @@ def steering_figure(family: Steering) -> Figure:
 def draw_steering(axes: Axes, family: Steering, panel: str = "cost") -> Axes:
     """Draw the panel of that name, "cost" or "tracks", and return the axes. `ProblemError` if there
     is none."""
-    return chosen(_panels(family), panel).draw_on(axes)
+    return find_panel(_panels(family), panel).draw_on(axes)
 
 
 def _panels(family: Steering) -> dict[str, Panel]:

@@ -80,36 +80,27 @@ def joint_torques(
     (angles, rates), z = solution.gait(t), motion.z
     load = problem.regime.pull(motion.theta[None])
     if not froude:
-        return slow_torques(solution, angles, rates, load, z)
-    against_friction = _friction_torques(solution, angles, rates, load, z)
+        return quasi_static_torques(solution, angles, rates, load, start=z)
+    against_friction = quasi_static_torques(solution, angles, rates, load, z)
     return against_friction + _inertial_torques(solution, t, z, load, froude)
 
 
-def slow_torques(
+def quasi_static_torques(
     solution: Solution,
     angles: np.ndarray,
     rates: np.ndarray,
     load: np.ndarray | None,
+    z: np.ndarray | None = None,
     start: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Torques of the motors in balance [weight x body length] at any angles and rates of joints,
-    ``(n_joint, n_time)``, with a pull on the centre of mass ``(2, n_time)`` if there is one; tail
-    velocities are sought near `start`."""
+    """Torques of the motors against friction, and a pull on the centre of mass ``(2, n_time)`` if
+    there is one, [weight x body length], at any angles and rates of joints ``(n_joint, n_time)``
+    and tail velocities z; by default these balance, and are sought near `start`."""
     body: Any = solution.problem.body
-    balance = body.solve if load is None else partial(solve_balance, body, load=load)
-    z = balance(solution.problem.law, angles, rates, solution.delta_per_period, start=start).z
-    return _friction_torques(solution, angles, rates, load, z)
-
-
-def _friction_torques(
-    solution: Solution,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    load: np.ndarray | None,
-    z: np.ndarray,
-) -> np.ndarray:
-    """Torques of the motors against friction and pull, with tail velocities z."""
-    body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
+    law, delta = solution.problem.law, solution.delta_per_period
+    if z is None:
+        balance = body.solve if load is None else partial(solve_balance, body, load=load)
+        z = balance(law, angles, rates, delta, start=start).z
     forces = body.forces(law, angles, rates, z, delta)
     return solution.problem.of_motors(joint_moments(body, law, angles, forces, delta, load))
 

@@ -277,7 +277,7 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
     answer, certificate, effects = solution.answer, solution.certificate, []
     finest, *others = _on_meshes(answer)
     for parameter in parameters(answer.problem):
-        sides = tuple(_beside(parameter, 4 * _STEP))  # as far as the differences go
+        sides = tuple(_neighbours(parameter, 4 * _STEP))  # as far as the differences go
         if not sides:  # such as the place of a pad as long as its link
             continue
         slope = _slope(finest, parameter, sides)
@@ -285,7 +285,7 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
         error += abs(_slope(finest, parameter, sides, 2 * _STEP) - slope)
         again: tuple[Again, ...] = ()
         if resolve and abs(slope) > _NOTHING * abs(solution.value):
-            beside = _beside(parameter, change).items()
+            beside = _neighbours(parameter, change).items()
             again = tuple(_again(solution, problem, side * change) for side, problem in beside)
         at = parameter.name, parameter.value, parameter.relative
         effects.append(Effect(*at, slope, error, sides, again))
@@ -361,7 +361,7 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
     return [on(_FINEST), on(2), on(4, 0.5) if gait.moves_knots else solved]
 
 
-def _beside(parameter: Parameter, step: float) -> dict[int, Problem]:
+def _neighbours(parameter: Parameter, step: float) -> dict[int, Problem]:
     """The problems with a number a little smaller (-1) and larger (1), as far as there are such."""
     found = {}
     for side in (-1, 1):
@@ -393,12 +393,12 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
         problem.body, problem.law, gait, delta * gait.delta_unit, breaks=gait.corner_phases,
         objective=problem.objective, quantities=problem.integrals, turn=problem.rotation or 0.0,
     )  # fmt: skip
-    breaks = "; ".join(_broken(problem, kept, ReducedProgram(space, delta).place_rows(v)))
+    breaks = "; ".join(_violations(problem, kept, ReducedProgram(space, delta).place_rows(v)))
     here = kept.value, kept.error * abs(kept.value)
     return Again(change, best.value, best.value_error, found.status, *here, breaks)
 
 
-def _broken(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
+def _violations(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
     if excess > _EXCESS:
         yield f"{excess:.2g} beyond its limits"
     turned = kept.rotation - (problem.rotation or 0.0)

@@ -195,7 +195,7 @@ def fine_motion(
     """
     asked: Any = {"quantities": quantities, "turn": turn}
 
-    def solved(
+    def evaluate(
         left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None
     ) -> tuple[Rates, Increments]:
         nodes = left[:, None] + width[:, None] * PANEL_RULE.c
@@ -205,7 +205,7 @@ def fine_motion(
     def error_weights(parts: Increments) -> tuple[list[float], float, float]:
         """What a change of the work and quantities, of displacement and of rotation in a panel
         changes in the objective, relative."""
-        turned, travelled, totals = _accumulated(parts)
+        turned, travelled, totals = _cumulative(parts)
         period = dict(zip(names, totals[:, -1], strict=True))
         period |= {"distance": max(abs(travelled[-1]), 1e-300), "rotation": turned[-1]}
         period["work"] = max(period["work"], 1e-300)
@@ -216,7 +216,7 @@ def fine_motion(
 
     names = "work", *(quantity.name for quantity in quantities)
     left, width = edges[:-1], np.diff(edges)
-    rates, parts = solved(left, width)
+    rates, parts = evaluate(left, width)
     gap = np.full(left.size, np.inf)
     while True:
         # halve the panels that hold the excess over the tolerance
@@ -234,7 +234,7 @@ def fine_motion(
             wanted = start[:, None] + half[:, None] * PANEL_RULE.c
             before = np.maximum(np.searchsorted(nodes.ravel(), wanted) - 1, 0)
             near = rates.z.reshape(3, -1)[:, before]
-        new_rates, new = solved(start, half, near)
+        new_rates, new = evaluate(start, half, near)
         middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
         # the whole panel, and its polynomials half way, against the two halves
         first, second = ([part[k::2] for part in new] for k in (0, 1))
@@ -248,12 +248,12 @@ def fine_motion(
         kept = np.setdiff1d(np.arange(left.size), chosen)
         place = np.argsort(np.concatenate([left[kept], start]))
 
-        def merged(old: np.ndarray, new: np.ndarray, kept: Any = kept, place: Any = place) -> Any:
+        def merge(old: np.ndarray, new: np.ndarray, kept: Any = kept, place: Any = place) -> Any:
             return np.concatenate([old[kept], new])[place]
 
         joined = zip(rates.of(kept), new_rates, strict=True)
         rates = Rates(*(np.concatenate(pair, axis=-2) for pair in joined)).of(place)
-        parts = tuple(merged(old, added) for old, added in zip(parts, new, strict=True))
+        parts = tuple(merge(old, added) for old, added in zip(parts, new, strict=True))
         on_sums, on_move, on_spin = error_weights(parts)
         change = sum(
             np.abs(move) * on_move
@@ -261,12 +261,12 @@ def fine_motion(
             + sum(np.abs(part) * share for share, part in zip(on_sums, gained, strict=True))
             for spin, move, *gained in differences
         )
-        gap = merged(gap, np.repeat(0.5 * change, 2))
-        left, width = merged(left, start), merged(width, half)
-    return FineMotion(np.append(left, edges[-1]), rates, *_accumulated(parts), gap)
+        gap = merge(gap, np.repeat(0.5 * change, 2))
+        left, width = merge(left, start), merge(width, half)
+    return FineMotion(np.append(left, edges[-1]), rates, *_cumulative(parts), gap)
 
 
-def _accumulated(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _cumulative(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Orientation, lab displacement, and work and quantities at the edges, from every interval's
     own."""
     theta, *totals = (np.append(0.0, np.cumsum(part)) for part in (parts[0], *parts[2:]))

@@ -83,7 +83,7 @@ def _on_slope(
     asked = [each for each in control.aims.integrals if each.needs_forces]
     body, law, *_ = control.dynamics
     on = gait_on_slope(body, law, gait, delta, regime.grade, gait.corner_phases)
-    ran = on.followed(np.array([gait.theta]), error)
+    ran = on.integrate(np.array([gait.theta]), error)
     return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
 
 

@@ -142,7 +142,7 @@ class GaitOnSlope(NamedTuple):
         way = fine_motion(*self[:4], edges, tolerance, lambda period: _WAY_ALONE).path[-1]
         return float(np.angle(way)) if abs(way) > tolerance else 0.0
 
-    def followed(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
+    def integrate(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
         """The unknowns ``(6,)`` through a period, from those at its begin, of which theta is the
         first; no step is longer than `longest`."""
         start = np.append(begin, np.zeros(6 - begin.size))
@@ -177,7 +177,7 @@ class GaitOnSlope(NamedTuple):
         `longest`."""
         start, courses = np.append(heading - course, np.zeros(5)), []
         for _ in range(periods):
-            courses.append(self.followed(start, tolerance, longest))
+            courses.append(self.integrate(start, tolerance, longest))
             start = courses[-1].states[:, -1]
         states = np.concatenate([ran.states for ran in courses], axis=1)
         ends = np.stack([states[:, 0], *(ran.states[:, -1] for ran in courses)], axis=1)
@@ -339,7 +339,7 @@ def slope_replay(
     on = gait_on_slope(body, friction, gait, delta, slope.grade, breaks)
 
     def run(aim: float) -> tuple[tuple[Course, float], dict[str, float]]:
-        ran = on.followed(np.array([gait.theta]), aim, _LONGEST / instants)
+        ran = on.integrate(np.array([gait.theta]), aim, _LONGEST / instants)
         theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
         way, work = slope.counted(complex(climb, aside)), float(spent + slope.grade * climb)
         found = {"distance": way.real, "work": work, "rotation": float(theta)}

@@ -44,7 +44,7 @@ class Trajectory:
     period: float  # seconds; a whole number of samples
 
 
-def timed(
+def plan_trajectory(
     path: Path,
     rate: float,
     period: float | None = None,
@@ -112,7 +112,7 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
     Examples
     --------
     >>> import colloc
-    >>> made = timed(colloc.ellipse(A0=0, A1=0.5, B1=0.3), 50.0, period=2.0)
+    >>> made = plan_trajectory(colloc.ellipse(A0=0, A1=0.5, B1=0.3), 50.0, period=2.0)
     >>> way = approach(made, 50.0, limits=np.array([2.0, 2.0]))
     >>> float(way.time[0]), float(way.time[-1]), bool(np.abs(way.angles[:, 0]).max() < 1e-4)
     (-2.0, -0.02, True)

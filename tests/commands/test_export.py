@@ -22,7 +22,7 @@ from colloc.results.store import save
 from colloc.smooth.modal_body import ModalBody
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
-from colloc.verification.trajectory import timed
+from colloc.verification.trajectory import plan_trajectory
 
 WAVE = Fourier(
     np.array([0.2, 0.0, -0.3]),
@@ -50,7 +50,7 @@ def test_distance_and_work_do_not_depend_on_pacing(settings):
     body, friction = Chain((0.25,) * 4), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
     before = replay(body, friction, path_of(WAVE), 1e-4)
     after = replay(
-        body, friction, path_through(timed(path_of(WAVE), 200.0, **settings).angles), 1e-4
+        body, friction, path_through(plan_trajectory(path_of(WAVE), 200.0, **settings).angles), 1e-4
     )
     assert after.distance == pytest.approx(before.distance, rel=2e-4)
     assert after.work == pytest.approx(before.work, rel=2e-4)
@@ -59,8 +59,8 @@ def test_distance_and_work_do_not_depend_on_pacing(settings):
 @pytest.mark.parametrize("limits", [0.7, np.array([0.5, 2.0, 1.0])])
 @pytest.mark.parametrize("slower", [1.0, 1.2, 5.0])
 def test_joint_speed_limits_hold_at_the_samples_and_between_them(limits, slower):
-    fastest = timed(path_of(WAVE), 100.0, limits=limits)
-    made = timed(path_of(WAVE), 100.0, slower * fastest.period, limits)
+    fastest = plan_trajectory(path_of(WAVE), 100.0, limits=limits)
+    made = plan_trajectory(path_of(WAVE), 100.0, slower * fastest.period, limits)
     allowed = np.broadcast_to(limits, 3)[:, None]
     assert (np.abs(made.speeds) <= allowed * (1 + 1e-9)).all()
     steps = np.diff(np.concatenate([made.angles, made.angles[:, :1]], axis=1), axis=1) * 100.0
@@ -69,25 +69,27 @@ def test_joint_speed_limits_hold_at_the_samples_and_between_them(limits, slower)
 
 def test_the_fastest_pacing_keeps_some_joint_at_its_limit():
     limits = np.array([0.5, 2.0, 1.0])
-    made = timed(path_of(WAVE), 1e5, limits=limits)  # a high rate: the period is hardly rounded
+    made = plan_trajectory(
+        path_of(WAVE), 1e5, limits=limits
+    )  # a high rate: the period is hardly rounded
     assert (np.abs(made.speeds) / limits[:, None]).max(axis=0).min() > 0.995
 
 
 def test_the_shortest_period_is_the_way_of_a_joint_over_its_speed():
     gait = Fourier(np.zeros(1), np.array([[0.7]]), np.zeros((1, 1)))
-    made = timed(path_of(gait), 1e5, limits=0.5)
+    made = plan_trajectory(path_of(gait), 1e5, limits=0.5)
     assert made.period == pytest.approx(4 * 0.7 / 0.5, abs=2e-5)
 
 
 def test_without_limits_or_with_loose_ones_the_pace_is_even():
     for settings in ({}, {"limits": 100.0}):
-        made = timed(path_of(WAVE), 50.0, 4.0, **settings)
+        made = plan_trajectory(path_of(WAVE), 50.0, 4.0, **settings)
         np.testing.assert_allclose(made.phase, np.arange(200) / 200, atol=1e-9)
         np.testing.assert_allclose(made.speeds, WAVE.rates(made.phase) / 4.0, atol=1e-9)
 
 
 def test_the_period_is_a_whole_number_of_samples_and_never_shorter_than_asked():
-    made = timed(path_of(WAVE), 7.0, 2.03)
+    made = plan_trajectory(path_of(WAVE), 7.0, 2.03)
     assert made.period == pytest.approx(15 / 7)
     assert made.time[-1] == pytest.approx(14 / 7)
 
@@ -108,7 +110,7 @@ def test_the_period_is_a_whole_number_of_samples_and_never_shorter_than_asked():
 )
 def test_impossible_wishes_are_refused(settings, complaint):
     with pytest.raises(ProblemError, match=complaint):
-        timed(path_of(WAVE), 100.0, **settings)
+        plan_trajectory(path_of(WAVE), 100.0, **settings)
 
 
 def written(path):
@@ -344,5 +346,5 @@ def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
 
 def test_a_corner_where_every_joint_rests_does_not_stop_the_clock():
     there_and_back = path_of(ellipse(0.0, 1.0, 0.0))
-    made = timed(there_and_back, 100.0, limits=1.0)
+    made = plan_trajectory(there_and_back, 100.0, limits=1.0)
     assert made.period == pytest.approx(4.0, abs=0.02)

@@ -17,7 +17,7 @@ from colloc.verification.mesh_error import mesh_error
 from colloc.verification.refinement import planned_mesh
 from colloc.verification.replay import replay
 from colloc.verification.slope import slope_motion
-from colloc.verification.trajectory import timed
+from colloc.verification.trajectory import plan_trajectory
 
 PRECISION, FLOOR = 1e-6, 1e-11
 
@@ -212,7 +212,7 @@ def gaits_on_slopes():
 
 def trajectories():
     return [
-        timed(SKEW, 50.0, limits=(2.0, 1.5)),
-        timed(SKEW, 20.0, 9.0, limits=2.0),
-        timed(FOUR, 10.0, 4.05),
+        plan_trajectory(SKEW, 50.0, limits=(2.0, 1.5)),
+        plan_trajectory(SKEW, 20.0, 9.0, limits=2.0),
+        plan_trajectory(FOUR, 10.0, 4.05),
     ]

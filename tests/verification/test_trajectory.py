@@ -5,14 +5,16 @@ import numpy as np
 import pytest
 
 from colloc import Fourier
-from colloc.verification.trajectory import timed
+from colloc.verification.trajectory import plan_trajectory
 
 GAIT = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 
 
 @pytest.mark.parametrize("limits", [2.0, (2.0, 1.5)])
 def test_at_the_gait_s_own_pace_the_fastest_instant_decides_and_the_clock_is_even(limits):
-    even, free = (timed(GAIT, 400.0, limits=limits, keep_pace=keep) for keep in (True, False))
+    even, free = (
+        plan_trajectory(GAIT, 400.0, limits=limits, keep_pace=keep) for keep in (True, False)
+    )
     most = np.broadcast_to(limits, 2)
     fastest = (np.abs(GAIT.rates(np.linspace(0, 1, 4001))).max(axis=1) / most).max()
     assert even.period == pytest.approx(fastest, abs=1 / 400)
@@ -24,5 +26,5 @@ def test_at_the_gait_s_own_pace_the_fastest_instant_decides_and_the_clock_is_eve
 
 
 def test_at_the_gait_s_own_pace_speeds_are_its_own():
-    found = timed(GAIT, 400.0, limits=2.0, keep_pace=True)
+    found = plan_trajectory(GAIT, 400.0, limits=2.0, keep_pace=True)
     np.testing.assert_allclose(found.speeds, GAIT.rates(found.phase) / found.period, atol=1e-6)
