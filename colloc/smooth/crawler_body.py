@@ -93,9 +93,6 @@ class CrawlerBody(PanelBody):
     def n_joint(self) -> int:
         return 1 + self.modes
 
-    def swapped(self, shape: np.ndarray) -> np.ndarray:
-        raise NotImplementedError("a bump's profile is named from the tail.")
-
     @property
     def grid(self) -> PanelGrid:
         low, high, straight = 0.5 - self.epsilon, 0.5 + self.epsilon, max(2, self.panels // 4)

@@ -27,8 +27,6 @@ class SmoothBody(Body):
     at rest moves along it and makes no kinks; forces on all nodes as variables would be too many
     for a full program."""
 
-    first_panels = 16
-
     def tangent(self, s: np.ndarray, angles: Array) -> Array:
         """Theta ``(n_node, n_time)`` at arc lengths s ``(n_node, 1 or n_time)`` of shapes
         ``(n_joint, n_time)``."""
@@ -57,7 +55,7 @@ class SmoothBody(Body):
             lambda s, t: self.turning(s, angles[:, at(t)], rates[:, at(t)]),
             lambda t: self.breaks(angles[:, at(t)]),
         )
-        settings = {"panels": self.first_panels, "quadrature_tolerance": _REPLAYED} | settings
+        settings = {"quadrature_tolerance": _REPLAYED} | settings
         return solve_smooth(motion, friction, np.arange(angles.shape[1]), delta, **settings)
 
     def replayed(

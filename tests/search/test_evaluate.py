@@ -349,3 +349,15 @@ def test_servos_that_stand_about_90_degrees_are_refused_before_the_replay_where_
         colloc.ProblemError, match=r"all joints move about 90°, where links cross: .* subtract it"
     ):
         colloc.evaluate(five, path)
+
+
+def test_a_gait_that_turns_goes_as_far_as_its_mirror_image_which_turns_the_other_way():
+    bent = colloc.Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
+    one, other = (colloc.evaluate(QUICK, gait) for gait in (bent, bent.mirrored))
+    assert one.success
+    assert other.success
+    assert other.rotation == pytest.approx(-one.rotation, rel=1e-6)
+    assert abs(one.rotation) > 0.3
+    errors = (each.certificate.errors["distance"] for each in (one, other))
+    assert other.distance == pytest.approx(one.distance, abs=sum(errors))
+    assert other.arc.radius == pytest.approx(one.arc.radius, rel=1e-4)

@@ -468,6 +468,7 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
         np.testing.assert_allclose(data.upper_bound[:, 0], [0.5, 0.25, 0.5 / 3])
         # work is at least the smallest coefficient times the way: 1 forwards, x sideways
         np.testing.assert_allclose(data.trivial_bound, 1.0)
+        assert not data.at_slowest.values.any()
         assert data.attrs["source"] == "text"
         assert data.attrs["command"] == "ä" * 70_000  # more than one block of HDF5 holds
         assert json.loads(data.attrs["versions"])["numpy"] == np.__version__

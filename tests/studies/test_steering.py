@@ -46,6 +46,7 @@ def test_every_gait_turns_by_what_is_asked_and_the_sharper_the_dearer(family):
         [point.rotation for point in family.points], TURNS, atol=PROBLEM.mesh_tolerance
     )
     assert family.efficiency.argmax() == 1
+    np.testing.assert_allclose(family.efficiency, [point.efficiency for point in family.points])
     assert family.points[1].problem.gait == PROBLEM.gait
 
 
