@@ -2,7 +2,6 @@
 optimising helps."""
 
 import runpy
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,14 +11,12 @@ from colloc.gaits.bspline import Polygon
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
-from colloc.numerics.mesh import Mesh
-from colloc.numerics.schemes import scheme
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
-from colloc.search.converge import converged
+from colloc.search.confirm import unconfirmed
+from colloc.search.converge import as_it_is, converged
 from colloc.search.effort import SKETCH
-from colloc.search.prescribed import as_it_is
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 from colloc.smooth.concertina import Concertina
@@ -143,9 +140,7 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
         delta=1e-3,
         delta_start=1e-3,
     )
-    mesh = Mesh(scheme(problem.scheme), guess.phases)
-    answer = as_it_is(problem, mesh, guess, guess.vertices.ravel(order="F"), "guess")
-    solution = Solution(problem, replace(answer, knots=guess.phases, history=(answer.step,)))
+    solution = Solution(problem, unconfirmed(as_it_is(*space_near(problem, guess), problem.delta)))
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
         ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps",
