@@ -186,12 +186,14 @@ class Splines(LinearClass):
     def nearest(self, gait: Any) -> np.ndarray:
         if not self.relative_delta or getattr(gait, "basis", None) == self:
             return super().nearest(gait)
-        if self._is_timed(gait):
-            times, points = self.corners_in_time, gait.vertices
-        else:
-            times, points = self.corners_in_time, self._corners_on(gait)
-        matrix = self.angle_matrix(times, gait.n_joint)
-        return np.linalg.lstsq(matrix.reshape(points.size, -1), points.T.ravel(), rcond=None)[0]
+        times = self.corners_in_time
+        points = gait.vertices if self._is_timed(gait) else self._corners_on(gait)
+        knots = self.knots * times - self.shift
+        corners = np.abs(knots - np.round(knots)) < _AT_A_CORNER  # others are middles of sides
+        matrix = self.angle_matrix(times[corners], gait.n_joint).reshape(
+            corners.sum() * len(points), -1
+        )
+        return np.linalg.lstsq(matrix, points[:, corners].T.ravel(), rcond=None)[0]
 
 
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:

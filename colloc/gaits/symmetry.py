@@ -83,32 +83,6 @@ def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarr
     return angles[:, : count + 1]
 
 
-def end_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices (A, B), independent rows, of the equations ``A q(first) + B q(last) = 0`` that close
-    a path of angles."""
-    unit = np.eye(n_joint)
-    if symmetry == BILATERAL:
-        rows = np.array(
-            [
-                unit[j] + unit[n_joint - 1 - j] if 2 * j + 1 < n_joint else unit[j]
-                for j in range((n_joint + 1) // 2)
-            ]
-        )
-        zero = np.zeros_like(rows)
-        return np.vstack([rows, zero]), np.vstack([zero, rows])
-    return (unit if symmetry == ANTIPODAL else -unit), unit
-
-
-def tangent_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
-    """The same for the tangents of a smooth path."""
-    unit = np.eye(n_joint)
-    if symmetry == BILATERAL:
-        rows = np.array([unit[j] - unit[n_joint - 1 - j] for j in range(n_joint // 2)])
-        zero = np.zeros_like(rows)
-        return np.vstack([rows, zero]), np.vstack([zero, rows])
-    return (unit if symmetry == ANTIPODAL else -unit), unit
-
-
 _ALIKE = {BILATERAL: "mirrored joints", ANTIPODAL: "to both sides"}
 
 

@@ -140,8 +140,7 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
         delta=1e-3,
         delta_start=1e-3,
     )
-    space, v = space_near(problem, guess, guess.phases, problem.scheme)
-    solution = Solution(problem, unconfirmed(as_it_is(space, v, problem.delta)))
+    solution = Solution(problem, unconfirmed(as_it_is(*space_near(problem, guess), problem.delta)))
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
         ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps",
