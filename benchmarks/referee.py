@@ -1,5 +1,5 @@
-"""Check the table of known gaits from the gaits alone, and take in better ones: python -m
-benchmarks.referee [--only NAME] [--add FILE.h5 --by COMMAND].
+"""Check the table of known gaits from the gaits alone, and take in better ones:
+python -m benchmarks.referee [--only NAME] [--add FILE.h5 --by COMMAND].
 
 Exit codes: 0 every row holds, 2 bad table or result, or one that is not better, 4 a row does not
 hold, 130 interrupted.
@@ -14,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.known import known, row_of, save_known, with_row
 from colloc.commands.ending import FAILED, OK, run
-from colloc.commands.options import PRINTING, Parser, flag, status_line, tell, text
+from colloc.commands.options import PRINTING, flag, status_line, tell, text
 from colloc.results.store import load
 from colloc.system.errors import CollocError, ProblemError
 from colloc.system.replaced_file import alone_in
@@ -29,9 +29,13 @@ friction, class of gaits, objective, limits and delta.
   python -m benchmarks.referee --add results/mine.h5 --by "colloc solve mine.py"    into known.json"""
 
 
-def _parser() -> Parser:
-    what = "Check the best gaits that are known, from the gaits alone; take in better ones."
-    parser = Parser("python -m benchmarks.referee", what, _EPILOG)
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.referee",
+        description="Check the best gaits that are known, from the gaits alone; take in better ones.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     table = "another table than benchmarks/known.json; with --add (default: known.json) begun as a copy of that"
     for name, settings in (
         text("--table", "FILE.json", table),
