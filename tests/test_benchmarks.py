@@ -103,7 +103,7 @@ def test_the_swimmer_written_apart_has_the_small_strokes_of_a_closed_form():
 
 def test_the_numbers_of_the_zoo_keep_their_problems_and_all_families_are_stated():
     lengths = "0.1712, 0.1186, 0.2235, 0.1596, 0.3273"
-    paths = "paths of curvature <= 2 per rad, symmetry none, within 3.14"
+    paths = "periodic B-splines of degree 4, 24 knots, symmetry none, within 3.14"
     known = (
         f"links of lengths {lengths} from the tail [body lengths], friction (5.95461, 1, 1) {paths}"
     )

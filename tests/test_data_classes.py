@@ -23,7 +23,7 @@ VALUES = {
     "Step", "Gap",
 }
 MUTABLE = {
-    "Archive", "Candidate", "CellState", "Group", "Run", "Solution", "State",
+    "Archive", "Candidate", "CellState", "Run", "Solution", "State",
     "_Heard",
     "_Meshes", "_State",
 }

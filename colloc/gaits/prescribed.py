@@ -95,6 +95,10 @@ class Prescribed(ClassOfGaits):
                 f"gait.stages must ascend from 0 to {self.fraction:g}, not {stages}."
             )
 
+    def trajectory(self, parameters: np.ndarray, n_joint: int) -> Phases:
+        """The same in the time of a program."""
+        return self.member(parameters, n_joint)
+
     def intervals(self, n_joint: int) -> int:
         """Intervals of a first mesh: some in every stage."""
         return _INTERVALS_A_STAGE * (len(self.stages) - 1)

@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from colloc.gaits.gait import delta_per_period
-from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer, Step
 from colloc.search.confirm import answer_of, second_order
@@ -43,7 +42,8 @@ def literal_answer(problem: Problem) -> Answer:
         Its message says what failed.
     """
     program, history = program_of(problem), tuple[Step, ...]()
-    parameters = _parameters(problem, problem.guess)
+    space, v = space_near(problem, problem.guess)
+    parameters = space.full_parameters(v)
     below = levels(problem, problem.delta_start)
     for done, delta in enumerate(below):
         this_run().told("descend", done, len(below))
@@ -68,8 +68,9 @@ def literal_answer(problem: Problem) -> Answer:
         if plan is None:
             break
         kept = np.concatenate([kept, plan.kept])
-        parameters = _parameters(problem, gait)
-        program = full_program(program.control, parameters, plan.edges, plan.scheme)
+        space, v = space_near(problem, gait, plan.edges, plan.scheme)
+        parameters = space.full_parameters(v)
+        program = full_program(program.control, parameters, space.mesh.edges, plan.scheme)
         answer = _solved(program, parameters, delta)
         history = (*history, answer.step)
         if not answer.optimal:
@@ -77,11 +78,6 @@ def literal_answer(problem: Problem) -> Answer:
     space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
     curved = second_order(space, v, answer.delta, answer.value)
     return replace(answer, second_order=curved, history=history)
-
-
-def _parameters(problem: Problem, gait: AnyGait) -> np.ndarray:
-    space, v = space_near(problem, gait)
-    return space.full_parameters(v)
 
 
 def _solved(program: FullProgram, parameters: np.ndarray, delta: float) -> Answer:

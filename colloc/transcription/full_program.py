@@ -363,6 +363,7 @@ class _Links(_Motion):
                 w, ca.norm_2(ca.diff(w)), self.layout.spins, delta=self.delta
             )
         self.contacts = [(group.rows, self._contact(group, inertial)) for group in self._groups()]
+        self.load = self._load()
         joint = np.arange(self.chain.n_joint)
         if inertial:
             self.swing, self.change = self._swing(), self._change()
@@ -447,6 +448,20 @@ class _Links(_Motion):
             moment += x * fy - y * fx
         power = -(force[0] * vs + force[1] * vn + couple * w)
         out = ca.vertcat(fx, fy, moment, power, *laws)
+        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
+
+    def _load(self) -> np.ndarray | None:
+        """Of every link, m g in the axes of the plane, and its power; None without a load."""
+        layout, local = self.layout, ca.SX.sym("link", 3)
+        pull = self.dynamics.regime.pull(local[0])
+        if pull is None:
+            return None
+        (mass,), given, values = self._given(mass=self.chain.mass_column())
+        c, s = ca.cos(local[0]), ca.sin(local[0])
+        force = mass * ca.vertcat(c * pull[0] - s * pull[1], s * pull[0] + c * pull[1])
+        tail = np.repeat(layout.directions[:1], self.chain.n_link, axis=0)
+        gather = self._instances([tail, layout.vx, layout.vy], slice(None))
+        out = ca.vertcat(force, ca.dot(force, local[1:]))
         return self.program.repeat(local, out, gather, given, values, delta=self.delta)
 
     def _lever(self, joint: np.ndarray, link: np.ndarray) -> np.ndarray:
@@ -536,10 +551,9 @@ class _Links(_Motion):
         program.add("velocity y", d @ vy - both @ cos)
         for k, (_, outputs) in enumerate(self.contacts):
             program.add(f"force law {k + 1}", pick(outputs[4:]))
-        pull = self.dynamics.regime.pull(np.zeros((1, 1)))
-        weight = np.repeat(self.chain.mass_column(), self.mesh.n_point)
-        self.pull = np.zeros(2) if pull is None else pull[:, 0]
-        loads = [self._on_links(k) + program.constant(weight * self.pull[k]) for k in range(2)]
+        loads = [self._on_links(k) for k in range(2)]
+        if self.load is not None:
+            loads = [force + pick(self.load[k]) for k, force in enumerate(loads)]
         moment = self._on_links(2)
         if layout.momenta.size:
             self._add_momenta(loads, moment, state, rate)
@@ -588,9 +602,10 @@ class _Links(_Motion):
         mass, angle = self.spread(self.chain.mass_column().T), self.dynamics.regime.ahead
         vx, vy = mass @ pick(layout.vx), mass @ pick(layout.vy)
         c, s = np.cos(angle), np.sin(angle)
-        power = self.of_points(self.chain.n_link) @ self._on_links(3)
-        climb = self.pull[0] * vx + self.pull[1] * vy
-        return c * vx + s * vy, c * vy - s * vx, power - climb
+        power = self._on_links(3)
+        if self.load is not None:  # of the joints
+            power = power - pick(self.load[2])
+        return c * vx + s * vy, c * vy - s * vx, self.of_points(self.chain.n_link) @ power
 
 
 class _Mapped(_Motion):

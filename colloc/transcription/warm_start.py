@@ -93,7 +93,7 @@ def _lift(
     the tail's orientations ``(n_point,)``."""
     angles, rates, z = motion
     dynamics = control.dynamics.in_speeds_of(RADIANS)
-    body, law, pull = dynamics.body, dynamics.law, _pull(dynamics.regime)
+    body, law, pull = dynamics.body, dynamics.law, dynamics.regime.pull(theta[None])
     assert isinstance(body, Links)
     posture = body.posture(angles)
     link = body.velocity(posture, rates, z)
@@ -103,7 +103,9 @@ def _lift(
     friction = body.forces(law, angles, rates, z, delta[None])
     on_link = body.contact.on_links(friction)
     mass = body.mass_column()
-    force = (on_link.tangential + 1j * on_link.normal) * along + mass * pull
+    force = (on_link.tangential + 1j * on_link.normal) * along
+    if pull is not None:
+        force += mass * (pull[0] + 1j * pull[1]) * axes
     x[layout.directions] = theta + body.tangent_angles(angles)
     x[layout.spins] = link.w
     x[layout.vx], x[layout.vy] = velocity.real, velocity.imag
@@ -122,9 +124,3 @@ def _lift(
         moment = (on_link.couple + (np.conj(arm) * force).imag).sum(axis=0)
         x[layout.x], x[layout.y] = arm.real, arm.imag
         x[layout.centre] = [moving.real, moving.imag, total.real, total.imag, moment]
-
-
-def _pull(regime) -> complex:
-    """The weight's pull along the ground, in the axes of the plane."""
-    pull = regime.pull(np.zeros((1, 1)))
-    return 0.0 if pull is None else complex(pull[0, 0], pull[1, 0])

@@ -119,7 +119,7 @@ def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
     assert max(answer.kkt_error, answer.violation, answer.complementarity) < 1e-8
     assert answer.iterations <= 15
     assert answer.value == pytest.approx(found.value, rel=1e-7)
-    assert answer.layout.forces.size == 9 * answer.mesh.n_point
+    assert answer.layout.friction.size == 9 * answer.mesh.n_point
     assert answer.message == ""
 
 

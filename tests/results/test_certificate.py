@@ -91,7 +91,7 @@ def test_first_order_conditions(failures, three_link, name, field, limit):
 
 def test_balance_at_the_nodes(failures, three_link):
     """A tail velocity that is off: the force left over is linear in it."""
-    index = three_link.layout.z[0, 10]
+    index = three_link.layout.spins[0, 10]
 
     def off(step):
         x = three_link.answer.x.copy()

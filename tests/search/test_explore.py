@@ -424,5 +424,8 @@ def test_a_gait_that_jumps_between_balanced_motions_gives_way_to_one_that_certif
 )
 def test_delta_is_lowered_where_nothing_else_fails(failed, lowered):
     checks = [SimpleNamespace(name=name) for name in failed]
-    found = SimpleNamespace(certificate=SimpleNamespace(failures=checks))
+    problem = SimpleNamespace(gait=SimpleNamespace(free=True))
+    found = SimpleNamespace(
+        certificate=SimpleNamespace(failures=checks), answer=SimpleNamespace(problem=problem)
+    )
     assert stages._is_viscous(found) == lowered
