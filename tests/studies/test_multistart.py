@@ -436,11 +436,10 @@ def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
         breaks=gait.corner_phases,
         tolerance=1e-8,
     )
-    # at the problem's own number, which is at unit shape speed, it would come out 40 times too
-    # large
-    assert mesh_errors(solution).sum() == pytest.approx(
-        abs(solution.efficiency / exact.efficiency - 1), rel=0.2
-    )
+    # magnitudes of intervals add up where their errors cancel in part; at the problem's own number,
+    # which is relative to the shape speed, it would come out 40 times too large
+    error = abs(solution.efficiency / exact.efficiency - 1)
+    assert error < mesh_errors(solution).sum() < 2 * error
 
 
 def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
