@@ -156,7 +156,7 @@ def moments_at(solution, t):
     body, law, delta = solution.problem.body, solution.problem.friction, solution.delta_per_period
     angles, rates = solution.gait(t)
     z = body.solve(law, angles, rates, delta).z
-    return joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta), rates
+    return joint_moments(body, angles, body.forces(law, angles, rates, z, delta)), rates
 
 
 def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):

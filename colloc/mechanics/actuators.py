@@ -10,31 +10,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.mechanics.bodies import Body
+from colloc.mechanics.balance import total_power
 from colloc.mechanics.feet import whole_links
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 from colloc.numerics.arrays import Array, namespace
 
 
-def joint_moments(
-    body: Body, friction: Law, angles: Array, forces: Array, delta: Array, load: Array | None = None
-) -> Array:
-    """Moment that every shape coordinate's actuator exerts, ``(n_joint, n_time)``, for a body with
-    a full formulation, from angles ``(n_joint, n_time)``, forces ``(n_force, n_time)`` on its parts
-    (`colloc.mechanics.bodies.Body.forces`), and an outside force ``(2, n_time)`` on its centre of
-    mass, in its axes, if there is one."""
+def joint_moments(body: Links, angles: Array, forces: Array, load: Array | None = None) -> Array:
+    """Moment that every joint's actuator exerts, ``(n_joint, n_time)``, from angles ``(n_joint,
+    n_time)``, friction ``(n_force, n_time)`` (`colloc.mechanics.bodies.Body.forces`), and an
+    outside force ``(2, n_time)`` on the centre of mass, in the body's axes, if there is one."""
+    xp, posture = namespace(angles, forces), body.posture(angles)
+    friction = body.contact.on_links(forces)
     still, moments = np.zeros((3, angles.shape[1])), []
     for joint in range(body.n_joint):
         unit = np.zeros(angles.shape)
         unit[joint] = 1.0
-        alone = body.with_forces(friction, angles, unit, still, forces, delta)
-        moments.append(
-            alone.power
-            if load is None
-            else alone.power - namespace(load).sum_rows(load * alone.centre)
-        )
-    return namespace(angles, forces).stack(moments)
+        velocity = body.velocity(posture, unit, still)
+        power = total_power(velocity, friction)
+        if load is not None:
+            centre = xp.stack(list(body.centre_velocity(posture, velocity)))
+            power = power - xp.sum_rows(load * centre)
+        moments.append(power)
+    return xp.stack(moments)
 
 
 def largest_moments(chain: Links, friction: Law, grade: float = 0.0) -> np.ndarray:

@@ -23,17 +23,6 @@ class Sliding(NamedTuple):
     """``(1, n_time)``: dissipated by friction (integrand of the paper's eq. W)."""
 
 
-class Lifted(NamedTuple):
-    """A body whose parts' forces are variables: what vanishes where they obey the law of friction,
-    scaled like velocities, and where they balance; velocity of the centre of mass ``(2, n_time)``
-    and power ``(1, n_time)``."""
-
-    laws: Array
-    balance: Array
-    centre: Array
-    power: Array
-
-
 @dataclass(frozen=True, eq=False)
 class BalanceSolution:
     """Tail velocities that balance the body, instant by instant.

@@ -19,7 +19,6 @@ from colloc.mechanics.balance_results import (
     BalancedMotion,
     BalanceSolution,
     Branches,
-    Lifted,
     Sliding,
 )
 from colloc.mechanics.contact import Contact
@@ -92,15 +91,8 @@ class Moved(Protocol):
         """The balance at any tail velocity z ``(3, n_time)``: the one statement of it, for NumPy
         and CasADi."""
 
-    def with_forces(
-        self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array
-    ) -> Lifted:
-        """The same with the forces ``(n_force, n_time)`` on the body's parts as variables: only for
-        the full formulation."""
-        raise ProblemError(f"{type(self).__name__} has no full program.")
-
     def forces(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
-        """Their values, ``(n_force, n_time)``, for NumPy and CasADi."""
+        """The forces on the body's parts, ``(n_force, n_time)``, for NumPy and CasADi."""
         return np.empty((0, angles.shape[1]))
 
     def largest_forces(self, friction: Law) -> np.ndarray:

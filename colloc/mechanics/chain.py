@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Lifted, Sliding
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Sliding
 from colloc.mechanics.bodies import ARROWS, Body, Pairs
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.contact import (
@@ -107,18 +107,6 @@ class Chain(Links, Body):
         return Sliding(
             net_force(now.posture, now.force), centre, total_power(now.velocity, now.force)
         )
-
-    def with_forces(
-        self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array
-    ) -> Lifted:
-        """Laws scaled like velocities (see
-        `colloc.mechanics.line_integrals.LineIntegrals.scaled_laws`)."""
-        posture, contact = self.posture(angles), self.contact
-        velocity, force = self.velocity(posture, rates, z), contact.on_links(forces)
-        laws = contact.laws(friction, velocity, forces, delta)
-        stack = namespace(angles, z, forces).stack
-        centre = stack(list(self.centre_velocity(posture, velocity)))
-        return Lifted(stack(laws), net_force(posture, force), centre, total_power(velocity, force))
 
     def forces(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
         return self.contact.forces(friction, self.velocity(self.posture(angles), rates, z), delta)

@@ -99,7 +99,7 @@ class Instants:
         body, friction, moments = self.body, self.friction, self.moments
         if moments is None:
             forces = body.forces(friction, self.angles, self.rates, self.z, self.delta)
-            moments = joint_moments(body, friction, self.angles, forces, self.delta, self.load)
+            moments = joint_moments(body, self.angles, forces, self.load)  # type: ignore[arg-type]
         return self.joint_map.motor_moments(moments) if self.joint_map else moments
 
     @property

@@ -266,32 +266,6 @@ class FloorContact:
             [(group.rows, self.pressure[group.rows] * own) for group, own in said]
         )
 
-    def laws(
-        self, friction: Law, velocity: LinkVelocities, forces: Array, delta: Array
-    ) -> list[Array]:
-        """What vanishes where forces obey the law, scaled like velocities: on points, the
-        difference over the law's secant."""
-        moves, n = self.velocities(velocity), len(self.parts)
-        found: list[list[tuple[list[int], Array]]] = [[], [], []]
-        for rows, law, pads in self.groups(friction):
-            vs, vn, w = (part[rows, :] for part in moves)
-            pressed = self.pressure[rows]
-            along, across = (forces[[k * n + row for row in rows], :] / pressed for k in range(2))
-            if pads:
-                couples = forces[[2 * n + self._pads.index(row) for row in rows], :] / pressed
-                left = line_integrals(law).scaled_laws(
-                    vs, vn, w, self.length[rows], delta, LinkForce(along, across, couples)
-                )
-            else:
-                there, secant = law.density(vs, vn, delta), law.density_secant(vs, vn, delta)
-                left = [
-                    (own - its) / secant[k][k]
-                    for k, (own, its) in enumerate(zip((along, across), there, strict=True))
-                ]
-            for pieces, piece in zip(found, left, strict=False):
-                pieces.append((rows, piece))
-        return [self._in_order(pieces) for pieces in found if pieces]
-
     def largest_forces(self, friction: Law) -> np.ndarray:
         """Their largest magnitudes, ``(n_force, 1)``."""
         found = np.full((3, len(self.parts), 1), np.inf)

@@ -102,7 +102,7 @@ def quasi_static_torques(
         balance = body.solve if load is None else partial(solve_balance, body, load=load)
         z = balance(law, angles, rates, delta, start=start).z
     forces = body.forces(law, angles, rates, z, delta)
-    return solution.problem.of_motors(joint_moments(body, law, angles, forces, delta, load))
+    return solution.problem.of_motors(joint_moments(body, angles, forces, load))
 
 
 def _inertial_torques(

@@ -26,7 +26,7 @@ def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
     (angles, rates), delta = random_instants(20), 1e-2
     idle = law.largest * delta ** (1 + law.degree)
     forces = BODY.forces(law, angles, rates, np.zeros((3, 20)), delta)
-    moments = joint_moments(BODY, law, angles, forces, delta)
+    moments = joint_moments(BODY, angles, forces)
 
     def driven(share):
         return DRIVEN_WORK.at(Instants(BODY, law, angles, share * rates, delta, moments=moments))[0]
@@ -56,7 +56,7 @@ def test_torques_are_limited_both_ways_and_powers_one_way():
     mirrored = Fourier(-gait.mean, -gait.cos, -gait.sin)
     t = np.arange(400) / 400
     at = LAW, gait.angles(t), gait.rates(t)
-    signed = joint_moments(BODY, LAW, at[1], BODY.forces(*at, BODY.solve(*at, 1e-2).z, 1e-2), 1e-2)
+    signed = joint_moments(BODY, at[1], BODY.forces(*at, BODY.solve(*at, 1e-2).z, 1e-2))
     # which is what makes a difference here
     assert np.abs(signed.max(axis=1) + signed.min(axis=1)).max() > 0.01
     found, other = (

@@ -35,7 +35,7 @@ def test_moments_of_joints_stay_below_what_friction_and_weight_can_do(body, law,
     friction = body.law(law)
     z = solve_balance(body, friction, angles, rates, 1e-4, load=load if grade else None).require().z
     forces = body.forces(friction, angles, rates, z, 1e-4)
-    moments = np.abs(joint_moments(body, friction, angles, forces, 1e-4, load))
+    moments = np.abs(joint_moments(body, angles, forces, load))
     most = largest_moments(body, law, grade)
     assert (moments <= most[:, None] * (1 + 1e-9)).all()
     assert (moments.max(axis=1) > 0.2 * most).all(), "the bound says something"

@@ -21,6 +21,7 @@ from colloc import (
     Wheel,
     solve_balance,
 )
+from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.native_kernel import native_kernel
 
 LENGTHS = (0.3, 0.45, 0.25)
@@ -174,7 +175,7 @@ def test_casadi_says_the_same_of_pads(law, feet):
 
     def said(q, r, z, f, delta):
         return [
-            *body.with_forces(law, q, r, z, f, delta),
+            joint_moments(body, q, f),
             *body.sliding(law, q, r, z, delta),
             body.forces(law, q, r, z, delta),
         ]

@@ -69,6 +69,4 @@ def mechanics(body, law, delta, size, seed=4, count=6):
     }
     if body.schedule == ():
         found["slopes"] = body.slopes(law, angles, rates, delta, solved)
-    if body.force_names:
-        found["lifted"] = body.with_forces(law, angles, rates, z, found["forces"] + 0.1, delta)
     return found

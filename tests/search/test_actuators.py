@@ -38,7 +38,7 @@ USUAL = Problem("limited", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral")
 
 def moments(body, law, angles, rates, delta):
     z = body.solve(law, angles, rates, delta).require().z
-    return joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta), z
+    return joint_moments(body, angles, body.forces(law, angles, rates, z, delta)), z
 
 
 def test_a_joint_balances_the_friction_on_all_that_lies_ahead_of_it():

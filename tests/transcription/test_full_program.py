@@ -191,7 +191,7 @@ def test_moments_at_the_joints_are_those_that_the_power_of_single_joints_says(ca
     law = law.in_speeds_of(RADIANS)
     z, theta = full.layout.tail_velocity(body, x), x[full.layout.directions[:1]]
     forces = body.forces(law, q, r, z, 0.1 / full.delta_unit)
-    expected = joint_moments(body, law, q, forces, 0.1 / RADIANS, regime.pull(theta))
+    expected = joint_moments(body, q, forces, regime.pull(theta))
     np.testing.assert_allclose(x[full.layout.moments], expected, atol=1e-12)
 
 
