@@ -205,7 +205,7 @@ def test_the_engine_takes_no_problem_apart():
             ), name
 
 
-MOST_MEMBERS, WIDER = 15, {"Body": 46, "Law": 16}
+MOST_MEMBERS, WIDER = 15, {"Body": 45, "Law": 16}
 """Of a protocol, and of those that are still wider; these may only get fewer."""
 
 
