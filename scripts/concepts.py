@@ -93,7 +93,7 @@ def gaits_in_shape_space(ax: Axes, solutions: dict[str, Solution]) -> Axes:
         angles = solution.gait(t)[0]
         ax.plot(*angles, color=colour, label=f"{label}: d/W {solution.measured.efficiency:.3f}")
     ax.set(xlabel="joint angle $q_1$ [rad]", ylabel="joint angle $q_2$ [rad]", aspect="equal")
-    ax.legend(loc="center")
+    ax.legend(loc="lower left", fontsize="small")
     return ax
 
 
