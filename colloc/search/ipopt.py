@@ -32,10 +32,16 @@ IPOPT_OPTIONS: dict[str, object] = {
     **dict.fromkeys([*_PUSHED[:2], *(f"warm_start_{name}" for name in _PUSHED)], 1e-5),
     "max_iter": 60,
 }
-LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
+LIFTED_OPTIONS: dict[str, object] = {
+    "theta_max_fact": 0.1,
+    "constr_viol_tol": 1e-11,
+    "max_iter": 300,
+}
 """With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from
 which a step along negative curvature would otherwise carry them away for good. The price is up to
-120 short steps a level. The velocity map needs no such leash and is slowed by it."""
+120 short steps a level. The velocity map needs no such leash and is slowed by it. What a row of the
+lifted program is off by moves the balance of a point by up to 1 / delta as much, and a certificate
+allows that 1e-6."""
 CONFIRMING: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
 """To confirm a gait. The barrier begins where it ends, as multipliers are known: one to four steps
 confirm most gaits, and more than these lead away."""
