@@ -80,12 +80,6 @@ class Corners(GaitFunction):
         return self.corners.shape[0]
 
     @property
-    def n_corner(self) -> int:
-        """Corners over the whole period."""
-        n = self.corners.shape[1]
-        return n if self.symmetry == NONE else round((n - 1) / fraction(self.symmetry))
-
-    @property
     def length(self) -> float:
         """Of the whole closed path [rad]."""
         return float(self._lengths().sum()) / fraction(self.symmetry)
