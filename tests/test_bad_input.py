@@ -173,7 +173,6 @@ def test_coefficients_that_are_equal_or_named_do_not_warn():
         assert law.in_units_of(0.1).mu_b == pytest.approx(1.4)
 
 
-X = {"name": "x"}
 SENTENCES = {
     "a constant objective": (lambda: Objective("1"), "speaks of nothing"),
     "a constant objective without a value": (lambda: Objective("log(-1)"), "speaks of nothing"),
@@ -312,10 +311,6 @@ def test_what_a_problem_file_raises_is_told_even_if_it_cannot_say_itself(tmp_pat
         colloc.load_problem(tmp_path / "y.py")
 
 
-def test_an_array_of_no_dimension_is_a_number():
-    assert Problem("x", joint_limit=np.array(1.5), gait=Harmonic(1)).joint_limit == 1.5
-
-
 def test_a_problem_file_with_a_byte_order_mark_is_read(tmp_path):
     text = "from colloc import *\nPROBLEM = Problem('x')\n"
     (tmp_path / "x.py").write_bytes(b"\xef\xbb\xbf" + text.encode())
@@ -330,9 +325,3 @@ def test_what_a_problem_file_raises_cannot_drive_the_terminal(tmp_path):
         colloc.load_problem(tmp_path / "x.py")
     assert str(caught.value).isprintable()
     assert r"\x1b[2J" in str(caught.value)
-
-
-def test_public_functions_go_to_other_processes():
-    import pickle
-
-    assert pickle.loads(pickle.dumps(colloc.solve)) is colloc.solve

@@ -7,14 +7,11 @@ import pytest
 from benchmarks.engines.__main__ import tasks
 from benchmarks.peer_table import OPTIMA, judged
 from benchmarks.peers import drag, physics
-from benchmarks.peers.nelder_mead import minus_efficiency
-from benchmarks.peers.slsqp_three_link import Reduced, solve
 from benchmarks.peers.starts import feasible_motion, starts
 from benchmarks.published import DIFFERS, number, scallop, small_stroke, small_wave
 from benchmarks.robustness import DELTA, PUBLISHED, SMALL_DELTA, advance, write_tables
-from benchmarks.tables import interleaved_seconds, markdown_table
 from benchmarks.zoo import described, law_problem, modal_problem, zoo_problem
-from colloc import Chain, Friction, ellipse, replay, solve_balance
+from colloc import Chain, Friction, ellipse, replay
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.inertia import moment_of_inertia
 from scripts.models.ellipses import admissible
@@ -66,23 +63,6 @@ def test_a_run_is_judged_by_the_replay_of_its_gait():
     assert not judged({"gait": [0.0, 1.0, 1.0], "efficiency": 0.26})[0]
     assert not judged({"gait": [0.0, 3.5, 1.0], "efficiency": 0.26})[0]
     assert not judged({"failed_at": 0.1, "message": "restoration failed"})[0]
-
-
-def test_nelder_mead_is_given_the_efficiency():
-    assert -minus_efficiency(np.array([0.0, 2.859, 1.302])) == pytest.approx(OPTIMA[0], rel=3e-3)
-    assert minus_efficiency(np.array([0.0, 4.0, 1.0])) == 0.0
-
-
-def test_slsqp_on_the_reduced_functions_finds_an_optimum():
-    found, claim, short = judged(solve(Reduced(), starts(1)[0]))
-    assert found
-    assert abs(claim) < 1e-4
-    assert abs(short) < 1e-4
-
-
-def test_tables_and_times():
-    assert markdown_table(["a", "b"], [[1, 1e-7]]) == "| a | b |\n|---|---|\n| 1 | 1.0e-07 |"
-    assert set(interleaved_seconds({"x": lambda: solve_balance})) == {"x"}
 
 
 def test_rows_about_published_results_judge_by_the_printed_digits():

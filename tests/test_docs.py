@@ -190,40 +190,6 @@ def is_program(dotted):
     return path.with_suffix(".py").exists() or (path / "__main__.py").exists()
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_the_bound_without_samples_is_called_guaranteed_and_says_for_which_joints(page):
-    """A computer said so, and nobody has read all of what it did."""
-    text = " ".join(page.read_text(encoding="utf-8").split())
-    for place in re.finditer(r"0\.46\b", text):
-        assert not re.search(
-            r"\bprove[nd]?\b|\btheorem\b", text[max(0, place.start() - 40) : place.end() + 40]
-        )
-    if page.stem in ("README", "known", "limits", "bound"):
-        assert re.search(
-            r"2\.5.{0,20}0\.46.{0,20}guaranteed|0\.46.{0,20}guaranteed.{0,20}2\.5", text
-        )
-
-
-def test_readme_and_tutorial_name_every_documented_command():
-    tutorial, readme = (
-        (ROOT / name).read_text(encoding="utf-8") for name in ("docs/tutorial.md", "README.md")
-    )
-    for name in (
-        "init",
-        "solve",
-        "report",
-        "animate",
-        "verify",
-        "multistart",
-        "open",
-        "export",
-        "compare",
-    ):
-        assert f"colloc {name}" in tutorial
-    assert all(f"colloc {name}" in readme for name in SUBCOMMANDS)
-    assert len(readme.splitlines()) <= 110
-
-
 def anchors(path):
     """The names that headings of a page can be reached by, as code hosts and the site make them."""
     headings = re.findall(r"^#+ (.*)", path.read_text(encoding="utf-8"), re.MULTILINE)
@@ -396,8 +362,3 @@ def test_the_python_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_s
         assert not quoted or len(numbers(said)) == len(numbers(quoted)), (said, quoted)
         for mine, theirs in zip(numbers(quoted or ""), numbers(said), strict=False):
             assert theirs == pytest.approx(mine, rel=1e-3, abs=2e-3)
-
-
-def test_every_page_with_python_is_run():
-    pages = {page.name for page in PAGES if "```python" in page.read_text(encoding="utf-8")}
-    assert {page.name for page in WITH_PYTHON} | RUN_ELSEWHERE == pages

@@ -1,6 +1,5 @@
 """The site of the documentation: what its hooks make of a page."""
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -49,22 +48,6 @@ def test_a_link_of_the_repository_leads_to_the_page_that_shows_it(link, page, be
     assert shown(link, page) == becomes
 
 
-def test_what_stands_for_files_are_pages_that_are_made():
-    assert set(docs_site.SHOWN.values()) <= set(docs_site.GENERATED)
-    assert all((ROOT / file).exists() for file in docs_site.SHOWN)
-
-
-def test_a_long_formula_scrolls_in_its_own_line_and_one_in_a_text_stays_there():
-    alone, inside = shown("```math\nx_1 + y_1\n```"), shown("so $`x_1`$ is")
-    assert re.search(
-        r'<span style="display: block; overflow-x: auto"><math '
-        r'[^>]*display="block".*</math></span>',
-        alone,
-    )
-    assert "overflow" not in inside
-    assert inside.startswith("so <math")
-
-
 @pytest.fixture
 def program():
     return browser() or pytest.skip(
@@ -94,23 +77,3 @@ def test_a_checker_of_accessibility_finds_nothing_serious_in_a_report(
     assert [
         line for dark in (False, True) for line in complaints(program, tmp_path, text, dark=dark)
     ] == []
-
-
-@pytest.mark.slow
-def test_the_browser_sees_what_is_wrong_with_a_page(program, tmp_path):
-    (tmp_path / "wide.html").write_text(
-        '<body style="background: #fff"><p style="width: 500px">wide</p>', encoding="utf-8"
-    )
-    (tmp_path / "search").mkdir()
-    (tmp_path / "index.html").write_text(
-        '<input data-md-component="search-query">', encoding="utf-8"
-    )
-    said = complaints(program, tmp_path, dark=True)
-    assert any(re.fullmatch(r"wide.html at 360: 1\d\d pixels too wide", line) for line in said)
-    assert "wide.html at 360: light on a dark system" in said
-    assert "index.html: the search finds nothing for friction" in said
-
-
-def test_the_site_is_dark_where_the_reader_s_system_is():
-    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    assert re.search(r"prefers-color-scheme: dark\)\"\n\s+scheme: slate", text)

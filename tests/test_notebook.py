@@ -1,7 +1,6 @@
 """The notebook of the documentation: it was run from top to bottom, its page shows all of it, and a
 new run says the same."""
 
-import ast
 import json
 import re
 from pathlib import Path
@@ -42,44 +41,6 @@ def test_it_was_run_once_from_top_to_bottom_without_an_error():
     ]
     kinds = {kind for cell in CODE for o in cell["outputs"] for kind in o.get("data", {})}
     assert {"image/png", "image/gif", "text/html"} <= kinds
-
-
-def test_the_first_cell_installs_and_the_others_are_python_that_imports_what_exists():
-    first, *others = ("".join(cell["source"]) for cell in CODE)
-    assert "%pip install -q {SOURCE}" in first
-    names = [
-        node.attr for source in others for node in ast.walk(ast.parse(source)) if is_of_colloc(node)
-    ]
-    import colloc
-
-    assert {"Problem", "solve", "replay", "save"} <= set(names) <= set(dir(colloc))
-
-
-def is_of_colloc(node):
-    return (
-        isinstance(node, ast.Attribute)
-        and isinstance(node.value, ast.Name)
-        and node.value.id == "colloc"
-    )
-
-
-def test_it_is_the_problem_of_the_tutorial():
-    tutorial = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
-    stated = "".join(CODE[1]["source"])
-    for line in (
-        "1 / 4, 1 / 4, 1 / 4, 1 / 4",
-        "mu_t=1.7, mu_f=1.0, mu_b=1.3",
-        'harmonics=2, symmetry="bilateral"',
-        "joint_limit=3.14",
-    ):
-        assert line in stated
-        assert line in tutorial
-    efficiency, distance = re.findall(r"efficiency is about (0\.\d+) with d = (0\.\d+)", tutorial)[
-        0
-    ]
-    words = "".join(map(said, CODE))
-    assert f"d/W = {efficiency}" in words
-    assert f"distance {distance}" in words
 
 
 def test_the_page_shows_every_cell_and_every_output():

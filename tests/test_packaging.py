@@ -3,16 +3,10 @@ files that go along."""
 
 import re
 import tomllib
-from fnmatch import fnmatch
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 STATED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-PACKED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"][
-    "packages"
-]["find"]["include"]
 NEEDED = dict(requirement.split(">=") for requirement in STATED["dependencies"])
 RECIPE = (ROOT / "recipe/recipe.yaml").read_text(encoding="utf-8")
 CONDA_NAMES = {"matplotlib-base": "matplotlib"}
@@ -42,30 +36,6 @@ def test_the_recipe_builds_and_starts_what_the_wheel_does():
     assert (ROOT / "LICENSE").exists()
 
 
-def test_of_all_packages_in_the_source_tree_the_wheel_holds_the_library():
-    packages = {path.parent.name for path in ROOT.glob("*/__init__.py")}
-    assert {"colloc", "research", "scripts"} <= packages
-    assert {name for name in packages if any(fnmatch(name, pattern) for pattern in PACKED)} == {
-        "colloc"
-    }
-
-
-def test_the_recipe_is_read_by_who_builds_it():
-    yaml = pytest.importorskip("yaml")
-    recipe = yaml.safe_load(RECIPE)
-    assert set(recipe) == {
-        "schema_version",
-        "context",
-        "package",
-        "source",
-        "build",
-        "requirements",
-        "tests",
-        "about",
-    }
-    assert recipe["requirements"]["run"] == listed("run")
-
-
 def test_the_oldest_versions_that_are_tested_are_those_that_are_stated():
     """The wheel is installed with these by .ci/pythons."""
     lines = (ROOT / ".ci/lowest.txt").read_text(encoding="utf-8").splitlines()
@@ -74,11 +44,6 @@ def test_the_oldest_versions_that_are_tested_are_those_that_are_stated():
         stated, tested = numbers(version), numbers(lowest[name])
         assert tested[: len(stated)] == stated, name
         assert not any(tested[len(stated) :]), name
-
-
-def test_citation_and_version_agree():
-    for name in ("CITATION.cff", "docs/cite.md", "CHANGELOG.md"):
-        assert STATED["version"] in (ROOT / name).read_text(encoding="utf-8"), name
 
 
 def test_binder_takes_a_python_that_is_supported_and_installs_the_clone():

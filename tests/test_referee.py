@@ -86,12 +86,6 @@ def test_only_what_is_better_takes_the_place_of_a_rival(best):
     assert with_row([good], other) == (good, other)  # another class is another question
 
 
-def test_what_is_not_certified_or_of_no_class_is_no_row(best):
-    failed = replace(best, certificate=colloc.Solution(PROBLEM, best.answer).certificate)
-    with pytest.raises(ProblemError, match="has to be"):
-        row_of(failed, "by hand")
-
-
 def test_the_referee_takes_a_result_and_holds_it(best, tmp_path, capsys):
     table, result = tmp_path / "known.json", tmp_path / "quick.h5"
     save_known([], table)

@@ -3,8 +3,6 @@ anything and explains itself."""
 
 import ast
 import importlib
-import pkgutil
-import re
 import runpy
 import sys
 import time
@@ -88,34 +86,3 @@ def test_a_program_refuses_what_it_does_not_understand(path, ended):
     code, _, complaints = ended(path, "--no-such-option")
     assert code == 2
     assert complaints.startswith("usage:")
-
-
-def test_nothing_that_can_be_started_is_left_out():
-    names = {path.stem for path in PROGRAMS}
-    assert {"reproduce_paper", "kernel", "peer_table", "curate"} <= names
-    assert {
-        path.stem for path in MODULES if not path.stem.startswith("__") and has_main(path)
-    } <= names
-
-
-def has_main(path):
-    return any(
-        isinstance(n, ast.FunctionDef) and n.name == "main"
-        for n in ast.parse(path.read_text(encoding="utf-8")).body
-    )
-
-
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_a_module_says_how_it_is_started_and_names_what_exists(path):
-    text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
-    assert text
-    if starts_itself(path):
-        assert f"python -m {name_of(path).removesuffix('.__main__')}" in text
-    for name in re.findall(r"(?<![/\w])(?:scripts|benchmarks|colloc)(?:\.\w+)+", text):
-        if not is_module(name):
-            pkgutil.resolve_name(name)  # raises if there is no such thing
-
-
-def is_module(name):
-    path = ROOT.joinpath(*name.split("."))
-    return path.with_suffix(".py").exists() or (path / "__init__.py").exists()

@@ -17,10 +17,8 @@ from pathlib import Path
 import pytest
 
 from colloc.bounds.optimality_gap import upper_bound
-from colloc.bounds.sampled import QUICK as BUDGET
-from colloc.bounds.sampled import Domain, bound_key
 from colloc.commands import ending
-from colloc.commands.ending import exit_code, show
+from colloc.commands.ending import exit_code
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
 from colloc.gaits import gait_fields
@@ -96,21 +94,6 @@ def test_ctrl_c_before_the_command_is_known_ends_without_a_traceback(module, wor
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-def test_ctrl_c_inside_text_that_is_executed_is_an_exit_code_too(quick, tmp_path):
-    """As in a dataclass that is made: Python would end the process by the signal, whatever the
-    command returned."""
-    (tmp_path / "library").mkdir()
-    text = "exec('import signal; signal.raise_signal(signal.SIGINT)')"
-    (tmp_path / "library" / "numpy.py").write_text(text)
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "library")}
-    done = command("solve", quick, "--output", f"{tmp_path}/", env=environment)
-    assert (done.returncode, done.stderr.decode()) == (
-        130,
-        "colloc: interrupted; nothing was written.\n",
-    )
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_ctrl_c_after_the_end_does_not_change_it(tmp_path):
     code = (
         "import atexit, signal, sys\nfrom colloc.__main__ import start\n"
@@ -156,16 +139,6 @@ def test_letters_that_an_encoding_lacks_are_printed_as_words(
     assert shown in printed.getvalue().decode(encoding)
 
 
-def test_a_solve_ends_well_on_a_terminal_without_greek(quick, tmp_path):
-    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
-    done = command(
-        "solve", quick, "--no-figure", "--verbose", "--output", f"{tmp_path}/", env=environment
-    )
-    assert done.returncode in (0, 4)
-    assert b"cos 2 pi t" in done.stdout
-    assert done.stderr == b""
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -198,26 +171,6 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_made(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_folder_whose_name_has_an_ending_is_named_with_a_slash(result, tmp_path, capsys):
-    for output in (f"{tmp_path}/v1.2/", f"{tmp_path}/v1.2"):  # made, then there
-        assert colloc(["export", str(result), "--period", "4", "--output", output]) == 0
-    assert [p.name for p in (tmp_path / "v1.2").iterdir()] == ["three_link.csv"]
-    assert capsys.readouterr().err == ""
-
-
-def test_a_long_name_of_a_problem_is_refused(tmp_path, capsys):
-    (tmp_path / "p.py").write_text(QUICK.replace('"quick"', f'"{"x" * 300}"'))
-    assert colloc(["solve", str(tmp_path / "p.py"), "--output", f"{tmp_path}/"]) == 2
-    assert (
-        "name has 300 characters; files are named after it, and 200 are allowed"
-        in capsys.readouterr().err
-    )
-    (tmp_path / "p.py").write_text(QUICK.replace('"quick"', f'"{"x" * 200}"'))
-    assert colloc(
-        ["solve", str(tmp_path / "p.py"), "--output", f"{tmp_path}/", "--quiet", "--no-figure"]
-    ) in (0, 4)
-
-
 def test_a_start_of_another_body_is_named(three_link, tmp_path, capsys):
     start = save(three_link, tmp_path / "three.h5")
     assert (
@@ -227,49 +180,6 @@ def test_a_start_of_another_body_is_named(three_link, tmp_path, capsys):
         == 2
     )
     assert f"the gait of {start} cannot be the guess: guess has 2 joints" in capsys.readouterr().err
-
-
-def test_errors_are_one_json_object_where_json_is_asked_for(result, tmp_path, capsys):
-    for words in (
-        ["solve", "nope.py", "--json"],
-        ["verify", str(result), "--tolerance", "3", "--json"],
-        ["solve", "--json"],
-    ):
-        assert colloc(words) == 2
-        printed = capsys.readouterr()
-        error = json.loads(printed.out)
-        assert (error["status"], error["exit_code"]) == ("error", 2)
-        assert printed.err == f"colloc: {error['message']}\n"
-
-
-@pytest.mark.parametrize("ending", ["sys.exit(0)", "raise SystemExit", "exit()"])
-def test_a_problem_file_that_ends_the_program_is_refused(ending, tmp_path, capsys):
-    (tmp_path / "p.py").write_text(f"import sys\n{ending}\n")
-    assert colloc(["solve", str(tmp_path / "p.py")]) == 2
-    assert "p.py, line 2: the file ends the program" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("cache", ["{", "ENTRY", "FOLDER", "KIND"])
-def test_a_broken_cache_of_bounds_is_left_alone(cache, quick, tmp_path):
-    path, problem = tmp_path / "bounds.sqlite", read_problem_file(quick).problem
-    if cache == "FOLDER":
-        path.mkdir()
-    elif cache == "ENTRY":
-        put_rows(
-            path,
-            CACHE,
-            {
-                bound_key(Domain(problem.body, problem.friction, problem.joint_limit), BUDGET): {
-                    "a": 1
-                }
-            },
-        )
-    elif cache == "KIND":
-        put_rows(path, "another kind", {"a": 1})
-    else:
-        path.write_text(cache)
-    with pytest.warns(UserWarning, match="No bound is taken from it"):
-        assert upper_bound(problem, tmp_path, compute=False) is None
 
 
 def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bound(
@@ -412,20 +322,6 @@ def test_a_command_that_was_interrupted_says_so_whatever_became_of_the_interrupt
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_many_intervals_are_announced(quick, tmp_path, capsys, monkeypatch):
-    class _Begun(Exception):
-        pass
-
-    def begun(*_, **__):
-        raise _Begun
-
-    monkeypatch.setattr("colloc.studies.saved.resume", begun)
-    for intervals, said in ((5000, "5000 intervals will take about 1 min 40 s"), (60, "")):
-        with pytest.raises(_Begun):
-            colloc(["solve", quick, "--mesh", str(intervals), "--output", f"{tmp_path}/"])
-        assert said in capsys.readouterr().err
-
-
 def test_a_command_imports_nothing_heavy_before_it_can_end_well():
     code = (
         "import sys, colloc.commands.main; print(any(name in sys.modules for name in ('numpy', "
@@ -549,17 +445,6 @@ def test_what_a_problem_file_and_its_parts_print_does_not_spoil_the_one_object(t
     printed = capsys.readouterr()
     assert json.loads(printed.out)["name"] == "quick"
     assert "hello from the file" in printed.err
-
-
-def test_what_is_printed_while_one_object_is_asked_for_goes_to_standard_error(capsys):
-    def command():
-        print("on the way")
-        show('{"a": 1}')
-        return 0
-
-    assert exit_code(lambda: exit_code(command, as_json=True), as_json=True) == 0
-    printed = capsys.readouterr()
-    assert (printed.out, printed.err) == ('{"a": 1}\n', "on the way\n")
 
 
 def shell(line, folder):

@@ -1,10 +1,6 @@
 """The command line: exit codes, one clear sentence for bad input, and failed solves that harm
 nothing."""
 
-import json
-import subprocess
-import sys
-
 import pytest
 
 from colloc.commands.solve import solve as main
@@ -36,13 +32,6 @@ def test_a_good_problem_is_solved_saved_and_drawn(options, kinds, problem, tmp_p
     assert {p.name for p in (tmp_path / "out").iterdir()} == {f"quick.{kind}" for kind in kinds}
     assert "efficiency d/W" in printed
     assert "delta had to be lowered from 0.3" in printed
-
-
-def test_json_is_one_object_on_standard_output(problem, tmp_path, capsys):
-    code = main([problem(GOOD), "--output", str(tmp_path), "--json", "--no-figure"])
-    summary = json.loads(capsys.readouterr().out)
-    assert summary["name"] == "quick"
-    assert summary["certificate"]["passed"] == (code == 0)
 
 
 BAD = {
@@ -117,15 +106,3 @@ def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(
     assert "not converged" in capsys.readouterr().out
     assert good.read_bytes() == b"a good result"
     assert (tmp_path / "quick.failed.h5").exists()
-
-
-def test_help_is_quick_and_does_not_need_casadi():
-    code = (
-        "import sys; from colloc.__main__ import start\ntry: start(['solve', '--help'])\n"
-        "except SystemExit: print('casadi' in sys.modules)"
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert result.stdout.rstrip().endswith("False")
-    assert "Exit codes" in result.stdout

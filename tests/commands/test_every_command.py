@@ -4,11 +4,10 @@ import json
 
 import pytest
 
-from colloc.commands.main import SUBCOMMANDS, command
+from colloc.commands.main import SUBCOMMANDS
 from colloc.commands.main import main as colloc
 from colloc.results.store import save
 
-PARSERS = {name: command(name).parser() for name in SUBCOMMANDS}
 PROBLEM = "from colloc import *\nPROBLEM = Problem('quick', gait=Harmonic(1, 'bilateral'))\n"
 STUDY = """from colloc import *
 STUDY = Study("quick", (Axis("mu_t", (1, 2)),), lambda mu_t: Problem("q", friction=Friction(mu_t=mu_t)))
@@ -26,11 +25,6 @@ def place(three_link, tmp_path, monkeypatch):
     (tmp_path / "problem.py").write_text(PROBLEM)
     (tmp_path / "study.py").write_text(STUDY)
     return tmp_path
-
-
-@pytest.mark.parametrize("name", SUBCOMMANDS)
-def test_every_command_has_the_same_options_for_printing(name):
-    assert {"--help", "--json", "--quiet"} <= set(PARSERS[name]._option_string_actions)
 
 
 REFUSED = {
@@ -183,12 +177,6 @@ def test_what_is_wrong_is_named_without_words_of_programmers(place, capsys):
     ):
         assert colloc(words.split()) == 2
         assert message in capsys.readouterr().err
-
-
-def test_a_new_problem_file_is_told_as_json(tmp_path, capsys):
-    assert colloc(["init", str(tmp_path / "mine.py"), "--links", "4", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told == {"status": "written", "file": str(tmp_path / "mine.py"), "links": 4}
 
 
 def test_a_sensitivity_is_told_as_a_table_and_as_json(place, capsys):

@@ -75,19 +75,6 @@ def test_the_fastest_pacing_keeps_some_joint_at_its_limit():
     assert (np.abs(made.speeds) / limits[:, None]).max(axis=0).min() > 0.995
 
 
-def test_the_shortest_period_is_the_way_of_a_joint_over_its_speed():
-    gait = Fourier(np.zeros(1), np.array([[0.7]]), np.zeros((1, 1)))
-    made = plan_trajectory(path_of(gait), 1e5, limits=0.5)
-    assert made.period == pytest.approx(4 * 0.7 / 0.5, abs=2e-5)
-
-
-def test_without_limits_or_with_loose_ones_the_pace_is_even():
-    for settings in ({}, {"limits": 100.0}):
-        made = plan_trajectory(path_of(WAVE), 50.0, 4.0, **settings)
-        np.testing.assert_allclose(made.phase, np.arange(200) / 200, atol=1e-9)
-        np.testing.assert_allclose(made.speeds, WAVE.rates(made.phase) / 4.0, atol=1e-9)
-
-
 def test_the_period_is_a_whole_number_of_samples_and_never_shorter_than_asked():
     made = plan_trajectory(path_of(WAVE), 7.0, 2.03)
     assert made.period == pytest.approx(15 / 7)
@@ -286,24 +273,6 @@ def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hol
         solution.export(tmp_path / "x.json", max_speed=limits, period=0.99 * stated["period_s"])
 
 
-def test_with_inertia_it_is_said_of_which_robot_the_numbers_are(unsolved, tmp_path):
-    """Of one whose length makes the period the pace that was solved for: L = Fr g T^2."""
-    solution = unsolved(
-        Problem("fast", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, froude=0.05)
-    )
-    stated = solution.export(tmp_path / "x.csv", period=2.0)
-    assert stated["froude_number"] == 0.05
-    assert "of a robot of 1.96 m in this period" in stated["pace"]
-    # the period is made one of whole samples, which may be another pace by a little
-    period = float(np.sqrt(1.2 / (9.81 * 0.05)))
-    assert (
-        solution.export(tmp_path / "x.csv", period=period, length=1.2, mass=3.0, rate=10)[
-            "period_s"
-        ]
-        > 1.01 * period
-    )
-
-
 def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
     guess = Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
     solution = unsolved(
@@ -342,9 +311,3 @@ def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
     ]
     # a field, of any body
     assert not [text for text in told if "joint" in str(text).replace("joint_limit", "")]
-
-
-def test_a_corner_where_every_joint_rests_does_not_stop_the_clock():
-    there_and_back = path_of(ellipse(0.0, 1.0, 0.0))
-    made = plan_trajectory(there_and_back, 100.0, limits=1.0)
-    assert made.period == pytest.approx(4.0, abs=0.02)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from colloc import Chain, Wheel, solve
+from colloc import Chain, Wheel
 from colloc.commands.ending import BAD_PROBLEM, OK
 from colloc.commands.init import init as main
 from colloc.gaits.problem_file import read_problem_file
@@ -19,13 +19,6 @@ def test_the_file_states_a_problem_of_so_many_links(links, tmp_path, capsys):
     assert problem.name == "mine"
     assert problem.body.lengths == pytest.approx([1 / links] * links)
     assert f"colloc solve {path}" in capsys.readouterr().out
-
-
-def test_the_file_runs_as_it_is(tmp_path):
-    path = tmp_path / "mine.py"
-    main([str(path), "--links", "4"])
-    solution = solve(read_problem_file(path).problem, 1)
-    assert solution.status == "solved", solution.message
 
 
 def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):

@@ -22,17 +22,6 @@ PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral")
 """
 
 
-def test_a_result_is_told_in_three_lines_and_its_checks_in_one(three_link):
-    lines = summary_lines(three_link, None)
-    assert len(lines) == 4
-    assert lines[0].startswith("three_link: solved in ")
-    assert "best of 8 starts" in lines[0]
-    checks = three_link.certificate.checks
-    nearest = max(checks, key=lambda check: abs(check.value) / check.threshold)
-    how_near = f"{nearest.name}, {abs(nearest.value):.1e} where {nearest.threshold:.0e} is allowed"
-    assert lines[3] == f"  {len(checks)} checks hold (largest: {how_near})"
-
-
 def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
     bad = [
         Check("closure", 2e-3, 1e-9, "joint angles after one period"),
@@ -122,18 +111,6 @@ def test_a_speed_that_decides_says_how_far_joints_can_swing():
         "speed_limit 7.54 rad per period, its unit, lets a joint swing by 216 of 229 degrees "
         "at most"
     ]
-
-
-def test_where_nothing_is_limited_nothing_is_told_of_limits():
-    assert told_of_limits()[1] == []
-
-
-def test_verbose_tells_every_check_the_search_and_the_gait(three_link):
-    lines = summary_lines(three_link, None, verbose=True)
-    assert {f"  {check.line()}" for check in three_link.certificate.checks} <= set(lines)
-    assert {f"  gait            {line}" for line in three_link.gait.lines()} <= set(lines)
-    assert sum(line.startswith("  search ") for line in lines) >= 2
-    assert not any("checks hold" in line for line in lines)
 
 
 def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_path):

@@ -12,14 +12,13 @@ import pytest
 
 from colloc.commands import verify as recheck
 from colloc.commands.main import SUBCOMMANDS, main
-from colloc.commands.results import export
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.results import checks
 from colloc.results.solution import Solution
-from colloc.results.store import load, save
+from colloc.results.store import save
 
 
 def changed(solution, certificate=None, answer=None):
@@ -121,27 +120,6 @@ def test_what_is_no_number_of_a_replay_is_held_against_it_too(three_link, tmp_pa
         assert said in json.loads(capsys.readouterr().out)["complaint"]
 
 
-def test_a_result_that_was_only_opened_is_still_exported(three_link, tmp_path, capsys):
-    path = save(three_link, tmp_path / "x.h5")
-    by_another_program(path, lambda group: None)
-    assert export([str(path), "--period", "4"]) == 0
-    assert (tmp_path / "x.csv").exists()
-
-
-def test_an_absurd_number_of_instants_in_a_file_costs_no_memory(three_link):
-    boast = replace(three_link.certificate, instants=10**12)
-    assert (
-        recheck.recheck_certificate(changed(three_link, certificate=boast)).certificate.instants
-        < 10**6
-    )
-
-
-def test_verify_refuses_what_is_no_result(tmp_path, capsys):
-    (tmp_path / "x.h5").write_text("nothing")
-    assert recheck.verify([str(tmp_path / "x.h5")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 @pytest.mark.parametrize(
     ("friction", "lengths", "alike"),
     [
@@ -226,7 +204,3 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
         assert hint in capsys.readouterr().err
     assert main(["--version"]) == 0
     assert "casadi" in capsys.readouterr().out
-
-
-def test_loading_keeps_what_verify_needs(three_link, tmp_path):
-    assert load(save(three_link, tmp_path / "x.h5")).certificate == three_link.certificate

@@ -60,15 +60,6 @@ def test_chains_of_any_number_of_links_take_the_same_steps(lengths):
                 assert np.mean(compiled.iterations == reference.iterations) > 0.75
 
 
-@pytest.mark.parametrize("method", ["newton", "fixed_point"])
-def test_the_methods_for_comparison_are_the_same_as_well(method):
-    compiled, reference = by_both(
-        Chain(), Friction(), ANGLES, RATES, 1e-2, method=method, max_iterations=60
-    )
-    np.testing.assert_array_equal(compiled.converged, reference.converged)
-    np.testing.assert_allclose(compiled.z / SPEED, reference.z / SPEED, rtol=0, atol=1e-9)
-
-
 @pytest.mark.parametrize("delta", [1e-3, 1e-7])
 @pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)
 def test_bodies_under_load_are_in_the_state_that_they_state(lengths, delta):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
-from colloc.motion.collocated import CollocatedPose, point_weights
-from colloc.motion.heading import closing_sign, heading, whole_turns
+from colloc.motion.collocated import CollocatedPose
+from colloc.motion.heading import heading
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
@@ -48,16 +48,6 @@ def test_the_place_converges_with_the_order_of_the_scheme(name, order):
 
 
 @pytest.mark.parametrize("name", SCHEMES)
-def test_edges_are_where_the_polynomials_of_both_intervals_meet(name):
-    found = pose(name, EDGES, rate, forward, theta_0=0.3)
-    k = np.arange(EDGES.size - 1)
-    for tau, edges in ((0.0, slice(None, -1)), (1.0, slice(1, None))):
-        theta, place = found.at(k, np.full(k.size, tau))
-        np.testing.assert_allclose(theta, found.theta[edges], atol=1e-14)
-        np.testing.assert_allclose(place, found.place[edges], atol=1e-14)
-
-
-@pytest.mark.parametrize("name", SCHEMES)
 def test_the_displacement_has_the_slopes_of_differences(name):
     mesh, rng, axis = Mesh(scheme(name), EDGES), np.random.default_rng(0), np.exp(0.4j)
     shape = (mesh.n, mesh.scheme.s)
@@ -80,13 +70,6 @@ def test_the_displacement_has_the_slopes_of_differences(name):
         assert (slopes * step).sum() == pytest.approx(0.5 * (there - back), rel=1e-6)
 
 
-def test_weights_of_shared_points_add_up():
-    for name in SCHEMES:
-        mesh = Mesh(scheme(name), EDGES)
-        assert point_weights(mesh).sum() == pytest.approx(1.0)
-        assert point_weights(mesh) @ mesh.times == pytest.approx(0.5)
-
-
 def test_a_gait_goes_where_its_whole_period_leads():
     """The second half of an antipodal gait is the mirror image of the first, from where that left
     the body."""
@@ -99,16 +82,3 @@ def test_a_gait_goes_where_its_whole_period_leads():
         )
     for symmetry in (NONE, BILATERAL):
         assert heading(symmetry, displacement, rotation) == pytest.approx(0.9)
-
-
-@pytest.mark.parametrize("backwards", [0.0, np.pi])
-def test_orientations_along_the_travel_close_an_antipodal_gait(backwards):
-    """Seen along the travel the second half begins as the mirror image of the first, which ends
-    there."""
-    rotation = 0.5
-    displacement = 0.3 * np.exp(1j * (0.5 * rotation + backwards))
-    first = -heading(ANTIPODAL, displacement, rotation)
-    last = first + rotation
-    assert last + closing_sign(ANTIPODAL) * first == pytest.approx(whole_turns(first, last))
-    assert whole_turns(first, last) == pytest.approx(2 * backwards)
-    assert (closing_sign(NONE), closing_sign(BILATERAL)) == (-1.0, None)

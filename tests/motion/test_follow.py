@@ -49,10 +49,6 @@ def test_a_jump_of_the_rates_is_met_from_both_sides():
     assert ran.states[0, -1] == pytest.approx(1.8, abs=1e-9)
 
 
-def test_steps_are_no_longer_than_asked():
-    assert np.diff(followed(turning, BEGIN, 1e-3, longest=0.01).phases).max() <= 0.01 + 1e-15
-
-
 @pytest.mark.parametrize(("others", "asks"), [(True, False), (True, True), (False, False)])
 def test_where_one_method_gives_up_or_asks_without_end_another_goes_on(monkeypatch, others, asks):
     """As where friction is far stiffer than the body is slow to move; where none goes on, a

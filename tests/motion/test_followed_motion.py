@@ -46,14 +46,6 @@ def step_by_step(friction, path, sense, n=2500):
     return abs((np.exp(1j * heading) * (parts[:, 0] + 1j * parts[:, 1])).sum()) / parts[:, 3].sum()
 
 
-def test_equal_coefficients_leave_nothing_open():
-    forwards, backwards = (
-        replay(BODY, Friction(), random_path(1), 1e-4, sense=s) for s in (FORWARDS, BACKWARDS)
-    )
-    assert forwards == backwards
-    assert forwards.several == forwards.ambiguity == 0
-
-
 def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
     """Panels count as at the worse of their ends, so a little more; and never more than all of
     it."""
@@ -81,21 +73,6 @@ def test_the_replay_follows_the_branch_in_time(sense):
     )
 
 
-def test_velocities_solved_one_by_one_are_put_on_the_branch_that_steps_in_time_stay_on():
-    friction, (angles, rates) = (
-        Friction(mu_t=100, mu_f=1, mu_b=1),
-        random_path(3)(np.arange(1500) / 1500),
-    )
-    alone = solve_balance(BODY, friction, angles, rates, 1e-4).z
-    found, z = on_one_branch(BODY, friction, angles, rates, 1e-4, alone), alone[:, :1]
-    walked = np.empty_like(found)
-    for i in [*range(1500), *range(1500)]:  # once round, in case the first was on another branch
-        z = solve_balance(BODY, friction, angles[:, [i]], rates[:, [i]], 1e-4, start=z).z
-        walked[:, i] = z[:, 0]
-    assert np.abs(alone - walked).max() > 0.1
-    np.testing.assert_allclose(found, walked, atol=1e-4 * np.abs(walked).max())
-
-
 @pytest.mark.parametrize(("law", "seed"), [((100, 1, 1), 3), ((100, 1, 1), 23)])
 def test_velocities_put_on_one_branch_are_of_motions_that_last(law, seed):
     """A step from a branch that ends, or a solve from nothing, may come to one that does not."""
@@ -109,13 +86,6 @@ def test_velocities_put_on_one_branch_are_of_motions_that_last(law, seed):
 
     assert not lasting(alone).all()
     assert lasting(on_one_branch(BODY, coulomb(*law), angles, rates, 1e-4, alone)).all()
-
-
-def test_where_one_motion_is_balanced_nothing_is_changed():
-    """To the last bit: the searches of all such problems go their way."""
-    angles, rates = random_path(1)(np.arange(300) / 300)
-    z = solve_balance(BODY, Friction(mu_t=1.5, mu_f=1, mu_b=1.2), angles, rates, 1e-3).z
-    assert on_one_branch(BODY, Friction(mu_t=1.5, mu_f=1, mu_b=1.2), angles, rates, 1e-3, z) is z
 
 
 @pytest.mark.parametrize("seed", [3, 5])

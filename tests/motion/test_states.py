@@ -99,29 +99,6 @@ def test_the_adjoint_has_the_slopes_of_differences(k, free):
     np.testing.assert_allclose(on_start[0, mask], 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["gauss-3", "radau-2"])
-def test_interval_by_interval_it_is_the_one_large_system(name):
-    mesh, rng, k = Mesh(scheme(name), EDGES), np.random.default_rng(0), 2
-    equations, n = CollocatedStates(mesh, unit=2.0), mesh.n_point
-    matrix, push = rng.normal(size=(k, k, n)), rng.normal(size=(k, n))
-    integral = np.stack(
-        [equations.integrals(row.reshape(k, n))[0].ravel() for row in np.eye(k * n)], axis=1
-    )
-    jacobian = np.zeros((k, n, k, n))
-    jacobian[:, range(n), :, range(n)] = np.moveaxis(matrix, -1, 0)
-    whole = np.eye(k * n) - integral @ jacobian.reshape(k * n, k * n)
-    states, _, held = equations.solved(
-        lambda s: Rates(np.einsum("abn,bn->an", matrix, s) + push, matrix), np.ones(k)
-    )
-    assert held
-    np.testing.assert_allclose(whole @ states.ravel(), 1 + integral @ push.ravel(), atol=1e-10)
-    of_states = rng.normal(size=(3, k, n))
-    mu = np.linalg.solve(whole.T, of_states.reshape(3, -1).T).T
-    on_start, on_rates, _ = equations.pulled_back(matrix, of_states)
-    np.testing.assert_allclose(on_start, mu.reshape(3, k, n).sum(axis=2), atol=1e-10)
-    np.testing.assert_allclose(on_rates.reshape(3, -1), mu @ integral, atol=1e-10)
-
-
 def test_half_a_period_and_its_image_are_the_whole():
     """Pushed the other way half a period later, odd springs do the opposite."""
     ode, image = spring(2), -np.eye(2)
@@ -137,38 +114,6 @@ def test_half_a_period_and_its_image_are_the_whole():
     assert held
     np.testing.assert_allclose(start, again, atol=1e-11)
     np.testing.assert_allclose(np.concatenate([first, -first], axis=1), both, atol=1e-11)
-
-
-def test_a_good_start_is_found_at_once_and_no_motion_is_said_to_be_none():
-    mesh, asked = Mesh(scheme("gauss-3"), EDGES), []
-    at = on_mesh(mesh, spring(3))
-
-    def counted(s):
-        asked.append(s)
-        return at(s)
-
-    equations = CollocatedStates(mesh, np.full(3, True))
-    states, start, _ = equations.solved(counted, np.zeros(3))
-    cold, _ = len(asked), asked.clear()
-    assert equations.solved(counted, start, states)[2]
-    assert len(asked) == 1 < cold
-    assert not equations.solved(lambda s: at(s)._replace(known=False), np.zeros(3))[2]
-
-
-@pytest.mark.parametrize("method", ["solved", "settled"])
-@pytest.mark.parametrize("k", SIZES)
-@pytest.mark.parametrize("free", [False, True])
-def test_newtons_method_solves_linear_equations_in_one_step(k, free, method):
-    mesh, matrix = Mesh(scheme("gauss-3"), EDGES), 2.0 * np.eye(k) + 0.3
-    force, asked = np.sin(2 * np.pi * mesh.times + np.arange(k)[:, None]), []
-
-    def rates(s):
-        asked.append(s)
-        return Rates(force - matrix @ s, np.repeat(-matrix[:, :, None], mesh.n_point, axis=2))
-
-    solve = getattr(CollocatedStates(mesh, np.full(k, free)), method)
-    assert solve(rates, np.full(k, 0.7), np.full((k, mesh.n_point), 0.7))[2]
-    assert len(asked) == 2
 
 
 def test_where_states_grow_beyond_all_numbers_no_motion_is_found_and_none_is_warned_of():

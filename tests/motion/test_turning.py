@@ -83,28 +83,11 @@ def test_the_chord_does_not_depend_on_the_phase_that_a_period_is_begun_at():
     np.testing.assert_allclose(chords, chords[0], rtol=1e-9)
 
 
-def test_the_error_of_a_chord_falls_with_the_instants_as_that_of_a_displacement_does():
-    # what lies before a period and after it is seen from the same axes, turned on: no seam is left
-    # between two periods
-    turn = replayed().rotation
-    straight, chord = (
-        replay(BODY, FRICTION, GAIT, DELTA, instants=8000, turn=at).errors for at in (0.0, turn)
-    )
-    assert chord["distance"] < 3 * straight["distance"]
-
-
 def test_an_answer_states_the_chord_that_its_replay_finds():
     turning = evaluate(Problem("turns", body=BODY, friction=FRICTION, delta=DELTA), GAIT)
     assert abs(turning.rotation) > 0.05
     assert turning.answer.distance == pytest.approx(turning.certificate.distance, rel=1e-5)
     assert turning.answer.value == pytest.approx(turning.certificate.value, rel=1e-5)
-
-
-def test_a_mirror_image_turns_the_other_way_on_the_same_chord():
-    turn = replayed().rotation
-    mirrored = replayed(GAIT.scaled(-1.0), -turn)
-    assert mirrored.rotation == pytest.approx(-turn, abs=1e-9)
-    assert mirrored.distance == pytest.approx(replayed(turn=turn).distance, rel=1e-9)
 
 
 def test_the_chord_tends_to_the_displacement_as_the_turn_tends_to_nothing():

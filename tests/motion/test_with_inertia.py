@@ -5,25 +5,20 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.summary import summary_lines
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import objective_from
 from colloc.mechanics.inertia import kinetic_energy, momentum_rates
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.motion import kinds
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
-from colloc.motion.kinds import Shapes, WithInertia, begin_of, kind_of_motion
+from colloc.motion.kinds import Shapes, begin_of, kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.pictures.animation import pictures
 from colloc.reduced.program import ReducedProgram
-from colloc.search.converge import converged
-from colloc.search.effort import ROUGH
 from colloc.search.small_starts import small_loops
 from colloc.search.spaces import space_near
-from colloc.verification.inertial_motion import GaitWithInertia, inertial_replay
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.refinement import planned_mesh
 
@@ -181,31 +176,6 @@ def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypa
     assert len(asked) < 300
 
 
-@pytest.mark.parametrize(
-    "fields",
-    [{}, {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "rotation": 0.0}],
-    ids=["whole", "half"],
-)
-@pytest.mark.parametrize("size", [0.1, 30.0])
-def test_the_kernel_and_numpy_come_to_the_same_momenta_or_to_none(fields, size):
-    """Also where a whole step would lead astray, and where the search is given up."""
-    stated, held = problem(intervals=12, delta=1e-5, **fields), []
-    space, _ = space_near(stated, stated.guess)
-    kind, mesh = kind_of_motion(control_problem(stated).dynamics), space.mesh
-    shapes = Shapes(*stated.guess(mesh.times), 1e-5)
-    for seed in range(6):
-        near = size * np.random.default_rng(seed).normal(size=(3, mesh.n_point))
-        states, out, found = kind._newton(mesh, shapes, near, np.empty(0))
-        with numpy_instead():
-            expected = kind._newton(mesh, shapes, near, np.empty(0))
-        held.append(found)
-        assert found == expected[2]
-        if found:
-            np.testing.assert_allclose(states, expected[0], atol=1e-10)
-            np.testing.assert_allclose(out, expected[1], rtol=1e-6, atol=1e-8)
-    assert set(held) == {size < 1.0}
-
-
 def test_the_slow_motion_is_the_limit():
     """The difference falls at least like the Froude number."""
     slow, v = program(problem(froude=0.0, intervals=200))
@@ -332,12 +302,6 @@ def test_a_body_that_begins_at_rest_comes_to_move_as_certified():
         colloc.evaluate(colloc.Problem("slow", delta=1e-2), ROUND).from_rest(moved.t)
 
 
-def test_bounds_of_slow_gaits_are_not_told_of_fast_ones():
-    fast = colloc.Problem("paced", froude=0.1)
-    assert gap_line(fast, 0.1, None) == "  no upper bound on the efficiency is known"
-    assert "1/min(mu)" in gap_line(fast.with_(froude=0.0), 0.1, None)
-
-
 def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
     """Each has an error of its own, though the body turns, and what comes later with it."""
     stated = problem(intervals=12, delta=0.1, objective="efficiency")
@@ -376,25 +340,6 @@ def test_a_mesh_is_fine_where_errors_are_made_not_where_they_are_felt():
     assert plan.edges.size < mesh.n
 
 
-def test_a_motion_that_does_not_follow_from_rest_is_another_one(monkeypatch):
-    def other_from_rest(self, near):
-        found = closed(self, near)
-        return (
-            found
-            if near.any()
-            else found._replace(momenta=found.momenta + np.array([0.5, 0.0, 0.0]))
-        )
-
-    closed = GaitWithInertia.rough_period
-    at = colloc.Chain(), colloc.Friction(), ROUND, 1e-2
-    one = inertial_replay(*at, regime=Paced(0.1), tolerance=1e-4)
-    monkeypatch.setattr(GaitWithInertia, "rough_period", other_from_rest)
-    two = inertial_replay(*at, regime=Paced(0.1), tolerance=1e-4)
-    assert (one.several, one.ambiguity) == (0.0, 0.0)
-    assert two.several == 1.0
-    assert two.ambiguity > 1e-3
-
-
 def test_kinetic_energy_is_that_of_dense_points():
     body, points = colloc.Chain((0.3, 0.45, 0.25)), (np.arange(400) + 0.5) / 400
     (angles, rates), z = LEANING(np.array([0.2])), np.array([[0.3], [-0.2], [0.7]])
@@ -430,43 +375,6 @@ def test_two_equal_links_go_nowhere_by_an_antipodal_gait_and_such_a_problem_is_r
     with pytest.raises(colloc.ProblemError, match="own axis of symmetry"):
         problem(body=colloc.Chain((0.5, 0.5)), **stated)
     assert problem(body=colloc.Chain((0.4, 0.6)), **stated).froude == 0.1
-
-
-def test_two_equal_links_never_turn_so_that_nothing_has_to_keep_them_from_it():
-    """In every shape they are their own mirror image; that a mesh errs is no reason to look for
-    gaits that make up for it."""
-    gait, friction = (
-        colloc.Fourier(mean=[0.7], cos=[[0.4, 0.5]], sin=[[0.9, -0.2]]),
-        colloc.Friction(mu_t=0.4),
-    )
-    turned = [
-        colloc.replay(
-            colloc.Chain(lengths), friction, gait, 1e-2, froude=0.05, tolerance=1e-5
-        ).rotation
-        for lengths in ((0.5, 0.5), (0.4, 0.6))
-    ]
-    assert abs(turned[0]) < 1e-6 < 1e-3 < abs(turned[1])
-    stated = {"friction": friction, "gait": colloc.Harmonic(2), "guess": gait, "rotation": 0.0}
-    rows = [
-        program(problem(body=colloc.Chain(lengths), **stated))
-        for lengths in ((0.5, 0.5), (0.4, 0.6))
-    ]
-    for reduced, v in rows:
-        reduced.place_rows(v)
-    assert [reduced.rows(v).size - reduced.constraints.values(v).size for reduced, v in rows] == [
-        0,
-        1,
-    ]
-    with pytest.raises(colloc.ProblemError, match="never turn"):
-        problem(body=colloc.Chain((0.5, 0.5)), **stated | {"rotation": 1.0})
-
-
-def test_where_no_motion_is_found_the_search_says_so(monkeypatch):
-    closed = WithInertia._closed
-    monkeypatch.setattr(WithInertia, "_closed", lambda *arguments: (*closed(*arguments)[:2], False))
-    stated = problem(delta=5.0, delta_start=5.0)
-    with pytest.raises(colloc.NotConvergedError, match="repeats itself"):
-        converged(*space_near(stated, LEANING), 5.0, ROUGH)
 
 
 def test_what_holds_slowly_alone_is_not_asked_of_a_fast_body():

@@ -10,7 +10,7 @@ from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 from scripts.models.ellipses import gait_grid, largest_amplitude
-from scripts.models.sweep import Route, distinct_maxima, local_maxima, performance, refined_maximum
+from scripts.models.sweep import Route, distinct_maxima, performance, refined_maximum
 from scripts.models.velocity_map import velocity_map
 
 BODY, ISOTROPIC, DELTA = Chain(), Friction(), 1e-4
@@ -71,31 +71,6 @@ def test_map_route_converges_to_the_direct_route(known, direct):
     assert errors[0] / errors[1] > 1.5
 
 
-def test_start_from_the_map_does_not_change_the_direct_route(direct):
-    gaits = _random_gaits(20, 24)
-    cold = performance(Route(BODY, ISOTROPIC, DELTA), gaits)
-    warm = performance(direct, gaits)
-    np.testing.assert_allclose(cold.distance, warm.distance, atol=1e-6)
-    np.testing.assert_allclose(cold.work, warm.work, rtol=1e-6)
-
-
-def test_processes_do_not_change_anything(direct):
-    gaits = _random_gaits(300, 25)
-    one, two = performance(direct, gaits, processes=1), performance(direct, gaits, processes=2)
-    np.testing.assert_array_equal(one.distance, two.distance)
-    np.testing.assert_array_equal(one.work, two.work)
-
-
-def test_symmetries_of_the_family(direct):
-    """Time reversal, half a period of phase, mirror image."""
-    gaits = _random_gaits(12, 26)
-    base = performance(direct, gaits)
-    for signs in ((1, 1, -1), (1, -1, -1), (-1, -1, -1), (-1, 1, 1)):
-        other = performance(direct, np.array(signs)[:, None] * gaits)
-        np.testing.assert_allclose(other.distance, base.distance, atol=1e-7)
-        np.testing.assert_allclose(other.work, base.work, rtol=1e-7)
-
-
 def test_no_motion_on_the_axes_and_little_on_the_diagonal(direct):
     side = np.linspace(0.2, 1.4, 7)
     zero = np.zeros_like(side)
@@ -103,26 +78,6 @@ def test_no_motion_on_the_axes_and_little_on_the_diagonal(direct):
     assert performance(direct, np.stack([zero, side, zero])).distance.max() < 1e-6
     diagonal = performance(direct, np.stack([zero, side, side])).distance.max()
     assert diagonal < 0.05 * performance(direct, BEST).distance[0]
-
-
-def test_work_grows_with_amplitude_and_hardly_with_offset(direct):
-    """At fixed direction W grows with the amplitude; at fixed ellipse it varies by less than half
-    with A0."""
-    amplitude = np.linspace(0.3, 1.2, 6)
-    rays = performance(
-        direct, np.stack([0 * amplitude + 0.5, amplitude * 0.8, amplitude * 0.6])
-    ).work
-    assert (np.diff(rays) > 0).all()
-    A0 = np.linspace(0, 2.2, 8)
-    work = performance(direct, np.stack([A0, 0 * A0 + 0.5, 0 * A0 + 0.5])).work
-    assert np.ptp(work) < 0.5 * work.mean()
-
-
-def test_local_maxima_by_neighbours():
-    values = np.zeros((6, 7))
-    values[2, 3], values[2, 4], values[5, 0] = 3.0, 2.0, 1.0
-    values[0] = np.nan
-    assert local_maxima(values).tolist() == [[2, 3], [5, 0]]
 
 
 def test_second_maximum_is_interior_and_matches_the_paper(direct):

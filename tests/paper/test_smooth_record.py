@@ -5,7 +5,6 @@ import pytest
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import sine_wave
-from colloc.system.errors import ProblemError
 from scripts.models.period import period
 from scripts.models.smooth_record import snapshots
 
@@ -22,15 +21,3 @@ def test_snapshots_are_inextensible_and_advance_by_the_distance():
     moved = made.x[:, -1] - made.x[:, 0]
     np.testing.assert_allclose(moved, period(motion, ALONG_EASY, 1e-3, intervals=2).d, rtol=1e-4)
     np.testing.assert_allclose(made.y[:, -1], made.y[:, 0], atol=1e-6)
-
-
-def test_half_a_period_later_the_body_is_mirrored():
-    made = snapshots(sine_wave(), ALONG_EASY, 1e-3, count=2, panels=40)
-    start, half = (made.x + 1j * made.y)[:, :2].T
-    shape, mirrored = np.diff(start), np.diff(half)
-    np.testing.assert_allclose(mirrored, shape.conj(), atol=1e-6)
-
-
-def test_odd_counts_are_refused():
-    with pytest.raises(ProblemError, match="even"):
-        snapshots(sine_wave(), ALONG_EASY, 1e-3, count=3)

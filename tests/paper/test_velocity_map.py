@@ -58,40 +58,6 @@ def test_map_is_homogeneous_and_periodic(isotropic):
     np.testing.assert_allclose(isotropic.tail_velocity(angles + 2 * np.pi, rates), z, atol=1e-11)
 
 
-def test_mirror_image(isotropic):
-    rng = np.random.default_rng(5)
-    angles, rates = rng.uniform(-np.pi, np.pi, (2, 200)), rng.normal(size=(2, 200))
-    u, v, omega = isotropic.tail_velocity(angles, rates)
-    mirrored = isotropic.tail_velocity(-angles, -rates)
-    np.testing.assert_allclose(mirrored, [u, -v, -omega], atol=1e-9)
-
-
-def test_reading_the_body_from_its_head_swaps_the_faces(isotropic):
-    """The velocity of the head, from the second face, is that of the tail of the reversed body,
-    from the first."""
-    rng = np.random.default_rng(6)
-    angles = rng.uniform(-np.pi, np.pi, (2, 200))
-    rates = np.stack([np.ones(200), rng.uniform(-1, 1, 200)])
-    body = isotropic.body
-    z = isotropic.tail_velocity(angles, rates)
-    posture = body.posture(angles)
-    link = body.velocity(posture, rates, z)
-    # head velocity in axes along the last link, which points backwards when read from the head
-    head = np.stack([-link.vs[2], -(link.vn[2] + link.w[2] / 6), link.w[2]])
-    reversed_z = isotropic.tail_velocity(-angles[::-1], -rates[::-1])
-    np.testing.assert_allclose(reversed_z, head, atol=2e-2)  # interpolation; exact on nodes
-    exact = solve_balance(body, Friction(), -angles[::-1], -rates[::-1], DELTA).z
-    direct = solve_balance(body, Friction(), angles, rates, DELTA).z
-    link = body.velocity(posture, rates, direct)
-    np.testing.assert_allclose(
-        exact, [-link.vs[2], -(link.vn[2] + link.w[2] / 6), link.w[2]], atol=1e-8
-    )
-
-
-def test_both_joints_at_rest_give_rest(isotropic):
-    assert not isotropic.tail_velocity(np.array([[0.3], [1.0]]), np.zeros((2, 1))).any()
-
-
 @pytest.mark.parametrize(("method", "order"), [("linear", 1.5), ("cubic", 2.5)])
 def test_median_error_falls_with_resolution(method, order, isotropic):
     """Away from kinks the stencils show their orders (2 and 4, less the kinks)."""

@@ -66,15 +66,6 @@ def test_every_picture_shows_the_body_where_it_is_then(three_link):
         assert np.all(np.abs(seen - scale * extent - 8.0) < 4.0)  # pixels, of the lines
 
 
-@pytest.mark.parametrize("n_link", [2, 8])
-def test_short_and_long_chains_are_drawn(n_link, unsolved):
-    solution = unsolved(crawler(n_link))
-    first, second = list(pictures(solution, 2, 1, width=400))
-    assert (first != second).any()
-    bare = next(pictures(solution, 2, 1, width=400, arrows=False))
-    assert (first != bare).any()
-
-
 def test_links_are_drawn_of_their_width(unsolved):
     def dark_pixels(width):
         problem = crawler(3).with_(body=Chain(width=width))
@@ -130,16 +121,6 @@ def test_without_ffmpeg_an_mp4_is_refused_before_anything_is_drawn(
     assert "ffmpeg, which is not installed" in printed
     assert "--format gif" in printed
     assert {path.name for path in tmp_path.iterdir()} == {"x.h5"}
-
-
-@pytest.mark.parametrize(
-    "options",
-    [["--fps", "0"], ["--periods", "0"], ["--seconds", "nan"], ["--width", "5"], ["--fps", "1e9"]],
-)
-def test_impossible_wishes_are_refused(options, three_link, tmp_path, capsys):
-    file = save(three_link, tmp_path / "x.h5")
-    assert main([str(file), *options]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_publication_figures_are_pdf_and_png_of_journal_width(three_link, tmp_path):

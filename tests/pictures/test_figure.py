@@ -1,12 +1,9 @@
 """The figure of a solution can be read: no words over words, nothing cut off, snapshots apart, and
 PDF only on demand."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from itertools import pairwise
 
-import matplotlib
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
@@ -24,16 +21,12 @@ from colloc.pictures.figure import (
     draw_filmstrip,
     draw_lab,
     draw_shape_path,
-    draw_speeds,
     forbidden,
-    strips,
 )
 from colloc.pictures.motion_frames import foot_kinds
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
-from colloc.pictures.style import save
 from colloc.smooth.modal_body import ModalBody
-from scripts.gallery import picture
 
 
 def crawler(n_link, size=0.6):
@@ -51,19 +44,6 @@ def crawler(n_link, size=0.6):
         delta=1e-2,
         intervals=8,
     )
-
-
-@pytest.mark.parametrize("turned", [0.0, 0.7, 2.5])
-def test_strips_have_the_width_of_the_links_and_round_ends(turned):
-    ends = np.array([[0.0, 0.4, 0.4], [0.0, 0.0, 0.6]])
-    axes = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
-    for strip, length, own in zip(
-        strips(axes @ ends, 0.1), (0.4, 0.6), (axes, axes[:, ::-1]), strict=True
-    ):
-        x, y = strip.T
-        area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-        assert area == pytest.approx(0.1 * length + np.pi * 0.05**2, rel=0.01)
-        assert np.ptp(strip @ own, axis=0) == pytest.approx([length + 0.1, 0.1])
 
 
 def snake(size):
@@ -239,21 +219,6 @@ def test_panels_alone_can_be_read_and_hold_all_that_is_drawn(name, three_link):
         assert min(seen) - rounding <= min(drawn) <= max(drawn) <= max(seen) + rounding
 
 
-def test_speeds_are_drawn_down_to_rest(unsolved):
-    """All joints of a standing wave rest at once, and so does the body."""
-    wave, axes = (
-        Fourier(np.zeros(4), np.array([[0.6], [0.3], [0.5], [0.2]]), np.zeros((4, 1))),
-        Figure().add_subplot(),
-    )
-    solution = unsolved(snake(1.2).with_(guess=wave))
-    draw_speeds(axes, solution, np.linspace(0.0, 1.0, 101))
-    low, high = axes.get_ylim()
-    drawn = np.array([line.get_ydata() for line in axes.lines[:5]])
-    delta = solution.delta_per_period
-    assert 0.1 * delta <= drawn.min() < 0.2 * delta < 10 * delta < drawn.max()
-    assert low < drawn.min() < drawn.max() < high
-
-
 def test_a_reader_of_words_sees_an_overlap():
     figure = Figure(figsize=(4, 2))
     figure.text(0.1, 0.5, "one")
@@ -322,38 +287,6 @@ def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     column, row = (np.abs(grid[:, None] - allowed[j]).argmin(axis=0) for j in plane)
     # no deeper than the nearest point of the grid may be
     assert excess[row, column].max() < 2.5 * (grid[1] - grid[0])
-
-
-def test_only_the_kinds_asked_for_are_written_and_nobodys_settings_change(tmp_path):
-    before = dict(matplotlib.rcParams)
-    figure = Figure(figsize=(1, 1))
-    assert save(figure, tmp_path / "x.y", ("png",)) == [tmp_path / "x.y.png"]
-    assert {path.name for path in tmp_path.iterdir()} == {"x.y.png"}
-    assert dict(matplotlib.rcParams) == before
-
-
-def test_solving_and_drawing_load_nothing_that_is_not_used():
-    program = (
-        "import sys, colloc.commands.solve; assert 'matplotlib' not in sys.modules; import "
-        "colloc.studies.saved, "
-        "colloc.pictures.solution_figure;"
-        "print(*sys.modules)"
-    )
-    loaded = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    ).stdout.split()
-    assert "matplotlib.figure" in loaded
-    parts = {
-        f"scipy.{part}" for part in ("integrate", "interpolate", "optimize", "special", "stats")
-    }
-    assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "jinja2", *parts} & set(
-        loaded
-    )
-
-
-@pytest.mark.parametrize(("n_link", "size"), [(2, 1.5), (3, 0.3), (5, 0.6)])
-def test_pictures_of_the_gallery_can_be_read(n_link, size, unsolved):
-    assert_readable(picture(unsolved(crawler(n_link, size))))
 
 
 @pytest.mark.parametrize(("size", "times"), [(0.02, 23), (0.6, 1)])

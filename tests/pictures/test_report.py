@@ -9,7 +9,6 @@ import subprocess
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,15 +21,11 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames, lab_outline
 from colloc.pictures.report_page import motion_data, report_page
-from colloc.pictures.style import INK
-from colloc.pictures.templates import environment
 from colloc.results.checks import Check
 from colloc.results.solution import Solution
 from colloc.results.store import save
-from colloc.search import certify as certificate
 from colloc.search.certify import certify
 from colloc.search.evaluate import evaluate
-from colloc.smooth.modal_body import ModalBody
 
 BROWSER = next(
     (path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path),
@@ -166,21 +161,6 @@ def test_a_reader_who_hears_the_page_is_told_what_is_drawn_and_can_scroll_with_t
     assert not re.search(r"<th[^>]*></th>", page)
 
 
-def test_the_film_comes_first_and_the_certificate_is_folded_away_unless_it_fails(page, three_link):
-    places = [
-        page.index(words)
-        for words in ("Motion in the lab frame", "What was solved", "<h2>Gait", "<h2>Certificate")
-    ]
-    assert places == sorted(places)
-    assert "<details><summary><h2>Certificate: 15 of 15 checks hold" in page
-    bad = replace(
-        three_link.certificate,
-        checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks),
-    )
-    failed = report_page(Solution(three_link.problem, three_link.answer, bad))
-    assert "<details open><summary><h2>Certificate: 15 of 16 checks hold" in failed
-
-
 def test_everything_from_the_file_is_escaped(three_link):
     checks = (Check(EVIL, 1.0, 0.0, EVIL), *three_link.certificate.checks)
     history = (*three_link.history, replace(three_link.history[0], status=EVIL, optimal=False))
@@ -207,30 +187,6 @@ def test_everything_from_the_file_is_escaped(three_link):
     assert "<script" not in card
 
 
-def test_json_in_the_page_cannot_end_its_block():
-    made = (
-        environment()
-        .from_string('<script id="x" type="application/json">{{ data|tojson }}</script>')
-        .render(data={"a": EVIL})
-    )
-    assert made.count("<") == 2
-    assert json.loads(outline(made).scripts[0])["a"] == EVIL
-
-
-def test_templates_escape_texts_and_attributes():
-    made = environment().from_string('<p title="{{ a }}">{{ a }}</p>').render(a='<b>"&')
-    assert made == '<p title="&lt;b&gt;&#34;&amp;">&lt;b&gt;&#34;&amp;</p>'
-
-
-def test_every_check_of_a_certificate_is_put_in_plain_words(page, three_link):
-    plain = environment().get_template("checks.html").module.plain
-    for check in three_link.certificate.checks:
-        assert plain[check.name] in unescape(page)
-    source = Path(certificate.__file__).read_text(encoding="utf-8")
-    limits = {body.usual.limit_name for body in (Chain(), ModalBody(2))}
-    assert set(re.findall(r'Check\(\s*"([^"]+)"', source)) | limits == set(plain)
-
-
 def test_the_page_says_how_slow_is_slow_enough(page, three_link):
     """On a floor with a part of the friction at that part of the Froude number, L/(gT²)."""
     words = (
@@ -240,18 +196,6 @@ def test_the_page_says_how_slow_is_slow_enough(page, three_link):
     froude, part, period = map(float, re.search(words, unescape(page)).groups())
     assert froude == pytest.approx(three_link.slow_enough(0.01), rel=0.05)
     assert 1 / (9.81 * period**2) == pytest.approx(part * froude, rel=0.15)  # of two digits
-
-
-def test_pictures_take_colour_and_font_from_the_page_and_do_not_style_it(page):
-    assert page.count("<style") == 1
-    assert "currentColor" in page
-    assert INK not in page[page.index("<figure") :]
-    pictures = re.findall("<svg.*?</svg>", page, re.DOTALL)
-    assert len(pictures) == 6  # a plane, angles, speeds, power, convergence, mesh
-    for picture in pictures:
-        assert "viewBox" in picture
-        assert "<text" in picture  # words, which a reader can search and a phone can draw sharply
-        assert "#ffffff" not in picture.replace("fill: #ffffff; stroke", "")  # no white background
 
 
 def test_failures_show_in_red_and_an_interrupted_solve_has_a_page_too(three_link):
@@ -384,36 +328,6 @@ def test_the_browser_draws_every_period_where_the_body_is_then(turning, tmp_path
     np.testing.assert_allclose(pixels, fitted, atol=1.0)
 
 
-def test_the_dot_of_a_plane_is_placed_in_the_coordinates_of_its_picture(unsolved):
-    small = crawler(
-        3,
-        guess=Fourier(np.array([2.3, -2.3]), np.array([[0.2], [-0.2]]), np.array([[0.15], [0.15]])),
-    )
-    page = report_page(unsolved(small.with_(smallest_shape_speed=0.01)))
-    plane = page[: page.index("data-sides")].rindex("<svg")
-    _, _, width, _ = (
-        float(v) for v in re.search('viewBox="([^"]*)"', page[plane:]).group(1).split()
-    )
-    left, right, top, bottom = (
-        float(v) for v in re.search('data-sides="([^"]*)"', page).group(1).split(",")
-    )
-    x0, x1, y0, y1 = (
-        float(v) for v in re.search('data-limits="([^"]*)"', page).group(1).split(",")
-    )
-    assert 0 < left < right < 100
-    assert 0 < top < bottom < 100
-    angles = small.guess.angles(np.linspace(0, 1, 200))
-    # a small loop is shown from close by
-    assert x0 < angles[0].min() < angles[0].max() < x1 < x0 + 1.0
-    assert y0 < angles[1].min() < angles[1].max() < y1
-    drawn = np.array(
-        re.findall(r"[ML] ([0-9.]+) ([0-9.]+) \n", page[plane : page.index("data-sides")]),
-        dtype=float,
-    )[:, 0]
-    expected = (left + (angles[0].max() - x0) / (x1 - x0) * (right - left)) / 100 * width
-    assert np.abs(drawn - expected).min() < 0.3
-
-
 def test_the_command_writes_the_page_beside_the_result(three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")
     assert main([str(file)]) == 0
@@ -515,27 +429,6 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
     (tmp_path / "stated.py").write_text(stated, encoding="utf-8")
     assert load_problem(tmp_path / "stated.py").hash == three_link.problem.hash
     assert "save the problem source above" in text
-
-
-def test_levels_on_the_way_do_not_alarm_and_the_last_one_does(three_link):
-    rough = replace(three_link.history[0], optimal=False, status="not stationary")
-    good = replace(
-        three_link, answer=replace(three_link.answer, history=(rough, *three_link.history[1:]))
-    )
-    text = " ".join(outline(report_page(good)).text)
-    assert "on the way" in text
-    assert "✗" not in text
-    bad = replace(
-        three_link, answer=replace(three_link.answer, history=(*three_link.history[:-1], rough))
-    )
-    assert "✗ not stationary" in " ".join(outline(report_page(bad)).text)
-
-
-def test_the_page_says_what_a_wrong_floor_costs(page, three_link):
-    rows = [effect.name for effect in three_link.sensitivity().seen]
-    assert rows
-    assert "What a wrong floor costs" in page
-    assert all(f"<td>{name}</td>" in page for name in rows)
 
 
 def test_feet_that_hold_are_filled_in_the_film_of_a_card():

@@ -1,8 +1,6 @@
 """The reduced space: exact gradients, the same numbers as the full program, and answers that solve
 the full program."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -19,10 +17,7 @@ from colloc import (
     ellipse,
 )
 from colloc.reduced.program import ReducedProgram
-from colloc.search.confirm import confirm
-from colloc.search.converge import converged
-from colloc.search.effort import FINE
-from colloc.search.spaces import remeshed, space_near
+from colloc.search.spaces import space_near
 from tests.shared.stages import answer_near
 
 FOUR = {
@@ -85,14 +80,6 @@ def test_gradients_are_those_of_differences(case):
     np.testing.assert_allclose(program.row_slopes(v), rows, atol=2e-6)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_no_equation_among_the_rows_is_redundant(case):
-    """An SQP step solves the linearised equations: dependent ones would have no solution."""
-    _, v, program = near_start(case)
-    equations = program.row_slopes(v)[program.row_lower == program.row_upper]
-    assert np.linalg.matrix_rank(equations, tol=1e-6) == len(equations)
-
-
 @pytest.mark.parametrize(
     "gait",
     [
@@ -121,30 +108,6 @@ def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
     assert answer.value == pytest.approx(found.value, rel=1e-7)
     assert answer.layout.friction.size == 9 * answer.mesh.n_point
     assert answer.message == ""
-
-
-def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since():
-    problem = Problem(
-        "p",
-        ellipse(1.0, 0.7, 1.1),
-        gait=Polygon(4, "bilateral"),
-        delta=3e-2,
-        delta_start=3e-2,
-        intervals=24,
-    )
-    space, v = space_near(problem, problem.guess)
-    ends = space.member(v).phases
-    graded = np.concatenate(
-        [a + (b - a) * np.linspace(0, 1, 9)[:-1] ** 2 for a, b in pairwise(ends)] + [ends[-1:]]
-    )
-    space = remeshed(space, space.member(v), graded, "gauss-3")
-    found = converged(space, space.parameters(space.member(v)), 3e-2, FINE)
-    answer = confirm(found)
-    assert answer.message == ""
-    assert np.abs(found.gait.phases - ends).max() > 1e-6
-    np.testing.assert_allclose(
-        answer.edges, space.control.in_phases(space.mesh, found.gait).edges, atol=1e-4
-    )
 
 
 def test_amplitudes_of_modes_may_exceed_the_bound_on_the_tangent():

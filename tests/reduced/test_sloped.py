@@ -1,8 +1,6 @@
 """The collocated motion on a slope: against the differential equation, differences, and the full
 program."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -162,27 +160,6 @@ def test_where_the_ground_is_nearly_level_a_gait_goes_up_as_far_as_on_the_level(
     )
     # where it points is found at a larger delta
     assert found["distance"] > 0.98 * known["distance"]
-
-
-def test_a_polygon_laid_through_a_gait_points_where_that_does():
-    space, v = space_near(SIDES, SIDES.guess)
-    for gait in (ellipse(0, 2.4, 1.2), space.member(v)):
-        assert space.parameters(replace(gait, theta=0.3))[-1] == pytest.approx(0.3, abs=1e-6)
-
-
-def test_a_serpenoid_gait_on_a_slope_is_known_by_its_few_parameters():
-    program, v = program_at(SNAKE, 0.05)
-    assert v.size == SNAKE.gait.n_own + 1
-    np.testing.assert_allclose(
-        program.space.parameters(gait_from(fields(program.space.member(v)))), v, atol=1e-12
-    )
-
-
-def test_what_friction_does_not_hold_has_no_value():
-    program, v = program_at(
-        LEVEL.with_(friction=Friction(mu_t=10, mu_f=0.1, mu_b=0.1), grade=5.0, intervals=12), 1e-3
-    )
-    assert np.isnan(program.objective(v))
 
 
 @pytest.mark.parametrize(

@@ -93,13 +93,6 @@ def test_on_a_file_system_without_locks_a_result_is_read_and_replaced(three_link
     assert (ran.stdout, ran.stderr) == ("None\n", "")
 
 
-def test_two_problems_in_turns_fill_no_folder(three_link, tmp_path):
-    for _ in range(4):
-        for delta, value in ((1e-4, 0.26), (2e-4, 0.25)):
-            save_result(valued(three_link, value, delta=delta), tmp_path / "x.h5")
-    assert values(tmp_path) == {"x.h5": 0.25, "x.former-1.h5": 0.26, "x.former-2.h5": 0.25}
-
-
 def test_what_belongs_to_a_result_goes_with_it(three_link, tmp_path):
     path = tmp_path / "x.h5"
     small = replace(valued(three_link, 0.3), shrunk=valued(three_link, 0.2))
@@ -181,14 +174,6 @@ def test_names_of_files_that_colloc_makes_beside_results_are_refused(name):
 )
 def test_other_names_are_taken(name):
     assert Problem(name).name == name
-
-
-def test_an_output_must_not_be_called_like_such_a_file_either(tmp_path, capsys):
-    (tmp_path / "p.py").write_text(FILE.replace("DELTA", "1e-2"))
-    for name in ("tiny.interrupted.h5", "tiny.starts.h5", "tiny.former-1.h5"):
-        assert colloc(["solve", str(tmp_path / "p.py"), "--output", str(tmp_path / name)]) == 2
-        assert f"--output {name} ends in" in capsys.readouterr().err
-    assert [p.name for p in tmp_path.iterdir()] == ["p.py"]
 
 
 def test_solve_says_where_the_result_of_another_problem_of_this_name_went(tmp_path, capsys):

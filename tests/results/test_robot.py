@@ -97,13 +97,6 @@ def test_work_over_a_period_is_the_mean_power_and_moves_the_body_its_way(three_l
     assert facts["peak_speed_rad_per_s"] == pytest.approx(np.abs(speeds).max(axis=1), rel=1e-4)
 
 
-def test_no_end_joint_carries_more_than_its_link_swung_broadside(three_link):
-    """mu m g / 3 at a sixth of the length."""
-    assert max(three_link.robot(**SLOW).facts["peak_torque_N_m"]) <= 3 * 9.81 / 3 * 1.2 / 6 * (
-        1 + 1e-4
-    )
-
-
 def test_every_side_of_a_polygon_is_sampled_eight_times_however_many_there_are(
     three_link, monkeypatch
 ):
@@ -279,49 +272,11 @@ def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, 
     assert "cost of transport" not in report_page(three_link)
 
 
-def test_the_mean_square_of_a_sine_is_half_of_its_amplitude_s(three_link, robot):
-    gait = three_link.gait
-    amplitudes = 2 * np.pi / SIZE["period"] * np.hypot(gait.cos[:, 0], gait.sin[:, 0])
-    np.testing.assert_allclose(
-        robot.facts["rms_speed_rad_per_s"], amplitudes / np.sqrt(2), rtol=1e-9
-    )
-
-
-def test_the_motion_has_units(robot):
-    dataset = robot.to_xarray()
-    assert [dataset[f"joint_{name}"].units for name in ("torques", "speeds", "powers")] == [
-        "N m",
-        "rad/s",
-        "W",
-    ]
-    assert dataset.sel(joint=2).joint_torques.shape == dataset.t.shape
-    assert float(dataset.t[-1]) == SIZE["period"]
-
-
 def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, robot):
     slow = three_link.robot(1.2, 3, robot.facts["slow_enough_period_s"]).facts
     assert slow["inertia_takes"] == pytest.approx(0.01, abs=2e-3)
     assert robot.facts["inertia_takes"] > 0.02
     assert "Inertia takes 2.5 % of the efficiency at this pace" in str(robot)
-
-
-@pytest.mark.slow
-def test_what_inertia_takes_is_that_of_the_motion_followed_through_time(three_link, robot):
-    at = three_link.problem.body, three_link.problem.law, three_link.gait, three_link.problem.delta
-    played = colloc.inertial_motion(*at, robot.froude, tolerance=1e-4)
-    assert robot.facts["inertia_takes"] == pytest.approx(
-        1 - played.efficiency / three_link.efficiency, abs=2e-4
-    )
-
-
-def test_what_inertia_takes_is_told_although_no_pace_is_slow_enough(three_link, robot, monkeypatch):
-    def never(loss):
-        raise colloc.NotConvergedError("at no pace")
-
-    monkeypatch.setattr(colloc.Solution, "slow_enough", lambda solution, loss: never(loss))
-    facts = three_link.robot(**SIZE).facts
-    assert facts["inertia_takes"] == robot.facts["inertia_takes"]
-    assert "slow_enough_period_s" not in facts
 
 
 @pytest.fixture(scope="module")

@@ -271,15 +271,3 @@ def test_bodies_without_a_motor_in_every_joint_are_refused_in_a_sentence():
     problem = Problem("stuck", body=Chain((0.25,) * 4), gait=gait, delta=1e-2)
     with pytest.raises(ProblemError, match="of a Chain with a motor in every joint"):
         mjcf(colloc.evaluate(problem, colloc.ellipse(0, 1, 1)).robot(**SIZE))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("froude", [0.005, 0.2])
-def test_mujoco_moves_as_colloc_does(uneven, three_link, froude):
-    mujoco = pytest.importorskip("mujoco")
-    from scripts.play_in_mujoco import compared
-
-    for solution in (three_link, uneven):
-        model = mujoco.MjModel.from_xml_string(mjcf(solution.robot(**SIZE)))
-        assert model.body_mass.sum() == pytest.approx(3.0, rel=1e-4)
-        assert compared(solution, froude)["apart"] < 1e-4

@@ -15,7 +15,6 @@ from colloc import (
     Problem,
     ProblemError,
     evaluate,
-    inertial_motion,
     slope_motion,
     solve,
 )
@@ -165,18 +164,3 @@ def test_an_export_with_inertia_on_a_slope_is_of_the_robot_that_is_pressed_down_
     facts = solution.export(tmp_path / "x.csv", period=2.0, ramp=False)
     assert f"of a robot of {length:.3g} m in this period" in facts["pace"]
     assert solution.robot(length, MASS, 2.0).froude == pytest.approx(0.05)
-
-
-def test_what_inertia_turns_is_what_it_adds_to_the_turn_of_slow_motion():
-    skew = Fourier([0.3, -0.5], [[0.4], [0.9]], [[1.1], [-0.2]])
-    solution = evaluate(
-        Problem("skew", gait=Harmonic(1), rotation=None, delta=1e-1, mesh_tolerance=1e-2), skew
-    )
-    robot, problem = solution.robot(LENGTH, MASS, 1.5), solution.problem
-    played = inertial_motion(
-        problem.body, problem.friction, skew, 1e-1, robot.froude, tolerance=1e-4
-    )
-    assert abs(solution.rotation) > 0.01
-    assert robot.facts["rotation_by_inertia_rad"] == pytest.approx(
-        played.rotation - solution.rotation, abs=1e-4
-    )

@@ -64,30 +64,6 @@ def test_a_certificate_without_one_of_its_numbers_or_with_several_for_one_is_ref
         load(path)
 
 
-def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
-    with pytest.raises(StoreError, match="there is no file"):
-        load(tmp_path / "none.h5")
-    with h5py.File(tmp_path / "other.h5", "w") as file:
-        file["x"] = [1.0]
-    with pytest.raises(
-        StoreError, match="not a readable colloc solution: attribute format of / is missing"
-    ):
-        load(tmp_path / "other.h5")
-    good = save(three_link, tmp_path / "good.h5")
-    data = good.read_bytes()
-    (tmp_path / "cut.h5").write_bytes(data[: len(data) // 2])
-    with pytest.raises(StoreError, match=r"not a readable colloc solution: OSError: .*truncated"):
-        load(tmp_path / "cut.h5")
-    with h5py.File(good, "a") as file:
-        del file["problem"]
-        file["problem"] = '{"name": "x"}'
-    with pytest.raises(
-        StoreError,
-        match=r"good.h5 is not a readable colloc solution: not the description of a problem",
-    ):
-        load(good)
-
-
 def test_xarray_opens_every_group_of_a_solution_with_named_dimensions(three_link, tmp_path):
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from colloc import Friction, Harmonic, Problem, load, save, solve
-from colloc.gaits.starts import latin_hypercube_gait
+from colloc.gaits.starts import latin_hypercube_gait, on_speed_floor
 from colloc.results.kept import save_result
 from colloc.search import run as run_module
 from colloc.search.run import ROWS, Run
@@ -60,13 +60,18 @@ def test_a_delta_that_was_lowered_for_a_small_gait_is_that_of_the_result_as_read
         "tiny",
         friction=Friction(mu_t=0.5, mu_f=1, mu_b=5),
         gait=Harmonic(1, "bilateral"),
-        delta=0.3,
+        delta=0.02,
     )
     solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 0)), 1)
     assert solution.answer.delta < 0.5 * solution.problem.delta
+    assert solution.status == "solved"
+    assert on_speed_floor(problem, solution.gait)
+    assert f"lowered from 0.02 to {solution.answer.delta:.1g}" in solution.message
+    checks = {check.name: check.value for check in solution.certificate.checks}
+    assert abs(checks["delta influence"]) < 1e-2
     again = load(save(solution, tmp_path / "tiny.h5"))
     assert again.answer.delta == again.answer.problem.delta == solution.answer.delta
-    assert again.problem.delta == 0.3
+    assert again.problem.delta == 0.02
     assert (again.status, again.value) == (solution.status, solution.value)
     t = np.linspace(0, 1, 7)
     np.testing.assert_array_equal(again.sample(t).z, solution.sample(t).z)

@@ -18,11 +18,8 @@ from colloc import (
     ProblemError,
     Viscous,
     ellipse,
-    load,
     replay,
-    save,
 )
-from colloc.commands.verify import verify
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import instant
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
@@ -180,26 +177,6 @@ def test_a_certificate_fails_a_gait_whose_joints_do_more_than_they_can(weak):
     assert checks[0].value == pytest.approx(0.6 / 0.55 - 1, rel=1e-3)
 
 
-def test_limits_are_kept_in_files_and_verified(weak, tmp_path, capsys):
-    path = save(weak, tmp_path / "weak.h5")
-    again = load(path)
-    assert again.problem.power_limit == 0.6
-    assert again.problem.hash == weak.problem.hash
-    assert "torque_limit" not in again.problem.to_dict()
-    assert Problem.from_dict(again.problem.to_dict()).path_limits == PathLimits(
-        torque_and_power((), (0.6, 0.6))
-    )
-    assert verify([str(path)]) == 0
-    assert "actuators" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_weaker_friction_and_motors_as_much_weaker_have_the_same_gait(weak):
-    scaled = solve(USUAL.with_(friction=Friction(1e-3, 1e-3, 1e-3), power_limit=6e-4), 1)
-    assert scaled.status == "solved"
-    assert scaled.efficiency == pytest.approx(1e3 * weak.efficiency, rel=1e-9)
-
-
 @pytest.mark.slow
 def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_price_it():
     problem = Problem(
@@ -218,14 +195,6 @@ def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_p
     )
     gained = solve(more, 1).efficiency - solve(less, 1).efficiency
     assert gained / 1e-3 == pytest.approx(price, rel=0.05)
-
-
-@pytest.mark.slow
-def test_joints_too_weak_for_a_search_from_one_guess_are_named():
-    found = solve(USUAL.with_(torque_limit=0.05), 1)
-    assert found.status == "not converged"
-    assert "the limit on the torque of joint" in found.message
-    assert "allow the joints more" in found.message
 
 
 HOPELESS = {
@@ -285,9 +254,3 @@ def test_limits_that_have_no_meaning_are_refused(case):
     changes, words = REFUSED[case]
     with pytest.raises(ProblemError, match=words):
         USUAL.with_(**changes)
-
-
-def test_a_problem_says_why_its_pace_matters():
-    assert USUAL.with_(torque_limit=1.0).paced_by == ""
-    assert USUAL.with_(power_limit=1.0).paced_by == "the joints' power is limited"
-    assert "drag" in USUAL.with_(friction=Viscous(normal=2, tangential=1)).paced_by

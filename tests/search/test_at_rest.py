@@ -9,7 +9,7 @@ import pytest
 from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.search.confirm import RADIUS, confirm
-from colloc.search.converge import at_rest, conditions_on_kink
+from colloc.search.converge import at_rest
 from colloc.search.effort import FINE
 from colloc.search.solve import solve
 from tests.shared.stages import optimum_near
@@ -84,22 +84,6 @@ def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(
     assert ("beyond its limits" in answer.message) == kept
     assert (answer.status == "stationary") == kept
     assert abs(answer.value + found.objective) < RADIUS
-
-
-@pytest.mark.parametrize(
-    ("slope", "missed", "kink"),
-    [(1e-3, 5e-7, True), (1e-3, 5e-6, False), (1.0, 5e-8, True), (1.0, 5e-7, False)],
-)
-def test_a_kink_may_be_missed_by_more_where_the_slopes_beside_it_are_small(slope, missed, kink):
-    """By a tenth of 1e-6, or of 1e-5 where that changes the objective by less than 1e-8; slope |x|
-    is least at 0."""
-    none = np.empty(0)
-    vee = SimpleNamespace(
-        lower=-np.ones(1), upper=np.ones(1), row_lower=none, row_upper=none, rows=lambda v: none,
-        row_slopes=lambda v: np.empty((0, 1)), objective=lambda v: slope * abs(v[0]),
-        gradient=lambda v: slope * np.sign(v),
-    )  # fmt: skip
-    assert (conditions_on_kink(vee, np.array([missed]), FINE) is not None) == kink
 
 
 @pytest.mark.parametrize("changed", [{}, {"mu_b": 2.0}], ids=["symmetric", "unequal"])

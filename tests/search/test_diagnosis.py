@@ -10,9 +10,6 @@ import pytest
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FORMULATIONS
-from colloc.results.checks import UNCERTIFIED
-from colloc.search import solve
-from colloc.search.certify import GAP
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
 from colloc.search.ipopt import Solver
 from colloc.search.spaces import program_of
@@ -105,24 +102,3 @@ def test_a_delta_that_rounding_hides_is_named():
     result = replace(result, excess=np.zeros_like(result.excess))
     assert "at least 1e-09, below which rounding" in explanation(program, result, 1e-10)
     assert "rounding" not in explanation(program, result, 1e-9)
-
-
-def test_rows_of_a_slope_have_a_meaning():
-    program = program_of(stated(grade=0.1, towards=0.3))
-    meanings = {
-        row_meaning(program, program.groups[name].start)[0] for name in ("heading", "across")
-    }
-    assert meanings == {
-        "where the body points at the start",
-        "the way across the direction that was asked for",
-    }
-
-
-def test_what_is_no_optimum_is_replayed_roughly(unsolved, monkeypatch):
-    """It cannot be certified, and its mesh may ask for a replay of minutes."""
-    asked = {}
-    monkeypatch.setattr(
-        solve, "certify", lambda answer, **settings: asked.update(settings) or UNCERTIFIED
-    )
-    solve.certified(unsolved(Problem("guess", gait=Harmonic(1, "bilateral"), delta=1e-2)).answer)
-    assert asked == {"tolerance": GAP, "instants": 1600}

@@ -103,17 +103,6 @@ def test_what_is_missing_at_the_end_of_a_record_is_found_and_a_drift_taken_out(t
         fitted_gait(np.degrees(GAIT.angles(T) + np.array([[1.0], [0.0]]) * T), 2, degrees=True)
 
 
-def test_a_corner_is_rounded_off_and_said():
-    found = fitted_gait(lambda t: np.stack([np.abs(4 * t - 2) - 1, np.sin(2 * np.pi * t)]), 2)
-    assert 1e-4 < found.rms < found.largest < 0.05
-
-
-def test_an_exported_gait_comes_back_as_it_was(evaluated, tmp_path):
-    evaluated.export(tmp_path / "x.csv", period=4, length=1, mass=2)
-    again = colloc.evaluate(PROBLEM, tmp_path / "x.csv")
-    assert again.efficiency == pytest.approx(evaluated.efficiency, rel=1e-6)
-
-
 def test_a_retraced_gait_goes_nowhere_and_that_is_said():
     there_and_back = colloc.evaluate(
         PROBLEM, colloc.Fourier([0.3, 0.1], [[0.8], [0.5]], np.zeros((2, 1)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -132,19 +131,6 @@ def test_the_answer_does_not_depend_on_what_the_search_is_given(changed, starts)
     assert solution.efficiency == pytest.approx(0.64685, rel=2e-4)
 
 
-@pytest.mark.parametrize(("violation", "kept"), [(1e-3, True), (0.5, False)])
-def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch, violation, kept):
-    """What breaks the rows of its class may have any value."""
-    converged = explore.converged
-    monkeypatch.setattr(
-        explore, "converged", lambda *arguments: replace(converged(*arguments), violation=violation)
-    )
-    problem = Problem("one_start", gait=Harmonic(1, "bilateral"))
-    known, tried = candidates(problem, 1, lambda: True, ALONE)
-    assert tried == 1
-    assert bool(known) == kept
-
-
 def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkeypatch):
     """However good it is: links that pass through each other as delta falls went on to be refined
     on ten thousand intervals."""
@@ -186,34 +172,6 @@ def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, coun
     )
     assert number == tried
     assert found[0].optimum.objective == -max(better.values())
-
-
-def test_more_starts_go_wherever_fewer_do(monkeypatch):
-    """New starts and hops take turns, and what a hop begins from depends on what came before
-    alone."""
-    begun = {}
-
-    def follow(problem, gait, deltas, known, *, hop=False):
-        number = len(begun)
-        begun[number] = (gait, len(deltas))
-        gait = ellipse(0, 1.0, 0.1 * number)
-        found = SimpleNamespace(
-            objective=-1.0 if number == 0 else -2.0, gait=gait, delta=1.0, problem=problem
-        )
-        known[-1].append(explore.Candidate(found))
-
-    monkeypatch.setattr(explore, "_follow", follow)
-    monkeypatch.setattr(explore, "small_loops", lambda problem: [])
-    monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
-    problem = Problem("turns", gait=Harmonic(1, "bilateral"))
-    candidates(problem, 18, lambda: True, ALONE)
-    fewer, begun = begun, {}
-    candidates(problem, 40, lambda: True, ALONE)
-    assert [deltas for _, deltas in begun.values()] == [2] * 16 + [1] * 16 + [2] * 8
-    assert len(fewer) == 18
-    for number, (gait, deltas) in fewer.items():
-        assert deltas == begun[number][1]
-        np.testing.assert_array_equal(gait.cos, begun[number][0].cos)
 
 
 @pytest.mark.parametrize(
@@ -258,53 +216,6 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     problem = Problem("same", gait=Harmonic(1, "antipodal"), froude=froude)
     assert candidates(problem, asked, lambda: True, ALONE)[1] == tried
-
-
-@pytest.mark.parametrize(
-    ("promised_and_kept", "followed"),
-    [
-        ([(1.0, 1.0), (0.9, 0.9), (0.5, 0.5)], [1.0, 0.9]),
-        ([(1.0, 0.3), (0.5, 0.4), (0.35, 0.35), (0.1, 0.1)], [1.0, 0.5, 0.35]),
-        ([(1.0, 0.6), (0.4, 0.4)], [1.0]),
-        ([(1.0, 0.9), (0.99, 0.8), (0.98, 0.7), (0.97, 1.0)], [1.0, 0.99, 0.98]),
-        ([(1.0, 0.9), (0.99, 0.9), (0.98, 0.8), (0.97, 1.0)], [1.0, 0.99, 0.98, 0.97]),
-    ],
-    ids=[
-        "promises are kept",
-        "the best one promised too much",
-        "and less than the others do",
-        "three",
-        "two are one",
-    ],
-)
-def test_gaits_are_followed_until_three_have_come_to_different_ones(
-    monkeypatch, promised_and_kept, followed
-):
-    ends, tried = dict(promised_and_kept), []
-
-    def end(problem, optimum):
-        tried.append(optimum.value)
-        return SimpleNamespace(
-            objective=-ends[optimum.value], violation=0.0, gait=None, delta=1e-4, history=()
-        )
-
-    monkeypatch.setattr(explore, "_followed", end)
-    monkeypatch.setattr(explore, "is_finite", lambda optimum: True)
-    monkeypatch.setattr(
-        explore, "same_gait", lambda problem, one, other: one.objective == other.objective
-    )
-    monkeypatch.setattr(explore, "space_near", lambda problem, gait: (None, None))
-    monkeypatch.setattr(
-        explore,
-        "converged",
-        lambda *at: SimpleNamespace(after=lambda *of: SimpleNamespace(objective=0.0)),
-    )
-    monkeypatch.setattr(explore, "_best", lambda optima: None)
-    known = [
-        explore.Candidate(SimpleNamespace(value=value, history=()), dry=-value) for value in ends
-    ]
-    explore._followed_to_the_end(UNEQUAL, known, lambda: True, ALONE)
-    assert tried == followed
 
 
 def certified(value, holds=True, finite=True):
@@ -411,21 +322,3 @@ def test_a_gait_that_jumps_between_balanced_motions_gives_way_to_one_that_certif
     )
     assert solution.status == "solved"
     assert solution.value > 0.69
-
-
-@pytest.mark.parametrize(
-    ("failed", "lowered"),
-    [
-        (["delta influence"], True),
-        (["mesh error"], False),
-        (["delta influence", "mesh error"], False),
-        ([], False),
-    ],
-)
-def test_delta_is_lowered_where_nothing_else_fails(failed, lowered):
-    checks = [SimpleNamespace(name=name) for name in failed]
-    problem = SimpleNamespace(gait=SimpleNamespace(free=True))
-    found = SimpleNamespace(
-        certificate=SimpleNamespace(failures=checks), answer=SimpleNamespace(problem=problem)
-    )
-    assert stages._is_viscous(found) == lowered

@@ -18,14 +18,11 @@ from colloc import (
     Problem,
     ProblemError,
     Wheel,
-    load,
-    save,
     solve_balance,
 )
 from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
-from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, ellipse
@@ -99,38 +96,6 @@ def test_a_replay_is_that_of_a_program_of_its_own(gait, feet):
     assert replay(Chain(feet=feet), Friction(), gait, 1e-1).efficiency == pytest.approx(
         played(gait, feet, 1e-1), rel=2e-3
     )
-
-
-def test_gaits_on_more_and_more_feet_do_what_they_do_on_a_line():
-    on_line = replay(Chain(), Friction(), PAPER, 1e-3).efficiency
-    found = [replay(Chain(feet=n), Friction(), PAPER, 1e-3).efficiency for n in (1, 2, 4, 16)]
-    np.testing.assert_allclose(found[:1], 0.285, atol=1e-3)
-    assert abs(found[-1] - on_line) < 5e-4
-
-
-def test_the_half_of_a_bilateral_gait_is_as_good_as_the_whole():
-    half = solve(Problem("half", body=Chain(feet=1), gait=Harmonic(1, "bilateral"), delta=1e-3), 2)
-    assert half.certificate.passed
-    whole = replay(Chain(feet=1), Friction(), half.gait, half.delta_per_period)
-    assert whole.efficiency == pytest.approx(half.certificate.efficiency, rel=1e-5)
-    assert abs(whole.rotation) < 1e-6
-
-
-def test_a_solution_on_feet_is_kept_and_verified(on_feet, tmp_path, capsys):
-    save(on_feet, tmp_path / "kept.h5")
-    assert load(tmp_path / "kept.h5").problem.body == Chain(feet=1)
-    assert colloc(["verify", str(tmp_path / "kept.h5"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["certified"]
-
-
-def test_a_film_shows_which_feet_hold(on_feet):
-    shown = frames(on_feet, 101)
-    assert shown.holding.shape == (3, 101)
-    moved = np.hypot(*np.diff(shown.feet[:, 0], axis=2))
-    both = shown.holding[:, 1:] & shown.holding[:, :-1]
-    assert both.any()
-    assert moved[both].max() < 0.02 * moved.max()
-    assert frames(on_feet, 11).feet.shape == (2, 2, 3, 11)
 
 
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():
@@ -215,17 +180,6 @@ def test_what_feet_cannot_do_yet_is_refused():
         Problem(
             "half", body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=Harmonic(1, "bilateral")
         )
-
-
-def test_init_writes_a_problem_on_feet(tmp_path, capsys):
-    from colloc.gaits.problem_file import read_problem_file
-
-    assert colloc(["init", str(tmp_path / "mine.py"), "--links", "4", "--feet", "2"]) == 0
-    assert read_problem_file(tmp_path / "mine.py").problem.body == Chain((0.25,) * 4, feet=2)
-    assert colloc(["init", str(tmp_path / "other.py"), "--feet", "99"]) == 2
-    assert colloc(["init", str(tmp_path / "other.py"), "--lengths", "1", "1e-9", "1"]) == 2
-    assert colloc(["init", str(tmp_path / "near.py"), "--lengths", "1", "1e-5", "1.0000001"]) == 0
-    assert "0 (a line) to 20" in capsys.readouterr().err
 
 
 def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, three_link):

@@ -120,13 +120,6 @@ def test_a_gait_is_played_at_the_pace_whose_period_it_says():
     )
 
 
-def test_a_range_of_one_pace_is_that_pace():
-    free, fixed = best(problem(colloc.Free(0.05, 0.05))), best(problem(0.05))
-    assert free.optimal
-    assert played(free) == pytest.approx(0.05, rel=1e-12)
-    assert free.value == pytest.approx(fixed.value, rel=1e-9)
-
-
 def test_speed_under_a_limit_of_power_takes_all_of_it():
     limited = best(
         problem(

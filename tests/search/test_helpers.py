@@ -2,7 +2,6 @@
 what becomes of them."""
 
 import time
-from types import SimpleNamespace
 
 import pytest
 
@@ -10,7 +9,7 @@ import colloc
 from benchmarks.kills import contents
 from colloc import Harmonic, Problem
 from colloc.search import helpers
-from colloc.search.explore import explore, sketched
+from colloc.search.explore import sketched
 from colloc.search.run import Run
 
 PROBLEM = Problem(
@@ -78,24 +77,6 @@ def test_so_it_is_if_they_die(alone, learnt, tmp_path, monkeypatch, command):
     assert contents(tmp_path / "quick.h5") == alone
 
 
-def test_none_is_begun_for_what_this_process_alone_knows_nor_for_little(learnt, monkeypatch):
-    run = Run(problem=PROBLEM)
-    with run.under_way(60.0), helpers.helping(SimpleNamespace(law=lambda: 0)) as some:
-        some.begin(1e3)
-        assert some.count == 0
-    monkeypatch.setattr(helpers, "_WORTH", 2.0)
-    with run.under_way(60.0), helpers.helping(PROBLEM) as some:
-        some.begin(1.9)
-        assert some.count == 0
-        some.begin(2.1)
-        assert some.count == 2
-
-
-def test_none_is_begun_where_a_stage_is_called_by_itself(learnt):
-    assert explore(PROBLEM, starts=4).starts >= 4
-    assert not learnt
-
-
 @pytest.mark.parametrize("name", ["random.py", "sitecustomize.py"])
 def test_files_of_the_folder_are_not_run_and_what_python_prints_as_it_starts_is_no_answer(
     learnt, tmp_path, monkeypatch, name
@@ -114,17 +95,3 @@ def test_files_of_the_folder_are_not_run_and_what_python_prints_as_it_starts_is_
         some.await_for(sketched, PROBLEM, PROBLEM.guess, True, [0.1])
     assert learnt[0][0] > 0
     assert (tmp_path / "ran").exists() == (name == "sitecustomize.py")
-
-
-def test_what_is_asked_for_twice_is_waited_for_once(learnt):
-    start = PROBLEM, PROBLEM.guess, True, [0.1, 0.01]
-    with Run(problem=PROBLEM).under_way(60.0), helpers.helping(PROBLEM) as some:
-        some.begin(1e3)
-        for _ in range(2):
-            some.ask(sketched, *start)
-        while some.waiting:
-            time.sleep(0.01)
-        for _ in range(2):
-            some.await_for(sketched, *start)
-    assert len(learnt) == 1
-    assert learnt[0][0] > 0

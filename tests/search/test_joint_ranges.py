@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, ProblemError
-from colloc.gaits.limits import under_one_limit
 from colloc.results.store import load, save
 from colloc.search.solve import solve
 
@@ -34,13 +33,6 @@ def test_the_answer_keeps_both_sides_and_uses_one(one_sided, tmp_path):
     assert read.problem.hash == one_sided.problem.hash
 
 
-def test_it_lies_between_what_the_narrow_and_the_wide_limit_allow(one_sided):
-    narrow, wide = (
-        solve(problem(limit, Harmonic(1, "bilateral")), starts=4) for limit in (0.6, 1.5)
-    )
-    assert narrow.efficiency < one_sided.efficiency < wide.efficiency
-
-
 def test_mirrored_ranges_give_the_mirrored_gait(one_sided):
     mirrored = solve(
         problem(tuple((-high, -low) for low, high in ONE_SIDED), Harmonic(1, "bilateral")), starts=4
@@ -65,14 +57,6 @@ def test_polygons_keep_both_sides_use_them_and_mirror():
 def test_a_range_that_is_even_is_a_limit_and_one_may_go_to_half_a_turn():
     assert problem(((-1, 1), 2.0)).joint_limit == problem((1.0, 2.0)).joint_limit
     assert problem(((-np.pi, 1), (-1, np.pi))).joint_limit == ((-np.pi, 1), (-1, np.pi))
-
-
-def test_shapes_are_held_against_one_limit_on_either_side():
-    stretched, limit = under_one_limit(
-        np.array([[-0.6, 1.5, 0.75], [0.5, -0.3, 0.0]]), ((-0.6, 1.5), 0.5)
-    )
-    assert limit == 1.5
-    np.testing.assert_allclose(stretched, [[-1.5, 1.5, 0.75], [1.5, -0.9, 0.0]])
 
 
 @pytest.mark.parametrize(

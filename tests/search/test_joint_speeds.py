@@ -9,7 +9,6 @@ from colloc import (
     Chain,
     Friction,
     Harmonic,
-    ModalBody,
     Polygon,
     Problem,
     ProblemError,
@@ -32,23 +31,6 @@ def fastest(solution):
 @pytest.fixture(scope="module")
 def slow():
     return solve(Problem("slow", gait=Harmonic(1, "bilateral"), speed_limit=12), starts=4)
-
-
-def test_an_ellipse_is_as_large_as_the_limit_lets_it(slow):
-    """One harmonic of amplitude a is at most 2 pi a fast: the bound is one on (A1, B1), here the
-    circle of radius 12 / 2 pi."""
-    assert slow.status == "solved"
-    assert np.hypot(slow.gait.cos[0, 0], slow.gait.sin[0, 0]) == pytest.approx(
-        12 / (2 * np.pi), rel=1e-6
-    )
-
-
-def test_a_limit_that_nothing_reaches_changes_nothing():
-    free, wide = (
-        solve(Problem("wide", gait=Harmonic(1, "bilateral"), speed_limit=s), starts=1)
-        for s in (None, 20)
-    )
-    assert wide.efficiency == pytest.approx(free.efficiency, rel=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -81,15 +63,6 @@ def test_the_fastest_instants_are_as_fast_as_allowed(gait, limit, more):
     assert found.status == "solved"
     share = fastest(found) / np.broadcast_to(limit, found.problem.body.n_joint)
     assert share.max() == pytest.approx(1.0, abs=1e-5)
-
-
-def test_faster_motors_go_farther():
-    """For friction that does not know the pace, a class that may be paced anyhow gains by every
-    limit that binds."""
-    far = Problem("far", gait=Harmonic(2, "bilateral"), delta=1e-3, **FAR)
-    ways = [solve(far.with_(speed_limit=s, guess=None), starts=1).distance for s in (6, 8, 10)]
-    assert ways == sorted(ways)
-    assert ways[2] > 1.2 * ways[0]
 
 
 def test_a_flat_top_that_the_second_round_comes_back_to_is_no_end():
@@ -131,12 +104,6 @@ def test_a_certificate_fails_a_gait_that_is_too_fast(slow):
     assert not check.passed
 
 
-def test_it_is_kept_in_files(slow, tmp_path):
-    read = colloc.load(colloc.save(slow, tmp_path / "slow.h5"))
-    assert (read.problem.speed_limit, read.problem.hash) == (12.0, slow.problem.hash)
-    assert Problem("free", gait=Harmonic(1)).hash != slow.problem.hash
-
-
 @pytest.mark.parametrize(
     ("stated", "words"),
     [
@@ -152,10 +119,3 @@ def test_it_is_kept_in_files(slow, tmp_path):
 def test_what_cannot_be_is_refused_in_a_sentence(stated, words):
     with pytest.raises(ProblemError, match=words):
         Problem("refused", **({"gait": Harmonic(1, "bilateral"), "speed_limit": 5.0} | stated))
-
-
-@pytest.mark.slow
-def test_smooth_bodies_have_speeds_too():
-    found = solve(Problem("smooth", body=ModalBody(2), gait=Harmonic(1), speed_limit=8.0), starts=2)
-    assert found.status == "solved"
-    assert fastest(found).max() == pytest.approx(8.0, rel=1e-5)

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from colloc import (
-    Chain,
     Fourier,
     Friction,
     Harmonic,
@@ -19,8 +18,7 @@ from colloc import (
     save,
 )
 from colloc.commands.verify import verify
-from colloc.gaits.objective import EFFICIENCY, SPEED
-from colloc.mechanics.densities import DRIVEN_WORK, Instants
+from colloc.gaits.objective import SPEED
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
@@ -143,15 +141,6 @@ def test_a_result_says_what_it_is_best_at_and_comes_back_from_its_file(fast, tmp
     assert "speed d/L" in capsys.readouterr().out
 
 
-def test_speed_does_not_depend_on_the_size_of_friction(fast):
-    light = solve(fast.problem.with_(friction=Friction(1e-3, 1e-3, 1e-3)), 1)
-    assert light.success
-    assert light.value == pytest.approx(fast.value, rel=1e-9)
-    assert light.certificate.efficiency == pytest.approx(
-        1e3 * fast.certificate.efficiency, rel=1e-6
-    )
-
-
 def test_a_least_distance_is_reached_for_the_price_of_efficiency():
     friction = Friction(mu_t=3, mu_f=1, mu_b=1)
     free = solve(
@@ -181,14 +170,6 @@ def test_a_turning_gait_turns_by_the_prescribed_angle():
     assert free.value > solution.value
 
 
-@pytest.mark.slow
-def test_an_efficient_gait_may_turn_as_well():
-    solution = solve(Problem("arc", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.2), 1)
-    assert solution.success
-    assert solution.problem.objective == EFFICIENCY
-    assert solution.certificate.rotation == pytest.approx(0.2, abs=1e-4)
-
-
 def test_an_objective_may_be_negative_and_of_any_sign():
     """Work costs more than the distance is worth: the best gait is the smallest."""
     solution = solve(
@@ -205,30 +186,6 @@ def test_an_objective_may_be_negative_and_of_any_sign():
     assert solution.value < 0
     assert solution.gait.shape_speed == pytest.approx(0.1, rel=1e-3)
     assert "better still" in solution.message
-
-
-def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
-    body, friction, delta, rng = (
-        Chain((0.3, 0.2, 0.5)),
-        Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
-        1e-2,
-        np.random.default_rng(3),
-    )
-    angles, rates = rng.normal(size=(2, 2, 40))
-    solved = body.solve(friction, angles, rates, delta)
-    motion = body.motion(friction, angles, rates, delta, solved)
-    forces = body.forces(friction, angles, rates, motion.z, delta)
-    now = Instants(body, friction, angles, rates, delta, z=motion.z)
-    powers = now.power
-    np.testing.assert_allclose(powers.sum(axis=0), motion.actuator_power, atol=1e-12)
-    # the head link's normal force acts half its length from the joint, its tangential force has no
-    # arm
-    np.testing.assert_allclose(powers[1], -(0.25 * forces[5] + forces[8]) * rates[1], atol=1e-12)
-    driven = DRIVEN_WORK.at(now)[0]
-    exact = np.maximum(powers, 0.0).sum(axis=0)
-    assert (powers < 0).any()
-    assert (driven >= exact).all()
-    assert (driven - exact <= friction.largest * delta * body.n_joint / 2).all()
 
 
 def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
@@ -270,15 +227,3 @@ def test_every_joint_has_a_limit_of_its_own():
     same = [{"gait": Harmonic(1, "bilateral"), "joint_limit": limit} for limit in (1.0, (1.0, 1.0))]
     values = [solve(problem.with_(guess=None, **changes), 1).value for changes in same]
     assert values[0] == values[1]
-
-
-@pytest.mark.parametrize("limit", [(1.0,), (1.0, 4.0), (1.0, "x"), (True, 1.0)])
-def test_limits_that_cannot_be_kept_are_refused(limit):
-    with pytest.raises(ProblemError, match="joint_limit"):
-        Problem("x", joint_limit=limit)
-
-
-def test_mirrored_joints_of_a_bilateral_gait_have_one_limit():
-    """The half period that is solved would know of one of them only."""
-    with pytest.raises(ProblemError, match="mirrored joints"):
-        Problem("x", gait=Harmonic(1, "bilateral"), joint_limit=(1.0, 2.0))

@@ -10,25 +10,6 @@ from colloc.results.solution import SOLVED
 from colloc.search.solve import solve
 
 
-@pytest.mark.slow
-def test_a_bilateral_triangle_shrinks_to_the_certified_two_fifths(solved):
-    solution, _ = solved("three_link_polygon")
-    assert solution.status == "solved"
-    assert 0.3990 < solution.certificate.efficiency < 0.4
-    assert solution.certificate.efficiency_at_zero_delta == pytest.approx(0.4, abs=3e-4)
-    corners = solution.gait.corners
-    np.testing.assert_allclose(corners[0, [0, 2]], -corners[1, [0, 2]], atol=1e-9)
-    # one joint moves along each side but the last, and both move alike along that
-    assert np.abs(corners[:, 1] - corners[:, 0]).min() < 1e-2
-    motion = solution.sample(np.array([0.0, 0.25, 1.0, 1.25]))
-    np.testing.assert_allclose(
-        motion.centre[0, 2] - motion.centre[0, 0], solution.distance, rtol=1e-9
-    )
-    np.testing.assert_allclose(
-        motion.centre[:, 3] - motion.centre[:, 1], [solution.distance, 0], atol=1e-9
-    )
-
-
 def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
     corners = np.array([[3.1416, 3.13, 3.13, 3.05], [-0.15, 0.0, 0.12, 0.12]])
     corners[0] = np.minimum(corners[0], np.pi)
@@ -38,14 +19,6 @@ def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
     assert solution.certificate.efficiency > 0.44
     assert np.abs(solution.gait.corners).max() == pytest.approx(np.pi, abs=1e-6)
     assert solution.gait.length == pytest.approx(2 * np.pi * problem.smallest_shape_speed, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_a_spline_of_many_knots_goes_far_beyond_the_paper(solved):
-    solution, reference = solved("three_link_spline")
-    assert solution.status == "solved"
-    assert solution.certificate.efficiency > 0.4068
-    assert abs(solution.certificate.efficiency - reference.efficiency) < reference.tolerance
 
 
 def test_ipopt_alone_refines_the_mesh_of_a_polygon_just_until_the_replay_is_as_near_as_asked():

@@ -199,19 +199,6 @@ def test_feet_that_have_to_be_alike_move_together():
     assert [foot.weight for foot in heavier] == pytest.approx([17 / 60, 26 / 60, 17 / 60])
 
 
-def test_feet_beside_each_other_move_together():
-    feet = (colloc.Foot(0, 0.2, offset=0.1), colloc.Foot(0, 0.2, offset=-0.1), colloc.Foot(1, 0.6))
-    problem = colloc.Problem(
-        "x", body=colloc.Chain((0.5, 0.5), feet=feet), friction=colloc.Friction(mu_b=3)
-    )
-    moved = (
-        next(each for each in parameters(problem) if each.name == "place of feet 1 and 2")
-        .changed(0.1)
-        .body.feet
-    )
-    assert [foot.place for foot in moved] == pytest.approx([0.3, 0.3, 0.6])
-
-
 @pytest.mark.parametrize(
     ("middle", "others"),
     [
@@ -312,25 +299,6 @@ def test_what_is_no_optimum_is_refused(three_link, tmp_path):
         rough.sensitivity()
     with pytest.raises(KeyError, match="there is friction sideways"):
         three_link.sensitivity()["colour"]
-
-
-def test_a_mirror_image_on_slippery_ground_has_the_same_sensitivity_in_other_units(of):
-    """A hundredth of the friction makes values, slopes and all errors a hundred times as large;
-    left and right are alike."""
-    of("length of link 1")
-    problem = colloc.Problem("unit", gait=colloc.Harmonic(1), delta=1e-2, mesh_tolerance=1e-3)
-    one = colloc.solve(problem, starts=1)
-    image = colloc.Fourier(-one.gait.mean, -one.gait.cos, -one.gait.sin)
-    slippery = colloc.Friction(0.01, 0.01, 0.01)
-    other = colloc.solve(problem.with_(friction=slippery, guess=image), starts=1)
-    a, b = (each.sensitivity(resolve=True)["length of link 1"] for each in (one, other))
-    assert b.slope == pytest.approx(100 * a.slope, rel=1e-4)
-    for here, there in zip(a.again, b.again, strict=True):
-        assert there.kept == pytest.approx(100 * here.kept, rel=1e-4)
-        assert 20 < there.kept_error / here.kept_error < 500
-    here, there = a.again[1], b.again[1]
-    assert there.value == pytest.approx(100 * here.value, rel=1e-4)
-    assert 20 < there.error / here.error < 500
 
 
 def test_the_error_of_a_slope_is_the_most_that_it_differs_by_on_another_mesh(

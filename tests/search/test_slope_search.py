@@ -1,8 +1,6 @@
 """Problems on a slope: solved, certified, kept and shown like any other; no gait or heading beside
 the one found is better."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -15,19 +13,16 @@ from colloc import (
     Polygon,
     Problem,
     ProblemError,
-    Viscous,
-    Wheel,
     ellipse,
     load,
     save,
 )
 from colloc.commands.results import report
-from colloc.commands.solve import solve as solve_command
 from colloc.commands.verify import verify
 from colloc.gaits.control_problem import control_problem
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram
-from colloc.search.certify import _one_motion, gait_certificate
+from colloc.search.certify import gait_certificate
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 from colloc.verification.mesh_error import mesh_error
@@ -80,15 +75,6 @@ def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, cap
 
 
 @pytest.mark.slow
-def test_a_body_on_wheels_climbs_three_times_as_steep_a_slope_as_they_hold_by_rolling():
-    body = Chain(feet=tuple(Wheel(link, rolling=0.05) for link in range(3)))
-    found = solve(Problem("wheels", body=body, gait=PROBLEM.gait, delta=1e-2, grade=0.15), 2)
-    assert found.status == "solved", found.message
-    assert run(body, found.gait, 0.15) == pytest.approx(found.certificate.value, rel=1e-4)
-    assert found.certificate.value > 1.0
-
-
-@pytest.mark.slow
 def test_a_body_on_feet_climbs_a_slope_that_is_too_steep_for_one_that_lies():
     found = solve(Problem("feet", body=Chain(feet=1), gait=PROBLEM.gait, grade=0.2))
     assert found.status == "solved", found.message
@@ -132,20 +118,6 @@ def test_it_is_kept_verified_reported_and_summarised_like_any_other(uphill, tmp_
     assert "slope of grade 0.1" in path.with_suffix(".html").read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
-def test_the_command_line_solves_a_problem_file_with_a_grade(tmp_path, capsys):
-    file = tmp_path / "up.py"
-    file.write_text(
-        "from colloc import Harmonic, Problem, ellipse\n"
-        "PROBLEM = Problem('up', ellipse(0, 2.8, 1.3), gait=Harmonic(1, 'bilateral'), delta=1e-2, "
-        "grade=0.1)\n"
-    )
-    assert solve_command([str(file), "--starts", "2", "--verbose", "--output", f"{tmp_path}/"]) == 0
-    out = capsys.readouterr().out
-    assert "slope of grade 0.1: d is the climb, W the work of the joints" in out
-    assert (tmp_path / "up.png").exists()
-
-
 def test_a_gait_that_turns_and_points_elsewhere_fails_its_certificate(uphill):
     gait = uphill.gait
     # no gait of the class
@@ -187,26 +159,6 @@ def test_what_joints_give_back_and_can_do_counts_on_slopes(uphill):
     assert error.total == pytest.approx(-program.objective(v) / found.value - 1, rel=1e-2)
 
 
-@pytest.mark.slow
-def test_a_gait_keeps_what_its_joints_can_do_on_a_slope(uphill):
-    free, most = (
-        solve(
-            PROBLEM.with_(objective="driven efficiency", guess=uphill.gait, torque_limit=limit), 1
-        )
-        for limit in (1.0, 0.0602)
-    )
-    for found in (free, most):
-        assert found.status == "solved", found.message
-    # the best gait asks for 0.061; with 0.059 no gait near it climbs
-    assert free.certificate.value > 1.1 * most.certificate.value
-
-
-def test_a_motion_that_is_left_open_for_long_fails_its_check():
-    for several, passes in ((0.9e-3, True), (1.1e-3, False)):
-        check = _one_motion(PROBLEM, SimpleNamespace(several=several))
-        assert (check.name, check.passed) == ("one motion", passes)
-
-
 def test_friction_and_the_pull_have_one_unit():
     heavy = PROBLEM.with_(friction=Friction(100, 100, 100), grade=10.0)
     scaled = control_problem(heavy)
@@ -215,16 +167,6 @@ def test_friction_and_the_pull_have_one_unit():
         PROBLEM.regime,
         PROBLEM.law,
     )
-
-
-def test_the_level_is_stated_as_before():
-    level = PROBLEM.with_(grade=0.0)
-    assert not {"grade", "towards"} & set(level.to_dict())
-    assert type(level.gait) is Harmonic
-    assert PROBLEM.gait.fraction == 1.0
-    again = Problem.from_dict(PROBLEM.to_dict())
-    assert again.hash == PROBLEM.hash != level.hash
-    assert "grade 0.1" in repr(again)
 
 
 @pytest.mark.slow
@@ -238,17 +180,6 @@ def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     found = solve(free, 1)
     assert found.status == "solved", found.message
     assert abs(found.certificate.rotation) < 1e-5
-
-
-@pytest.mark.slow
-def test_a_gait_goes_across_the_slope_if_it_is_asked_to():
-    across = solve(PROBLEM.with_(gait=Harmonic(2, "bilateral"), towards=np.pi / 2), 1)
-    assert across.status == "solved", across.message
-    ran = slope_motion(Chain(), Friction(), across.gait, 1e-2, 0.1)
-    assert abs(ran.climb[0]) < 1e-3 * ran.aside[0]
-    assert across.certificate.distance == pytest.approx(ran.aside[0], rel=1e-4)
-    assert 0 < ran.headings[0] < np.pi / 2  # it points uphill of where it goes
-    assert ran.joint_work[0] == pytest.approx(ran.friction_work[0], abs=1e-4)
 
 
 @pytest.mark.slow
@@ -283,12 +214,6 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
 def test_what_cannot_be_asked_is_named(changed, said):
     with pytest.raises(ProblemError, match=said):
         PROBLEM.with_(**changed)
-
-
-def test_a_viscous_body_may_be_on_any_slope():
-    assert (
-        PROBLEM.with_(friction=Viscous(normal=2.0, tangential=1.0), grade=3.0).regime.grade == 3.0
-    )
 
 
 def test_a_slope_that_is_not_climbed_is_said_so():

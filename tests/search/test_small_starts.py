@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Polygon, Problem, Viscous, replay
+from colloc import Chain, Friction, Harmonic, Polygon, Problem, Viscous
 from colloc.results.distinct_optima import distance
 from colloc.search.explore import candidates
 from colloc.search.helpers import Helpers
@@ -41,23 +41,6 @@ def test_loops_are_admissible_members_of_the_class_hardly_longer_than_they_must_
         assert (
             0.9 < loop.shape_speed / problem.smallest_shape_speed < 2
         )  # pressed against its limits, a loop is a little smaller
-
-
-def test_loops_travel_as_their_shapes_promise():
-    """Two thirds of what corners and no size would give, by replay: sine waves cut the corners."""
-    problem = Problem("fold", gait=Harmonic(3))
-    best = max(
-        replay(problem.body, problem.friction, loop, 1e-5).efficiency
-        for loop in small_loops(problem)
-    )
-    assert 0.25 < best < 0.4561
-
-
-def test_mirror_images_are_one():
-    """Of the fold, joints at (pi, 0), there are four by mirror and end swap; the second shape is
-    another one."""
-    first, _, second, _ = small_loops(Problem("fold", gait=Harmonic(2)))
-    assert abs(np.sort(np.abs(first.mean)) - np.sort(np.abs(second.mean))).max() > 0.5
 
 
 def test_viscous_drag_has_none():

@@ -23,7 +23,6 @@ from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
-from colloc.pictures.publication import mesh_errors
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.distinct_optima import (
@@ -80,11 +79,6 @@ def test_images_of_a_gait_keep_its_distance_work_and_rotation(friction, n_image)
         np.testing.assert_allclose(abs(other.rotation), abs(original.rotation), rtol=1e-8)
 
 
-def test_reversal_alone_changes_the_motion_where_friction_tells_forward_from_backward():
-    forward, backward = (replayed(g, IRREVERSIBLE).distance for g in (GAIT, reversed_in_time(GAIT)))
-    assert abs(forward / backward - 1) > 0.05
-
-
 @pytest.mark.parametrize("coefficients", [(1, 1, 1), (1.7, 1, 1.3), (0.5, 1, 5)])
 def test_bilateral_gaits_close_their_rotation_for_any_friction(coefficients):
     rng = np.random.default_rng(5)
@@ -116,16 +110,6 @@ def test_distance_does_not_see_start_phase_or_symmetry_but_sees_everything_else(
         )
         < 1e-7
     )
-
-
-def test_phase_distance_is_the_smallest_over_a_brute_force_scan():
-    other = reversed_in_time(GAIT)
-    t = np.arange(64) / 64
-    scan = [
-        np.sqrt(np.mean(np.sum((GAIT.angles(t) - other.angles(t + a)) ** 2, axis=0)))
-        for a in np.linspace(0, 1, 2001)
-    ]
-    assert phase_distance(GAIT, other) == pytest.approx(min(scan), rel=1e-5)
 
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
@@ -169,22 +153,6 @@ def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     assert is_trivial(solution.answer)
     assert solution.status != SOLVED
     assert "goes nowhere" in solution.message
-
-
-def test_a_start_that_reached_no_optimum_is_told_with_what_its_replay_measured(monkeypatch):
-    """Replayed it is in any case; no level has to be optimal for that."""
-    problem = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=10)
-
-    def stopped(*asked, **how):
-        solution = solve(*asked, **how)
-        steps = tuple(replace(step, optimal=False) for step in solution.history)
-        return replace(solution, answer=replace(solution.answer, optimal=False, history=steps))
-
-    monkeypatch.setattr(campaign, "solve", stopped)
-    outcome = campaign.run_guess(problem, lambda: problem.guess, 3, np.inf)
-    assert outcome.status not in (ERROR, SOLVED)
-    assert outcome.delta == problem.delta
-    assert outcome.efficiency > 0
 
 
 def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
@@ -416,62 +384,12 @@ def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
     assert resolution_warning(three_link) is None
 
 
-def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
-    stated = Problem(
-        "p",
-        ellipse(0.1, 2.0, 1.0),
-        gait=Polygon(3, "bilateral"),
-        delta=1e-2,
-        intervals=24,
-        mesh_tolerance=0.0,
-    )
-    solution = Solution(stated, answer_near(stated))
-    gait = solution.gait
-    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
-    exact = replay(
-        stated.body,
-        stated.friction,
-        path,
-        stated.delta * gait.length,
-        breaks=gait.corner_phases,
-        tolerance=1e-8,
-    )
-    # magnitudes of intervals add up where their errors cancel in part; at the problem's own number,
-    # which is relative to the shape speed, it would come out 40 times too large
-    error = abs(solution.efficiency / exact.efficiency - 1)
-    assert error < mesh_errors(solution).sum() < 2 * error
-
-
 def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
     stated = problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait)
     coarse = Solution(stated, answer_near(stated))
     assert "under-resolved by 5 intervals" in resolution_warning(coarse)
     with pytest.raises(ValueError, match="at least two converged levels"):
         value_at_zero_delta(coarse)
-
-
-class _Losing(Executor):
-    """Gives up on start 1 in its own way, as Dask does on a task that kills its workers."""
-
-    def __init__(self, workers):
-        pass
-
-    def submit(self, function, *arguments):
-        future = Future()
-        if arguments[3] == 1:
-            future.set_exception(RuntimeError("killed worker"))
-        else:
-            future.set_result(outcome(arguments[3]))
-        return future
-
-
-def test_a_start_that_the_executor_loses_does_not_end_the_run():
-    found = {o.start: o for o in campaign.run_starts(problem(), range(3), executor=_Losing)}
-    assert (found[1].status, found[1].message) == (
-        CRASHED,
-        "its worker failed twice (RuntimeError: killed worker).",
-    )
-    assert found[0].status == found[2].status == SOLVED
 
 
 def test_starts_run_on_a_dask_cluster_and_end_as_they_do_here():

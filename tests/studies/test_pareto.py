@@ -3,7 +3,6 @@ alone."""
 
 import csv
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -49,12 +48,6 @@ def front(told):
         starts=1,
         progress=lambda k, solution: told.append((k, solution.measured.value)),
     )
-
-
-def test_a_point_is_replaced_only_by_a_better_one(front, told):
-    for k in range(4):
-        values = [value for point, value in told if point == k]
-        assert all(after > (1 + 0.5e-6) * before for before, after in pairwise(values))
 
 
 def test_the_front_is_monotone_and_every_point_is_certified(front):
@@ -118,12 +111,6 @@ def test_its_ends_are_the_best_by_one_objective_alone(front):
         assert front.values[at, k] == pytest.approx(alone.certificate.value, rel=1e-9)
 
 
-def test_the_front_bulges_beyond_its_chord(front):
-    speed, efficiency = front.values.T
-    chord = np.interp(efficiency, efficiency[[0, -1]], speed[[0, -1]])
-    assert (speed[1:-1] > chord[1:-1]).all()
-
-
 @pytest.mark.parametrize("signs", [(1, 1, 1, 1, 1), (-1, 1, -1, 1, 1), (1, -1, -1, -1, -1)])
 def test_the_figure_draws_every_value_and_mirror_images_alike(front, signs):
     gaits = [point.gait.scaled(sign) for sign, point in zip(signs, front.points, strict=True)]
@@ -171,12 +158,6 @@ def test_the_command_leaves_a_table_a_figure_and_results(tmp_path, monkeypatch, 
         fastest.certificate.value, rel=1e-12
     )
     assert (tmp_path / "results/p.front.png").stat().st_size > 1000
-
-
-def test_the_figure_names_its_axes(front):
-    axes = front_figure(front).axes
-    assert (axes[0].get_xlabel(), axes[0].get_ylabel()) == ("efficiency d/W", "speed d/L")
-    assert len(axes[1].lines) == len(front.points)
 
 
 def test_a_gait_that_turns_is_as_far_whether_its_certificate_knows_the_objective_or_not():

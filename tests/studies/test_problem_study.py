@@ -39,7 +39,6 @@ from colloc.studies.gait_class import (
     winding,
 )
 from colloc.studies.journal import (
-    Attempt,
     Visit,
     append_visits,
     best_attempt,
@@ -49,7 +48,7 @@ from colloc.studies.journal import (
 from colloc.studies.run import StudyRun
 from colloc.studies.study import Axis, Study, read_study_file
 from colloc.studies.table import NO_PROBLEM, load_study, save_study, study_table
-from colloc.system.errors import ProblemError, StoreError
+from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 
 FILE = """
@@ -246,17 +245,6 @@ def test_the_guess_of_every_problem_is_tried_and_every_cell_has_random_starts_of
         }
 
 
-def test_cells_that_an_earlier_colloc_finished_without_their_guess_are_missing(fake, tmp_path):
-    gait = ellipse(0.0, 1.2, 0.4)
-    for cell in grid().cells():
-        attempt = Attempt("cold", start_key(gait), outcome(0, gait, gait, 0.2))
-        append_visits(tmp_path, [Visit(grid().problem_at(cell).hash, (attempt,))])
-    run = StudyRun(grid(cold_starts=0), tmp_path)
-    assert len(run.missing) == 12
-    finished(run)
-    assert run.missing == []
-
-
 def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_again_and_then_marked(
     fake, tmp_path, monkeypatch, capsys
 ):
@@ -347,24 +335,6 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
         StudyRun(grid(problem=lambda x, y: 3), tmp_path)
 
 
-def test_what_was_solved_stays_when_the_rest_is_tried_again(fake, tmp_path, monkeypatch):
-    """The landscape has one cell that never converges, which is no failure of the machine: it is
-    left alone too."""
-    finished(StudyRun(grid(cold_starts=0), tmp_path))
-    died = Attempt(
-        GUESS, "0", outcome(0, ellipse(0.0, 1.2, 0.4), ellipse(0.0, 1.2, 0.4), np.nan, CRASHED)
-    )
-    append_visits(tmp_path, [Visit(grid().problem_at((0, 0)).hash, (died,))])
-    kept, forgotten = (
-        StudyRun(grid(cold_starts=0), tmp_path, retry=retry) for retry in (False, True)
-    )
-    assert forgotten.missing == []
-    for cell, state in kept.cells.items():
-        left = [a.key for a in state.attempts if a is not state.attempts[-1] or cell != (0, 0)]
-        assert [a.key for a in forgotten.cells[cell].attempts] == left
-    assert forgotten.cells[0, 0].best.key == kept.cells[0, 0].best.key
-
-
 def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path, monkeypatch):
     solved = []
 
@@ -415,21 +385,6 @@ def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
     append_visits(tmp_path, [Visit("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})])
     (kept,) = read_journal(tmp_path)
     assert kept.scores == {"known": 0.2}
-
-
-def test_a_gait_that_promises_more_than_was_found_is_measured_as_finely_as_a_certificate_does(
-    monkeypatch,
-):
-    """So that a cell is not marked for what a coarse replay has seen too large."""
-    stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
-    monkeypatch.setattr(
-        study_cell,
-        "run_guess",
-        lambda s, start, number, limit, **_: outcome(number, start(), start(), 0.01),
-    )
-    monkeypatch.setattr(study_cell, "value_of", lambda p, g, *grid: 0.2 if grid else 0.21)
-    work = Work((0,), stated, True, (), (elsewhere,), (), 0.0, frozenset(), 1, 300.0, 1)
-    assert list(study_cell.visit(work).scores.values()) == [0.2]
 
 
 def test_a_task_whose_worker_dies_is_recorded_as_crashed(fake, tmp_path, monkeypatch):
@@ -630,16 +585,6 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
         assert abs(found.forward) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_the_displacement_that_decides_the_class_is_that_of_the_replay():
-    gait, friction = (
-        Fourier([0, 0], [[0.9], [-0.3]], [[0.0], [0.8]]),
-        Friction(mu_t=5, mu_f=1, mu_b=1),
-    )
-    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
-    assert replay(Chain(), friction, path, 1e-3, instants=400, most_instants=400).distance > 0.01
-    assert abs(gait_class(gait, Chain(), friction).forward) > 0.9
-
-
 def test_the_name_of_a_gait_is_the_same_in_every_process():
     gait = Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [0.4]])
     given = f"from colloc.gaits.gait_fields import gait_from; gait = gait_from({fields(gait)})"
@@ -669,18 +614,6 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     np.testing.assert_array_equal(
         load_study(out / "tiny.nc").variables["efficiency"], table["efficiency"]
     )
-
-
-def test_an_output_that_is_no_folder_is_refused_in_a_sentence(tmp_path, capsys):
-    path = tmp_path / "tiny.py"
-    path.write_text(FILE, encoding="utf-8")
-    (tmp_path / "file").write_text("")
-    for options, text in (
-        (["--output", str(tmp_path / "file" / "x")], "cannot make the folder"),
-        (["--output", str(tmp_path / "z.nc")], "z.nc should be a folder"),
-    ):
-        assert sweep_study([str(path), *options]) == 2
-        assert text in capsys.readouterr().err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -727,16 +660,6 @@ def test_dask_runs_a_study_on_a_local_cluster(tmp_path):
         for _ in run.run(workers=2, executor=lambda n: client.get_executor(pure=False)):
             pass
     assert study_table(run).variables["efficiency"].min() > 0.25
-
-
-def test_without_a_dask_scheduler_or_a_journal_folder_the_error_is_clear(fake, tmp_path, capsys):
-    pytest.importorskip("distributed")
-    path = tmp_path / "tiny.py"
-    path.write_text(FILE, encoding="utf-8")
-    assert sweep_study([str(path), "--dask", "nonsense://x", "--output", str(tmp_path)]) == 2
-    assert "no Dask scheduler at nonsense://x" in capsys.readouterr().err
-    with pytest.raises(StoreError, match="cannot write"):
-        finished(StudyRun(grid(), path / "below a file"))
 
 
 def test_a_start_that_turns_as_it_should_is_worth_the_same_whatever_phase_it_begins_at():

@@ -13,10 +13,8 @@ from colloc import (
     Coupled,
     Friction,
     Harmonic,
-    Polygon,
     Problem,
     ProblemError,
-    Serpenoid,
     replay,
     steer,
 )
@@ -70,19 +68,6 @@ def test_a_turn_to_the_right_is_the_mirror_image_of_that_to_the_left(family):
     )
 
 
-@pytest.mark.parametrize("kind", [Polygon(3, "bilateral")])
-def test_gaits_of_every_class_have_a_mirror_image(kind):
-    family = steer(
-        Problem("p", gait=kind, friction=Friction(mu_t=4, mu_f=1, mu_b=1), delta=1e-2),
-        [-0.2, 0.2],
-        starts=1,
-    )
-    right, left = family.points
-    assert family.certified
-    # sought from the other's mirror image, on a mesh and so with arcs of its own
-    assert right.value > (1 - 1e-3) * left.value
-
-
 def test_a_body_that_is_not_its_mirror_image_turns_to_both_sides():
     body, friction = Chain((0.2,) * 5), Friction(mu_t=2, mu_f=1, mu_b=1)
     bent = Coupled(Harmonic(1), stuck={1: 0.5})
@@ -111,20 +96,6 @@ def test_gaits_begin_where_they_are_nearest_to_their_neighbours():
     np.testing.assert_allclose(family.begins, (later[2] - later) % 1, atol=1e-12)
 
 
-def test_an_offset_turns_a_serpenoid_snake():
-    snake = Problem(
-        "s",
-        body=Chain((0.2,) * 5),
-        friction=Friction(mu_t=10, mu_f=1, mu_b=1),
-        gait=Serpenoid(symmetry="antipodal"),
-        delta=1e-2,
-    )
-    family = steer(snake, [-0.2, 0.2], starts=1)
-    assert family.certified
-    right, left = (point.gait.mean[0] for point in family.points)
-    assert right * left < 0
-
-
 def test_on_the_spot_a_turn_takes_the_least_work_and_leads_nowhere():
     on_the_way = steer(PROBLEM, [0.2], spot=[0.2], starts=2)
     spot = on_the_way.on_the_spot
@@ -135,12 +106,6 @@ def test_on_the_spot_a_turn_takes_the_least_work_and_leads_nowhere():
     assert on_the_way.table(4)["on_the_spot"]["turn_rad"] == [0.2]
     marks = {line.get_marker() for line in steering_figure(on_the_way).axes[1].lines}
     assert marks == {"None", "o", "s"}
-
-
-def test_the_figure_names_its_axes(family):
-    cost, floor = steering_figure(family).axes
-    assert "turn" in cost.get_xlabel()
-    assert floor.get_aspect() == 1
 
 
 def test_all_tracks_set_out_along_x_and_have_a_dot_a_period(family):

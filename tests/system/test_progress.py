@@ -1,7 +1,6 @@
 """What a person sees while they wait, and that a log sees nothing."""
 
 import io
-import subprocess
 import sys
 import time
 
@@ -90,17 +89,3 @@ def test_nothing_is_written_where_nobody_watches():
             line.clear()
     assert log.getvalue() == ""
     assert muted.getvalue() == ""
-
-
-def test_nothing_is_loaded_to_draw_where_nobody_watches():
-    code = (
-        "import sys\nfrom colloc.system.progress import StatusLine\nwith StatusLine() as line: "
-        "line.say('x')\n"
-    )
-    said = subprocess.run(
-        [sys.executable, "-c", code + "print('rich' in sys.modules)"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert (said.stdout, said.stderr) == ("False\n", "")

@@ -8,17 +8,14 @@ import io
 import multiprocessing
 import os
 import resource
-import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, record
 
-from colloc.commands.families import sweep as sweep_study
 from colloc.commands.solve import open_archive as show_archive
 from colloc.results.archive import StartName, archive_at, open_archive
 from colloc.studies.journal import append_visits, read_journal
@@ -152,16 +149,6 @@ def test_an_archive_is_read_where_nothing_can_be_written(tmp_path, tmp_path_fact
         assert in_child(shown) == 11
     assert sorted(p.name for p in folder.iterdir()) == before
     assert len(archive_at(folder / "a.h5").outcomes) == 4
-
-
-def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
-    (tmp_path / "s.py").write_text(STUDY)
-    folder = tmp_path / "out" / "tiny.study"
-    with locked(folder / "lock"):
-        assert sweep_study([str(tmp_path / "s.py"), "--output", str(tmp_path / "out")]) == 2
-    assert f"in use by process {os.getpid()} on" in capsys.readouterr().err
-    with locked(folder / "lock"):
-        pass
 
 
 def test_a_lock_keeps_other_processes_out_until_its_holder_lets_go(tmp_path):
@@ -307,56 +294,3 @@ def test_ctrl_c_at_any_moment_leaves_no_temporary_file(moment, tmp_path, monkeyp
     monkeypatch.undo()
     assert [p.name for p in tmp_path.iterdir()] == ["x"]
     assert (tmp_path / "x").read_text() == "old"
-
-
-def test_an_error_of_the_disk_when_a_file_is_flushed_is_reported(tmp_path, monkeypatch):
-    def broken(_):
-        raise OSError(errno.EIO, "Input/output error")
-
-    (tmp_path / "x").write_text("old")
-    monkeypatch.setattr("colloc.system.replaced_file.os.fsync", broken)
-    with (
-        pytest.raises(StoreError, match="Input/output error"),
-        replaced_file(tmp_path / "x") as name,
-    ):
-        Path(name).write_text("new")
-    assert (tmp_path / "x").read_text() == "old"
-
-
-def _fill(samples, kind):
-    for version in range(1, 400):
-        samples.write(kind, version)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(
-    not hasattr(os, "geteuid") or os.geteuid() != 0,
-    reason="mounting a small disk needs the superuser",
-)
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_small_disk_that_fills_up(samples, kind, tmp_path):
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    if subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)], capture_output=True
-    ).returncode:
-        pytest.skip("no file system may be mounted here")
-    try:
-        samples.folder = disk
-        samples.write(kind)
-        before = samples.read(kind)
-        filling = np.zeros(2**20, dtype="u1").tobytes()
-        with contextlib.suppress(OSError), open(disk / "filling", "wb", buffering=0) as file:
-            while file.write(filling):
-                pass
-        with pytest.raises(CollocError, match="cannot write"):
-            _fill(samples, kind)
-        (disk / "filling").unlink()
-        after = samples.read(kind)
-        if kind in ROW_KINDS:  # small rows may have found room
-            assert set(before) <= set(after)
-        else:
-            assert after == before
-        samples.write(kind, 1)
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)

@@ -50,19 +50,6 @@ def test_a_file_with_anything_but_its_one_table_is_refused_by_readers_and_writer
     assert path.read_bytes() == before
 
 
-def test_a_file_that_lost_its_table_is_no_empty_one(tmp_path):
-    """One changed byte takes it: as many tables as the first page says there are."""
-    path = tmp_path / "x.sqlite"
-    put_rows(path, KIND, {"a": 1})
-    data = bytearray(path.read_bytes())
-    data[103:105] = b"\0\0"
-    path.write_bytes(data)
-    for attempt in (lambda: read_rows(path, KIND), lambda: put_rows(path, KIND, {"b": 2})):
-        with pytest.raises(StoreError, match="its table is missing"):
-            attempt()
-    assert path.read_bytes() == data
-
-
 @pytest.mark.parametrize("row", ["'b', NULL", "'c', 'd'", "'e', '{0}'", "'f', x'00'"])
 def test_a_file_with_a_row_that_cannot_be_read_is_refused_in_a_sentence(row, tmp_path):
     path = tmp_path / "x.sqlite"
@@ -92,14 +79,6 @@ def test_damaged_pages_are_refused_in_a_sentence_or_read(tmp_path):
         except StoreError as error:
             said.append(str(error))
     assert all(each.startswith(f"{path} ") for each in said)
-
-
-def test_an_empty_file_is_one_whose_writer_was_killed_before_its_first_row(tmp_path):
-    path = tmp_path / "x.sqlite"
-    path.touch()
-    assert read_rows(path, KIND) == {}
-    put_rows(path, KIND, {"b": 2})
-    assert read_rows(path, KIND) == {"b": 2}
 
 
 def test_a_reader_finishes_what_a_killed_writer_began(tmp_path):

@@ -1,6 +1,5 @@
 """HDF5 files of results: what texts and numbers become, and what is refused."""
 
-import h5py
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -9,7 +8,6 @@ from shared.store_samples import HDF5_KINDS, Samples
 
 from colloc.system.errors import StoreError
 from colloc.system.store_file import array, attribute, mark, new_file, open_file, put, put_attribute
-from scripts.paper.array_store import read_arrays, write_arrays
 
 TEXTS = [
     "",
@@ -53,12 +51,6 @@ def test_texts_round_trip(tmp_path, value):
 def test_lists_of_texts_round_trip_but_for_trailing_nuls(tmp_path, values):
     for found in returned(tmp_path / "x.h5", np.array(values, dtype=object)):
         assert found.tolist() == [value.rstrip("\0") for value in values]
-
-
-def test_trailing_nuls_are_not_kept_and_what_utf8_cannot_hold_is_replaced(tmp_path):
-    assert returned(tmp_path / "x.h5", "a\0b\0\0") == ("a\0b", "a\0b")
-    assert returned(tmp_path / "x.h5", "\0") == ("", "")
-    assert returned(tmp_path / "x.h5", "name \udcff") == ("name ?", "name ?")
 
 
 @pytest.mark.parametrize(
@@ -118,13 +110,3 @@ def test_what_is_missing_or_no_dataset_is_named(tmp_path):
             open_file(tmp_path / "x.h5", "test", 1) as file,
         ):
             read(file, name)
-
-
-def test_plain_h5py_reads_texts(tmp_path):
-    path = tmp_path / "x.h5"
-    write_arrays(path, {"names": np.array(["ä", "bb"]), "one": "text"}, attributes={"note": "µ"})
-    with h5py.File(path) as file:
-        assert file["names"].asstr()[()].tolist() == ["ä", "bb"]
-        assert file["one"].asstr()[()] == "text"
-        assert file.attrs["note"].decode() == "µ"
-    assert read_arrays(path)["names"].tolist() == ["ä", "bb"]

@@ -8,12 +8,10 @@ reason.
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ellipse, solve_balance
+from colloc import Chain, Harmonic, Problem, ellipse, solve_balance
 from colloc.numerics.multiplier_estimate import estimated_multipliers, quasi_definite_factors
 from colloc.search.ipopt import Solver
 from colloc.search.spaces import program_of
-from colloc.smooth.balance import solve_smooth
-from colloc.smooth.motion import sine_wave
 from tests.shared.laws import coulomb
 
 
@@ -55,12 +53,6 @@ def test_steps_of_the_balance_solver(law, delta, mean, largest):
     iterations = solve_balance(Chain(), coulomb(*law), angles, rates, delta).require().iterations
     assert iterations.mean() <= mean
     assert iterations.max() <= largest
-
-
-def test_panels_and_steps_of_a_smooth_body():
-    solved = solve_smooth(sine_wave(), Friction(), np.linspace(0, 0.45, 10), 1e-4).require()
-    assert solved.panels.max() <= 60
-    assert solved.iterations.max() <= 100
 
 
 @pytest.mark.parametrize(

@@ -195,17 +195,6 @@ def test_moments_at_the_joints_are_those_that_the_power_of_single_joints_says(ca
     np.testing.assert_allclose(x[full.layout.moments], expected, atol=1e-12)
 
 
-def test_half_a_period_with_a_symmetry_gives_the_same_efficiency_as_the_whole():
-    values = []
-    for symmetry, intervals in (("none", 80), ("bilateral", 40), ("antipodal", 40)):
-        problem = Problem(
-            "p", ellipse(0, 1.5, 0.8), gait=Harmonic(1, symmetry), intervals=intervals
-        )
-        full, x, *_ = at_guess(problem, 0.05)
-        values.append(float(full.nlp.functions["grad_f"](x, 0.05 / full.delta_unit)[0]))
-    np.testing.assert_allclose(values, values[0], rtol=1e-6)
-
-
 @pytest.mark.parametrize(
     ("name", "order"), [("trapezoid", 2), ("hermite-simpson", 4), ("gauss-2", 4), ("radau-2", 3)]
 )
@@ -231,14 +220,6 @@ def test_no_equation_is_redundant(case):
     equations = jacobian[full.row_lower == full.row_upper][:, full.lower < full.upper]
     singular = np.linalg.svd(equations, compute_uv=False)
     assert singular.min() > 1e-6 * singular.max()
-
-
-def test_a_symmetry_closes_the_rotation_without_a_row():
-    names = {
-        symmetry: program_of(stated("symmetric", gait=Harmonic(1, symmetry))).groups
-        for symmetry in ("none", "bilateral", "antipodal")
-    }
-    assert {name for name, groups in names.items() if "rotation" in groups} == {"none", "antipodal"}
 
 
 def test_functions_grow_neither_with_the_mesh_nor_with_the_links():
@@ -281,16 +262,6 @@ def test_nonzeros_grow_by_so_many_for_every_interval(links, formulation, jacobia
     growth = np.diff(counts, axis=0)[0] / 20
     assert growth[0] <= jacobian
     assert growth[1] <= hessian
-
-
-def test_limits_of_the_shape_are_rows_where_they_may_bind_and_follow_the_gait():
-    problem = stated("symmetric", joint_limit=1.8, guess=ellipse(0.0, 1.55, 0.8))
-    full, x, *_ = at_guess(problem)
-    assert 0 < full.cells["joint 1"].size < full.mesh.n
-    parameters = 0.8 * x[full.layout.parameters[:, 0]]
-    moved, y = full.moved_to(full.feasible(parameters, 0.1))
-    assert moved.cells["joint 1"].size < full.cells["joint 1"].size
-    np.testing.assert_allclose(y, moved.feasible(parameters, 0.1), atol=1e-12)
 
 
 def test_ipopt_finds_from_the_guess_what_it_confirms():
