@@ -63,9 +63,7 @@ def random_gait(number: int) -> tuple[Chain, Friction, GaitPath]:
     )
     kind = harmonics_within(int(rng.integers(1, 5)), symmetry)
     size = kind.size(body.n_joint)
-    gait = kind.fourier(
-        rng.normal(0, rng.uniform(0.2, 1.0), size) / np.sqrt(size / 3), body.n_joint
-    )
+    gait = kind.member(rng.normal(0, rng.uniform(0.2, 1.0), size) / np.sqrt(size / 3), body.n_joint)
     return body, Friction(mu_t=mu_t, mu_f=1.0, mu_b=mu_b), gait
 
 

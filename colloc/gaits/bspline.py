@@ -1,12 +1,8 @@
-"""Gaits whose joint angles are periodic B-splines of the phase, on evenly spaced knots.
-
-Function i is the cardinal B-spline of the degree, centred at phase i / knots (C. de Boor, A
-Practical Guide to Splines, 2001). It differs from 0 on degree + 1 intervals between knots, so one
-coefficient changes a part of the period alone, which no harmonic does.
+"""Joint angles as periodic B-splines of the phase on even knots (C. de Boor, A Practical Guide to
+Splines, 2001): function i is the cardinal B-spline centred at phase i / knots.
 
 Splines of degree 1 are polygons. Their pace does not matter: delta is relative to the shape speed,
-a program spends as much of its time on one side as on any other, and members are run through at
-constant shape speed.
+a program spends as much time on each side, and members are run through at constant shape speed.
 """
 
 from __future__ import annotations
@@ -25,25 +21,19 @@ from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
-_DRAWN = 3
-"""Harmonics, at most, through which starts are drawn: coefficients by chance would make rough
-gaits."""
-_INSTANTS = 32
-"""Phases a side at which polygons are fitted."""
-_INTERVALS, _A_SIDE = 24, 4
-"""Of the first mesh of a polygon, and of each of its sides, at least."""
+_DRAWN = 3  # harmonics of starts, at most: random coefficients would make rough gaits
+_INSTANTS = 32  # phases a side at which polygons are fitted
+_INTERVALS, _A_SIDE = 24, 4  # of the first mesh of a polygon, and of each of its sides, at least
 _POINTS = 241
-_AT_A_CORNER = 1e-9
-"""Distance at which an edge of a mesh is at a corner."""
+_AT_A_CORNER = 1e-9  # distance at which an edge of a mesh is at a corner
 
 
 class Splines(LinearClass):
-    """Base of `BSpline` and `Polygon`: periodic splines by their ``knots`` and ``degree``."""
+    """Base of `BSpline` and `Polygon`."""
 
     knots: int
     degree: int
-    shift = 0.0
-    """Phase of the first knot, in spacings of knots."""
+    shift = 0.0  # phase of the first knot, in spacings of knots
     series = series_of
 
     @property
@@ -56,21 +46,16 @@ class Splines(LinearClass):
 
     @property
     def harmonics(self) -> int:  # type: ignore[override]
-        """As many waves as so many knots resolve."""
         return self.knots // 2
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """``(knots, n_time)``: the B-splines at phases t, or their derivatives per period; at a
-        corner those of the side ahead."""
+        # derivatives at a corner are those of the side ahead
         from scipy.interpolate import BSpline as Piecewise
 
-        one, width = (
-            Piecewise.basis_element(np.arange(self.degree + 2), extrapolate=False),
-            self.degree + 1,
-        )
-        since = (
-            self.knots * t - np.arange(self.knots)[:, None] - self.shift + 0.5 * width
-        ) % self.knots
+        width = self.degree + 1
+        one = Piecewise.basis_element(np.arange(width + 1), extrapolate=False)
+        knots = np.arange(self.knots)[:, None]
+        since = (self.knots * t - knots - self.shift + 0.5 * width) % self.knots
         values = self.knots**derivative * np.nan_to_num(one(since, nu=derivative), nan=0.0)
         return np.where(since < width, values, 0.0)
 
@@ -81,10 +66,8 @@ class Splines(LinearClass):
         n = _INSTANTS * self.knots
         return np.arange(n) / n
 
-    # starts
     @property
     def _smooth(self) -> Harmonic:
-        """What starts are drawn through."""
         return self.series(min(self.harmonics, _DRAWN))
 
     def dimension(self, n_joint: int) -> int:
@@ -94,10 +77,9 @@ class Splines(LinearClass):
         return self._smooth.drawn(unit, n_joint)
 
     def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
-        """The member nearest to a gait, moved by smooth waves by chance: all finer features
-        stay."""
-        rest = self._smooth.fourier(np.zeros(self._smooth.size(gait.n_joint)), gait.n_joint)
-        by = self.parameters(self._smooth.moved(rest, step, fall, rng))
+        """Add smooth random waves, which leave finer features as they are."""
+        straight = self._smooth.member(np.zeros(self._smooth.size(gait.n_joint)), gait.n_joint)
+        by = self.parameters(self._smooth.moved(straight, step, fall, rng))
         return self.member(self.parameters(self.through(gait)) + by, gait.n_joint)
 
     # polygons
@@ -108,15 +90,19 @@ class Splines(LinearClass):
         inner = corners[(corners > _AT_A_CORNER) & (corners < self.fraction - _AT_A_CORNER)]
         return np.concatenate([[0.0], inner, [self.fraction]])
 
+    @property
+    def _n_side(self) -> int:
+        return self.corners_in_time.size - 1
+
     def intervals(self, n_joint: int) -> int:
         if not self.relative_delta:
             return super().intervals(n_joint)
-        return max(_INTERVALS, _A_SIDE * (self.corners_in_time.size - 1))
+        return max(_INTERVALS, _A_SIDE * self._n_side)
 
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         if not self.relative_delta:
             return super().fewest_intervals(per_interval)
-        return 2 * (self.corners_in_time.size - 1), "the sides"
+        return 2 * self._n_side, "the sides"
 
     def edges(self, n: int) -> np.ndarray:
         if not self.relative_delta:
@@ -134,15 +120,14 @@ class Splines(LinearClass):
         return self.rate_matrix(times, n_joint)
 
     def side_rates(self, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
-        """Share of each side of the solved part in its time, ``(n_side,)``, and joint rates on it
-        per parameter, ``(n_side, n_joint, n_parameter)``."""
+        """Fraction of the time of each side ``(n_side,)``, and joint rates on it per parameter
+        ``(n_side, n_joint, n_parameter)``."""
         corners = self.corners_in_time
         middles = 0.5 * (corners[1:] + corners[:-1])
         return np.diff(corners) / corners[-1], self.rate_matrix(middles, n_joint)
 
     def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
-        table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
-        return Combination(self, table)
+        return Combination(self, (self._basis(n_joint) @ parameters).reshape(n_joint, -1))
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Any:
         gait = self.trajectory(parameters, n_joint)
@@ -150,13 +135,11 @@ class Splines(LinearClass):
             return gait
         return Corners.through(gait.angles(self.corners_in_time), self.symmetry)
 
-    def _is_timed(self, gait: Any) -> bool:
-        """Whether a gait has the corners of a member."""
+    def _has_corners_of(self, gait: Any) -> bool:
         return (
-            self.relative_delta
-            and isinstance(gait, Corners)
+            isinstance(gait, Corners)
             and gait.symmetry == self.symmetry
-            and gait.phases.size == self.corners_in_time.size
+            and gait.phases.size == self._n_side + 1
         )
 
     def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
@@ -165,35 +148,32 @@ class Splines(LinearClass):
         return np.interp(times, self.corners_in_time, gait.phases)
 
     def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
-        """The edges are at the corners, whatever gait it is."""
         if not self.relative_delta:
             return phases
         corners, edges = self.corners_in_time, phases
-        if self._is_timed(gait):
+        if self._has_corners_of(gait):
             edges = np.interp(phases, gait.phases, corners)
         apart = np.abs(edges[:, None] - corners).min(axis=1)
         return np.union1d(edges[apart > _AT_A_CORNER], corners)
-
-    def _corners_on(self, gait: Any) -> np.ndarray:
-        """Corners of the solved part, and its ends, on the path of a gait."""
-        samples = symmetric_samples(gait, self.symmetry)
-        steps = np.linalg.norm(np.diff(samples), axis=0)
-        along = np.concatenate([[0.0], np.cumsum(steps)])
-        even = np.linspace(0.0, along[-1], _POINTS)
-        path = np.stack([np.interp(even, along, row) for row in samples])
-        return path[:, _best_corners(path, self.corners_in_time.size - 1)]
 
     def nearest(self, gait: Any) -> np.ndarray:
         if not self.relative_delta or getattr(gait, "basis", None) == self:
             return super().nearest(gait)
         times = self.corners_in_time
-        points = gait.vertices if self._is_timed(gait) else self._corners_on(gait)
+        if self._has_corners_of(gait):
+            points = gait.vertices
+        else:  # on the path, evenly in arc length
+            samples = symmetric_samples(gait, self.symmetry)
+            steps = np.linalg.norm(np.diff(samples), axis=0)
+            along = np.concatenate([[0.0], np.cumsum(steps)])
+            even = np.linspace(0.0, along[-1], _POINTS)
+            path = np.stack([np.interp(even, along, row) for row in samples])
+            points = path[:, _best_corners(path, self._n_side)]
         knots = self.knots * times - self.shift
         corners = np.abs(knots - np.round(knots)) < _AT_A_CORNER  # others are middles of sides
-        matrix = self.angle_matrix(times[corners], gait.n_joint).reshape(
-            corners.sum() * len(points), -1
-        )
-        return np.linalg.lstsq(matrix, points[:, corners].T.ravel(), rcond=None)[0]
+        matrix = self.angle_matrix(times[corners], gait.n_joint)
+        values = points[:, corners].T.ravel()
+        return np.linalg.lstsq(matrix.reshape(values.size, -1), values, rcond=None)[0]
 
 
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
@@ -202,17 +182,14 @@ def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
     n = points.shape[1]
     cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
     for i in range(n - 1):
-        # points beyond i, seen from it: the chord to each of them, and all that lie before that one
+        # the chord from point i to each later one, and all points between
         seen = points[:, i + 1 :] - points[:, i : i + 1]
         dots, squares = seen.T @ seen, np.sum(seen**2, axis=0)
         along = dots / np.maximum(squares, 1e-300)
         np.clip(along, 0.0, 1.0, out=along)
         nearer = along * (2 * dots - along * squares)
-        cost[i, i + 1 :] = (
-            np.cumsum(squares)
-            - squares
-            - np.einsum("kj,kj->j", nearer, before[: n - i - 1, : n - i - 1])
-        )
+        between = before[: n - i - 1, : n - i - 1]
+        cost[i, i + 1 :] = np.cumsum(squares) - squares - np.einsum("kj,kj->j", nearer, between)
     best, back = cost[0].copy(), []
     for _ in range(pieces - 1):
         total = best[:, None] + cost
@@ -229,13 +206,11 @@ def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
 class BSpline(Splines):
     """The class of gaits whose joint angles are periodic B-splines in time.
 
-    A joint has as many coefficients as the spline has knots.
-
     Parameters
     ----------
     knots : int
-        In a period, evenly spaced; more than the degree, 64 at most, and an even number for
-        antipodal gaits.
+        In a period, evenly spaced, each with a coefficient for every joint; more than the degree,
+        64 at most, and an even number for antipodal gaits.
     degree : int
         Of the polynomials between knots, 1 to 5; its derivatives below the degree are continuous.
         Those of degree 1 are polygons, see `Polygon`.

@@ -1,14 +1,13 @@
-"""Gaits on functions of one's own: joint angles are linear in columns over time, such as the
-primitives of a controller."""
+"""Gaits that are linear in columns over time, such as the primitives of a controller."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -18,19 +17,12 @@ from colloc.system.arguments import named_arguments
 from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 
-Column: TypeAlias = Any
-"""Samples over a period, ``(n_time,)`` or ``(n_joint, n_time)``, or a function of phases that
-returns such."""
-
 _DEGREE, _FEWEST, _SAMPLED, _ROUNDING = 5, 24, 192, 1e-15
-"""Of the interpolating spline; samples at least; samples of functions; rounding."""
-_ROUGH = 0.02
-"""Relative error of interpolation at which columns are refused."""
-_EVEN = 1e-3
-"""Relative difference of steps that counts as none."""
+"""Degree of the spline; samples at least; samples of functions; rounding."""
+_ROUGH = 0.02  # relative error of interpolation at which columns are refused
+_EVEN = 1e-3  # relative difference of even steps
 _RESOLVED, _MOST = 1e-6, 24
-"""Share of the mean square rate that harmonics left out may hold, and the most that meshes are made
-for."""
+"""Share of the mean square rate in harmonics left out, and the most harmonics of a mesh."""
 
 
 @named_arguments
@@ -77,7 +69,7 @@ class Basis(LinearClass):
     series = series_of
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "columns", _checked(self.columns))
+        object.__setattr__(self, "columns", _check_columns(self.columns))
         self._check_symmetry()
         if self.error > _ROUGH:
             raise ProblemError(
@@ -93,20 +85,15 @@ class Basis(LinearClass):
 
     @property
     def error(self) -> float:
-        """Estimate of the error of interpolation, of the largest value. What a spline through every
-        other sample misses at the others falls, from every fourth to every other sample, by a
-        factor; this is what one more such step leaves."""
-        return _splines(self)[1]
+        """Estimated error of interpolation, relative to the largest value."""
+        return _interpolate(self)[1]
 
     @property
     def harmonics(self) -> int:  # type: ignore[override]
-        """As many as hold all but a millionth of the columns' mean square rates."""
-        return _splines(self)[2]
+        return _interpolate(self)[2]
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """The columns, of all joints one after the other, at phases t or their derivatives per
-        period."""
-        return _splines(self)[0](np.asarray(t) % 1.0, nu=derivative).T
+        return _interpolate(self)[0](np.asarray(t) % 1.0, nu=derivative).T
 
     def label(self, number: int) -> str:
         return super().label(number // len(self.columns[0]) if self._whole else number)
@@ -138,8 +125,8 @@ class Basis(LinearClass):
 
 
 @lru_cache(maxsize=32)
-def _splines(kind: Basis) -> tuple[Any, float, int]:
-    """A spline through the columns, the relative error of it, and how many harmonics they have."""
+def _interpolate(kind: Basis) -> tuple[Any, float, int]:
+    """A spline through the columns, its relative error, and the number of harmonics."""
     from scipy.interpolate import make_interp_spline
 
     values = np.array(kind.columns)
@@ -148,69 +135,64 @@ def _splines(kind: Basis) -> tuple[Any, float, int]:
     phases, closed = np.arange(n + 1) / n, np.vstack([values, values[:1]])
     spline = make_interp_spline(phases, closed, _DEGREE, bc_type="periodic")
 
-    def missed(every: int) -> float:
+    def residual(every: int) -> float:
         kept = np.append(np.arange(0, n, every), n)
         coarse = make_interp_spline(phases[kept], closed[kept], _DEGREE, bc_type="periodic")
         return float(np.abs(coarse(phases) - closed).max() / largest)
 
-    now, before = missed(2), missed(4)
-    falls = np.clip(now / max(before, _ROUNDING), 0.5 ** (_DEGREE + 1), 1.0)
-    power = (np.arange(n // 2 + 1)[:, None] ** 2 * np.abs(np.fft.rfft(values, axis=0)) ** 2).sum(
-        axis=1
-    )
+    # the error falls from each halving of the step to the next by about the same factor
+    half, quarter = residual(2), residual(4)
+    falls = np.clip(half / max(quarter, _ROUNDING), 0.5 ** (_DEGREE + 1), 1.0)
+    power = np.arange(n // 2 + 1)[:, None] ** 2 * np.abs(np.fft.rfft(values, axis=0)) ** 2
+    power = power.sum(axis=1)
     left = 1 - np.cumsum(power) / power.sum()
-    return spline, float(now * falls), int(np.clip(np.argmax(left < _RESOLVED), 1, _MOST))
+    return spline, float(half * falls), int(np.clip(np.argmax(left < _RESOLVED), 1, _MOST))
 
 
-def _checked(given: str | os.PathLike[str] | Sequence[Column]) -> tuple:
-    """The columns as nested tuples of samples."""
-    if isinstance(given, (str, os.PathLike)):
-        given = _read(Path(given))
+def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
+    """Sample or read columns; as nested tuples."""
+    if isinstance(columns, (str, os.PathLike)):
+        columns = _read(Path(columns))
+    phases = np.arange(_SAMPLED) / _SAMPLED
     try:
-        found = [np.array(_sampled(column), dtype=float) for column in given]
+        arrays = [np.array(each(phases) if callable(each) else each, float) for each in columns]
     except (TypeError, ValueError):
         raise ProblemError(
             "gait.columns must be a sequence of columns: samples over a period, or functions of "
             "the phase."
         ) from None
     if (
-        not found
-        or found[0].ndim not in (1, 2)
-        or any(column.shape != found[0].shape for column in found)
+        not arrays
+        or arrays[0].ndim not in (1, 2)
+        or any(each.shape != arrays[0].shape for each in arrays)
     ):
         raise ProblemError(
             "gait.columns must be alike: each (n_time,), or each (n_joint, n_time), with as many "
             "samples."
         )
-    if found[0].shape[-1] < _FEWEST:
+    if arrays[0].shape[-1] < _FEWEST:
         raise ProblemError(
-            f"gait.columns have {found[0].shape[-1]} samples of a period: give at least {_FEWEST}."
+            f"gait.columns have {arrays[0].shape[-1]} samples of a period: give at least {_FEWEST}."
         )
-    if not all(np.isfinite(column).all() for column in found):
+    if not all(np.isfinite(each).all() for each in arrays):
         raise ProblemError("gait.columns must be finite numbers.")
-    if max(np.ptp(column, axis=-1).max() for column in found) == 0:
+    if max(np.ptp(each, axis=-1).max() for each in arrays) == 0:
         raise ProblemError("gait.columns do not change over time: nothing would move.")
-    return tuple(_nested(column.tolist()) for column in found)
+    return tuple(_nested(each.tolist()) for each in arrays)
 
 
 def _nested(values: list) -> tuple:
     return tuple(_nested(value) if isinstance(value, list) else value for value in values)
 
 
-def _sampled(column: Column | Callable[[np.ndarray], np.ndarray]) -> Any:
-    return column(np.arange(_SAMPLED) / _SAMPLED) if callable(column) else column
-
-
 def _read(path: Path) -> list[np.ndarray]:
-    """The columns of a file but the first, which is time at even steps of a period; the last line
-    may be the first again."""
+    """Columns of a file after its first, even times of a period; a last line that repeats the first
+    is dropped."""
     _, table = csv_table(path, _FEWEST)
     steps = np.diff(table[:, 0])
     if steps.min() <= 0 or np.ptp(steps) > _EVEN * steps.mean():
         raise ProblemError(f"{path}: the times in the first column must rise by even steps.")
     values = table[:, 1:]
-    repeats = (
-        np.abs(values[-1] - values[0]).max()
-        <= 0.1 * np.abs(np.diff(values, axis=0)).max(axis=1).mean()
-    )
+    step = np.abs(np.diff(values, axis=0)).max(axis=1).mean()
+    repeats = np.abs(values[-1] - values[0]).max() <= 0.1 * step
     return list(values[:-1].T if repeats else values.T)

@@ -1,9 +1,9 @@
-"""Gaits of a chain some of whose joints hang on one motor, or are stuck: a class of gaits of the
-motors, and a linear map from their angles to those of the joints (`colloc.mechanics.joint_map`)."""
+"""Gaits of a chain some of whose joints hang on one motor or are stuck: a class of gaits m of the
+motors, and a linear map to the joints, q = G m + q0."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -66,9 +66,9 @@ class Coupled(LinearClass):
                 "Problem(body=Chain(...), gait=Coupled(Harmonic(1), stuck={1: 0.4})), not a "
                 f"{type(kind).__name__}."
             )
-        object.__setattr__(self, "stuck", _checked_stuck(self.stuck))
-        usual = isinstance(self.gears, (tuple, list)) and not self.gears
-        object.__setattr__(self, "gears", () if usual else _checked_gears(self.gears))
+        object.__setattr__(self, "stuck", _check_stuck(self.stuck))
+        default = isinstance(self.gears, (tuple, list)) and not self.gears
+        object.__setattr__(self, "gears", () if default else _check_gears(self.gears))
 
     def joint_map(self, n_joint: int) -> JointMap:
         return _joint_map(self, n_joint)
@@ -116,23 +116,18 @@ class Coupled(LinearClass):
         return f"{self.gait.describe()}{motors}{stuck}"
 
     def lines(self, gait: Any) -> list[str]:
+        """A member as a formula of its motors, and the joints that are stuck."""
         stuck = [f"joint {j + 1}: {angle:+.4f}" for j, angle in self.stuck]
         return [*self.driven(gait).lines(), *stuck]
 
-    def offset(self, n_joint: int) -> np.ndarray:
-        return self.joint_map(n_joint).offset
-
     def _basis(self, n_joint: int) -> np.ndarray:
         joints = self.joint_map(n_joint)
-        of_motors = self.gait._basis(joints.n_motor)
-        return np.asarray(
-            np.tensordot(
-                joints.matrix, of_motors.reshape(joints.n_motor, -1, of_motors.shape[1]), 1
-            )
-        ).reshape(-1, of_motors.shape[1])
+        motors = self.gait._basis(joints.n_motor)
+        tables = motors.reshape(joints.n_motor, -1, motors.shape[1])
+        return np.asarray(np.tensordot(joints.matrix, tables, 1)).reshape(-1, motors.shape[1])
 
     def _motors(self, gait: Any) -> Any:
-        """The gait of the motors that comes nearest to one of the joints."""
+        """The gait of the motors that is nearest to one of the joints."""
         joints = self.joint_map(gait.n_joint)
         if getattr(gait, "basis", None) == self:
             return self.gait.member(self.nearest(gait), joints.n_motor)
@@ -160,7 +155,6 @@ class Coupled(LinearClass):
 
 @lru_cache(maxsize=32)
 def _joint_map(kind: Coupled, n_joint: int) -> JointMap:
-    """The map of a class for so many joints, or a `ProblemError`."""
     for joint, _ in kind.stuck:
         if joint >= n_joint:
             raise ProblemError(
@@ -188,14 +182,10 @@ def _joint_map(kind: Coupled, n_joint: int) -> JointMap:
     return JointMap(tuple(map(tuple, gears.tolist())), tuple(rest.tolist()))
 
 
-def _checked_stuck(
-    stuck: Mapping[int, float] | Sequence[Sequence[float]],
-) -> tuple[tuple[int, float], ...]:
+def _check_stuck(stuck: Any) -> tuple[tuple[int, float], ...]:
     try:
-        pairs = [
-            (joint, angle)
-            for joint, angle in (stuck.items() if isinstance(stuck, Mapping) else stuck)
-        ]
+        pairs = stuck.items() if isinstance(stuck, Mapping) else stuck
+        pairs = [(joint, angle) for joint, angle in pairs]
     except (TypeError, ValueError):
         raise ProblemError(
             f"stuck gives joints and their angles, as {{1: 0.4}}, not {stuck!r}."
@@ -212,7 +202,7 @@ def _checked_stuck(
     return tuple(sorted((int(joint), float(angle)) for joint, angle in pairs))
 
 
-def _checked_gears(gears: Any) -> tuple[tuple[float, ...], ...]:
+def _check_gears(gears: Any) -> tuple[tuple[float, ...], ...]:
     try:
         table = np.array(gears, dtype=float)
     except (TypeError, ValueError, OverflowError):

@@ -1,8 +1,4 @@
-"""What a gait is, and a class of gaits: the bases of all kinds.
-
-A gait is a function of the phase, with words for its reader. A class says which gaits are allowed.
-Its members are known by a vector of parameters.
-"""
+"""Gaits, functions of the phase in [0, 1], and classes of gaits, known by vectors of parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.symmetry import SYMMETRIES, fraction, symmetric_samples
+from colloc.gaits.symmetry import SYMMETRIES, fraction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.joint_map import JointMap
 from colloc.system.arguments import shown
@@ -21,39 +17,18 @@ from colloc.system.errors import ProblemError
 _DENSE = 2000
 _SEED_HARMONICS = 2
 DELTA_START = 0.01
-"""Where searches begin in delta relative to the shape speed [body lengths per radian of path]."""
+"""First delta of a search, relative to the shape speed [body lengths per radian of path]."""
 
 
 class GaitFunction:
-    """Base of the kinds of gaits: ``gait(t)`` gives joint angles and rates, so a gait can stand
-    where a path is asked for.
+    """Base of gaits: ``gait(t)`` is joint angles and rates ``(n_joint, n_time)`` at phases t."""
 
-    Examples
-    --------
-    >>> from colloc import ellipse
-    >>> gait = ellipse(A0=0, A1=2, B1=1)
-    >>> angles, rates = gait([0, 0.25])
-    >>> angles
-    array([[ 2.,  1.],
-           [-2.,  1.]])
-    >>> print(gait)
-    joint 1: +0.0000 +2.0000 cos 2πt +1.0000 sin 2πt
-    joint 2: +0.0000 -2.0000 cos 2πt +1.0000 sin 2πt
-    """
-
-    is_series = False
-    """Whether it is a sum of functions of the phase with coefficients, a Fourier series for one."""
-    theta: float | None = None
-    """Where the tail link points at phase 0, of a gait for a slope (`colloc.gaits.sloped`)."""
-    log_period: float | None = None
-    """Logarithm of the period [sqrt(length / gravity)], of a gait that says its pace
-    (`colloc.gaits.inertia`)."""
-    coordinate = "joint"
-    """What the gait's body calls a shape coordinate."""
+    is_series = False  # a sum of functions of the phase
+    theta: float | None = None  # orientation of the tail link at phase 0, on a slope [rad]
+    log_period: float | None = None  # logarithm of the period [sqrt(length / gravity)]
+    coordinate = "joint"  # name of a shape coordinate
     joint_map: JointMap | None = None
-    """Of joints that hang on fewer motors."""
-    rest: np.ndarray | float = 0.0
-    """What of the angles stays where the gait is scaled."""
+    rest: np.ndarray | float = 0.0  # part of the angles that scaling leaves as it is
 
     @property
     def n_joint(self) -> int:
@@ -69,61 +44,59 @@ class GaitFunction:
 
     @property
     def length(self) -> float:
-        """Of the closed path [rad], which is the mean shape speed per period."""
+        """Length of the closed path [rad], the mean shape speed per period."""
         points = self.angles(np.linspace(0.0, 1.0, _DENSE + 1))
         return float(np.linalg.norm(np.diff(points), axis=0).sum())
 
     def mapped(self, matrix: np.ndarray) -> Any:
-        """The gait, or a polygon near it, with shapes multiplied by a matrix ``(m, n_joint)``."""
+        """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
         raise NotImplementedError
 
     @property
     def driven(self) -> Any:
-        """The gait of what has motors: the gait itself, unless several joints share one."""
+        """The gait of the motors."""
         return self
 
     @property
     def mirrored(self) -> Any:
-        """Its mirror image: all angles are negative."""
+        """The mirror image: all angles negated."""
         return self.mapped(-np.eye(self.n_joint))
 
     def grown(self, factor: float) -> Any:
-        """The gait with shapes multiplied by a factor about their mean, where it can grow; else as
-        it is."""
+        """The gait with shapes multiplied by a factor about their mean, if it can grow."""
         return self
 
     @property
     def corner_phases(self) -> np.ndarray:
-        """Phases in (0, 1) where the rates jump: by default none."""
+        """Phases in (0, 1) where the rates jump."""
         return np.empty(0)
 
     def lines(self) -> list[str]:
-        """The gait in words or as a formula."""
+        """The gait as a formula or in words, a line each."""
         raise NotImplementedError
 
     @property
     def pointing(self) -> list[str]:
-        """Lines that say how fast it is played and where it points, if it does."""
-        found = []
+        """Lines on the period and the initial orientation, if the gait has them."""
+        lines = []
         if self.log_period is not None:
             period = np.exp(self.log_period)
-            said = (
+            lines.append(
                 f"a period takes {period:.5g} sqrt(L/g), {period / np.sqrt(GRAVITY):.3g} s for "
-                f"a body of 1 m"
+                f"a body of 1 m: Froude number {period**-2:.4g}"
             )
-            found.append(f"{said}: Froude number {period**-2:.4g}")
         if self.theta is not None:
             turned = np.degrees(np.angle(np.exp(1j * self.theta)))
-            found.append(
+            lines.append(
                 f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)"
             )
-        return found
+        return lines
 
     def named(self, coordinate: str) -> Any:
-        """The gait of a body that calls its shape coordinates so."""
-        found = copy.copy(self)
-        object.__setattr__(found, "coordinate", coordinate)
-        return found
+        """The gait with another name for its shape coordinates."""
+        gait = copy.copy(self)
+        object.__setattr__(gait, "coordinate", coordinate)
+        return gait
 
     def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.angles(t), self.rates(t)
@@ -132,34 +105,21 @@ class GaitFunction:
         return "\n".join(self.lines())
 
     def __repr__(self) -> str:
-        return (
-            f"<{type(self).__name__} of {self.n_joint} "
-            f"{self.coordinate}{'s' if self.n_joint > 1 else ''}>"
-        )
+        plural = "s" * (self.n_joint > 1)
+        return f"<{type(self).__name__} of {self.n_joint} {self.coordinate}{plural}>"
 
 
 class ClassOfGaits:
-    """Base of the classes of gaits; besides what stands here a class has ``symmetry``."""
+    """Base of classes of gaits."""
 
     symmetry: str
-    symmetries: tuple[str, ...] = SYMMETRIES
-    """Those that it may have."""
-    free = True
-    """Whether it has more than one member."""
-    stages: tuple[float, ...] = ()
-    """Phases that every mesh has to have as knots."""
-    relative_delta = False
-    """Whether delta is relative to the shape speed, in body lengths per radian of path, as
-    where members are given by their path and the pace does not matter."""
-    delta_start: float | None = None
-    """Where a search begins in delta; None: where the body's usual one does."""
-    has_fixed_edges = True
-    """Whether edges of its meshes are where the rates jump, so that a planned mesh keeps them."""
-    linear = True
-    """Whether angles of a class of series are linear in the parameters by which its members are
-    searched."""
-    may_tell = False
-    """Whether members can say where they point (`colloc.gaits.told`)."""
+    symmetries: tuple[str, ...] = SYMMETRIES  # that the class may have
+    free = True  # has parameters
+    stages: tuple[float, ...] = ()  # phases that every mesh has as edges
+    relative_delta = False  # delta is relative to the shape speed, as the pace does not matter
+    delta_start: float | None = None  # first delta of a search; None: the body's default
+    linear = True  # angles are linear in the parameters of the search
+    may_tell = False  # members can have static parameters (`colloc.gaits.told`)
 
     def _check_symmetry(self) -> None:
         if self.symmetry not in self.symmetries:
@@ -168,11 +128,10 @@ class ClassOfGaits:
             )
 
     def with_symmetry(self, symmetry: str) -> Any:
-        """The same class with another symmetry."""
         return dataclasses.replace(self, symmetry=symmetry)  # type: ignore[type-var]
 
     def check_joints(self, n_joint: int) -> None:
-        """A `ProblemError` if bodies with so many shape coordinates have no gaits of the class."""
+        """Raise a `ProblemError` if bodies with so many shape coordinates have no such gaits."""
         if self.relative_delta and n_joint < 2:
             raise ProblemError(
                 f"the class {type(self).__name__} needs a body of at least three links, or two "
@@ -180,52 +139,27 @@ class ClassOfGaits:
             )
 
     def joint_map(self, n_joint: int) -> JointMap | None:
-        """The map from motors to so many joints, where several hang on one or some are stuck."""
+        """The map from motors to joints, if several joints hang on one or some are stuck."""
         return None
-
-    def retraces(self, n_joint: int) -> bool:
-        """Whether every member goes back the way it came, in as many shape coordinates."""
-        return n_joint == 1
 
     @property
     def fraction(self) -> float:
-        """The part of the period that has to be solved; symmetry gives the rest."""
+        """Part of the period that is solved; symmetry gives the rest."""
         return fraction(self.symmetry)
 
     @property
     def motion_symmetry(self) -> str:
-        """That of the motion, which gives the rest of it."""
+        """Symmetry of the motion, which is less than that of the gait on a slope."""
         return self.symmetry
 
     @property
     def closing_symmetry(self) -> str:
-        """What is known of the net rotation of all members: that of gaits with this symmetry."""
+        """Symmetry that closes the net rotation."""
         return self.symmetry
-
-    def series(self, harmonics: int) -> Any:
-        """The class of Fourier series with about so many harmonics that stand for its gaits."""
-        raise NotImplementedError
-
-    def first_guess(self, gait: Any) -> Any:
-        """What a search begins with where no guess is given but a wave: by default that."""
-        return gait
-
-    def through(self, gait: Any) -> Any:
-        """The gait that stands for any gait where a search in the class begins: by default
-        itself."""
-        return gait
-
-    def guessed(self, gait: Any) -> tuple[Any, float]:
-        """What is checked of a guess, and its shape speed in rad per radian of phase: by default
-        those of its path."""
-        points = symmetric_samples(gait, self.symmetry)
-        return gait, float(
-            np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.fraction)
-        )
 
     @property
     def level(self) -> Any:
-        """The class on the level."""
+        """The class without static parameters."""
         return self
 
     def describe(self) -> str:
@@ -233,20 +167,24 @@ class ClassOfGaits:
         raise NotImplementedError
 
     def intervals(self, n_joint: int) -> int:
-        """Intervals that a first mesh wants."""
+        """Intervals of a first mesh."""
         raise NotImplementedError
 
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
-        """Intervals that a mesh with so many points on each needs at least, and for what."""
+        """Least intervals of a mesh with so many points on each, and the reason."""
         return 4, "a gait"
 
     def edges(self, n: int) -> np.ndarray:
-        """A mesh of about n intervals on the part of the period that is solved."""
+        """Edges of a mesh of about n intervals on the solved part of the period."""
         return np.linspace(0.0, self.fraction, n + 1)
+
+    def series(self, harmonics: int) -> Any:
+        """The class of Fourier series with about so many harmonics that stand for the gaits."""
+        raise NotImplementedError
 
     @property
     def seeds(self) -> Any:
-        """The class that starts are drawn from: a few harmonics where the class is one of paths."""
+        """The class that starts of a search are drawn from."""
         return self.series(_SEED_HARMONICS)
 
     def size(self, n_joint: int) -> int:
@@ -257,35 +195,34 @@ class ClassOfGaits:
         """The gait of a parameter vector."""
         raise NotImplementedError
 
+    def parameters(self, gait: Any) -> np.ndarray:
+        """Parameters of the member nearest to a gait."""
+        raise NotImplementedError
+
+    def in_phase(self, gait: Any) -> bool:
+        """Whether a gait starts in the phase in which members do."""
+        return True
+
+    def through(self, gait: Any) -> Any:
+        """The gait that a search in the class begins with, for any gait."""
+        return gait
+
     def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
-        """Phases of a member at times of its program: by default the same."""
+        """Phases of a member at times of its program."""
         return times
 
     def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
         """Edges of a program's mesh, from phases of a member."""
         return phases
 
-    def parameters(self, gait: Any) -> np.ndarray:
-        """The parameter vector of a member."""
-        raise NotImplementedError
-
-    def nearest(self, gait: Any) -> np.ndarray:
-        """That of the member nearest to a gait, in its phase."""
-        return self.parameters(gait)
-
-    def in_phase(self, gait: Any) -> bool:
-        """Whether a gait starts where members do."""
-        return True
-
 
 def delta_per_period(gait_class: ClassOfGaits, gait: GaitFunction, delta: float) -> float:
-    """Delta of a class, in body lengths per period of a gait."""
+    """Convert delta in the units of a class to body lengths per period of a gait."""
     return delta * gait.length if gait_class.relative_delta else delta
 
 
 def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
-    """Numbers of a gait as an array of so many dimensions. `ProblemError` if they, or their
-    squares, are none or not finite."""
+    """Convert to an array of so many dimensions. `ProblemError` unless all squares are finite."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):

@@ -1,13 +1,9 @@
-"""Gaits to start from: what is asked of them, and, where none is given, travelling waves of a size
-that any body can do.
+"""Gaits to start from: by default a travelling wave of an amplitude that any body can do,
 
-With joint j at s_j along the body, tail at 0, head at 1,
+    q_j(t) = a sin(2 pi t - 2 pi w (s_j - 1/2)),
 
-    q_j(t) = a sin(2 pi t - 2 pi w (s_j - 1/2))
-
-has both symmetries, about the middle of the body: q_j(t + 1/2) = -q_j(t), and q_j(-t) =
--q_(n+1-j)(t) where the lengths read the same from both ends. Bending travels towards the head for w
-> 0, towards the tail for w < 0.
+joint j at s_j along the body, tail at 0 and head at 1; w > 0 travels towards the head. It has both
+symmetries about the middle of a body whose lengths read the same from both ends.
 """
 
 from __future__ import annotations
@@ -16,34 +12,35 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.limits import Limit, under_one_limit
+from colloc.gaits.linear import LinearClass
+from colloc.gaits.symmetry import symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.system.errors import ProblemError
 
 WAVES = -1.0
-"""Waves along the body: one, towards the tail, which carries a body with mu_t > mu_f head first."""
+"""Waves along the body: towards the tail, which carries a body with mu_t > mu_f head first."""
 _SHARE, _LARGEST, _MOVING = 0.6, 1.5, 1.05
 """Amplitude: a share of the largest admissible one, and at most so much [rad], or so many times the
 least that moves enough."""
 _PHASES = np.linspace(0.0, 1.0, 201)
 SAFE = 1 - 1e-3
 """Shapes as large as may be are scaled by this, to be clearly admissible."""
-_BISECTIONS = 21
-"""Each halves what the factor may be missed by: to a thousandth of the margin above."""
+_BISECTIONS = 21  # to a thousandth of the margin above
 _CHECKED_PHASES = 2000
-_SLACK = 1e-6
-"""Depth of a crossing at which a guess still counts as admissible: what a certificate allows."""
+_SLACK = 1e-6  # depth of a crossing that a certificate allows
 _AT_THE_BOUND = 1e-2
-"""An optimum that lies on the lower bound of the shape speed is a good guess for a richer class,
-although sampling cuts its corners and makes it a little shorter."""
+"""Sampling cuts the corners of an optimum on the lower bound of the shape speed: it is still a good
+guess for a richer class."""
+_MOVES = 1e-3  # shape speed, of a wave's, below which a class has nothing of the wave
 
 
 def largest_factor(
     body: Body, joint_limit: Limit, angles: np.ndarray, rest: np.ndarray | float = 0.0
 ) -> float:
-    """The largest factor by which shapes ``(n_joint, n)``, but for what is at rest of them, can be
-    multiplied and stay admissible; inf for straight ones."""
+    """The largest factor by which shapes ``(n_joint, n)``, less those at rest, can be multiplied
+    and stay admissible; inf for straight ones."""
     angles = angles - rest
     stretched, joint_limit = under_one_limit(angles, joint_limit)
     peak = body.largest_angles(stretched).max()
@@ -62,56 +59,69 @@ def largest_factor(
 def travelling_wave(
     body: Body, joint_limit: Limit, waves: float = WAVES, share: float = _SHARE, least: float = 0.0
 ) -> Fourier:
-    """A wave of bending along a body: so many waves stand along it, positive ones travel towards
-    the head. Its amplitude is a share of the largest that is admissible, at most 1.5 rad; where its
-    shape speed would be below `least`, it is larger, and each joint bends in proportion to its own
-    limit."""
+    """A wave along a body whose amplitude is a share of the largest admissible one, at most 1.5
+    rad. If its shape speed were below `least` it is larger, and each joint bends in proportion to
+    its own limit."""
     cos, sin = body.wave(waves)
     unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
-    wave = unit.grown(
-        min(share * largest_factor(body, joint_limit, unit.angles(_PHASES)), _LARGEST)
-    )
+    angles = unit.angles(_PHASES)
+    wave = unit.grown(min(share * largest_factor(body, joint_limit, angles), _LARGEST))
     if wave.shape_speed >= least:
         return wave
-    angles = unit.angles(_PHASES)
     stretched = np.abs(under_one_limit(angles, joint_limit)[0]).max(axis=1)
-    each = unit.mapped(
-        np.diag(np.abs(angles).max(axis=1) / np.maximum(stretched, np.finfo(float).tiny))
-    )
-    return each.grown(
-        min(
-            largest_factor(body, joint_limit, each.angles(_PHASES)),
-            _MOVING * least / each.shape_speed,
-        )
-    )
+    proportions = np.abs(angles).max(axis=1) / np.maximum(stretched, np.finfo(float).tiny)
+    each = unit.mapped(np.diag(proportions))
+    largest = largest_factor(body, joint_limit, each.angles(_PHASES))
+    return each.grown(min(largest, _MOVING * least / each.shape_speed))
 
 
 def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
-    """Of the largest speeds of the joints [rad per period], that a gait moves at; 0 where there are
-    none."""
-    return (
-        float((np.abs(gait.driven.rates(_PHASES)).max(axis=1) / np.array(speeds)).max())
-        if speeds
-        else 0.0
-    )
+    """Largest ratio of a gait's motor speeds to their limits [rad per period]; 0 without limits."""
+    if not speeds:
+        return 0.0
+    fastest = np.abs(gait.driven.rates(_PHASES)).max(axis=1)
+    return float((fastest / np.array(speeds)).max())
 
 
-def usual_guess(
+def initial_member(gait_class: Any, wave: Fourier) -> Any:
+    """What stands for a wave in a class: itself, or the nearest member of its shape speed; all
+    functions of the class at once if it has nothing of the wave."""
+    by_path = gait_class.relative_delta or not isinstance(gait_class, LinearClass)
+    if by_path or isinstance(gait_class, Harmonic):
+        return wave
+    near = gait_class.through(wave)
+    if near.shape_speed <= _MOVES * wave.shape_speed:
+        near = gait_class.member(np.ones(gait_class.size(wave.n_joint)), wave.n_joint)
+    return near.scaled(wave.shape_speed / near.shape_speed)
+
+
+def checked_member(gait_class: Any, gait: Any) -> tuple[Any, float]:
+    """The gait of a class that a guess stands for, a path itself, and its shape speed [rad per
+    radian of phase]."""
+    if isinstance(gait_class, LinearClass) and not gait_class.relative_delta:
+        near = gait_class.member(gait_class.parameters(gait_class.through(gait)), gait.n_joint)
+        return near, near.shape_speed
+    points = symmetric_samples(gait, gait_class.symmetry)
+    length = np.linalg.norm(np.diff(points), axis=0).sum()
+    return gait, float(length / (2 * np.pi * gait_class.fraction))
+
+
+def default_guess(
     body: Body,
     gait_class: Any,
     joint_limit: Limit,
     speeds: tuple[float, ...],
     smallest_shape_speed: float,
 ) -> Any:
-    """A wave laid into a class, no joint of it faster than allowed. `ProblemError` if it hardly
-    moves."""
-    gait = gait_class.first_guess(travelling_wave(body, joint_limit, least=smallest_shape_speed))
+    """A wave in a class, no joint of it faster than allowed. `ProblemError` if it hardly moves."""
+    wave = travelling_wave(body, joint_limit, least=smallest_shape_speed)
+    gait = initial_member(gait_class.level, wave)
     if gait.joint_map is not None:
         most = largest_factor(body, joint_limit, gait.angles(_PHASES), gait.rest)
         gait = gait.scaled(min(1.0, most))
     if (share := largest_share(gait, speeds)) > 1:
         gait = gait.scaled(1 / share)
-    _, rms = gait_class.guessed(gait)
+    _, rms = checked_member(gait_class, gait)
     if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
         raise ProblemError(
             f"with {'speed_limit' if share > 1 else 'joint_limit'} the usual first gait has a "
@@ -123,22 +133,21 @@ def usual_guess(
 
 
 def check_guess(
-    body: Body, gait_class: Any, stated: Any, joint_limit: Limit, smallest_shape_speed: float
+    body: Body, gait_class: Any, guess: Any, joint_limit: Limit, smallest_shape_speed: float
 ) -> None:
-    """Raise a `ProblemError` for a gait that no search can begin with: of another body, at rest, or
-    inadmissible."""
-    if stated.n_joint != body.n_joint:
+    """Raise a `ProblemError` for a gait of another body, at rest, or inadmissible."""
+    if guess.n_joint != body.n_joint:
         raise ProblemError(
-            f"guess has {stated.n_joint} {body.coordinate}s but the body has {body.n_joint}."
+            f"guess has {guess.n_joint} {body.coordinate}s but the body has {body.n_joint}."
         )
-    guess, rms = gait_class.guessed(stated)
+    member, rms = checked_member(gait_class, guess)
     if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
         raise ProblemError(
             f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
             f"{smallest_shape_speed:g}); does it have the symmetry {gait_class.symmetry!r} of its "
             f"class?"
         )
-    angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
+    angles = member.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
     stretched, limit = under_one_limit(angles, joint_limit)
     largest = body.largest_angles(stretched).max()
     if largest > limit + body.usual.excess:
@@ -149,6 +158,5 @@ def check_guess(
     depth = body.crossing_depth(angles)
     if depth.max() > _SLACK:
         when = np.argmax(depth) / _CHECKED_PHASES
-        if body.drawn_width:
-            raise ProblemError(f"guess is inadmissible: links overlap at phase {when:.3f}.")
-        raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
+        how = "overlap" if body.drawn_width else "cross each other"
+        raise ProblemError(f"guess is inadmissible: links {how} at phase {when:.3f}.")

@@ -1,5 +1,4 @@
-"""Harmonic gaits: joint angles as finite Fourier series of the phase, with or without a symmetry
-(`colloc.gaits.symmetry`)."""
+"""Joint angles as finite Fourier series of the phase."""
 
 from __future__ import annotations
 
@@ -10,15 +9,14 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
-from colloc.gaits.linear import LinearClass
+from colloc.gaits.linear import LinearClass, largest_coordinate
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.system.arguments import STATED_IF_SET, check_finite, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 SAME_START = 1e-9
-"""Sine of the first joint's first harmonic, or of the wave, up to which a gait starts where those
-of its class do."""
+"""Sine of the first joint's first harmonic up to which a gait starts in the phase of its class."""
 
 
 @named_arguments
@@ -61,24 +59,35 @@ class Fourier(GaitFunction):
                 f"{self.sin.shape}."
             )
 
+    @classmethod
+    def from_table(cls, table: np.ndarray, *more: Any) -> Any:
+        """The series of coefficients (mean, cos 1, sin 1, cos 2, ...), a row a joint."""
+        return cls(table[:, 0], table[:, 1::2], table[:, 2::2], *more)
+
+    @property
+    def table(self) -> np.ndarray:
+        """Coefficients (mean, cos 1, sin 1, cos 2, ...), a row a joint."""
+        table = np.empty((self.n_joint, 2 * self.n_harmonic + 1))
+        table[:, 0], table[:, 1::2], table[:, 2::2] = self.mean, self.cos, self.sin
+        return table
+
     @property
     def n_joint(self) -> int:
         return len(self.mean)
 
     @property
-    def shape_speed(self) -> float:
-        """Root-mean-square shape speed, in rad per radian of phase."""
-        k = np.arange(1, self.n_harmonic + 1)
-        return float(np.sqrt(0.5 * np.sum(k**2 * (self.cos**2 + self.sin**2))))
-
-    @property
     def n_harmonic(self) -> int:
         return self.cos.shape[1]
 
+    @property
+    def shape_speed(self) -> float:
+        """Root-mean-square shape speed [rad per radian of phase]."""
+        k = np.arange(1, self.n_harmonic + 1)
+        return float(np.sqrt(0.5 * np.sum(k**2 * (self.cos**2 + self.sin**2))))
+
     @cached_property
     def _terms(self) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies ``(K, 1)``, and what angles and rates ``(2 n_joint, 2 K)`` have of their
-        cosines and then sines."""
+        """Frequencies ``(K, 1)``, and angles and rates ``(2 n_joint, 2 K)`` per cosine and sine."""
         k = 2 * np.pi * np.arange(1, self.n_harmonic + 1)
         return k[:, None], np.block([[self.cos, self.sin], [k * self.sin, -k * self.cos]])
 
@@ -89,25 +98,21 @@ class Fourier(GaitFunction):
         return self.mean[:, None] + both[: self.n_joint], both[self.n_joint :]
 
     def angles(self, t: np.ndarray) -> np.ndarray:
-        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
         return self(t)[0]
 
     def rates(self, t: np.ndarray) -> np.ndarray:
-        """Joint rates ``(n_joint, n_time)`` per period at phases t."""
         return self(t)[1]
 
     def lines(self) -> list[str]:
-        """The formula, joint by joint, or mode by mode."""
-        found = []
-        for j in range(self.n_joint):
-            terms = [_rounded(self.mean[j])]
-            for k in range(self.n_harmonic):
-                wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
-                terms.append(
-                    f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}"
-                )
-            found.append(f"{self.coordinate} {j + 1}: " + " ".join(terms))
-        return [*found, *self.pointing]
+        lines = []
+        for j, row in enumerate(self.table):
+            mean, *waves = (f"{round(float(a), 4) + 0.0:+.4f}" for a in row)  # no minus zero
+            terms = [mean]
+            for k, (cos, sin) in enumerate(zip(waves[::2], waves[1::2], strict=True), 1):
+                angle = "2πt" if k == 1 else f"{2 * k}πt"
+                terms.append(f"{cos} cos {angle} {sin} sin {angle}")
+            lines.append(f"{self.coordinate} {j + 1}: {' '.join(terms)}")
+        return [*lines, *self.pointing]
 
     def mapped(self, matrix: np.ndarray) -> Fourier:
         """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
@@ -122,16 +127,11 @@ class Fourier(GaitFunction):
         return Fourier(self.mean, factor * self.cos, factor * self.sin)
 
     def resized(self, n_harmonic: int) -> Fourier:
-        """The same gait with harmonics added (zero) or cut."""
+        """The gait with harmonics added (zero) or cut."""
         keep = min(n_harmonic, self.n_harmonic)
         cos, sin = np.zeros((2, self.n_joint, n_harmonic))
         cos[:, :keep], sin[:, :keep] = self.cos[:, :keep], self.sin[:, :keep]
         return Fourier(self.mean, cos, sin)
-
-
-def _rounded(value: float) -> str:
-    """With its sign; no minus before zeros."""
-    return f"{round(float(value), 4) + 0.0:+.4f}"
 
 
 def ellipse(A0: float, A1: float, B1: float) -> Fourier:
@@ -160,9 +160,6 @@ def ellipse(A0: float, A1: float, B1: float) -> Fourier:
 class Harmonic(LinearClass):
     """The class of gaits with `harmonics` harmonics and a given symmetry.
 
-    A member is a parameter vector p; angles are linear in it. Without a symmetry that fixes it, the
-    start phase is fixed by taking the first joint's first sine coefficient out.
-
     Parameters
     ----------
     harmonics : int
@@ -185,60 +182,25 @@ class Harmonic(LinearClass):
     symmetry: str = "none"
 
     def __post_init__(self) -> None:
-        if not is_whole(self.harmonics, 1, 64):
-            raise ProblemError(
-                f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}."
-            )
+        k = self.harmonics
+        if not is_whole(k, 1, 64):
+            raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {k!r}.")
         self._check_symmetry()
-        if self.symmetry == ANTIPODAL and self.harmonics % 2 == 0:
+        if self.symmetry == ANTIPODAL and k % 2 == 0:
             raise ProblemError(
-                f"antipodal gaits have odd harmonics only, as q(t + 1/2) = -q(t): {self.harmonics} "
-                f"would be the same class as "
-                f"{self.harmonics - 1}; ask for {self.harmonics - 1} or {self.harmonics + 1}."
+                f"antipodal gaits have odd harmonics only, as q(t + 1/2) = -q(t): {k} would be "
+                f"the same class as {k - 1}; ask for {k - 1} or {k + 1}."
             )
 
     def series(self, harmonics: int) -> Harmonic:
-        """Fourier series that stand for its gaits: its members are such."""
         return self
 
     def describe(self) -> str:
-        """The class in words, for reports."""
-        return (
-            f"{self.harmonics} harmonic{'s' if self.harmonics > 1 else ''}, symmetry "
-            f"{self.symmetry}"
-        )
-
-    def _basis(self, n_joint: int) -> np.ndarray:
-        """``(n_joint * (2 K + 1), n_parameter)``: parameters to (mean, cos_1, sin_1, cos_2, ...) of
-        every joint."""
-        columns = []
-        for kind in range(2 * self.harmonics + 1):
-            odd_harmonic = (kind + 1) // 2 % 2 == 1
-            if self.symmetry == ANTIPODAL and not odd_harmonic:
-                continue
-            sine = kind > 0 and kind % 2 == 0
-            for joint in range(n_joint):
-                column = np.zeros((n_joint, 2 * self.harmonics + 1))
-                column[joint, kind] = 1.0
-                if self.symmetry == "bilateral":
-                    partner = n_joint - 1 - joint
-                    if partner < joint or (partner == joint and not sine):
-                        continue
-                    column[partner, kind] = 1.0 if sine else -1.0
-                elif joint == 0 and kind == 2:
-                    continue  # the start phase
-                columns.append(column.ravel())
-        return np.array(columns).T
-
-    @property
-    def instants(self) -> np.ndarray:
-        """As many as make means of products exact."""
-        n = 4 * self.harmonics + 4
-        return np.arange(n) / n
+        plural = "s" * (self.harmonics > 1)
+        return f"{self.harmonics} harmonic{plural}, symmetry {self.symmetry}"
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """``(2 K + 1, n_time)``: 1, cos 1, sin 1, cos 2, ... at phases t, or what they change by
-        per period."""
+        # 1, cos 1, sin 1, cos 2, ...
         k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
         waves = np.empty((2 * self.harmonics + 1, t.size))
         if derivative:
@@ -247,22 +209,56 @@ class Harmonic(LinearClass):
             waves[0], waves[1::2], waves[2::2] = 1.0, np.cos(k * t), np.sin(k * t)
         return waves
 
-    def check_joints(self, n_joint: int) -> None:
-        """Any number will do."""
+    @property
+    def instants(self) -> np.ndarray:
+        n = 4 * self.harmonics + 4  # means of products are exact
+        return np.arange(n) / n
 
-    def fourier(self, parameters: np.ndarray, n_joint: int) -> Fourier:
-        """The gait of a parameter vector."""
-        with np.errstate(over="ignore", invalid="ignore"):  # a series refuses what is not finite
-            table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
-        return Fourier(table[:, 0], table[:, 1::2], table[:, 2::2])
+    def check_joints(self, n_joint: int) -> None:
+        pass
+
+    def _basis(self, n_joint: int) -> np.ndarray:
+        columns = []
+        for function in range(2 * self.harmonics + 1):
+            if self.symmetry == ANTIPODAL and (function + 1) // 2 % 2 == 0:
+                continue  # even harmonics
+            sine = function > 0 and function % 2 == 0
+            for joint in range(n_joint):
+                column = np.zeros((n_joint, 2 * self.harmonics + 1))
+                column[joint, function] = 1.0
+                if self.symmetry == BILATERAL:
+                    partner = n_joint - 1 - joint
+                    if partner < joint or (partner == joint and not sine):
+                        continue
+                    column[partner, function] = 1.0 if sine else -1.0
+                elif joint == 0 and function == 2:
+                    continue  # the start phase is free: no first sine of the first joint
+                columns.append(column.ravel())
+        return np.array(columns).T
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Fourier:
-        """The gait of a parameter vector."""
-        return self.fourier(parameters, n_joint)
+        with np.errstate(over="ignore", invalid="ignore"):  # a series refuses what is not finite
+            table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
+        return Fourier.from_table(table)
+
+    def parameters(self, gait: Fourier) -> np.ndarray:
+        """Parameters of the member nearest to a series, after shifting its start phase if that is
+        free."""
+        gait = gait.resized(self.harmonics)
+        if self.symmetry != BILATERAL:
+            gait = shifted(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
+        return self.nearest(gait)
+
+    def nearest(self, gait: Fourier) -> np.ndarray:
+        table = gait.resized(self.harmonics).table
+        return np.linalg.lstsq(self._basis(gait.n_joint), table.ravel(), rcond=None)[0]
+
+    def in_phase(self, gait: Fourier) -> bool:
+        return self.symmetry == BILATERAL or bool(abs(gait.sin[0, 0]) < SAME_START)
 
     def through(self, gait: Any) -> Fourier:
-        """The Fourier series of a gait, paced by its own phase, with the symmetry and harmonics of
-        the class."""
+        """The Fourier series of a gait in its own phase, with the symmetry and harmonics of the
+        class; a series as it is."""
         if isinstance(gait, Fourier):
             return gait
         half = symmetric_samples(gait, self.symmetry)
@@ -274,57 +270,29 @@ class Harmonic(LinearClass):
         spectrum = np.fft.rfft(whole, axis=1)[:, : self.harmonics + 1] * (2 / whole.shape[1])
         return Fourier(0.5 * spectrum[:, 0].real, spectrum[:, 1:].real, -spectrum[:, 1:].imag)
 
-    def first_guess(self, gait: Fourier) -> Fourier:
-        return gait
+    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        # a function bounded by L has Fourier coefficients of at most 4 L / pi
+        largest = np.full(self.size(body.n_joint), largest_coordinate(body) * 4 * limit / np.pi)
+        return -largest, largest
 
     def dimension(self, n_joint: int) -> int:
         return n_joint * (2 * self.harmonics + 1)
 
     def drawn(self, unit: np.ndarray, n_joint: int) -> Fourier:
-        """Harmonic k has an amplitude that falls like 1/k, so that no harmonic dominates the
-        rates."""
         table = (2 * unit - 1).reshape(n_joint, -1)
-        falling = 1.0 / np.arange(1, self.harmonics + 1)
-        return Fourier(
-            table[:, 0],
-            table[:, 1 : self.harmonics + 1] * falling,
-            table[:, self.harmonics + 1 :] * falling,
-        )
+        fall = 1.0 / np.arange(1, self.harmonics + 1)  # no harmonic dominates the rates
+        cos, sin = np.split(table[:, 1:], 2, axis=1)
+        return Fourier(table[:, 0], cos * fall, sin * fall)
 
     def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Fourier:
         series = self.through(gait).resized(self.harmonics)
         steps = step / np.arange(1, self.harmonics + 1) ** fall
-        drawn = Fourier(
+        moved = Fourier(
             series.mean + step * rng.normal(size=series.mean.shape),
             series.cos + steps * rng.normal(size=series.cos.shape),
             series.sin + steps * rng.normal(size=series.sin.shape),
         )
-        return self.fourier(self.parameters(drawn), gait.n_joint)
-
-    def parameters(self, gait: Fourier) -> np.ndarray:
-        """The parameter vector of the class member nearest to `gait`, after shifting its start
-        phase if that is free."""
-        gait = gait.resized(self.harmonics)
-        if self.symmetry != BILATERAL:
-            gait = shifted(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
-        return self.nearest(gait)
-
-    def in_phase(self, gait: Fourier) -> bool:
-        return self.symmetry == BILATERAL or bool(abs(gait.sin[0, 0]) < SAME_START)
-
-    def nearest(self, gait: Fourier) -> np.ndarray:
-        """The parameter vector of the class member nearest to `gait`, in its phase."""
-        gait = gait.resized(self.harmonics)
-        table = np.zeros((gait.n_joint, 2 * self.harmonics + 1))
-        table[:, 0], table[:, 1::2], table[:, 2::2] = gait.mean, gait.cos, gait.sin
-        return np.linalg.lstsq(self._basis(gait.n_joint), table.ravel(), rcond=None)[0]
-
-    def largest_parameters(self, body: Body, limit: float) -> np.ndarray:
-        """Bounds on the parameters ``(n_parameter,)`` of gaits whose angles keep a limit: a
-        function bounded by L has Fourier coefficients of at most 4 L / pi."""
-        # coordinates, such as amplitudes of modes, may be larger than what is bounded
-        largest = max(1.0, np.abs(np.linalg.pinv(body.limited)).sum(axis=1).max())
-        return np.full(self.size(body.n_joint), largest * 4 * limit / np.pi)
+        return self.member(self.parameters(moved), gait.n_joint)
 
 
 def harmonics_within(highest: int, symmetry: str) -> Harmonic:
@@ -335,8 +303,6 @@ def harmonics_within(highest: int, symmetry: str) -> Harmonic:
 
 
 def series_of(gait_class: ClassOfGaits, harmonics: int) -> Harmonic:
-    """The class of Fourier series up to about so many harmonics that stand for the gaits of a
-    class."""
     return harmonics_within(harmonics, gait_class.symmetry)
 
 

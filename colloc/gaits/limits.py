@@ -11,22 +11,16 @@ from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
 Limit = float | tuple[Any, ...]
-"""On the magnitude of all angles of a body, or of each joint angle of a chain, or its least and its
-largest value."""
+"""Largest magnitude of all angles, or of each joint angle, or (least, largest) of each."""
 
 
 def checked_limit(body: Body, limit: Any) -> Limit:
-    """A limit as it is, or as a tuple of one for each joint. `ProblemError` if it cannot be used
-    for the body."""
+    """A joint limit as a number, or a tuple of a number or (least, largest) for each joint."""
     if isinstance(limit, np.ndarray) and limit.ndim == 0:
         limit = limit.item()
     if not isinstance(limit, (tuple, list, np.ndarray)):
         return _checked_number(body, limit)
-    each = tuple(_range_or_number(own) for own in limit)
-    for own in each:
-        if isinstance(own, tuple):
-            _check_range(own, body.usual.largest_limit)
-    each = tuple(own if isinstance(own, tuple) else _checked_number(body, own) for own in each)
+    each = tuple(_checked_joint(body, joint) for joint in limit)
     if len(each) != body.n_joint or len(body.limit_names) != body.n_joint:
         raise ProblemError(
             f"joint_limit has {len(each)} values; give one for all joints, or one for each joint "
@@ -35,27 +29,26 @@ def checked_limit(body: Body, limit: Any) -> Limit:
     return each
 
 
-def _range_or_number(own: Any) -> Any:
-    if np.ndim(own) == 0:
-        return own
-    pair = _each(own)
+def _checked_joint(body: Body, limit: Any) -> Any:
+    if np.ndim(limit) == 0:
+        return _checked_number(body, limit)
+    pair, largest = _numbers(limit), body.usual.largest_limit
     if len(pair) != 2:
         raise ProblemError(
-            f"joint_limit of a joint is a number, or its least and its largest angle, not {own!r}."
+            f"joint_limit of a joint is a number, or its least and its largest angle, not "
+            f"{limit!r}."
         )
-    return pair if pair[0] != -pair[1] else pair[1]
-
-
-def _check_range(own: tuple[float, float], largest: float) -> None:
-    if not -largest - 1e-12 <= own[0] < 0 < own[1] <= largest + 1e-12:
+    if pair[0] == -pair[1]:
+        return _checked_number(body, pair[1])
+    if not -largest - 1e-12 <= pair[0] < 0 < pair[1] <= largest + 1e-12:
         raise ProblemError(
-            f"joint_limit {own!r} must go from a negative to a positive angle in radians, neither "
-            f"beyond {largest:.4g}: the "
-            "straight body has to lie between."
+            f"joint_limit {pair!r} must go from a negative to a positive angle in radians, neither "
+            f"beyond {largest:.4g}: the straight body has to lie between."
         )
+    return pair
 
 
-def _checked_number(body: Body, limit: Any) -> Any:
+def _checked_number(body: Body, limit: Any) -> float:
     largest = body.usual.largest_limit
     if not is_number(limit) or not 0 < limit <= largest + 1e-12:
         most = f"pi/{np.pi / largest:g}".removesuffix("/1")
@@ -64,51 +57,11 @@ def _checked_number(body: Body, limit: Any) -> Any:
     return float(limit)
 
 
-def range_of(own: Any) -> tuple[float, float]:
-    """The least and the largest angle that a limit of one joint allows."""
-    return own if isinstance(own, tuple) else (-own, own)
-
-
-def one_sided(limit: Limit) -> bool:
-    """Whether a joint may bend farther to one side than to the other."""
-    return isinstance(limit, tuple) and any(isinstance(own, tuple) for own in limit)
-
-
-def widest(limit: Limit) -> float:
-    """The largest magnitude that the limits allow."""
-    return max(of_each_angle(limit, 1))
-
-
-def of_each_angle(limit: Limit, n_joint: int) -> tuple[float, ...]:
-    """The largest magnitude of each joint angle; all alike of so many where there is one limit."""
-    each = limit if isinstance(limit, tuple) else (limit,) * n_joint
-    return tuple(float(np.abs(own).max()) for own in each)
-
-
-def of_each(limit: Limit | None, n_joint: int) -> tuple[float, ...]:
-    """The limits joint by joint; empty where there is none."""
-    return (
-        ()
-        if limit is None
-        else tuple(np.broadcast_to(np.asarray(limit, dtype=float), n_joint).tolist())
-    )
-
-
-def under_one_limit(angles: np.ndarray, limit: Limit) -> tuple[np.ndarray, float]:
-    """Shapes ``(n_joint, n)``, each joint stretched by what its limit is below the widest, and
-    that: to be held against it."""
-    if not isinstance(limit, tuple):
-        return angles, limit
-    low, high = np.array([range_of(own) for own in limit]).T[:, :, None]
-    return angles * (widest(limit) / np.where(angles < 0, -low, high)), widest(limit)
-
-
 def checked_actuator_limit(name: str, limit: Any, n_joint: int) -> Limit | None:
-    """A limit as it is, or as a tuple of one for each joint; None is none. `ProblemError` if it
-    cannot be used."""
+    """A limit as a number or a tuple of one for each joint; None is none."""
     if limit is None:
         return None
-    each = _each(limit)
+    each = _numbers(limit)
     if not each or not all(0 < a < np.inf for a in each):
         raise ProblemError(f"{name} must be positive and finite, not {limit!r}.")
     if np.ndim(limit) and len(each) != n_joint:
@@ -119,7 +72,44 @@ def checked_actuator_limit(name: str, limit: Any, n_joint: int) -> Limit | None:
     return each if np.ndim(limit) else each[0]
 
 
-def _each(limit: Any) -> tuple[float, ...]:
-    """The limits one by one; none if they are no numbers."""
+def _numbers(limit: Any) -> tuple[float, ...]:
+    """The numbers of a limit; none if they are no numbers."""
     each = np.ravel(np.asarray(limit, dtype=object))
     return tuple(float(a) for a in each) if all(map(is_number, each)) else ()
+
+
+def range_of(limit: Any) -> tuple[float, float]:
+    """Least and largest angle of one joint."""
+    return limit if isinstance(limit, tuple) else (-limit, limit)
+
+
+def one_sided(limit: Limit) -> bool:
+    """Whether a joint may bend farther to one side than to the other."""
+    return isinstance(limit, tuple) and any(isinstance(joint, tuple) for joint in limit)
+
+
+def widest(limit: Limit) -> float:
+    """The largest magnitude that the limits allow."""
+    return max(of_each_angle(limit, 1))
+
+
+def of_each_angle(limit: Limit, n_joint: int) -> tuple[float, ...]:
+    """The largest magnitude of each joint angle."""
+    each = limit if isinstance(limit, tuple) else (limit,) * n_joint
+    return tuple(float(np.abs(joint).max()) for joint in each)
+
+
+def of_each(limit: Limit | None, n_joint: int) -> tuple[float, ...]:
+    """The limits joint by joint; empty without one."""
+    if limit is None:
+        return ()
+    return tuple(np.broadcast_to(np.asarray(limit, dtype=float), n_joint).tolist())
+
+
+def under_one_limit(angles: np.ndarray, limit: Limit) -> tuple[np.ndarray, float]:
+    """Scale each joint angle ``(n_joint, n)`` by its limit so that one limit, returned too, holds
+    for all."""
+    if not isinstance(limit, tuple):
+        return angles, limit
+    low, high = np.array([range_of(joint) for joint in limit]).T[:, :, None]
+    return angles * (widest(limit) / np.where(angles < 0, -low, high)), widest(limit)

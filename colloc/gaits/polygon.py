@@ -1,4 +1,4 @@
-"""Gaits along polygons, at constant shape speed: members of `colloc.gaits.bspline.Polygon`."""
+"""Gaits along polygons at constant shape speed: members of `colloc.gaits.bspline.Polygon`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from colloc.system.arguments import STATED_IF_SET, named_arguments
 from colloc.system.errors import ProblemError
 
 _EVENLY = np.linspace(0.0, 1.0, 1001)[:-1]
-_MOST_TOLD = 64
-"""Vertices of a polygon that are told one by one."""
+_MOST_LISTED = 64  # vertices
 
 
 @named_arguments
@@ -66,13 +65,12 @@ class Corners(GaitFunction):
 
     @property
     def vertices(self) -> np.ndarray:
-        """Ends of the straight pieces of the stored part, ``(n_joint, n_piece + 1)``."""
-        closed = self.symmetry == "none"
-        return (
-            np.concatenate([self.corners, self.corners[:, :1]], axis=1) if closed else self.corners
-        )
+        """Ends of the sides of the solved part, ``(n_joint, n_side + 1)``."""
+        if self.symmetry != NONE:
+            return self.corners
+        return np.concatenate([self.corners, self.corners[:, :1]], axis=1)
 
-    def _lengths(self) -> np.ndarray:
+    def _side_lengths(self) -> np.ndarray:
         return np.linalg.norm(np.diff(self.vertices), axis=0)
 
     @property
@@ -81,23 +79,22 @@ class Corners(GaitFunction):
 
     @property
     def length(self) -> float:
-        """Of the whole closed path [rad]."""
-        return float(self._lengths().sum()) / fraction(self.symmetry)
+        """Length of the whole closed path [rad]."""
+        return float(self._side_lengths().sum()) / fraction(self.symmetry)
 
     @property
     def shape_speed(self) -> float:
-        """Shape speed, in rad per radian of phase."""
+        """Shape speed [rad per radian of phase]."""
         return self.length / (2 * np.pi)
 
     @property
     def corner_phases(self) -> np.ndarray:
-        """Phases in (0, 1) where the rates jump."""
         return both_halves(self.symmetry, self.phases)
 
     @property
     def phases(self) -> np.ndarray:
-        """Phases of `vertices`, from 0 to the part of the period that symmetry leaves."""
-        along = np.concatenate([[0.0], np.cumsum(self._lengths())])
+        """Phases of `vertices`, from 0 to the solved part of the period."""
+        along = np.concatenate([[0.0], np.cumsum(self._side_lengths())])
         return fraction(self.symmetry) * along / along[-1]
 
     def mapped(self, matrix: np.ndarray) -> Corners:
@@ -110,22 +107,16 @@ class Corners(GaitFunction):
         return imaged(self.symmetry, start + rates * since, image)
 
     def rates(self, t: np.ndarray) -> np.ndarray:
-        """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side
-        ahead."""
+        """Joint rates ``(n_joint, n_time)`` per period; at a corner those of the side ahead."""
         phase, image = reduced(self.symmetry, t)
         return imaged(self.symmetry, self._side(phase)[1], image, derivative=1)
 
     def _side(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where the side that each phase lies on begins, the rates on it, and how long ago it
-        began."""
+        """First vertex of the side at each phase, rates on it, and phase since that vertex."""
         phases, vertices = self.phases, self.vertices
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
-        # a side of no length is never chosen
-        return (
-            vertices[:, k],
-            (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k]),
-            phase - phases[k],
-        )
+        rates = (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k])
+        return vertices[:, k], rates, phase - phases[k]
 
     def grown(self, factor: float) -> Corners:
         """The polygon with shapes multiplied by a factor about their mean over the path."""
@@ -133,11 +124,8 @@ class Corners(GaitFunction):
         return Corners(mean + factor * (self.corners - mean), self.symmetry)
 
     def lines(self) -> list[str]:
-        """Length and, if they are few, corners."""
-        n = self.corners.shape[1]
-        if n > _MOST_TOLD:
-            return [f"path of length {self.length:.4f} rad, {n} vertices", *self.pointing]
-        corners = [
-            f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in self.corners.T
-        ]
-        return [f"path of length {self.length:.4f} rad", *corners, *self.pointing]
+        first, n = f"path of length {self.length:.4f} rad", self.corners.shape[1]
+        if n > _MOST_LISTED:
+            return [f"{first}, {n} vertices", *self.pointing]
+        vertices = (", ".join(f"{a:+.4f}" for a in corner) for corner in self.corners.T)
+        return [first, *(f"vertex ({each})" for each in vertices), *self.pointing]

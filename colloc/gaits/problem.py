@@ -11,10 +11,11 @@ import numpy as np
 
 from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
-from colloc.gaits.guesses import check_guess, usual_guess
+from colloc.gaits.guesses import check_guess, default_guess
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.inertia import Free, paced_from
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
+from colloc.gaits.linear import LinearClass
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Regime
@@ -187,67 +188,69 @@ class Problem:
         # asked first: to look what else a body answers can take gigabytes
         coordinates = getattr(self.body, "n_joint", 0)
         if is_whole(coordinates, MOST_COORDINATES + 1):
-            what = (
-                f"the body has {coordinates} {self.body.coordinate}s, and {MOST_COORDINATES} "
-                f"are allowed"
-            )
             raise ProblemError(
-                f"{what}: fewer links, or a smooth body of a few modes, come near it."
+                f"the body has {coordinates} {self.body.coordinate}s, and {MOST_COORDINATES} are "
+                f"allowed: fewer links, or a smooth body of a few modes, come near it."
             )
         check_kind("body", self.body, gait_fields.BODIES, Body)
-        schedule = self.body.schedule
+        schedule, usual = self.body.schedule, self.body.usual
         self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
         self._check_parts()
-        object.__setattr__(self, "objective", objective_from(self.objective))
-        object.__setattr__(self, "at_least", least_values(self.at_least))
-        regime = self.regime
-        object.__setattr__(self, "gait", regime.class_of(self.gait))
-        stated = self.froude
-        object.__setattr__(
-            self,
-            "froude",
-            Free(*map(float, stated)) if isinstance(stated, (list, tuple)) else float(stated),
+        self._set(objective=objective_from(self.objective), at_least=least_values(self.at_least))
+        regime, froude = self.regime, self.froude
+        paces = isinstance(froude, (list, tuple))
+        self._set(
+            gait=regime.class_of(self.gait),
+            froude=Free(*map(float, froude)) if paces else float(froude),  # type: ignore[arg-type]
         )
-        usual = self.body.usual
-        start = (
-            (self.gait.delta_start or usual.delta_start) if self.law.regularised else usual.delta
-        )
+        start = self.gait.delta_start or usual.delta_start
         self._fill(
             delta=usual.delta,
-            delta_start=start,
+            delta_start=start if self.law.regularised else usual.delta,
             joint_limit=usual.limit,
             formulation=formulations(self.body)[0],
+            intervals=self.gait.intervals(self.body.n_joint),
         )
-        self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
+        self._set(
+            delta_start=max(self.delta, self.delta_start),
+            joint_limit=checked_limit(self.body, self.joint_limit),
+        )
+        self._check_discretisation()
         self._check_aims()
+        limits = self.limits if isinstance(self.limits, Iterable) else (self.limits,)
+        motor_limits = ("torque_limit", "power_limit", "speed_limit")
+        self._set(
+            **{
+                name: checked_actuator_limit(name, getattr(self, name), self.n_motor)
+                for name in motor_limits
+            }
+        )
+        self._set(limits=tuple(map(stated_limit, limits)))
         self._check_actuators()
         regime.check(self)
         self._check_gaits()
-        if self.guess is None:
-            limits = self.joint_limit, self.largest_speeds, self.smallest_shape_speed
-            free = self.gait.free
-            self._fill(
-                guess=usual_guess(self.body, self.gait, *limits)
-                if free
-                else self.gait.member(np.empty(0), 2)
-            )
+        bounds = self.joint_limit, self.largest_speeds, self.smallest_shape_speed
+        if self.guess is None and self.gait.free:
+            self._set(guess=default_guess(self.body, self.gait, *bounds))
+        elif self.guess is None:
+            self._set(guess=self.gait.member(np.empty(0), 2))
         check_kind("guess", self.guess, gait_fields.GAITS)
         check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 
-    def _fill(self, **usual: object) -> None:
-        """Put values where none are given."""
-        for name, value in usual.items():
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, value)
+    def _set(self, **values: object) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def _fill(self, **defaults: object) -> None:
+        self._set(**{name: x for name, x in defaults.items() if getattr(self, name) is None})
 
     def _check_parts(self) -> None:
         check_name(self.name)
         check_kind("friction", self.friction, gait_fields.LAWS, Law)
         check_kind("gait", self.gait, gait_fields.CLASSES)
-        check_kind(
-            "motion", LEVEL if self.motion is None else self.motion, [Regime, *gait_fields.MOTIONS]
-        )
+        motion = LEVEL if self.motion is None else self.motion
+        check_kind("motion", motion, [Regime, *gait_fields.MOTIONS])
         if self.gait.free == bool(self.body.schedule):
             what = (
                 "a prescribed motion has no class of gaits"
@@ -272,9 +275,8 @@ class Problem:
                 f"delta and delta_start must be at most {LARGEST_DELTA:g}: at such speeds friction "
                 f"would be viscous."
             )
-        if self.delta_start < self.delta:
-            object.__setattr__(self, "delta_start", self.delta)
-        object.__setattr__(self, "joint_limit", checked_limit(self.body, self.joint_limit))
+
+    def _check_discretisation(self) -> None:
         if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
             raise ProblemError(
                 f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}."
@@ -288,7 +290,18 @@ class Problem:
             raise ProblemError(f"formulation must be one of {known}, not {self.formulation!r}.")
         if not is_whole(self.intervals):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
-        self._check_resolution()
+        collocation = scheme(self.scheme)
+        if self.gait.relative_delta and collocation.left:
+            raise ProblemError(
+                f"the class {type(self.gait).__name__} needs a gauss-N or radau-N scheme, not "
+                f"{self.scheme}."
+            )
+        fewest, what = self.gait.fewest_intervals(collocation.s - collocation.left)
+        if self.intervals < fewest:
+            raise ProblemError(
+                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot "
+                f"resolve {what}; use at least {fewest}."
+            )
         if self.intervals > 100_000:
             raise ProblemError(
                 f"the mesh is too large: {self.intervals} intervals; use at most 100000."
@@ -321,33 +334,58 @@ class Problem:
             )
 
     def _check_actuators(self) -> None:
-        for name in ("torque_limit", "power_limit", "speed_limit"):
-            object.__setattr__(
-                self, name, checked_actuator_limit(name, getattr(self, name), self.n_motor)
-            )
-        given = self.limits if isinstance(self.limits, Iterable) else (self.limits,)
-        object.__setattr__(self, "limits", tuple(stated_limit(each) for each in given))
         limits = self.path_limits
         forced = [each.name for each in self.integrals if each.needs_forces]
-        asks = (
-            forced[0] if forced else f"a limit on the {limits.each[0].name}" if limits.each else ""
-        )
-        if asks and self.formulation != FULL:
+        forced += [f"a limit on the {each.name}" for each in limits.each]
+        if forced and self.formulation != FULL:
             raise ProblemError(
-                f"{asks} needs the forces on the body's parts: a chain, and the formulation "
+                f"{forced[0]} needs the forces on the body's parts: a chain, and the formulation "
                 f"{FULL!r}."
             )
-        most = (
-            float(np.linalg.norm(of_each(self.speed_limit, self.n_motor)))
-            if self.speed_limit
-            else np.inf
-        )
+        most = float(np.linalg.norm(self.largest_speeds)) if self.speed_limit else np.inf
         if most <= (least := 2 * np.pi * self.smallest_shape_speed):
             raise ProblemError(
                 f"speed_limit leaves no gait: all joints together move at {most:.3g} rad per "
-                f"period at most, and "
-                f"smallest_shape_speed asks for {least:.3g} on average (2 pi "
+                f"period at most, and smallest_shape_speed asks for {least:.3g} on average (2 pi "
                 f"{self.smallest_shape_speed:g}). Make that smaller."
+            )
+
+    def _check_gaits(self) -> None:
+        """Raise a `ProblemError` if the body has no such gaits, or none that goes anywhere."""
+        check_symmetric(self)
+        if self.joint_map is not None:
+            if not isinstance(self.body, Chain):
+                raise ProblemError(
+                    f"Coupled is for the joints of a Chain, not of a {type(self.body).__name__}."
+                )
+            if self.body.crossing_depth(self.joint_map.offset).any():
+                raise ProblemError("links cross where joints are stuck.")
+        self.gait.check_joints(self.body.n_joint)
+        if self.gait.relative_delta and self.paced_by:
+            raise ProblemError(
+                f"the class {type(self.gait).__name__} leaves the pace open, but {self.paced_by}; "
+                f"use Harmonic (period 1)."
+            )
+        alone = self.body.n_joint == 1
+        if self.law.reversible and not self.froude and (alone or _retraces(self)):
+            coordinate = self.body.coordinate
+            which = (
+                f"a body with one {coordinate}" if alone else f"the class ({self.gait.describe()})"
+            )
+            more = f"the body a second {coordinate}" if alone else "the class more freedom"
+            raise ProblemError(
+                f"no gait of {which} goes anywhere when mu_f = mu_b: it retraces its path, and "
+                f"reversed rates reverse the motion (the scallop theorem). Give {more}, mu_b "
+                f"different from mu_f, or the problem a froude."
+            )
+        if self.keeps_heading and self.rotation:
+            raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")
+        if self.keeps_heading and self.gait.symmetry == ANTIPODAL:
+            raise ProblemError(
+                "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: the body "
+                "moves along its own axis of symmetry, and as far back while it is bent to the "
+                "other side. Take the class without symmetry, links that differ, or mu_b different "
+                "from mu_f."
             )
 
     @property
@@ -439,57 +477,6 @@ class Problem:
         """The quantities of which these speak that are integrals of functions of an instant."""
         return integrals_of(self.aims)
 
-    def _check_resolution(self) -> None:
-        collocation, kind = scheme(self.scheme), type(self.gait).__name__
-        if self.gait.relative_delta and collocation.left:
-            raise ProblemError(
-                f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}."
-            )
-        fewest, what = self.gait.fewest_intervals(collocation.s - collocation.left)
-        if self.intervals < fewest:
-            raise ProblemError(
-                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot "
-                f"resolve {what}; "
-                f"use at least {fewest}."
-            )
-
-    def _check_gaits(self) -> None:
-        """That the body has gaits of the class."""
-        check_symmetric(self)
-        if self.joint_map is not None:
-            if not isinstance(self.body, Chain):
-                raise ProblemError(
-                    f"Coupled is for the joints of a Chain, not of a {type(self.body).__name__}."
-                )
-            if self.body.crossing_depth(self.joint_map.offset).any():
-                raise ProblemError("links cross where joints are stuck.")
-        self.gait.check_joints(self.body.n_joint)
-        if self.gait.relative_delta and self.paced_by:
-            what = f"the class {type(self.gait).__name__} leaves the pace open"
-            raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
-        if self.law.reversible and not self.froude and self.gait.retraces(self.body.n_joint):
-            coordinate, alone = self.body.coordinate, self.body.n_joint == 1
-            which = (
-                f"a body with one {coordinate}" if alone else f"the class ({self.gait.describe()})"
-            )
-            more = f"the body a second {coordinate}" if alone else "the class more freedom"
-            raise ProblemError(
-                f"no gait of {which} goes anywhere when mu_f = mu_b: it retraces its path, and "
-                f"reversed rates reverse the "
-                f"motion (the scallop theorem). Give {more}, mu_b different from mu_f, or the "
-                f"problem a froude."
-            )
-        if self.keeps_heading and self.rotation:
-            raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")
-        if self.keeps_heading and self.gait.symmetry == ANTIPODAL:
-            raise ProblemError(
-                "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: the body "
-                "moves along its own axis of "
-                "symmetry, and as far back while it is bent to the other side. Take the class "
-                "without symmetry, links that "
-                "differ, or mu_b different from mu_f."
-            )
-
     @property
     def keeps_heading(self) -> bool:
         """Whether the body is its own mirror image in every shape: then it moves along its own axis
@@ -540,3 +527,14 @@ class Problem:
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
         return gait_fields.statement_hash(self.to_dict())
+
+
+def _retraces(problem: Problem) -> bool:
+    """Whether every gait of a class goes back the way it came: the rates of a random member have
+    one direction."""
+    gaits, n_joint = problem.gait, problem.body.n_joint
+    if not isinstance(gaits, LinearClass):
+        return False
+    rates = gaits.rate_matrix(gaits.instants, n_joint)
+    drawn = np.random.default_rng(0).normal(size=rates.shape[2])
+    return bool(np.linalg.matrix_rank(rates @ drawn) <= 1)

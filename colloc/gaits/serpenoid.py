@@ -1,12 +1,13 @@
-"""Serpenoid gaits: one wave of bending that travels along a chain, known by a few numbers however
-many joints there are.
+"""Serpenoid gaits: a wave of bending that travels along a chain (S. Hirose, Biologically Inspired
+Robots, 1993),
 
-    q_j(t) = offset + sum_k  a_k cos k psi_j + b_k sin k psi_j,      psi_j = 2 pi t - lag (j - (n + 1) / 2),      a_1 = 0
+    q_j(t) = offset + sum_k  a_k cos k psi_j + b_k sin k psi_j,      a_1 = 0,
 
-(S. Hirose, Biologically Inspired Robots, 1993). The lag is the one number in which angles are not
-linear. So the program has Fourier coefficients among its variables, as for all series, and one more
-group of equations that makes them a wave's.
-"""  # noqa: E501
+    psi_j = 2 pi t - lag (j - (n + 1) / 2).
+
+A map into Fourier series that is linear in all parameters but the lag. The full program has the
+Fourier coefficients as parameters, too, and this map as constraints.
+"""
 
 from __future__ import annotations
 
@@ -22,39 +23,25 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import named_arguments
 from colloc.system.errors import ProblemError
 
-_LAGS = np.linspace(-np.pi, np.pi, 361)
-"""Where the lag of the wave nearest to a gait is looked for first; equal lags a whole turn apart
-are the same wave."""
+_LAGS = np.linspace(-np.pi, np.pi, 361)  # first guesses of the lag of a gait
 
 
 @named_arguments
 @dataclass(frozen=True, eq=False, repr=False)
 class SerpenoidSeries(Fourier):
-    """The Fourier series of a serpenoid gait, which knows its lag.
-
-    Parameters
-    ----------
-    mean, cos, sin
-        As of a `Fourier`.
-    lag : float
-        By how much of its phase a joint follows the one behind it, positive where the wave travels
-        towards the head [rad].
-    """
+    """The Fourier series of a serpenoid gait with its lag [rad of phase a joint], positive where
+    the wave travels towards the head."""
 
     lag: float
 
     def lines(self) -> list[str]:
-        """The wave in words, then the formula."""
         amplitude = float(np.hypot(self.cos[0, 0], self.sin[0, 0]))
         offset = np.round(self.mean[0], 4) + 0.0
         waves = abs(self.lag) * (self.n_joint + 1) / (2 * np.pi)
-        towards = "head" if self.lag > 0 else "tail"
-        told = (
-            f"serpenoid: amplitude {amplitude:.4f} rad, offset {offset:+.4f} rad, lag "
-            f"{self.lag:+.4f} rad a joint"
-        )
         return [
-            f"{told} ({waves:.3f} waves along the body, towards the {towards})",
+            f"serpenoid: amplitude {amplitude:.4f} rad, offset {offset:+.4f} rad, lag "
+            f"{self.lag:+.4f} rad a joint ({waves:.3f} waves along the body, towards the "
+            f"{'head' if self.lag > 0 else 'tail'})",
             *super().lines(),
         ]
 
@@ -92,11 +79,9 @@ class Serpenoid(Harmonic):
     linear = False
 
     def describe(self) -> str:
-        """The class in words, for reports."""
         return f"serpenoid, {super().describe()}"
 
     def check_joints(self, n_joint: int) -> None:
-        """A `ProblemError` for one joint, along which no wave travels."""
         if n_joint < 2:
             raise ProblemError(
                 "a serpenoid wave travels along a chain: the class Serpenoid needs at least three "
@@ -105,133 +90,116 @@ class Serpenoid(Harmonic):
 
     @property
     def _waves(self) -> list[tuple[int, bool]]:
-        """Of each amplitude its harmonic, and whether it is a sine's."""
-        found = [(1, True)]
+        """Harmonic of each amplitude, and whether it is that of a sine."""
+        waves = [(1, True)]
         for k in range(2, self.harmonics + 1):
             if self.symmetry == ANTIPODAL and k % 2 == 0:
                 continue
-            found += [(k, True)] if self.symmetry == BILATERAL else [(k, False), (k, True)]
-        return found
+            waves += [(k, True)] if self.symmetry == BILATERAL else [(k, False), (k, True)]
+        return waves
 
     @property
     def n_own(self) -> int:
-        """The parameters from which the others, the Fourier coefficients, follow."""
+        """Number of parameters of the wave; the Fourier coefficients follow them."""
         return 1 + int(self.symmetry == NONE) + len(self._waves)
 
     def coefficients(self, own: Array, n_joint: int) -> list[list[Array]]:
-        """(mean, cos 1, sin 1, cos 2, ...) of every joint, from the own parameters: NumPy or
-        CasADi."""
-        xp = namespace(own)
-        offset = own[1] if self.symmetry == NONE else 0 * own[0]
+        """(mean, cos 1, sin 1, cos 2, ...) of every joint, of a wave; NumPy or CasADi."""
+        xp, lag = namespace(own), own[0]
+        offset = own[1] if self.symmetry == NONE else 0 * lag
         amplitudes = [own[i] for i in range(self.n_own - len(self._waves), self.n_own)]
         table = []
         for place in _places(n_joint):
-            row = [offset, *[0 * own[0]] * (2 * self.harmonics)]
+            row = [offset, *[0 * lag] * (2 * self.harmonics)]
             for (k, sine), amplitude in zip(self._waves, amplitudes, strict=True):
-                cos, sin = xp.cos(k * place * own[0]), xp.sin(k * place * own[0])
+                cos, sin = xp.cos(k * place * lag), xp.sin(k * place * lag)
                 row[2 * k - 1] += amplitude * (-sin if sine else cos)
                 row[2 * k] += amplitude * (cos if sine else sin)
             table.append(row)
         return table
 
     def coefficient_slopes(self, own: np.ndarray, n_joint: int) -> np.ndarray:
-        """Derivatives of the coefficients, ``(n_joint * (2 K + 1), n_own)``."""
-        columns = [np.zeros((n_joint, 2 * self.harmonics + 1))]
-        unit = np.eye(self.n_own)
-        for i in range(1, self.n_own):  # linear in all but the lag
-            only = unit[i].copy()
-            only[0] = own[0]
-            columns.append(np.array(self.coefficients(only, n_joint), dtype=float))
-        turning = np.arange(1, self.harmonics + 1) * _places(n_joint)[:, None]
+        """Derivatives of `coefficients`, ``(n_joint * (2 K + 1), n_own)``."""
+        k = np.arange(1, self.harmonics + 1) * _places(n_joint)[:, None]
         table = np.array(self.coefficients(own, n_joint), dtype=float)
-        columns[0][:, 1::2], columns[0][:, 2::2] = (
-            -turning * table[:, 2::2],
-            turning * table[:, 1::2],
-        )
+        by_lag = np.zeros_like(table)
+        by_lag[:, 1::2], by_lag[:, 2::2] = -k * table[:, 2::2], k * table[:, 1::2]
+        columns = [by_lag]
+        for unit in np.eye(self.n_own)[1:]:  # linear in the others
+            unit[0] = own[0]
+            columns.append(np.array(self.coefficients(unit, n_joint), dtype=float))
         return np.array([column.ravel() for column in columns]).T
 
-    def _basis(self, n_joint: int) -> np.ndarray:
-        """Of all parameters, own ones and Fourier coefficients, the latter alone enter the
-        angles."""
-        n = n_joint * (2 * self.harmonics + 1)
-        return np.hstack([np.zeros((n, self.n_own)), np.eye(n)])
-
     def full(self, own: np.ndarray, n_joint: int) -> np.ndarray:
-        """All parameters: the own ones, then the Fourier coefficients that follow from them."""
+        """The parameters of a wave, then its Fourier coefficients."""
         return np.concatenate([own, np.ravel(self.coefficients(own, n_joint))])
 
-    def fourier(self, parameters: np.ndarray, n_joint: int) -> SerpenoidSeries:
-        """The gait of parameters, of which the own ones count."""
+    def _basis(self, n_joint: int) -> np.ndarray:
+        n = n_joint * (2 * self.harmonics + 1)  # the Fourier coefficients alone enter the angles
+        return np.hstack([np.zeros((n, self.n_own)), np.eye(n)])
+
+    def member(self, parameters: np.ndarray, n_joint: int) -> SerpenoidSeries:
         with np.errstate(over="ignore", invalid="ignore"):  # a series refuses what is not finite
             table = np.array(self.coefficients(parameters[: self.n_own], n_joint), dtype=float)
-        return SerpenoidSeries(table[:, 0], table[:, 1::2], table[:, 2::2], float(parameters[0]))
+        return SerpenoidSeries.from_table(table, float(parameters[0]))
 
     def parameters(self, gait: Fourier) -> np.ndarray:
-        """The own parameters of the wave nearest to a gait, after shifting its start phase if that
-        is free."""
-        lag, start = self._begun(gait)
+        """Parameters of the wave nearest to a series, after shifting its start phase if that is
+        free."""
+        lag, start = self._lag_and_start(gait)
         gait = gait.resized(self.harmonics)
-        wave = _at_the_middle(
-            gait if abs(start) <= SAME_START else shifted(gait, -start / (2 * np.pi)), lag
-        )
-        offset = [gait.mean.mean()] if self.symmetry == NONE else []
-        return np.array(
-            [
-                lag,
-                *offset,
-                *(-wave[k - 1].imag if sine else wave[k - 1].real for k, sine in self._waves),
-            ]
-        )
-
-    def _begun(self, gait: Fourier) -> tuple[float, float]:
-        """The lag of the wave nearest to a gait, and by how much of its phase it begins off that of
-        members [rad]."""
-        lag, gait = getattr(gait, "lag", None), gait.resized(self.harmonics)
-        if lag is None:
-            lag = self._nearest_lag(gait)
+        if abs(start) > SAME_START:
+            gait = shifted(gait, -start / (2 * np.pi))
         wave = _at_the_middle(gait, lag)
-        return lag, 0.0 if self.symmetry == BILATERAL or wave[0] == 0 else float(
-            np.angle(1j * wave[0])
-        )
-
-    def in_phase(self, gait: Fourier) -> bool:
-        return abs(self._begun(gait)[1]) <= SAME_START
-
-    def _nearest_lag(self, gait: Fourier) -> float:
-        """The lag at which the joints agree best on what wave they are part of."""
-        from scipy.optimize import minimize_scalar
-
-        def agreed(lag: float) -> float:
-            wave = _at_the_middle(gait, lag)
-            kept = wave.imag if self.symmetry == BILATERAL else np.abs(wave)
-            return -float(np.sum(kept**2))
-
-        first = _LAGS[np.argmin([agreed(lag) for lag in _LAGS])]
-        step = _LAGS[1] - _LAGS[0]
-        bounds = max(first - step, -np.pi), min(first + step, np.pi)
-        return float(
-            minimize_scalar(agreed, bounds=bounds, method="bounded", options={"xatol": 1e-12}).x
-        )
+        offset = [gait.mean.mean()] if self.symmetry == NONE else []
+        amplitudes = (-wave[k - 1].imag if sine else wave[k - 1].real for k, sine in self._waves)
+        return np.array([lag, *offset, *amplitudes])
 
     def nearest(self, gait: Fourier) -> np.ndarray:
         return self.parameters(gait)
 
-    def largest_parameters(self, body: Body, limit: float) -> np.ndarray:
-        """Bounds as for all series; the lag's is half a turn."""
-        bounds = super().largest_parameters(body, limit)
-        bounds[0] = np.pi
-        return bounds
+    def in_phase(self, gait: Fourier) -> bool:
+        return abs(self._lag_and_start(gait)[1]) <= SAME_START
+
+    def _lag_and_start(self, gait: Fourier) -> tuple[float, float]:
+        """Lag of the wave nearest to a gait, and by how much it starts off the phase of members
+        [rad]."""
+        lag, gait = getattr(gait, "lag", None), gait.resized(self.harmonics)
+        if lag is None:
+            lag = self._nearest_lag(gait)
+        first = _at_the_middle(gait, lag)[0]
+        in_phase = self.symmetry == BILATERAL or first == 0
+        return lag, 0.0 if in_phase else float(np.angle(1j * first))
+
+    def _nearest_lag(self, gait: Fourier) -> float:
+        """The lag at which the joints agree best on the wave they are part of."""
+        from scipy.optimize import minimize_scalar
+
+        def disagreement(lag: float) -> float:
+            wave = _at_the_middle(gait, lag)
+            kept = wave.imag if self.symmetry == BILATERAL else np.abs(wave)
+            return -float(np.sum(kept**2))
+
+        first = _LAGS[np.argmin([disagreement(lag) for lag in _LAGS])]
+        step = _LAGS[1] - _LAGS[0]
+        bounds = max(first - step, -np.pi), min(first + step, np.pi)
+        how: Any = {"method": "bounded", "options": {"xatol": 1e-12}}
+        return float(minimize_scalar(disagreement, bounds=bounds, **how).x)
+
+    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        _, largest = super().bounds(body, limit)
+        largest[0] = np.pi  # a lag of a whole turn more is the same wave
+        return -largest, largest
 
 
 def _places(n_joint: int) -> np.ndarray:
-    """Of the joints, counted from the middle one."""
+    """Numbers of the joints, counted from the middle."""
     return np.arange(n_joint) - 0.5 * (n_joint - 1)
 
 
 def _at_the_middle(gait: Fourier, lag: float) -> Any:
-    """Amplitudes ``cos - i sin`` of the harmonics of the wave with a lag that fits all joints best,
-    ``(n_harmonic,)``."""
+    """Amplitudes ``cos - i sin`` of the harmonics of the wave of a lag that is nearest to a gait,
+    at the middle of the body, ``(n_harmonic,)``."""
     k = np.arange(1, gait.n_harmonic + 1)
-    return (
-        (gait.cos - 1j * gait.sin) * np.exp(1j * k * lag * _places(gait.n_joint)[:, None])
-    ).mean(axis=0)
+    phase = np.exp(1j * k * lag * _places(gait.n_joint)[:, None])
+    return ((gait.cos - 1j * gait.sin) * phase).mean(axis=0)

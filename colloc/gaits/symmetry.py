@@ -1,15 +1,9 @@
-"""Symmetries of gaits: the part of a period that has to be solved, and the other part from it.
+"""Symmetries of a gait q(t), phase t in [0, 1], with the exchange of tail and head
+``(S q)_j = -q_(n+1-j)``. For any friction the net rotation vanishes.
 
-Symmetries of a gait q(t), phase t from 0 to 1 over a period, joints counted from the tail, with the
-exchange of tail and head ``(S q)_j = -q_(n+1-j)``:
-
-- ``bilateral``: q(-t) = S q(t). The body at -t, seen from its head, has the shape it has at t. For
-  any friction the net rotation vanishes (paper, appendix A; `colloc.results.distinct_optima`) and
-  the second half period repeats the first half's displacement and work. The path starts and ends
-  its half on shapes with S q = q, with tangents that S reverses.
-- ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any
-  friction.
-- ``none``.
+- ``bilateral``: q(-t) = S q(t). The second half period repeats the displacement and work of the
+  first (paper, appendix A).
+- ``antipodal``: q(t + 1/2) = -q(t). The second half period is the mirror image of the first.
 """
 
 from __future__ import annotations
@@ -26,13 +20,12 @@ _DENSE = 2000
 
 
 def fraction(symmetry: str) -> float:
-    """The part of the period that has to be solved."""
+    """Part of the period that is solved; symmetry gives the rest."""
     return 1.0 if symmetry == NONE else 0.5
 
 
 def reduced(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Phases ``(n_time,)`` of the solved part that real phases t are images of, and whether they
-    are (not identical)."""
+    """Phases ``(n_time,)`` of the solved part that give phases t, and whether as images."""
     t = np.asarray(t, dtype=float)
     # whole periods are ends, not starts, so that a path that fails to close shows it
     phase = np.where((t > 0) & (t % 1.0 == 0), 1.0, t % 1.0)
@@ -42,26 +35,23 @@ def reduced(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def both_halves(symmetry: str, phases: np.ndarray) -> np.ndarray:
-    """Phases in (0, 1) of instants ``(n,)`` of the solved part and of their images."""
+    """Phases in (0, 1) of phases ``(n,)`` of the solved part and of their images."""
     images = {NONE: phases, BILATERAL: 1 - phases, ANTIPODAL: 0.5 + phases}[symmetry]
     both = np.concatenate([phases, images])
     return np.unique(both[(both > 0) & (both < 1)])
 
 
 def imaged(symmetry: str, values: np.ndarray, image: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """Angles ``(n_joint, n_time)``, or their first derivatives, those of the columns `image` turned
-    into their images."""
+    """Replace columns `image` of angles ``(n_joint, n_time)``, or of rates, by their images."""
     if symmetry == BILATERAL:  # time runs backwards
         return np.where(image, -((-1) ** derivative) * values[::-1], values)
     return np.where(image, -values, values) if symmetry == ANTIPODAL else values
 
 
 def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarray:
-    """Points ``(n_joint, count + 1)`` along the solved part of the symmetric gait nearest to
-    `gait`, evenly in phase.
+    """Sample the solved part of the symmetric gait nearest to a gait, ``(n_joint, count + 1)``.
 
-    Phase 0 is kept if the gait has the symmetry about it, else moved to where it comes closest to
-    having it.
+    Phase 0 moves to the phase about which the gait is closest to the symmetry, if not there.
     """
     if symmetry == NONE:
         return gait.angles(np.linspace(0.0, 1.0, count + 1))
@@ -87,8 +77,7 @@ _ALIKE = {BILATERAL: "mirrored joints", ANTIPODAL: "to both sides"}
 
 
 def check_symmetric(problem: Any) -> None:
-    """A `ProblemError` if the body of a problem has no gaits with the symmetry of its class, or its
-    limits forbid them."""
+    """Raise a `ProblemError` if body or limits of a problem lack the symmetry of its gaits."""
     symmetry = problem.gait.symmetry
     if symmetry not in problem.body.symmetries:
         raise ProblemError(

@@ -82,10 +82,6 @@ class Telling(ClassOfGaits):
         near = self.without.through(gait)
         return replace(near, **{self.tells: getattr(gait, self.tells)}) if gait.is_series else near
 
-    def first_guess(self, gait: Any) -> Any:
-        """Where searches begin the number is not drawn."""
-        return self.without.first_guess(gait)
-
 
 def telling(kind: type[Telling], gait_class: Any, **own: Any) -> Any:
     """A class of gaits whose members say a number, with attributes of its own."""

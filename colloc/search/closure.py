@@ -15,6 +15,7 @@ import numpy as np
 
 from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.linear import enclosed_area
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
@@ -91,7 +92,7 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
         | paced
     )
     space, v = space_near(problem.with_(**settings), gait)
-    program, area = ReducedProgram(space, delta), own.enclosed_area(problem.body.n_joint)
+    program, area = ReducedProgram(space, delta), enclosed_area(own, problem.body.n_joint)
     # near no limit of the angles: those are kept by the search that begins here
     program.place_rows(np.zeros_like(v))
     return space.member(minimised(_Nearest(program, v, area), v, np.inf, _ACCURACY, _STEPS).v)

@@ -12,7 +12,7 @@ import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem, control_problem
 from colloc.gaits.coupled import Coupled
-from colloc.gaits.fitted_gait import FittedGait, Given, Uncertainty, coefficients, fitted_gait
+from colloc.gaits.fitted_gait import FittedGait, Given, Uncertainty, fitted_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
@@ -237,7 +237,7 @@ def _errors_of_samples(
             period["work"],
         ]
 
-    v = coefficients(gait.resized(highest)).ravel()
+    v = gait.resized(highest).table.ravel()
     known, period, slopes = values(v), motion.values(v, delta), motion.gradients(v, delta)
     by_aim = [
         aim.gradient(period, slopes) + np.zeros_like(v) for aim in (aims.objective, EFFICIENCY)
@@ -252,7 +252,7 @@ def _errors_of_samples(
     noise = samples.factor * (noise + np.abs(bent).max(axis=0))
     lack, missed = np.zeros(4), ""
     if richer is not None:
-        lack = np.abs(values(coefficients(richer.resized(highest)).ravel()) - known)
+        lack = np.abs(values(richer.resized(highest).table.ravel()) - known)
         missed = (
             f", and lack of fit: {richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
         )

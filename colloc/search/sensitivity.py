@@ -350,7 +350,7 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
         found = converged(space, space.parameters(answer.gait), answer.delta, FINE)
         return _Lagrangian.at_optimum(found.space, found.v, answer.delta)
 
-    fixed = answer.problem.gait.has_fixed_edges
+    fixed = answer.problem.gait.relative_delta or not answer.problem.gait.free
     return [on(_FINEST), on(2), solved if fixed else on(4, 0.5)]
 
 

@@ -193,7 +193,8 @@ def planned_mesh(
         # kinked
         on_knots = kinks[:0] if switches and (rule.left or rule.right) else kinks
         # where the rates jump edges may be added, not moved
-        keeps = nested or control.admissible.gait.has_fixed_edges
+        gait = control.admissible.gait
+        keeps = nested or gait.relative_delta or not gait.free
         snap = 0.0 if keeps else _SNAP
         first = np.union1d(mesh.edges if keeps else coarse_edges(control, mesh.edges), knots)
         edges = moved_knots(first, np.union1d(on_knots, _beside(mesh, on_knots)), snap)

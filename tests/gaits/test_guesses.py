@@ -4,7 +4,7 @@ further."""
 import numpy as np
 import pytest
 
-from colloc.gaits.guesses import SAFE, largest_factor
+from colloc.gaits.guesses import SAFE, checked_member, largest_factor
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import latin_hypercube_gait
@@ -44,7 +44,7 @@ def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
         Problem("crossed", wave, body, gait=Harmonic(1))
     phase = float(str(refused.value).rstrip(".").split()[-1])
     depth = body.crossing_depth(
-        Harmonic(1).guessed(wave)[0].angles(np.append(phase, np.arange(400) / 400))
+        checked_member(Harmonic(1), wave)[0].angles(np.append(phase, np.arange(400) / 400))
     )
     assert 0.05 < phase < 0.4
     assert depth[0] == pytest.approx(depth.max(), rel=1e-3)

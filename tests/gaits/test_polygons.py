@@ -49,7 +49,7 @@ def test_harmonics_survive_the_way_through_points(symmetry):
         0.3 * rng.normal(size=2), 0.3 * rng.normal(size=(2, 3)), 0.3 * rng.normal(size=(2, 3))
     )
     target = Harmonic(3, symmetry)
-    gait = target.fourier(target.parameters(drawn), 2)
+    gait = target.member(target.parameters(drawn), 2)
 
     class Opaque(GaitFunction):
         n_joint = 2

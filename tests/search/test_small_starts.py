@@ -33,7 +33,7 @@ def test_loops_are_admissible_members_of_the_class_hardly_longer_than_they_must_
     assert 2 <= len(loops) <= 4
     for loop in loops:
         n_joint = problem.body.n_joint
-        again = own.fourier(own.parameters(loop), n_joint)
+        again = own.member(own.parameters(loop), n_joint)
         assert distance(again, loop, problem.body, problem.friction) < 1e-9
         angles = loop.angles(np.linspace(0, 1, 200))
         assert (np.abs(angles).max(axis=1) <= np.broadcast_to(problem.joint_limit, n_joint)).all()

@@ -177,7 +177,7 @@ def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_progra
     shapes /= body.largest_angles(shapes)
     largest = np.abs(shapes).max(axis=1)
     assert largest.max() > 4 / np.pi
-    assert (largest <= gait.largest_parameters(body, 1.0).max() * np.pi / 4).all()
+    assert (largest <= gait.bounds(body, 1.0)[1].max() * np.pi / 4).all()
     problem = Problem("modes", body=body, gait=gait, joint_limit=1.0)
     program = program_of(problem)
     np.testing.assert_allclose(

@@ -82,7 +82,7 @@ def test_images_of_a_gait_keep_its_distance_work_and_rotation(friction, n_image)
 @pytest.mark.parametrize("coefficients", [(1, 1, 1), (1.7, 1, 1.3), (0.5, 1, 5)])
 def test_bilateral_gaits_close_their_rotation_for_any_friction(coefficients):
     rng = np.random.default_rng(5)
-    gait = Harmonic(2, "bilateral").fourier(0.5 * rng.normal(size=5), 2)
+    gait = Harmonic(2, "bilateral").member(0.5 * rng.normal(size=5), 2)
     motion = replayed(gait, coulomb(*coefficients))
     assert abs(motion.rotation) < 1e-10
     assert motion.distance > 1e-3
@@ -128,7 +128,7 @@ def test_starts_are_admissible_members_of_their_class_and_reproducible(
         assert np.abs(angles).max() <= 2.8
         assert not crossing_depth(stated.body, angles).any()
         assert gait.shape_speed >= stated.smallest_shape_speed
-        again = stated.gait.fourier(stated.gait.parameters(gait), 2)
+        again = stated.gait.member(stated.gait.parameters(gait), 2)
         assert phase_distance(gait, again) < 1e-7
         np.testing.assert_array_equal(angles, start_gait(stated, sampler, 3, k).angles(t))
         assert np.abs(angles - start_gait(stated, sampler, 4, k).angles(t)).max() > 1e-2
