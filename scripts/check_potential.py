@@ -17,14 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import swaps_ends
+from colloc.bounds.coulomb_motion import CoulombMotion
 from colloc.bounds.potential import PotentialSpace, largest_ratios
-from colloc.bounds.recheck import largest_ratio
-from colloc.bounds.sampling import Domain
+from colloc.bounds.sampling import Domain, summits_met
+from colloc.bounds.spline import TensorSpline
 from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.numerics.spline import TensorSpline
 
 KEPT = Path("results/curated/potentials.json")
 _AT_ONCE = 200_000
@@ -48,7 +47,7 @@ def potentials(path: Path = KEPT) -> list[Kept]:
             Chain(tuple(kept["lengths"])), LAWS[kept["law"]](*kept["mu"]), kept["joint_limit"]
         )
         spline = TensorSpline(2, domain.joint_limit, len(kept["graded"]) + 1, tuple(kept["graded"]))
-        space = PotentialSpace(spline, tuple(kept["harmonics"]), swaps_ends(domain.body))
+        space = PotentialSpace(spline, tuple(kept["harmonics"]), domain.body.symmetric)
         found.append(Kept(domain, space, np.array(kept["coefficients"]), kept["program"]))
     return found
 
@@ -99,6 +98,15 @@ def domain_of(options: argparse.Namespace) -> Domain:
         LAWS[options.law](mu_t=mu_t, mu_f=mu_f, mu_b=mu_b),
         options.limit,
     )
+
+
+def largest_ratio(
+    domain: Domain, space: PotentialSpace, free: np.ndarray, **settings: int
+) -> tuple[float, CoulombMotion]:
+    """The largest ratio that `summits_met` finds, and its motion."""
+    reached, summit = summits_met(domain, space, free, **settings)
+    best = int(np.argmax(reached))
+    return float(reached[best]), summit.take(np.array([best]))
 
 
 def largest_random_ratio(kept: Kept, count: int, seed: int) -> float:

@@ -14,7 +14,6 @@ import warnings
 from contextlib import suppress
 from pathlib import Path
 
-from colloc.bounds.infinitesimal import best_small_gait
 from colloc.bounds.sampled import efficiency_bound
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
@@ -23,6 +22,7 @@ from colloc.mechanics.feet import Wheel
 from colloc.mechanics.friction import Friction
 from colloc.search.solve import solve
 from colloc.system.errors import CollocError, ProblemError
+from research.small_gaits import best_small_gait
 
 STANDS = {"line": 0, "1 foot a link": 1, "2 feet": 2, "3 feet": 3}
 CLASSES = (Harmonic(1), Harmonic(2), Harmonic(3))

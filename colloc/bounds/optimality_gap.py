@@ -1,5 +1,4 @@
-"""How far a gait is from the best possible: efficiency, upper bound and gap, in one line for
-reports."""
+"""Efficiency, upper bound and gap of a gait, in one line for reports."""
 
 from __future__ import annotations
 
@@ -19,18 +18,15 @@ from colloc.system.errors import ProblemError, ReadOnlyRunWarning, StoreError
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
 
-CACHE = "bounds.sqlite"
-"""Where bounds are kept, beside the results."""
+CACHE = "bounds.sqlite"  # beside the results
 
 
 def refusal(problem: Problem) -> str:
-    """Why no upper bound can be computed for the gaits of a problem, in a sentence; "" if one
-    can."""
+    """Why no upper bound can be computed for the gaits of a problem; "" if one can."""
     if not isinstance(problem.body, Chain) or not isinstance(problem.friction, Friction):
         return (
             "upper bounds are computed for chains of links under Coulomb friction, or the elliptic "
-            "law, only; for this one "
-            "there is 1/min(mu)."
+            "law, only; for this one there is 1/min(mu)."
         )
     if problem.body.feet and not problem.law.associated:
         return (
@@ -51,9 +47,8 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed
     if asked for.
 
-    None where there can be none (`refusal`), unless it is asked for: that is a `ProblemError`. A
-    cache that cannot be read or written is left as it is, with a `ReadOnlyRunWarning`: no result
-    depends on it.
+    None where there can be none (`refusal`), unless it is asked for: a `ProblemError`. A cache that
+    cannot be read or written costs a `ReadOnlyRunWarning`: no result depends on it.
     """
     if why := refusal(problem):
         if compute:
@@ -66,17 +61,14 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
     from colloc.bounds.sampled import efficiency_bound, known_bound
 
     try:
-        return (
-            efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
-        )
+        return (efficiency_bound if compute else known_bound)(*domain, cache=cache)
     except StoreError as error:
         warnings.warn(f"{error} No bound is taken from it.", ReadOnlyRunWarning, stacklevel=2)
         return efficiency_bound(*domain) if compute else None
 
 
 def _bounded(problem: Problem) -> bool:
-    """Work that depends on the pace has no bound per distance: a slow gait pays as little as it
-    likes. Nor has a body that coasts."""
+    # work that depends on the pace has no bound per distance, nor has a body that coasts
     dry = problem.regime.slow_on_level and rate_independent(problem.law)
     return dry and problem.objective == EFFICIENCY and problem.rotation == 0
 
@@ -84,8 +76,8 @@ def _bounded(problem: Problem) -> bool:
 def gap_line(
     problem: Problem, efficiency: float, bound: Bound | None, *, asked: bool = False
 ) -> str:
-    """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu) (eq.
-    lambdaupper). Whoever has asked for a bound in vain is not told to ask for one."""
+    """Efficiency, upper bound and gap; without a computed bound, 1/min(mu) with the hint to ask for
+    one, unless one was `asked` for in vain."""
     if bound is not None:
         return f"  {bound.report(efficiency)}"
     if not _bounded(problem):

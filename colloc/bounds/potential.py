@@ -1,46 +1,40 @@
 r"""Potentials over shape and heading: the unknowns of the upper bound (docs/bound.md).
 
 For any function ``phi(q, theta)`` of the joint angles q and the heading theta of the middle link,
-the integral of its rate vanishes over a closed gait. So the distance along a fixed direction may be
-counted as ``v_x(q, theta, r) + d phi/dt``, and
+the integral of its rate vanishes over a closed gait, so
 
-    efficiency <= max over q, theta, r of ( Re(e^{i theta} v) + d phi/dt ) / P.
+    efficiency <= max over q, theta, r of ( Re(e^{i theta} v) + d phi/dt ) / P,
 
-As a Fourier series in theta, ``phi = Re sum_k e^{i k theta} c_k(q)``. The harmonic k = 1 alone
-follows a point c_1(q) of the body frame (x + i y) from the middle link; k = 0 is a potential on
-shape space. Splines in q, parities from the symmetries.
+with ``phi = Re sum_k e^{i k theta} c_k(q)``, c_k splines with the parities of the symmetries. The
+harmonic k = 1 alone follows a point c_1(q) of the body from the middle link.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 from colloc.bounds.coulomb_motion import CoulombMotion
-from colloc.numerics.spline import TensorSpline
+from colloc.bounds.spline import TensorSpline
 
 _HEADINGS = 48
 _NEWTON_STEPS = 3
 _AT_ONCE = 50000
+_MOST_WORTH = 0.3  # share of the largest worth that a knot needs to be inserted with the best
+_SINGULAR = 1e-10  # added to the roughness, of its mean diagonal: affine functions have none
 
 
 @dataclass(frozen=True)
 class PotentialSpace:
-    """The potentials with given harmonics in the heading and splines in the angles.
+    """Potentials with given harmonics in the heading and splines in the angles.
 
-    Parameters
-    ----------
-    spline : TensorSpline
-    harmonics : tuple of int
-        Those used; odd ones suffice where mu_b = mu_f.
-    end_swap : bool
-        Whether the body is the same when turned end for end (see
-        `colloc.bounds.coulomb_motion.swaps_ends`).
-    together : int, optional
-        Only sums of functions of so many joint angles each.
+    Odd harmonics suffice where mu_b = mu_f; `end_swap`: the body is the same turned end for end;
+    `together`: only sums of functions of so many joint angles each.
     """
 
     spline: TensorSpline
@@ -51,10 +45,8 @@ class PotentialSpace:
     @cached_property
     def bases(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Bases of the real parts (even under the mirror) and of the imaginary parts (odd)."""
-        swap = -1 if self.end_swap else None
-        return self.spline.symmetric_basis(1, swap, self.together), self.spline.symmetric_basis(
-            -1, swap, self.together
-        )
+        swap, basis = -1 if self.end_swap else None, self.spline.symmetric_basis
+        return basis(1, swap, self.together), basis(-1, swap, self.together)
 
     @cached_property
     def layout(self) -> list[tuple[int, int, slice]]:
@@ -69,7 +61,6 @@ class PotentialSpace:
 
     @property
     def size(self) -> int:
-        """Number of free coefficients."""
         return self.layout[-1][2].stop
 
     @cached_property
@@ -77,40 +68,22 @@ class PotentialSpace:
         """Quadratic form of the free coefficients: integral of the squared second derivatives,
         harmonic k weighted by k^2."""
         table = self.spline.roughness
-        return sparse.block_diag(
-            [
-                max(k, 1) ** 2 * (self.bases[part].T @ table @ self.bases[part])
-                for k, part, _ in self.layout
-            ],
-            format="csr",
-        )
+        blocks = [
+            max(k, 1) ** 2 * (self.bases[part].T @ table @ self.bases[part])
+            for k, part, _ in self.layout
+        ]
+        return sparse.block_diag(blocks, format="csr")
 
     def coefficients(self, free: np.ndarray) -> dict[int, np.ndarray]:
-        """Complex spline coefficients of every c_k, ``(spline.size,)`` each."""
+        """Complex spline coefficients ``(spline.size,)`` of every c_k."""
         full = {k: np.zeros(self.spline.size, dtype=complex) for k in self.harmonics}
         for k, part, where in self.layout:
             full[k] += (1, 1j)[part] * (self.bases[part] @ free[where])
         return full
 
-    def turned(self, free: np.ndarray) -> np.ndarray:
-        """The same potential for the body turned end for end: ``c_k(q)`` becomes
-        ``-conj(c_k(reversed q))``.
-
-        Turning the body and reversing time take angles q to -reversed q and rates r to reversed r;
-        the velocity of the middle link in its own axes and its heading stay as they are, the sense
-        of its rotation does not. By the mirror image ``c_k(-q) = conj(c_k(q))``.
-        """
-        found = np.empty_like(free)
-        for _, part, where in self.layout:
-            basis = self.bases[part]
-            table = (basis @ free[where]).reshape((self.spline.per_joint,) * self.spline.n_joint)
-            image = (-1, 1)[part] * table.transpose().ravel()
-            found[where] = (basis.T @ image) / basis.multiply(basis).sum(axis=0).A1
-        return found
-
 
 class Samples:
-    """Motions with what a potential needs to be evaluated on them."""
+    """Motions with what potentials need to be evaluated on them."""
 
     def __init__(self, space: PotentialSpace, motion: CoulombMotion) -> None:
         self.space, self.motion = space, motion
@@ -118,7 +91,6 @@ class Samples:
         self.slope = space.spline.slope(motion.angles, motion.rates)
 
     def joined(self, motion: CoulombMotion) -> Samples:
-        """These samples and new ones."""
         new = Samples(self.space, motion)
         both = Samples.__new__(Samples)
         both.space, both.motion = self.space, self.motion.joined(motion)
@@ -127,8 +99,7 @@ class Samples:
         return both
 
     def amplitudes(self, free: np.ndarray) -> dict[int, np.ndarray]:
-        """Complex amplitudes ``(n,)`` by harmonic k of the gain ``Re sum_k e^{i k theta} a_k`` as a
-        function of heading."""
+        """Complex amplitudes a_k ``(n,)`` of the gain ``Re sum_k e^{i k theta} a_k``."""
         motion = self.motion
         result = {1: motion.velocity[0] + 1j * motion.velocity[1]}
         for k, c in self.space.coefficients(free).items():
@@ -137,39 +108,35 @@ class Samples:
         return result
 
     def ratio(self, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Largest (gain over heading) / power, and the heading where it is taken, ``(n,)`` each."""
+        """Largest (gain over heading) / power ``(n,)``, and the heading where it is taken."""
         gain, heading = largest_gain(self.amplitudes(free))
         return gain / self.motion.power, heading
 
     def rows(self, chosen: np.ndarray, heading: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
-        """The gain of chosen samples at given headings, over power: ``matrix @ free +
-        constant``."""
-        u, v = self.motion.velocity[:, chosen]
-        constant = (np.cos(heading) * u - np.sin(heading) * v) / self.motion.power[chosen]
-        scale = 1.0 / self.motion.power[chosen]
-        value, slope, spin = self.value[chosen], self.slope[chosen], self.motion.spin[chosen]
+        """Gain over power of chosen samples at given headings: ``matrix @ free + constant``."""
+        motion = self.motion.take(chosen)
+        u, v = motion.velocity
+        constant = (np.cos(heading) * u - np.sin(heading) * v) / motion.power
+        scale, value, slope = 1.0 / motion.power, self.value[chosen], self.slope[chosen]
         blocks = []
         for k, part, _ in self.space.layout:
             cos, sin = np.cos(k * heading) * scale, np.sin(k * heading) * scale
             along, across = (cos, -sin) if part == 0 else (-sin, -cos)
-            full = sparse.diags(along) @ slope + sparse.diags(across * k * spin) @ value
+            full = sparse.diags(along) @ slope + sparse.diags(across * k * motion.spin) @ value
             blocks.append(full @ self.space.bases[part])
         return sparse.hstack(blocks, format="csr"), constant
 
 
 def largest_ratios(space: PotentialSpace, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
-    """Largest (gain over heading) / power of each motion, ``(n,)``; `Samples` of a part at a time,
+    """Largest (gain over heading) / power of each motion ``(n,)``; `Samples` of a part at a time,
     as they are large."""
     parts = np.array_split(np.arange(motion.size), motion.size // _AT_ONCE + 1)
     return np.concatenate([Samples(space, motion.take(part)).ratio(free)[0] for part in parts])
 
 
 def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Maximum over theta of ``Re sum_k e^{i k theta} a_k`` and its place, ``(n,)`` each.
-
-    Closed form if only k = 0 and 1 occur; else the best of a grid of headings, polished by Newton
-    steps.
-    """
+    """Maximum over theta of ``Re sum_k e^{i k theta} a_k`` and its place, ``(n,)`` each: in closed
+    form for k = 0 and 1, else the best of a grid of headings, polished by Newton steps."""
     if set(amplitudes) <= {0, 1}:
         first = amplitudes[1]
         return np.abs(first) + np.real(amplitudes.get(0, 0.0)), -np.angle(first)
@@ -192,3 +159,54 @@ def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndar
         gain = terms(trial).real.sum(axis=1)
         heading, best = np.where(gain > best, trial, heading), np.maximum(gain, best)
     return best, heading
+
+
+class Measure(NamedTuple):
+    """Multipliers of the bound's program: of all ways to share out work among motions so that they
+    close in the mean, the one that travels farthest, along heading 0."""
+
+    motion: CoulombMotion
+    heading: np.ndarray  # of the middle link [rad], (n,)
+    weight: np.ndarray  # share of the work, of sum 1, (n,)
+
+    def efficiency(self) -> float:
+        """Distance over work; up to smoothing and tolerances the value of the program."""
+        u, v = self.motion.velocity
+        way = np.cos(self.heading) * u - np.sin(self.heading) * v
+        return float(self.weight / self.motion.power @ way)
+
+
+def worth(space: PotentialSpace, measure: Measure) -> float:
+    """What the functions of a space can gain over those that the measure closes for, up to a
+    factor: ``g.R^-1.g``, g being their mean rates and R the roughness.
+
+    The measure's own weight is no guide: it may close well where it is heavy.
+    """
+    rows, _ = Samples(space, measure.motion).rows(np.arange(measure.weight.size), measure.heading)
+    slope, size = rows.T @ measure.weight, space.roughness.diagonal().mean()
+    roughness = space.roughness + _SINGULAR * size * sparse.eye(space.size)
+    return float(slope @ spsolve(roughness.tocsc(), slope))
+
+
+def with_knots(space: PotentialSpace, added: np.ndarray) -> PotentialSpace:
+    """The potentials with more knots, at the angles `added` and their opposites."""
+    old = space.spline
+    inner = np.unique(np.concatenate([old.knots[1:-1], added, -added]).round(12) + 0.0)
+    spline = TensorSpline(old.n_joint, old.limit, inner.size + 1, tuple(inner.tolist()))
+    return replace(space, spline=spline)
+
+
+def with_more_knots(space: PotentialSpace, measure: Measure, intervals: int) -> PotentialSpace:
+    """The potentials with knots in the middle of those intervals where they are worth most, at most
+    `intervals` in all."""
+    knots = space.spline.knots
+    middle = 0.5 * (knots[1:] + knots[:-1])
+    places = middle[middle > -1e-12]
+    values = np.array([worth(with_knots(space, places[[k]]), measure) for k in range(places.size)])
+    added: list[float] = []
+    for k in np.argsort(-values):
+        more = with_knots(space, np.array([*added, places[k]])).spline.intervals
+        if added and (values[k] < _MOST_WORTH * values.max() or more > intervals):
+            break
+        added.append(float(places[k]))
+    return with_knots(space, np.array(added))

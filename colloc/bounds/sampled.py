@@ -1,9 +1,8 @@
 """An upper bound on the efficiency of every gait of a body: derivation in docs/bound.md.
 
-The bound is the value of a convex problem: choose a potential over shape and heading
-(`colloc.bounds.potential`) so that the largest (gain / power) over all shapes, headings and rate
-directions is smallest. It is solved by exchange of samples (`bounds.cutting_plane`). What comes out
-is a *sampled* bound; `research/guarantee` guarantees one for associated friction.
+A convex program chooses the potential (`bounds.potential`) whose largest (gain / power) over all
+shapes, headings and rate directions is smallest, by exchange of samples (`bounds.cutting_plane`).
+The result is a *sampled* bound; `research/guarantee` guarantees one for associated friction.
 """
 
 from __future__ import annotations
@@ -17,15 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import MOST_LINKS, swaps_ends
+from colloc.bounds.coulomb_motion import MOST_LINKS
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampling import Domain
+from colloc.bounds.spline import TensorSpline
 from colloc.gaits.gait_fields import fields, statement_hash
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
-from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ProblemError, ReadOnlyRunWarning, StoreError
 from colloc.system.row_file import CACHE, put_rows, read_rows
 
@@ -35,7 +34,7 @@ VERSION = 6
 
 @dataclass(frozen=True)
 class Budget:
-    """How much work a bound is worth.
+    """Effort of a bound.
 
     Parameters
     ----------
@@ -46,15 +45,12 @@ class Budget:
         mu_b differs from mu_f.
     shapes, directions : int
         The first lattice: steps of every joint angle, and rate directions.
-    rounds : int
-        Largest number of rounds of climbs between the samples.
-    starts : int
-        Climbs a round.
+    rounds, starts : int
+        Largest number of rounds of climbs between the samples, and climbs a round.
     tolerance : float
         Excess of the summits over the program's value at which a bound counts as converged.
     first : int
-        Even intervals to begin with; more knots are inserted where they are worth most
-        (`colloc.bounds.knots`). As many as `intervals` keep the knots even.
+        Even intervals to begin with; more knots are inserted where they are worth most.
     smoothing : float
         Weight of the roughness of the potential.
     together : int, optional
@@ -83,12 +79,10 @@ FIVE_LINKS = replace(FOUR_LINKS, intervals=3, first=3, tolerance=3e-3)
 
 
 def usual_budget(body: Chain) -> Budget:
-    """What a bound is worth if nothing else is asked for: coarser splines for more joints."""
     return {3: FOUR_LINKS, 4: FIVE_LINKS}.get(body.n_joint, QUICK)
 
 
 def usual_harmonics(body: Chain, friction: Law) -> tuple[int, ...]:
-    """Those in the heading that are worth what they cost."""
     if not friction.reversible:
         return 0, 1
     return (1, 3) if body.n_joint <= 2 else (1,)
@@ -101,24 +95,19 @@ class Bound:
     Attributes
     ----------
     sampled : float
-        Largest ratio met on any sample; what lies between samples may exceed it. Or 1/min(mu), if
-        that is less.
+        Largest ratio on any sample; between samples it may be exceeded. Or 1/min(mu), if less.
     floor : float
         Value of the last program: no potential of this space does better on the samples held, up to
         the smoothing (1e-5).
     converged : bool
         Whether the last climbs between the samples stayed within the budget's tolerance of `floor`,
-        and those of a check that the program knows nothing of (`colloc.bounds.recheck`) within
-        twice of it.
+        and those of an independent check (`bounds.sampling.summits_met`) within twice of it.
     guaranteed : float or None
-        Value certified between samples too (`research/guarantee`), if asked for and possible.
+        Value certified between samples too (`research/guarantee`).
     missing : str
         What keeps the sampled value from being a theorem; empty if `guaranteed` is set.
     angles, rates : tuple of float
         Shape and rate direction where the sampled value is taken.
-    joint_limit : float
-    intervals : int
-    harmonics : tuple of int
     coefficients : tuple of float
         Free coefficients of the potential (see `potential_space`).
     samples : int
@@ -126,8 +115,6 @@ class Bound:
         Processor time.
     graded : tuple of float
         Inner knots, if they are not evenly spaced.
-    together : int or None
-        Joint angles that the potential's summands depend on, if not on all.
     """
 
     sampled: float
@@ -147,22 +134,18 @@ class Bound:
     together: int | None = None
 
     def potential_space(self, body: Chain) -> PotentialSpace:
-        """The space `coefficients` belong to."""
+        """Space of the `coefficients`."""
         spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals, self.graded)
-        return PotentialSpace(spline, self.harmonics, swaps_ends(body), self.together)
-
-    def gap(self, efficiency: float) -> float:
-        """How far an efficiency is from the sampled bound."""
-        return self.sampled - efficiency
+        return PotentialSpace(spline, self.harmonics, body.symmetric, self.together)
 
     def report(self, efficiency: float) -> str:
-        """One line for reports: efficiency, bound, gap, and what is proved."""
+        """Efficiency, bound, gap, and what is proved, in one line."""
         proved = (
             f"guaranteed {self.guaranteed:.4f}" if self.guaranteed is not None else self.missing
         )
         return (
             f"efficiency {efficiency:.4f}, upper bound {self.sampled:.4f}, gap "
-            f"{self.gap(efficiency):.4f} ({proved})"
+            f"{self.sampled - efficiency:.4f} ({proved})"
         )
 
 
@@ -175,39 +158,29 @@ MISSING_LAW = (
 
 
 def compute_bound(domain: Domain, budget: Budget) -> Bound:
-    """The sampled bound, computed anew (see `efficiency_bound`)."""
-    begin = time.process_time()
-    body = domain.body
+    begin, body = time.process_time(), domain.body
     harmonics = budget.harmonics or usual_harmonics(body, domain.law)
     spline = TensorSpline(body.n_joint, domain.joint_limit, min(budget.first, budget.intervals))
-    space = PotentialSpace(spline, harmonics, swaps_ends(body), budget.together)
-    found = exchanged_optimum(
-        domain,
-        space,
-        intervals=budget.intervals,
-        shapes=budget.shapes,
-        directions=budget.directions,
-        rounds=budget.rounds,
-        starts=budget.starts,
-        tolerance=budget.tolerance,
-        smoothing=budget.smoothing,
-    )
+    space = PotentialSpace(spline, harmonics, body.symmetric, budget.together)
+    names = "intervals", "shapes", "directions", "rounds", "starts", "tolerance", "smoothing"
+    settings = {name: getattr(budget, name) for name in names}
+    best = exchanged_optimum(domain, space, **settings)
     missing = MISSING_MARGIN if domain.law.associated else MISSING_LAW
     return Bound(
-        sampled=min(found.top, 1.0 / domain.law.smallest),
-        floor=found.floor,
-        converged=found.converged,
+        sampled=min(best.top, 1.0 / domain.law.smallest),
+        floor=best.floor,
+        converged=best.converged,
         guaranteed=None,
-        missing=missing.format(samples=found.samples),
-        angles=tuple(found.summit.angles[:, 0].tolist()),
-        rates=tuple(found.summit.rates[:, 0].tolist()),
+        missing=missing.format(samples=best.samples),
+        angles=tuple(best.summit.angles[:, 0].tolist()),
+        rates=tuple(best.summit.rates[:, 0].tolist()),
         joint_limit=domain.joint_limit,
-        intervals=found.space.spline.intervals,
+        intervals=best.space.spline.intervals,
         harmonics=harmonics,
-        coefficients=tuple(found.free.tolist()),
-        samples=found.samples,
+        coefficients=tuple(best.free.tolist()),
+        samples=best.samples,
         seconds=time.process_time() - begin,
-        graded=found.space.spline.graded,
+        graded=best.space.spline.graded,
         together=budget.together,
     )
 
@@ -230,8 +203,7 @@ def known_bound(
     budget: Budget | None = None,
     cache: str | os.PathLike,
 ) -> Bound | None:
-    """The bound that an earlier run left in the cache, or None; arguments as for
-    `efficiency_bound`."""
+    """The bound of an earlier run in the cache, or None; arguments as for `efficiency_bound`."""
     key = bound_key(Domain(body, friction, float(joint_limit)), budget or usual_budget(body))
     entry = read_rows(Path(cache), CACHE).get(key)
     if entry is None:
@@ -261,8 +233,7 @@ def efficiency_bound(
     body : Chain
         Two to five links.
     friction : Friction
-        Coulomb friction or the elliptic law, delta -> 0 (docs/bound.md states what finite delta
-        changes).
+        Coulomb friction or the elliptic law, delta -> 0 (finite delta: docs/bound.md).
     joint_limit : float
         At most pi.
     budget : Budget, optional
@@ -286,13 +257,10 @@ def efficiency_bound(
             f"fill all of shape space."
         )
     budget = budget or usual_budget(body)
-    known = (
-        known_bound(body, friction, joint_limit, budget=budget, cache=cache)
-        if cache is not None
-        else None
-    )
-    if known is not None:
-        return known
+    if cache is not None:
+        known = known_bound(body, friction, joint_limit, budget=budget, cache=cache)
+        if known is not None:
+            return known
     domain = Domain(body, friction, float(joint_limit))
     if domain.law.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
         raise ProblemError(

@@ -1,5 +1,5 @@
-"""Where a bound is sampled: lattices of shapes and rate directions, and climbs to the summits
-between them."""
+"""Samples of a bound: lattices of shapes and rate directions, and climbs to the summits between
+them."""
 
 from __future__ import annotations
 
@@ -19,38 +19,29 @@ from colloc.bounds.coulomb_motion import (
     two_resting,
     unit_directions,
 )
+from colloc.bounds.potential import PotentialSpace, largest_ratios
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 
 _DELTA = 1e-6
-"""Regularisation speed, at unit shape speed: solving costs half of what it does at 1e-9, the best
-small gait loses 1.5e-5."""
+"""At unit shape speed: costs half of what it does at 1e-9; the best small gait loses 1.5e-5."""
 _EDGE = 1e-9
 _FRAMES, _STEADY = 4, 2
 """Directions, and their opposites, that a climb tries at a step; and in how many of them the rates
 stay as they are."""
-_FINER = 3
-"""Motions of one joint alone are sampled so many times as densely in every angle: their peaks are
-those hardest to meet."""
-_SPECIAL = 0.5
-"""Share of joints that are straight or at their limit in every other of the shapes at random."""
+_FINER = 3  # lattice of shapes for motions of one joint alone: their peaks are hardest to meet
+_SPECIAL = 0.5  # share of joints straight or at their limit in every other random shape
 _TRIAL_STEPS = 4
 _GROW, _SHRINK = 1.25, 0.5
+_WINDOW = 0.03
+_STEPS = 30
 
 
 @dataclass(frozen=True)
 class Domain:
-    """The gaits a bound speaks of.
-
-    Parameters
-    ----------
-    body : Chain
-    friction : Friction
-    joint_limit : float
-        Largest |joint angle| [rad].
-    """
+    """The gaits of a bound: those of a body under friction with |joint angles| <= joint_limit."""
 
     body: Chain
     friction: Friction
@@ -65,7 +56,7 @@ class Domain:
 
     @property
     def law(self) -> Law:
-        """That of all that touches the floor."""
+        """Law of all that touches the floor."""
         return self.body.law(self.friction)
 
     def holds(self, angles: np.ndarray) -> np.ndarray:
@@ -74,82 +65,71 @@ class Domain:
         return inside & admissible(self.body, angles, _EDGE)
 
     def solved(self, angles: np.ndarray, rates: np.ndarray) -> tuple[CoulombMotion, np.ndarray]:
-        """All balanced motions, and the column of shapes and rates that each is of; but those in
-        which all feet hold: they pay nothing, and those beside them say what a potential may gain
-        there."""
+        """All balanced motions, and the column of shapes and rates that each belongs to.
+
+        Those in which all feet stick are left out: they pay nothing, and those beside them say what
+        a potential may gain there.
+        """
         motion, source = all_motions(self.body, self.friction, angles, rates, _DELTA)
         slides = np.flatnonzero(motion.power > self.law.smallest * _DELTA)
         return motion.take(slides), source[slides]
 
     def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> CoulombMotion:
         """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions`
-        rate directions; and of each joint turning alone, and others where two links rest, on a
-        finer one.
+        rate directions; and on a finer one of each joint turning alone, and where two links rest.
 
         One of each class of mirror images; with directed friction the end swap reverses time, so
         both senses of every rate are sampled. `shift` in [0, 1) moves the lattice by that part of
-        its spacing (then without its last value). More than two joints have directions at random,
-        others at every shape; another shift draws others.
+        its spacing (then without its last value). More than two joints have random directions,
+        others at every shape and for every shift.
         """
         n_joint, half = self.body.n_joint, self.law.reversible
-        angles = self._representatives(shapes, shift)
+        angles, finer = (self._shapes(n * shapes, shift) for n in (1, _FINER))
         rng = np.random.default_rng(round(1e9 * shift))
         if n_joint > 2:
-            every = (
-                np.repeat(angles, directions, axis=1),
-                random_directions(n_joint, directions * angles.shape[1], rng),
-            )
+            every = np.repeat(angles, directions, axis=1)
+            motion, _ = self.solved(every, random_directions(n_joint, every.shape[1], rng))
         else:
-            every = _pairs(angles, unit_directions(n_joint, directions, half, shift))
-        finer = self._representatives(_FINER * shapes, shift)
-        motion = self.solved(*every)[0].joined(
-            self.solved(*_pairs(finer, one_joint(n_joint, half)))[0]
-        )
+            rates = unit_directions(n_joint, directions, half, shift)
+            motion, _ = self.solved(*_pairs(angles, rates))
+        motion = motion.joined(self.solved(*_pairs(finer, one_joint(n_joint, half)))[0])
         resting, rates = two_resting(self.body, finer, rng)
         motion = motion.joined(self.solved(resting, rates)[0])
         return motion if half else motion.joined(self.solved(resting, -rates)[0])
 
     def _shapes(self, steps: int, shift: float) -> np.ndarray:
-        """Shapes ``(n_joint, n)`` of a lattice, with those where a joint is at its limit, and where
-        on its lines links touch.
+        """Shapes ``(n_joint, n)`` of a lattice without mirror images, with those where a joint is
+        at its limit, and where on its lines links touch.
 
-        The ratio has peaks in corners between limit and contact, which a potential sees only if
-        they are sampled. More than two joints have as many at random as a lattice of three.
+        The ratio has peaks in corners between limit and contact. More than two joints have as many
+        random shapes as a lattice of three.
         """
         n_joint, limit = self.body.n_joint, self.joint_limit
         if n_joint > 2:
-            return self._scattered(
-                (steps + 1) ** 3, np.random.default_rng(round(1e9 * shift) + steps)
-            )
-        axis = np.clip(
-            limit * (2.0 * (np.arange(-1, steps + 1) + shift) / steps - 1.0), -limit, limit
-        )
-        grid = np.stack(np.meshgrid(*[np.unique(axis)] * n_joint, indexing="ij"))
+            rng = np.random.default_rng(round(1e9 * shift) + steps)
+            angles = self._random_shapes((steps + 1) ** 3, rng)
+            return angles[:, fundamental(self.body, angles)]
+        axis = limit * (2.0 * (np.arange(-1, steps + 1) + shift) / steps - 1.0)
+        axis = np.unique(np.clip(axis, -limit, limit))
+        grid = np.stack(np.meshgrid(*[axis] * n_joint, indexing="ij"))
         held = self.holds(grid.reshape(n_joint, -1)).reshape(grid.shape[1:])
-        found = [grid[:, held]]
+        shapes = [grid[:, held]]
         for joint in range(n_joint):
-            one, other = (np.delete(grid, end, axis=joint + 1) for end in (-1, 0))
-            of_one, of_other = (np.delete(held, end, axis=joint) for end in (-1, 0))
-            for inside, outside, touches in (
-                (one, other, of_one & ~of_other),
-                (other, one, of_other & ~of_one),
-            ):
-                found.append(drawn_in(self.body, outside[:, touches], inside[:, touches], _EDGE))
-        return np.concatenate(found, axis=1)
+            ends = [np.delete(grid, end, axis=joint + 1) for end in (-1, 0)]
+            holds = [np.delete(held, end, axis=joint) for end in (-1, 0)]
+            for a, b in ((0, 1), (1, 0)):
+                touches = holds[a] & ~holds[b]
+                shapes.append(drawn_in(self.body, ends[b][:, touches], ends[a][:, touches], _EDGE))
+        angles = np.concatenate(shapes, axis=1)
+        return angles[:, fundamental(self.body, angles)]
 
-    def _scattered(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """`count` shapes at random, in every other of which some joints are straight or at their
-        limit; instead of one where links would cross, the last on the way to it from the straight
-        body."""
+    def _random_shapes(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """`count` shapes, in every other of which some joints are straight or at their limit; where
+        links would cross, the last shape before that on the way from the straight body."""
         angles = rng.uniform(-1.0, 1.0, (self.body.n_joint, count))
         special = (rng.random(angles.shape) < _SPECIAL) & (np.arange(count) % 2 == 1)
         angles = self.joint_limit * np.where(special, np.rint(angles), angles)
         return drawn_in(self.body, angles, np.zeros_like(angles), _EDGE)
-
-    def _representatives(self, shapes: int, shift: float) -> np.ndarray:
-        """One of each class of mirror images of those."""
-        angles = self._shapes(shapes, shift)
-        return angles[:, fundamental(self.body, angles)]
 
     def summits(
         self,
@@ -161,66 +141,102 @@ class Domain:
         rng: np.random.Generator,
         hopeless: float = -np.inf,
     ) -> CoulombMotion:
-        """Climb `value` from every motion of `start`, ``(n_joint, n)``, in random directions of
-        shape and rates.
+        """Climb `value` from every motion of `start` by pattern search in random directions.
 
-        Pattern search: ridges where a link changes between stick and slip are creases, and run at
-        any angle to the axes. Steps begin at `spacing` [rad] for shapes and `turn` [rad] for
-        directions, and adapt. Climbs that are below `hopeless` after a few steps are given up, and
-        not returned.
+        Ridges where a link changes between stick and slip are creases, at any angle to the axes.
+        Steps begin at `spacing` [rad] for shapes and `turn` [rad] for directions, and adapt. Climbs
+        below `hopeless` after a few steps are given up, and not returned.
         """
-        n_joint, n = start.angles.shape
-        angles, rates = start.angles, start.rates
-        best = value(start)
-        size = np.ones(n)
-        top = start
+        n_joint, top = len(start.angles), start
+        best, size = value(start), np.ones(start.size)
         for step in range(steps):
             if step == _TRIAL_STEPS and (best < hopeless).any() and (best >= hopeless).any():
                 going = np.flatnonzero(best >= hopeless)
-                top, best, size, n = top.take(going), best[going], size[going], going.size
-                angles, rates = top.angles, top.rates
-            move = rng.standard_normal((2 * n_joint, n, _FRAMES))
-            # along a crease that holds for the same rates at many shapes, as where one joint turns
-            # and the rest sticks;
-            move[n_joint:, :, :_STEADY] = 0.0
-            # or as long as some joints are straight, as where two links buckle;
-            move[:n_joint, :, 0] *= angles != 0.0
-            # along one that holds as long as some joints rest
-            move[n_joint:, :, _STEADY] *= rates != 0.0
-            # a direction of rates means nothing along the rates themselves
-            along = (move[n_joint:] * rates[:, :, None]).sum(axis=0)
-            move[n_joint:] -= along * rates[:, :, None]
-            move /= np.maximum(np.sqrt((move**2).sum(axis=0)), _EDGE)
-            move = np.concatenate([move, -move], axis=2) * size[:, None]
-            new_angles = np.clip(
-                angles[:, :, None] + spacing * move[:n_joint], -self.joint_limit, self.joint_limit
-            )
-            new_rates = rates[:, :, None] + turn * move[n_joint:]
-            new_rates /= np.sqrt((new_rates**2).sum(axis=0))
-            flat_angles, flat_rates = (
-                new_angles.reshape(n_joint, -1),
-                new_rates.reshape(n_joint, -1),
-            )
-            tried = np.flatnonzero(self.holds(flat_angles))
-            motion, source = self.solved(flat_angles[:, tried], flat_rates[:, tried])
-            found = np.full(flat_angles.shape[1], -np.inf)
-            place = np.zeros(flat_angles.shape[1], dtype=int)
+                top, best, size = top.take(going), best[going], size[going]
+            move = self._moves(top, rng) * size[:, None]
+            angles = top.angles[:, :, None] + spacing * move[:n_joint]
+            angles = np.clip(angles, -self.joint_limit, self.joint_limit).reshape(n_joint, -1)
+            rates = top.rates[:, :, None] + turn * move[n_joint:]
+            rates = (rates / np.sqrt((rates**2).sum(axis=0))).reshape(n_joint, -1)
+            tried = np.flatnonzero(self.holds(angles))
+            motion, source = self.solved(angles[:, tried], rates[:, tried])
+            height = np.full(angles.shape[1], -np.inf)
+            place = np.zeros(angles.shape[1], dtype=int)
             reached = value(motion)
             rising = np.argsort(reached)  # of several motions the best is written last
-            found[tried[source[rising]]] = reached[rising]
+            height[tried[source[rising]]] = reached[rising]
             place[tried[source[rising]]] = rising
-            choice = np.argmax(found.reshape(n, -1), axis=1) + np.arange(n) * 2 * _FRAMES
-            up = found[choice] > best
-            both = top.joined(motion.take(place[choice[up]]))
-            order = np.arange(n)
-            order[up] = n + np.arange(up.sum())
-            top = both.take(order)
-            angles, rates = top.angles, top.rates
-            best = np.where(up, found[choice], best)
+            choice = np.argmax(height.reshape(top.size, -1), axis=1)
+            choice += np.arange(top.size) * 2 * _FRAMES
+            up = height[choice] > best
+            order = np.arange(top.size)
+            order[up] = top.size + np.arange(up.sum())
+            top = top.joined(motion.take(place[choice[up]])).take(order)
+            best = np.where(up, height[choice], best)
             size = np.where(up, _GROW * size, _SHRINK * size)
         return top
+
+    @staticmethod
+    def _moves(at: CoulombMotion, rng: np.random.Generator) -> np.ndarray:
+        """Random unit directions of angles and rates, and their opposites, ``(2 n_joint, n, 2
+        _FRAMES)``; rates do not move along themselves."""
+        n_joint, n = at.angles.shape
+        move = rng.standard_normal((2 * n_joint, n, _FRAMES))
+        # along a crease that holds for the same rates at many shapes, as where one joint turns
+        move[n_joint:, :, :_STEADY] = 0.0
+        # or as long as some joints are straight, as where two links buckle
+        move[:n_joint, :, 0] *= at.angles != 0.0
+        # along one that holds as long as some joints rest
+        move[n_joint:, :, _STEADY] *= at.rates != 0.0
+        along = (move[n_joint:] * at.rates[:, :, None]).sum(axis=0)
+        move[n_joint:] -= along * at.rates[:, :, None]
+        move /= np.maximum(np.sqrt((move**2).sum(axis=0)), _EDGE)
+        return np.concatenate([move, -move], axis=2)
 
 
 def _pairs(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Every shape with all rates, ``(n_joint, n)`` each."""
     return np.repeat(angles, rates.shape[1], axis=1), np.tile(rates, angles.shape[1])
+
+
+def near_the_top(
+    motion: CoulombMotion, ratio: np.ndarray, level: float, spacing: float, count: int
+) -> np.ndarray:
+    """Indices of up to `count` of the largest that come near `level`, one for each cell of shapes
+    and directions."""
+    near = np.flatnonzero(ratio > level - _WINDOW)
+    near = near[np.argsort(-ratio[near])]
+    angles, rates = motion.angles[:, near] / spacing, motion.rates[:, near] * 4.0
+    cell = np.concatenate([np.rint(angles), np.rint(rates)]).T
+    _, first = np.unique(cell, axis=0, return_index=True)
+    return near[np.sort(first)][:count]
+
+
+def summits_met(
+    domain: Domain,
+    space: PotentialSpace,
+    free: np.ndarray,
+    *,
+    shapes: int = 60,
+    directions: int = 120,
+    starts: int = 1000,
+    seed: int = 0,
+    level: float = np.inf,
+) -> tuple[np.ndarray, CoulombMotion]:
+    """Ratios of gain to power ``(n,)`` of a potential where climbs from the best of a lattice end,
+    and the motions.
+
+    They know nothing of how the potential was found. Climbs begin near `level` and above, or near
+    the largest ratio on the lattice if that is less.
+    """
+    rng = np.random.default_rng(seed)
+
+    def ratio(motion: CoulombMotion) -> np.ndarray:
+        return largest_ratios(space, free, motion)
+
+    lattice = domain.lattice(shapes, directions, float(rng.uniform(0.1, 0.9)))
+    values, spacing = ratio(lattice), 2.0 * domain.joint_limit / shapes
+    chosen = near_the_top(lattice, values, min(level, float(values.max())), spacing, starts)
+    turn = 0.5 * np.pi / directions
+    summit = domain.summits(ratio, lattice.take(chosen), 0.5 * spacing, turn, _STEPS, rng)
+    return ratio(summit), summit

@@ -1,8 +1,7 @@
-"""The periodic time grid of a collocation scheme: where its nodes, stage points and states sit.
+"""The time grid of a collocation scheme.
 
-An interval k runs from edges[k] to edges[k+1]. *Points* are the stages, where the equations hold;
-schemes whose first stage is the left end share it with the neighbour. *Sites* carry a state: every
-edge and every interior stage.
+*Points* are the stages, where the equations hold; schemes whose first stage is the left end of an
+interval share it with the neighbour. *Sites* carry a state: every edge and every interior stage.
 """
 
 from __future__ import annotations
@@ -73,10 +72,8 @@ class Mesh:
 
     def integration(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Matrices (L, Q) of the equations ``L X - Q X' = 0`` of a state at the sites, from its
-        rate at the points.
-
-        One row per stage that is not a left end, and one per right edge that is not a stage.
-        """
+        rate at the points: one row per stage that is not a left end, and one per right edge that is
+        not a stage."""
         s = self.scheme
         targets = [(self.sites[:, i], s.A[i]) for i in range(s.s) if not (s.left and i == 0)]
         if not s.right:
@@ -84,32 +81,25 @@ class Mesh:
         return self._defects(targets, self.edge_sites, self.n_site)
 
     def quadrature(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """The same for a state that is kept at the edges only: ``X_(k+1) - X_k - h sum_j b_j
-        X'_j``."""
+        """(L, Q) of a state at the edges alone: ``X_(k+1) - X_k - h sum_j b_j X'_j``."""
         edges = np.arange(self.n + 1)
         return self._defects([(edges[1:], self.scheme.b)], edges, self.n + 1)
 
     def _defects(
-        self, targets, left: np.ndarray, n_state: int
+        self, targets: list[tuple[np.ndarray, np.ndarray]], left: np.ndarray, n_state: int
     ) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        n, s = self.n, self.scheme.s
-        state_row, state_col, state_value, rate_row, rate_col, rate_value = [], [], [], [], [], []
-        for order, (target, weights) in enumerate(targets):
-            row = np.arange(n) * len(targets) + order
-            state_row += [row, row]
-            state_col += [target, left[:n]]
-            state_value += [np.ones(n), -np.ones(n)]
-            rate_row.append(np.repeat(row, s))
-            rate_col.append(self.points.ravel())
-            rate_value.append((self.h[:, None] * weights).ravel())
-        m = n * len(targets)
-        state = (
-            np.concatenate(state_value),
-            (np.concatenate(state_row), np.concatenate(state_col)),
-        )
-        rate = (np.concatenate(rate_value), (np.concatenate(rate_row), np.concatenate(rate_col)))
-        return sparse.csr_matrix(state, shape=(m, n_state)), sparse.csr_matrix(
-            rate, shape=(m, self.n_point)
+        """Rows ``X_target - X_left - h weights . X'``, from targets (states ``(n,)``, weights
+        ``(s,)``)."""
+        row = np.arange(self.n)[:, None] * len(targets) + np.arange(len(targets))
+        to = np.stack([target for target, _ in targets], axis=1)
+        weights = self.h[:, None, None] * np.stack([weight for _, weight in targets])
+        start, one = np.broadcast_to(left[: self.n, None], to.shape), np.ones(to.size)
+        states = np.tile(row.ravel(), 2), np.concatenate([to.ravel(), start.ravel()])
+        points = np.broadcast_to(self.points[:, None], weights.shape)
+        rates = np.repeat(row.ravel(), self.scheme.s), points.ravel()
+        return (
+            sparse.csr_matrix((np.append(one, -one), states), shape=(row.size, n_state)),
+            sparse.csr_matrix((weights.ravel(), rates), shape=(row.size, self.n_point)),
         )
 
 

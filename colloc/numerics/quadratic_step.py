@@ -3,8 +3,7 @@ CasADi.
 
     minimise  d.B d / 2 + g.d   with  low <= d <= high,  row_low <= R d <= row_high
 
-DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill, IEEE TAC 67, 2022); its steps are
-exact to rounding.
+DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill, IEEE TAC 67, 2022).
 """
 
 from __future__ import annotations
@@ -16,10 +15,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-_TOLERANCE, _MET = 1e-10, 1e-7
-"""What DAQP may leave of a limit, in units of its rows, and how much is taken for a failure."""
-_UNMET = 1e3
-"""Price of half the squared share of the violations that stays."""
+_TOLERANCE = 1e-10  # DAQP may leave of a limit, in units of its rows
+_MET = 1e-7  # what it leaves counts as failure above this
+_UNMET = 1e3  # price of half the squared share of the violations that stays
 
 
 class QuadraticStep(NamedTuple):
@@ -40,63 +38,59 @@ def quadratic_step(
     low: np.ndarray,
     high: np.ndarray,
 ) -> QuadraticStep | None:
-    """The minimum of the quadratic model; where the rows contradict each other, their violations
-    are removed in part.
-
-    b ``(n, n)`` is positive definite, the slopes ``(m, n)`` are those of the rows. None if there is
-    no step, or no finite model.
-    """
+    """Minimise the model with b ``(n, n)`` positive definite and row gradients `slopes` ``(m, n)``;
+    where rows contradict each other, their violations are removed in part. None if there is no
+    step, or no finite model."""
     if not (np.isfinite(gradient).all() and np.isfinite(slopes).all() and np.isfinite(b).all()):
         return None
     rows = {"lba": row_low, "uba": row_high}
-    found = _minimum(h=b, g=gradient, a=slopes, lbx=low, ubx=high, **rows)
-    if found is not None:
-        return QuadraticStep(*found, 1.0)
+    solver = _LOCAL.solver(*slopes.shape)
+    exact = solver.minimum({"h": b, "g": gradient, "a": slopes, "lbx": low, "ubx": high, **rows})
+    if exact is not None:
+        return QuadraticStep(*exact, 1.0)
     short = np.where(row_low > 0, row_low, np.where(row_high < 0, row_high, 0.0))
     wide = np.zeros((gradient.size + 1, gradient.size + 1))
     wide[:-1, :-1], wide[-1, -1] = b, _UNMET
     relaxed = {
+        "h": wide,
+        "g": np.append(gradient, 0.0),
         "a": np.column_stack([slopes, short]),
         "lbx": np.append(low, 0.0),
         "ubx": np.append(high, 1.0),
     }
-    found = _minimum(h=wide, g=np.append(gradient, 0.0), **relaxed, **rows)
-    return None if found is None else QuadraticStep(found[0][:-1], found[1], 1.0 - found[0][-1])
-
-
-def _minimum(**program: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    return _OWN.solver(*program["a"].shape).minimum(program)
+    partial = _LOCAL.solver(*relaxed["a"].shape).minimum(relaxed | rows)
+    if partial is None:
+        return None
+    return QuadraticStep(partial[0][:-1], partial[1], 1.0 - partial[0][-1])
 
 
 class _Solver:
-    """DAQP for m rows and n unknowns, in memory of its own: CasADi's arrays take five times as long
-    as a small step."""
+    """DAQP for m rows and n variables, in memory of its own: CasADi's arrays take five times as
+    long as a small step."""
 
     def __init__(self, m: int, n: int) -> None:
         shapes = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(m, n)}
+        options = {"error_on_fail": False, "daqp": {"primal_tol": _TOLERANCE}}
         with _MAKING:
-            function = ca.conic(
-                "step", "daqp", shapes, {"error_on_fail": False, "daqp": {"primal_tol": _TOLERANCE}}
-            )
+            function = ca.conic("step", "daqp", shapes, options)
         self._buffer, self._solve = function.buffer()
-        self._room = {name: np.empty(function.sparsity_in(name).shape[::-1]) for name in _GIVEN}
+        self._inputs = {name: np.empty(function.sparsity_in(name).shape[::-1]) for name in _INPUTS}
         self._d, self._on_rows = np.empty(n), np.empty(m)
-        for name, room in self._room.items():
-            self._buffer.set_arg(function.index_in(name), room.reshape(-1).data)
+        for name, memory in self._inputs.items():
+            self._buffer.set_arg(function.index_in(name), memory.reshape(-1).data)
         self._buffer.set_res(function.index_out("x"), self._d.data)
         self._buffer.set_res(function.index_out("lam_a"), self._on_rows.data)
 
     def minimum(self, program: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
         """The step and the multipliers of the rows; None where there is no step."""
-        for name, room in self._room.items():
-            room[:] = program[name].T
+        for name, memory in self._inputs.items():
+            memory[:] = program[name].T
         self._d.fill(np.nan)
         self._solve()
         # a dual method that fails ends outside of some limit
         d, rows = self._d.copy(), program["a"] @ self._d
-        within = _within(d, program["lbx"], program["ubx"]) and _within(
-            rows, program["lba"], program["uba"]
-        )
+        within = _within(d, program["lbx"], program["ubx"])
+        within = within and _within(rows, program["lba"], program["uba"])
         return (d, self._on_rows.copy()) if within else None
 
 
@@ -105,12 +99,12 @@ def _within(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> bool:
     return bool(((values >= low - slack) & (values <= high + slack)).all())
 
 
-class _OfThread(threading.local):
+class _PerThread(threading.local):
     """Solvers by size; one that two threads share would be torn by them."""
 
     def __init__(self) -> None:
         self.solver = lru_cache(maxsize=64)(_Solver)
 
 
-_GIVEN = ("h", "g", "a", "lba", "uba", "lbx", "ubx")
-_OWN, _MAKING = _OfThread(), threading.Lock()
+_INPUTS = ("h", "g", "a", "lba", "uba", "lbx", "ubx")
+_LOCAL, _MAKING = _PerThread(), threading.Lock()

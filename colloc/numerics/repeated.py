@@ -1,9 +1,8 @@
-"""Nonlinear programs that are linear in small functions repeated over a mesh, with derivatives.
+"""Nonlinear programs linear in small functions that are repeated over a mesh, with derivatives.
 
-With y the outputs of all functions at all their instances, every row is ``R [x; y(x); 1]`` with a
-constant sparse matrix R, and so is the objective. Each function is differentiated once, for one
-instance, whatever the size of the mesh: CasADi's own Hessian of the whole takes three times as
-long to build and to evaluate.
+With y the outputs of all functions at all their instances, rows and objective are ``R [x; y; 1]``
+with constant sparse R. Each function is differentiated once, for one instance: CasADi's own
+Hessian of the whole takes three times as long to build and to evaluate.
 """
 
 from __future__ import annotations
@@ -20,15 +19,11 @@ from scipy import sparse
 
 @dataclass(frozen=True, eq=False)
 class LocalFunction:
-    """A function of local variables, given numbers and delta, with its derivatives.
+    """A function `out` of `local` variables, `given` numbers and `delta`, all columns, with its
+    derivatives.
 
-    Parameters
-    ----------
-    local, given, delta, out : casadi.SX
-        Symbols ``(n_local, 1)``, ``(n_given, 1)``, ``(1, 1)``, and the expression ``(n_out, 1)``.
-    solved, equations : casadi.SX, optional
-        Symbols ``(n_solved, 1)`` of which `out` is also a function, and equations that they solve:
-        derivatives are those of the implicit function theorem.
+    It may also depend on `solved`, which solves `equations`: derivatives are then those of the
+    implicit function theorem.
     """
 
     local: ca.SX
@@ -44,8 +39,7 @@ class LocalFunction:
 
     @cached_property
     def derivatives(self) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Weights ``(n_out, 1)``, sparse Jacobian of the outputs, and the upper triangle of the
-        Hessian of their weighted sum."""
+        """Weights ``(n_out, 1)``, sparse Jacobian, upper triangle of the weighted sum's Hessian."""
         weight = ca.SX.sym("weight", self.n_out)
         total = ca.dot(weight, self.out)
         jacobian = ca.jacobian(self.out, self.local)
@@ -66,7 +60,7 @@ class LocalFunction:
 
     @cached_property
     def functions(self) -> tuple[ca.Function, ca.Function, ca.Function]:
-        """Outputs, nonzeros of the Jacobian, and nonzeros of the Hessian for weights."""
+        """Outputs, nonzeros of the Jacobian, and of the Hessian for weights."""
         weight, jacobian, upper = self.derivatives
         symbols = [self.local, self.given, self.delta]
         symbols += [] if self.solved is None else [self.solved]
@@ -82,16 +76,9 @@ class LocalFunction:
 class Repeated:
     """A local function at many instances.
 
-    Parameters
-    ----------
-    function : LocalFunction
-    gather : (n_local, n_instance) int
-        Which variables of the program are the local ones of each instance.
-    values : (n_given, n_instance)
-        The given numbers.
-    solve : callable, optional
-        From local variables ``(n_local, n_instance)`` and delta, MX both, to what the function is
-        solved for, ``(n_solved, n_instance)``.
+    `gather` ``(n_local, n_instance)``: indices of each instance's local variables among those of
+    the program; `values` ``(n_given, n_instance)``. `solve` takes local variables
+    ``(n_local, n_instance)`` and delta, MX both, to what the function is solved for.
     """
 
     function: LocalFunction
@@ -109,8 +96,7 @@ class Repeated:
 
 
 class Rows:
-    """Rows of a program, by name, as sparse matrices over ``[x; y; 1]``, y the outputs of repeated
-    functions."""
+    """Rows of a program, by name, as sparse matrices over ``[x; y; 1]``."""
 
     def __init__(self, n: int) -> None:
         self.n, self.width = n, n
@@ -131,37 +117,35 @@ class Rows:
         *,
         delta: ca.SX,
     ) -> np.ndarray:
-        """Where the outputs ``(n_out, n_instance)`` of a function at many instances are; see
-        `LocalFunction` and `Repeated`."""
+        """Add a function at many instances; indices of its outputs ``(n_out, n_instance)``."""
         given = ca.SX(0, 1) if given is None else given
         values = np.empty((0, gather.shape[1])) if values is None else values
         return self.add_repeated(Repeated(LocalFunction(local, given, delta, out), gather, values))
 
     def add_repeated(self, repeated: Repeated) -> np.ndarray:
-        """Where the outputs ``(n_out, n_instance)`` of a repeated function are."""
         self.repeated.append(repeated)
         places = self.width + np.arange(repeated.n_out).reshape(repeated.n_instance, -1).T
         self.width += repeated.n_out
         return places
 
     def close(self) -> None:
-        """No function is added from here on."""
+        """Add the column of constants: no function is added from here on."""
         self.width += 1
 
     def pick(self, places: np.ndarray) -> sparse.csr_matrix:
-        """Variables or outputs, one below the other, as rows."""
+        """Rows that are variables or outputs."""
         places = np.asarray(places).ravel()
         entries = np.ones(places.size), (np.arange(places.size), places)
         return sparse.csr_matrix(entries, shape=(places.size, self.width))
 
     def constant(self, values: np.ndarray) -> sparse.csr_matrix:
-        """Numbers ``(n_row,)`` as rows."""
+        """Rows that are numbers ``(n_row,)``."""
         last = np.full(values.size, self.width - 1)
         entries = values, (np.arange(values.size), last)
         return sparse.csr_matrix(entries, shape=(values.size, self.width))
 
     def add(self, name: str, rows: sparse.spmatrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
-        """``lower <= rows <= upper``; by default the rows vanish."""
+        """Add ``lower <= rows <= upper``; by default the rows vanish."""
         m = rows.shape[0]
         self.rows.append(sparse.csr_matrix(rows))
         self.lower.append(np.zeros(m) + lower)
@@ -172,16 +156,8 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Nlp:
-    """Functions of a nonlinear program in variables x ``(n,)`` and the parameter delta, as
-    `casadi.nlpsol` takes them.
-
-    Attributes
-    ----------
-    expressions : dict
-        x, p, f and g.
-    functions : dict
-        grad_f, jac_g and hess_lag.
-    """
+    """A nonlinear program in x ``(n,)`` and the parameter delta, as `casadi.nlpsol` takes it:
+    expressions x, p, f, g; functions grad_f, jac_g, hess_lag."""
 
     expressions: dict[str, ca.MX]
     functions: dict[str, ca.Function]
@@ -190,8 +166,8 @@ class Nlp:
 def nonlinear_program(
     n: int, repeated: Sequence[Repeated], rows: sparse.spmatrix, objective: sparse.spmatrix
 ) -> Nlp:
-    """The program of n variables with the rows ``rows @ [x; y; 1]`` and the objective
-    ``objective @ [x; y; 1]``, y the outputs of the repeated functions, instance by instance."""
+    """The program of n variables with rows ``rows @ [x; y; 1]`` and objective
+    ``objective @ [x; y; 1]``."""
     x, delta = ca.MX.sym("x", n), ca.MX.sym("delta")
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows.shape[0])
     every = sparse.csr_matrix(sparse.vstack([objective, rows]))
@@ -245,14 +221,13 @@ def nonlinear_program(
 
 
 def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
-    """A CasADi matrix as a SciPy one."""
     parts = matrix.nonzeros(), matrix.row(), matrix.colind()
     return sparse.csc_matrix(parts, shape=matrix.shape).tocsr()
 
 
 def _matrix(shape: tuple[int, int], places: list, values: ca.MX) -> ca.MX:
-    """The sparse matrix with entries at places (row, column, factor), each ``(n_entry,
-    n_instance)``; values that fall on one place add up."""
+    """Sparse matrix with entries at places (row, column, factor), each ``(n_entry, n_instance)``;
+    values at one place add up."""
     row, column, factor = (
         np.concatenate([part[k].ravel(order="F") for part in places]) for k in range(3)
     )

@@ -1,9 +1,7 @@
-"""Time-collocation schemes as data: tableaux of Lobatto IIIA, Gauss-Legendre and Radau IIA type.
+"""Collocation schemes of Lobatto IIIA, Gauss-Legendre and Radau IIA type, from their nodes c.
 
-A scheme is its nodes ``c`` in [0, 1]; on an interval the derivative is the polynomial through its
-values at the nodes, so ``A[i, j] = integral of L_j from 0 to c_i``, ``b[j] = integral of L_j from 0
-to 1`` with Lagrange polynomials L_j (Hairer, Norsett and Wanner, Solving ODEs I, section II.7). The
-same integrals up to any tau are the interpolant.
+``A[i, j]`` and ``b[j]`` are the integrals of the Lagrange polynomial L_j from 0 to c_i and to 1
+(Hairer, Norsett and Wanner, Solving ODEs I, section II.7); up to any tau, the interpolant.
 """
 
 from __future__ import annotations
@@ -21,20 +19,18 @@ _LARGEST = 12
 
 @dataclass(frozen=True, eq=False)
 class Scheme:
-    """A collocation scheme."""
+    """A collocation scheme with nodes c ``(s,)`` in [0, 1], ascending."""
 
     name: str
     c: np.ndarray
-    """Nodes in [0, 1], ascending, ``(s,)``."""
     order: int
-    """Order of the end-point values for a smooth problem."""
     A: np.ndarray = field(init=False)  # (s, s)
     b: np.ndarray = field(init=False)  # (s,)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "A", self.integrals(self.c))
         object.__setattr__(self, "b", self.integrals(np.ones(1))[0])
-        for table in (self.c, self.A, self.b):  # all who ask for a scheme share it
+        for table in (self.c, self.A, self.b):  # shared by all who ask for the scheme
             table.flags.writeable = False
 
     @property
@@ -44,8 +40,7 @@ class Scheme:
 
     @property
     def left(self) -> bool:
-        """The first node is the left end of the interval (then neighbours share their end
-        nodes)."""
+        """The first node is the left end of the interval: neighbours share their end nodes."""
         return bool(self.c[0] == 0.0)
 
     @property
@@ -78,10 +73,6 @@ def _gauss_rule(s: int) -> tuple[np.ndarray, np.ndarray]:
     return np.polynomial.legendre.leggauss(s)
 
 
-def _gauss_nodes(s: int) -> np.ndarray:
-    return 0.5 * (_gauss_rule(s)[0] + 1.0)
-
-
 def _radau_nodes(s: int) -> np.ndarray:
     # zeros of P_s - P_(s-1), the largest of which is the right end
     coefficients = np.zeros(s + 1)
@@ -92,8 +83,8 @@ def _radau_nodes(s: int) -> np.ndarray:
 
 
 def scheme(name: str) -> Scheme:
-    """The scheme called `name`: "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N
-    nodes. `ProblemError` for any other name."""
+    """The scheme "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N nodes;
+    `ProblemError` for any other name."""
     known = _known(name) if isinstance(name, str) else None
     if known is None:
         raise ProblemError(
@@ -110,11 +101,9 @@ def _known(name: str) -> Scheme | None:
     if name == "hermite-simpson":
         return Scheme(name, np.array([0.0, 0.5, 1.0]), 4)
     match = re.fullmatch(r"(gauss|radau)-(\d{1,3})", name)
-    if match and 1 <= int(match[2]) <= _LARGEST:
-        s = int(match[2])
-        return (
-            Scheme(name, _gauss_nodes(s), 2 * s)
-            if match[1] == "gauss"
-            else Scheme(name, _radau_nodes(s), 2 * s - 1)
-        )
-    return None
+    if not match or not 1 <= int(match[2]) <= _LARGEST:
+        return None
+    s = int(match[2])
+    if match[1] == "gauss":
+        return Scheme(name, 0.5 * (_gauss_rule(s)[0] + 1.0), 2 * s)
+    return Scheme(name, _radau_nodes(s), 2 * s - 1)

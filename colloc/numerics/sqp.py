@@ -1,10 +1,8 @@
-"""Small programs with bounds and rows by sequential quadratic programming with dense quasi-Newton
-updates.
+"""Sequential quadratic programming for small dense programs with bounds and rows.
 
-The second derivatives of a reduced gait program jump where narrow bands of stick cross a mesh
-point, so they are not asked for: damped BFGS updates (Powell, 1978) build them from gradients, and
-do not mind. What comes back is measured here. SciPy's SLSQP takes the same steps (150 to 600 ms
-each with 250 parameters, where this takes 12), but begins anew at every call.
+Second derivatives of a reduced gait program jump where narrow bands of stick cross a mesh point, so
+damped BFGS updates (Powell, 1978) build them from gradients. SciPy's SLSQP takes the same steps
+(150 to 600 ms each with 250 variables, where this takes 12), but begins anew at every call.
 """
 
 from __future__ import annotations
@@ -15,21 +13,21 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from colloc.numerics.nonnegative import nonnegative
 from colloc.numerics.quadratic_step import quadratic_step
 from colloc.system.interruption import interrupted, interruptible
 
 Value = TypeVar("Value")
-_NOWHERE = 1e3
-"""Objective where the balance cannot be solved: a line search steps back from it."""
+_NOWHERE = 1e3  # objective where the balance cannot be solved: a line search steps back from it
 _ACTIVE = 1e-6
 """Slack below which an inequality may carry a multiplier; its product with the slack is measured
 too."""
 _EDGE = 1e-9
-_FEASIBLE = 1e-10
-"""Sum of the violations that no accuracy asks to be below."""
-_TRIED, _DAMPED = 12, 0.2
-"""Points along a step; the least curvature along it, as a share of what was known (Powell)."""
+_FEASIBLE = 1e-10  # sum of the violations that no accuracy asks to be below
+_MOST_TRIALS = 12  # points along a step
+_DAMPING = 0.2  # least curvature along a step, as a share of the model's (Powell)
+_FEW = 8
+"""Columns up to which `nonnegative` does without SciPy's optimize, which takes a sixth of a second
+to load."""
 
 
 class NonlinearProgram(Protocol):
@@ -61,52 +59,47 @@ class NonlinearProgram(Protocol):
 class Stationarity:
     """First-order conditions at a point, by the multipliers that come closest to them."""
 
-    kkt_error: float
-    """Largest component of the Lagrangian's gradient."""
-    violation: float
-    """Largest violation of a row or bound."""
-    complementarity: float
-    """Largest product of a multiplier and its slack."""
-    on_rows: np.ndarray
+    kkt_error: float  # largest component of the Lagrangian's gradient
+    violation: float  # largest, of a row or bound
+    complementarity: float  # largest product of a multiplier and its slack
+    on_rows: np.ndarray  # multipliers, positive at upper bounds
     on_bounds: np.ndarray
-    """Multipliers of rows and bounds, positive at upper ones."""
 
 
 def binding(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which rows and bounds, counted on, may carry a multiplier at their upper and at their lower
-    ends; and their slopes, ``(n, n_binding)``, those at lower ends reversed."""
-    values, unit = (
-        np.concatenate([program.rows(v), v]),
-        np.vstack([program.row_slopes(v), np.eye(v.size)]),
-    )
-    lower, upper = (
-        np.concatenate([program.row_lower, program.lower]),
-        np.concatenate([program.row_upper, program.upper]),
-    )
+    """Indices of rows and bounds, counted on, that may carry a multiplier at their upper and at
+    their lower ends; and their gradients ``(n, n_binding)``, those at lower ends negated."""
+    values, lower, upper = _rows_and_bounds(program, v)
+    unit = np.vstack([program.row_slopes(v), np.eye(v.size)])
     high, low = np.flatnonzero(values > upper - _ACTIVE), np.flatnonzero(values < lower + _ACTIVE)
     return high, low, np.concatenate([unit[high], -unit[low]]).T
 
 
-def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
-    """Measure the first-order conditions at v, with the non-negative multipliers that minimise the
-    Lagrangian's gradient; where there are no variables they hold."""
-    if not v.size:
-        return Stationarity(0.0, 0.0, 0.0, np.zeros(program.row_lower.size), np.empty(0))
-    gradient, values = program.gradient(v), np.concatenate([program.rows(v), v])
-    lower, upper = (
+def _rows_and_bounds(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Values, lower and upper ends of rows and variables."""
+    return (
+        np.concatenate([program.rows(v), v]),
         np.concatenate([program.row_lower, program.lower]),
         np.concatenate([program.row_upper, program.upper]),
     )
+
+
+def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
+    """Measure the first-order conditions at v, with the non-negative multipliers that minimise the
+    Lagrangian's gradient; without variables they hold."""
+    if not v.size:
+        return Stationarity(0.0, 0.0, 0.0, np.zeros(program.row_lower.size), np.empty(0))
+    gradient, (values, lower, upper) = program.gradient(v), _rows_and_bounds(program, v)
     high, low, columns = binding(program, v)
-    multipliers, on = np.zeros(values.size), np.zeros(0)
+    multipliers, left = np.zeros(values.size), gradient
     if columns.size and np.isfinite(columns).all() and np.isfinite(gradient).all():
         on = nonnegative(columns, -gradient)
         np.add.at(multipliers, high, on[: high.size])
         np.add.at(multipliers, low, -on[high.size :])
+        left = gradient + columns @ on
     slack = np.where(multipliers > 0, upper - values, values - lower)
     slack = np.where((lower < upper) & (multipliers != 0), slack, 0.0)
     outside = np.maximum(np.maximum(lower - values, values - upper), 0.0)
-    left = gradient + (columns @ on if on.size else 0.0)
     on_rows, on_bounds = np.split(multipliers, [values.size - v.size])
     return Stationarity(
         float(np.abs(left).max()),
@@ -117,23 +110,53 @@ def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
     )
 
 
+def nonnegative(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The x >= 0 ``(n,)`` that minimises ``|matrix @ x - right|`` (Lawson and Hanson, Solving Least
+    Squares Problems, 1974)."""
+    n = matrix.shape[1]
+    if n > _FEW:
+        from scipy.optimize import nnls
+
+        return nnls(matrix, right, maxiter=30 * n)[0]
+    x, free = np.zeros(n), np.zeros(n, dtype=bool)
+    size = np.abs(matrix).sum(axis=0).max(initial=0.0)
+    tolerance = 10 * max(matrix.shape) * np.finfo(float).eps * size
+    for _ in range(30 * n):
+        falls = np.where(free, -np.inf, matrix.T @ (right - matrix @ x))
+        if falls.max() <= tolerance:
+            break
+        free[np.argmax(falls)] = True
+        while True:
+            best = np.zeros(n)
+            best[free] = np.linalg.lstsq(matrix[:, free], right, rcond=None)[0]
+            negative = free & (best <= 0)
+            if not negative.any():
+                break
+            # as far as the first that would turn negative, which stays 0
+            way = np.full(n, np.inf)
+            way[negative] = x[negative] / (x[negative] - best[negative])
+            x = x + way.min() * (best - x)
+            free &= way > way.min()
+            x[~free] = 0.0
+        x = best
+    return x
+
+
 @dataclass(frozen=True, eq=False)
 class SqpResult:
-    """Where SQP ended."""
+    """End of an SQP run."""
 
     v: np.ndarray  # (n,)
     objective: float
     iterations: int
     evaluations: int
-    on_edge: bool
-    """Whether v lies on the edge of the box round the start."""
-    curvature: np.ndarray
-    """What is known of the Lagrangian's second derivatives, ``(n, n)``."""
+    on_edge: bool  # v lies on the edge of the box around the start
+    curvature: np.ndarray  # model of the Lagrangian's second derivatives, (n, n)
 
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A point and what holds there; an objective or row that cannot be evaluated is far too
+    """A point with its objective, rows and their violations; what cannot be evaluated is far too
     large."""
 
     v: np.ndarray
@@ -157,39 +180,21 @@ def minimised(
     iterations: int = 150,
     curvature: np.ndarray | None = None,
 ) -> SqpResult:
-    """Minimise from v within a box of the given radius round it.
+    """Minimise from v within a box of the given radius around it, to an accuracy of the objective.
 
-    Every step is the minimum of a quadratic model, within the box and the rows' linear models. It
-    is shortened until the objective and the violations, each at its price, fall together (Han,
-    1977; Powell, 1978).
-
-    Parameters
-    ----------
-    program : NonlinearProgram
-    v : (n,)
-    radius : float
-    accuracy : float
-        Of the objective, at which to stop.
-    iterations : int
-    curvature : (n, n), optional
-        Of the first model; by default 1. Where a model leads nowhere, it begins anew with that.
+    Every step minimises a quadratic model within the box and the linear models of the rows, and is
+    shortened until the objective and the violations, each at its price, fall together (Han, 1977;
+    Powell, 1978). Where a model of the given curvature leads nowhere, that of curvature 1 follows.
     """
     if not v.size:
         return SqpResult(v, program.objective(v), 0, 1, False, np.empty((0, 0)))
     v = np.clip(v, program.lower, program.upper)
     lower, upper = np.maximum(program.lower, v - radius), np.minimum(program.upper, v + radius)
     here, fresh = _Point.at(program, v), curvature is None
-    b, price, feasible = (
-        np.eye(v.size) if curvature is None else curvature,
-        np.zeros(here.rows.size),
-        max(accuracy, _FEASIBLE),
-    )
-    gradient, slopes, count, evaluations = (
-        program.gradient(here.v),
-        program.row_slopes(here.v),
-        0,
-        1,
-    )
+    b = np.eye(v.size) if curvature is None else curvature
+    price, feasible = np.zeros(here.rows.size), max(accuracy, _FEASIBLE)
+    gradient, slopes = program.gradient(here.v), program.row_slopes(here.v)
+    count, evaluations = 0, 1
     with interruptible():
         while count < iterations and not interrupted():
             count += 1
@@ -198,75 +203,67 @@ def minimised(
             there = None
             if step is not None:
                 price = np.maximum(np.abs(step.on_rows), 0.5 * (price + np.abs(step.on_rows)))
-                promised = gradient @ step.d - step.share * price @ here.outside
-                if (
-                    abs(gradient @ step.d) + price @ here.outside < accuracy
-                    and here.outside.sum() < feasible
-                ):
+                change, violations = gradient @ step.d, price @ here.outside
+                if abs(change) + violations < accuracy and here.outside.sum() < feasible:
                     break
-                there, tried = _improved(program, here, step.d, price, promised)
-                evaluations += tried
+                model = change - step.share * price @ here.outside
+                there, trials = _line_search(program, here, step.d, price, model)
+                evaluations += trials
             if step is None or there is None:
                 if fresh:
                     break
                 b, fresh = np.eye(v.size), True
                 continue
-            before, here = here, there
+            before, here, fresh = here, there, False
             new_gradient, new_slopes = program.gradient(here.v), program.row_slopes(here.v)
-            change = new_gradient - gradient + step.on_rows @ (new_slopes - slopes)
-            gradient, slopes, b, fresh = (
-                new_gradient,
-                new_slopes,
-                _updated(b, here.v - before.v, change),
-                False,
-            )
+            turn = new_gradient - gradient + step.on_rows @ (new_slopes - slopes)
+            gradient, slopes, b = new_gradient, new_slopes, _bfgs(b, here.v - before.v, turn)
             if abs(here.objective - before.objective) < accuracy and here.outside.sum() < feasible:
                 break
-    at = here.v
-    inner = (program.lower < lower - _EDGE) & (at < lower + _EDGE) | (
-        program.upper > upper + _EDGE
-    ) & (at > upper - _EDGE)
-    return SqpResult(at, here.objective, count, evaluations, bool(inner.any()), b)
+    at_low = (program.lower < lower - _EDGE) & (here.v < lower + _EDGE)
+    at_high = (program.upper > upper + _EDGE) & (here.v > upper - _EDGE)
+    on_edge = bool((at_low | at_high).any())
+    return SqpResult(here.v, here.objective, count, evaluations, on_edge, b)
 
 
-def _improved(
-    program: NonlinearProgram, here: _Point, d: np.ndarray, price: np.ndarray, promised: float
+def _line_search(
+    program: NonlinearProgram, here: _Point, d: np.ndarray, price: np.ndarray, model: float
 ) -> tuple[_Point | None, int]:
-    """The first point along a step that keeps a tenth of what the model promises, if there is one;
-    points tried."""
+    """First point along a step with a tenth of the model's decrease, if there is one; and the
+    number of trials."""
     merit, size = here.objective + price @ here.outside, 1.0
-    for tried in range(1, _TRIED + 1):
+    for trial in range(1, _MOST_TRIALS + 1):
         there = _Point.at(program, here.v + size * d)
         change = there.objective + price @ there.outside - merit
-        if change <= 0.1 * size * promised:
-            return there, tried
-        size *= min(max(0.5 * size * promised / (size * promised - change), 0.1), 0.5)
-    return None, _TRIED
+        if change <= 0.1 * size * model:
+            return there, trial
+        size *= min(max(0.5 * size * model / (size * model - change), 0.1), 0.5)
+    return None, _MOST_TRIALS
 
 
-def _updated(b: np.ndarray, s: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Curvature after a step s that changed the Lagrangian's gradient by y: BFGS, damped so that it
-    stays positive."""
+def _bfgs(b: np.ndarray, s: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Curvature after a step s that changed the Lagrangian's gradient by y, damped so that it stays
+    positive definite."""
     bs = b @ s
     sbs, sy = s @ bs, s @ y
     if not np.isfinite(sy) or sbs <= 0:
         return b
-    if sy < _DAMPED * sbs:
-        share = (1 - _DAMPED) * sbs / (sbs - sy)
+    if sy < _DAMPING * sbs:
+        share = (1 - _DAMPING) * sbs / (sbs - sy)
         y = share * y + (1 - share) * bs
         sy = s @ y
     return b - np.outer(bs, bs) / sbs + np.outer(y, y) / sy
 
 
 def remembered(function: Callable[[np.ndarray], Value]) -> Callable[[np.ndarray], Value]:
-    """The function, evaluated once where it is asked for the same point again and again."""
-    known: dict[bytes, Value] = {}
+    """Keep the last value of a function for calls at the same point."""
+    last: dict[bytes, Value] = {}
 
-    def remembering(at: np.ndarray) -> Value:
+    def call(at: np.ndarray) -> Value:
         key = at.tobytes()
-        if key not in known:
-            known.clear()
-            known[key] = function(at)
-        return known[key]
+        if key not in last:
+            last.clear()
+            last[key] = function(at)
+        return last[key]
 
-    return remembering
+    return call

@@ -36,7 +36,7 @@ from research.guarantee.enclosure import (
     corner_motions,
     least_power,
 )
-from research.guarantee.potential_range import PotentialRange
+from research.guarantee.potential_range import PotentialRange, turned
 
 _CHUNK = 8000
 _FIRST = 0.07
@@ -263,7 +263,7 @@ def certify(
     begin, unit = time.process_time(), friction.in_units_of(friction.mu_t)
     views = [(body, free)]
     if not space.end_swap:
-        views.append((Chain(body.lengths[::-1]), space.turned(free)))
+        views.append((Chain(body.lengths[::-1]), turned(space, free)))
     left, examined, deepened = [np.empty(0)], 0, 0
     for view, potential in views:
         cover = _Cover(

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from colloc.bounds.potential import PotentialSpace
-from colloc.numerics.spline import DEGREE
+from colloc.bounds.spline import DEGREE
 from research.guarantee.enclosure import WIDER, Cells, ReferencePoint, spread
 from research.guarantee.kernel import call
 from research.guarantee.loaded_balance import Loaded
@@ -34,6 +34,23 @@ def gain_bound(amplitudes: dict[int, np.ndarray]) -> np.ndarray:
         + 2.0**-44 * size.sum(axis=1)
         + 0.5 * (np.pi / _HEADINGS) ** 2 * (size @ harmonics**2)
     )
+
+
+def turned(space: PotentialSpace, free: np.ndarray) -> np.ndarray:
+    """The same potential for the body turned end for end: ``c_k(q)`` becomes
+    ``-conj(c_k(reversed q))``.
+
+    Turning the body and reversing time take angles q to -reversed q and rates r to reversed r;
+    the velocity of the middle link in its own axes and its heading stay, the sense of its
+    rotation does not. By the mirror image ``c_k(-q) = conj(c_k(q))``.
+    """
+    image = np.empty_like(free)
+    for _, part, where in space.layout:
+        basis = space.bases[part]
+        table = (basis @ free[where]).reshape((space.spline.per_joint,) * space.spline.n_joint)
+        swapped = (-1, 1)[part] * table.transpose().ravel()
+        image[where] = (basis.T @ swapped) / basis.multiply(basis).sum(axis=0).A1
+    return image
 
 
 _Near = tuple[np.ndarray, np.ndarray]

@@ -7,14 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from colloc.bounds import infinitesimal
 from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion
-from colloc.bounds.infinitesimal import SmallGait, best_small_gait, small_gait
+from colloc.bounds.infinitesimal import SmallGait
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError
+from research import small_gaits
+from research.small_gaits import best_small_gait, small_gait
 from tests.shared.laws import coulomb
 
 ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)
@@ -190,7 +191,7 @@ def test_shapes_at_which_few_directions_do_not_close_are_passed_over(monkeypatch
             raise NotConvergedError("infeasible")
         return SmallGait(1.0 + float(shape[0]), 0.0, np.empty((2, 0)), np.empty(0))
 
-    monkeypatch.setattr(infinitesimal, "small_gait", failing)
+    monkeypatch.setattr(small_gaits, "small_gait", failing)
     best, shape = best_small_gait(Chain(), Friction(), 2.5, steps=4, refined=1)
     assert shape[0] == pytest.approx(0.0, abs=1e-2)
     assert best.efficiency == 1.0 + shape[0]
@@ -206,7 +207,7 @@ def test_the_start_of_a_search_counts_where_it_is_better_than_its_end(monkeypatc
             size if settings and settings[0] == 180 else -size, 0.0, np.empty((2, 0)), np.empty(0)
         )
 
-    monkeypatch.setattr(infinitesimal, "small_gait", misleading)
+    monkeypatch.setattr(small_gaits, "small_gait", misleading)
     best, shape = best_small_gait(Chain(), Friction(), 2.0, steps=4, refined=1)
     assert (best.efficiency, *shape) == (0.0, 0.0, 0.0)
 

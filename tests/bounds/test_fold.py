@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction
-from colloc.bounds import infinitesimal
+from research import small_gaits
 
 MOTIONS = {
     "the first link turns": (F(0), F(10), F(0), F(0)),
@@ -86,10 +86,9 @@ def test_its_efficiency_is_462_over_1013():
 
 def missing(monkeypatch, delta):
     """How much less than the exact value the linear program finds at a finite regularisation."""
-    monkeypatch.setattr(infinitesimal, "_DELTA", delta)
+    monkeypatch.setattr(small_gaits, "_DELTA", delta)
     return (
-        462 / 1013
-        - infinitesimal.small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
+        462 / 1013 - small_gaits.small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
     )
 
 

@@ -4,18 +4,20 @@ the program says."""
 import numpy as np
 import pytest
 
-from colloc.bounds.coulomb_motion import balanced_motion
 from colloc.bounds.cutting_plane import exchanged_optimum
-from colloc.bounds.knots import with_knots, with_more_knots, worth
-from colloc.bounds.measure import Measure
-from colloc.bounds.potential import PotentialSpace, Samples
-from colloc.bounds.recheck import largest_ratio
+from colloc.bounds.potential import (
+    PotentialSpace,
+    Samples,
+    with_knots,
+    with_more_knots,
+    worth,
+)
 from colloc.bounds.sampling import Domain
+from colloc.bounds.spline import TensorSpline
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ProblemError
-from scripts.check_potential import Kept, keep, potentials
+from scripts.check_potential import Kept, keep, largest_ratio, potentials
 
 LIMIT = 2.5
 
@@ -112,31 +114,6 @@ def test_more_knots_lower_the_program(found):
     assert more.space.spline.intervals == 6
     assert more.space.spline.graded
     assert more.floor < found[1].floor - 1e-3
-
-
-def motions(angles, weight):
-    """A measure at given shapes."""
-    angles = np.array(angles, dtype=float).T
-    motion = balanced_motion(Chain(), Friction(), angles, np.ones_like(angles) / np.sqrt(2))
-    return Measure(motion, np.zeros(angles.shape[1]), np.array(weight))
-
-
-def test_a_measure_round_the_straight_body_shows_a_path_with_both_symmetries():
-    turn = np.linspace(0.05, 1.5, 40)
-    shapes = np.stack(
-        [1.5 * np.cos(turn) + 0.9 * np.sin(turn), -1.5 * np.cos(turn) + 0.9 * np.sin(turn)], axis=1
-    )
-    path = motions(shapes, np.full(40, 1 / 40)).path()
-    t = np.linspace(0.0, 1.0, 101)
-    q = path.angles(t)
-    assert np.allclose(path.angles((t + 0.5) % 1.0), -q, atol=1e-9)
-    radius = np.hypot(0.5 * (q[0] - q[1]) / 1.5, 0.5 * (q[0] + q[1]) / 0.9)
-    assert np.abs(radius - 1).max() < 0.05
-
-
-def test_loops_at_one_shape_are_no_path():
-    with pytest.raises(ProblemError, match="no path"):
-        motions([(2.2, -2.2), (2.21, -2.2)], [0.5, 0.5]).path()
 
 
 @pytest.mark.parametrize("knots", [(-1.0, 0.0, 1.2), (1.0, 0.0, -1.0), (-3.0, 0.0, 3.0), (0.0,)])

@@ -15,15 +15,14 @@ from colloc.bounds.coulomb_motion import (
     CoulombMotion,
     balanced_motion,
     fundamental,
-    swaps_ends,
     two_resting,
 )
-from colloc.bounds.cutting_plane import exchanged_optimum
-from colloc.bounds.infinitesimal import small_gait
+from colloc.bounds.cutting_plane import exchanged_optimum, smallest_maximum
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
 from colloc.bounds.potential import PotentialSpace, Samples, largest_gain, largest_ratios
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, usual_harmonics
 from colloc.bounds.sampling import Domain
+from colloc.bounds.spline import TensorSpline
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.laws.viscous import Viscous
@@ -31,10 +30,9 @@ from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.feet import Foot
 from colloc.mechanics.friction import Friction
-from colloc.numerics.minimax_program import smallest_maximum
-from colloc.numerics.spline import TensorSpline
 from colloc.smooth.modal_body import ModalBody
 from colloc.system.errors import ProblemError, StoreError
+from research.small_gaits import small_gait
 from tests.shared.laws import coulomb
 
 FRICTIONS = [(1.0, 1.0, 1.0), (3.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0)]
@@ -194,11 +192,11 @@ def test_mirror_images_and_end_swap_move_alike(mu, lengths):
     space = PotentialSpace(
         TensorSpline(body.n_joint, 2.0, 4),
         (1,) if friction.reversible else (0, 1),
-        swaps_ends(body),
+        body.symmetric,
     )
     free = 0.1 * np.random.default_rng(10).standard_normal(space.size)
     ratio = Samples(space, balanced_motion(body, friction, q, r)).ratio(free)[0]
-    assert swaps_ends(body)
+    assert body.symmetric
     for image in ((-q, -r), (-q[::-1], r[::-1])):
         other = Samples(space, balanced_motion(body, friction, *image)).ratio(free)[0]
         np.testing.assert_allclose(other, ratio, rtol=1e-5)

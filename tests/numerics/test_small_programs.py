@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from colloc.numerics.linear_program import linear_maximum
-from colloc.numerics.nonnegative import nonnegative
+from colloc.numerics.sqp import nonnegative
 from colloc.system.errors import NotConvergedError
 
 

@@ -13,18 +13,15 @@ from colloc.bounds.coulomb_motion import (
     unit_directions,
 )
 from colloc.bounds.cutting_plane import exchanged_optimum
-from colloc.bounds.infinitesimal import best_small_gait, small_gait
-from colloc.bounds.knots import with_more_knots, worth
-from colloc.bounds.measure import Measure
-from colloc.bounds.potential import PotentialSpace, Samples
-from colloc.bounds.recheck import near_the_top
+from colloc.bounds.potential import Measure, PotentialSpace, Samples, with_more_knots, worth
 from colloc.bounds.sampled import Budget, efficiency_bound
-from colloc.bounds.sampling import Domain
-from colloc.numerics.spline import TensorSpline
+from colloc.bounds.sampling import Domain, near_the_top
+from colloc.bounds.spline import TensorSpline
 from research.guarantee.enclosure import by_convexity, by_loads
 from research.guarantee.guaranteed import certify
 from research.guarantee.loaded_balance import loaded_balance
 from research.guarantee.potential_range import PotentialRange, gain_bound
+from research.small_gaits import best_small_gait, small_gait
 from tests.recorded.bodies import shapes
 from tests.research.random_cells import random_cells
 
@@ -64,7 +61,7 @@ def motions_and_shapes():
     return (
         found,
         [unit_directions(n, 20, half) for n in (1, 2, 3) for half in (True, False)],
-        _motions(UNEQUAL).reversed(),
+        _motions(UNEQUAL),
     )
 
 
@@ -109,7 +106,7 @@ def mixtures_and_knots():
     measure = Measure(motion, rng.uniform(0, 2 * np.pi, motion.size), weight / weight.sum())
     few = np.flatnonzero(motion.angles[0] > 1.5)
     there = Measure(motion.take(few), measure.heading[few], np.full(few.size, 1 / few.size))
-    found = [measure.time, measure.efficiency(), measure.path().corners]
+    found = [measure.efficiency()]
     for space in SPACES.values():
         found += [worth(space, each) for each in (measure, there)]
         found += [

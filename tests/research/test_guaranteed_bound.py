@@ -8,19 +8,19 @@ from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion
 from colloc.bounds.potential import PotentialSpace, Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
+from colloc.bounds.spline import DEGREE, TensorSpline
 from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.balance import dissipation_potential, instant, net_force
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
-from colloc.numerics.spline import DEGREE, TensorSpline
 from colloc.system.errors import ProblemError
 from research.guarantee import enclosure, guaranteed
 from research.guarantee.enclosure import CORNERS, DELTA, by_convexity, by_loads, corner_motions
 from research.guarantee.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from research.guarantee.loaded_balance import loaded_balance
-from research.guarantee.potential_range import PotentialRange, gain_bound
+from research.guarantee.potential_range import PotentialRange, gain_bound, turned
 from tests.research.convexity_enclosure import allowance
 from tests.research.load_enclosure import KAPPA, allowance_by_loads
 from tests.research.random_cells import all_cells, random_cells
@@ -467,7 +467,7 @@ def test_a_potential_says_the_same_of_a_body_turned_end_for_end(friction):
     ratios = []
     for lengths, own, angles, rates in (
         (ODD_LENGTHS.lengths, free, q, r),
-        (ODD_LENGTHS.lengths[::-1], space.turned(free), -q[::-1], r[::-1]),
+        (ODD_LENGTHS.lengths[::-1], turned(space, free), -q[::-1], r[::-1]),
     ):
         motion = balanced_motion(Chain(lengths), friction, angles, rates)
         assert motion.size == 60

@@ -20,7 +20,6 @@ from colloc import (
     Wheel,
     solve_balance,
 )
-from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.summary import summary_lines
@@ -30,6 +29,7 @@ from colloc.pictures.motion_frames import frames
 from colloc.search.solve import solve
 from colloc.verification.dry_balance import dry_balance
 from colloc.verification.replay import replay
+from research.small_gaits import small_gait
 
 KNOWN = Fourier([-1.287, 1.287], [[0.687], [-0.687]], [[1.206], [1.206]])
 """A gait of three links on a foot each that a program of its own has found, whose efficiency there

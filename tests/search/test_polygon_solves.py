@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Corners, Friction, Polygon, Problem, ellipse
-from colloc.bounds.infinitesimal import small_gait
 from colloc.results.solution import SOLVED
 from colloc.search.solve import solve
+from research.small_gaits import small_gait
 
 
 def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
