@@ -25,7 +25,7 @@ from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.search.certify import gait_certificate
 from colloc.system.errors import ProblemError, StoreError
-from colloc.system.replaced_file import replaced_file
+from colloc.system.files import replaced_file
 from colloc.system.versions import version_of
 from colloc.verification.dry_friction import dry_friction
 

@@ -17,7 +17,7 @@ from colloc.commands.ending import FAILED, OK, run
 from colloc.commands.options import PRINTING, flag, status_line, tell, text
 from colloc.results.store import load
 from colloc.system.errors import CollocError, ProblemError
-from colloc.system.replaced_file import alone_in
+from colloc.system.files import alone_in
 
 _EPILOG = """\
 A row is a problem, a gait and a value; the referee replays the gait, and believes nothing else. A

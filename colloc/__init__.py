@@ -24,23 +24,52 @@ The paper: S. Alben, "Efficient sliding locomotion with isotropic friction" (201
 
 from __future__ import annotations
 
-import ast
 import functools
 import importlib
 from collections.abc import Callable
-from pathlib import Path
 from types import FunctionType
 
-from colloc.system.late_binding import bind
-from colloc.system.versions import version_of
-
-_HOME = {
-    alias.name: node.module
-    for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body
-    if isinstance(node, ast.ImportFrom) and node.module
-    for alias in node.names
+_NAMES = {
+    "gaits.problem": "Problem",
+    "gaits.problem_file": "Reference load_problem",
+    "gaits.objective": "Objective",
+    "mechanics.chain": "Chain",
+    "gaits.coupled": "Coupled",
+    "mechanics.feet": "Foot Pad Wheel",
+    "mechanics.densities": "PathLimit Quantity",
+    "smooth.modal_body": "ModalBody",
+    "smooth.concertina": "Concertina",
+    "smooth.crawler_body": "CrawlerBody",
+    "smooth.prescribed_body": "Wave",
+    "mechanics.friction": "Friction",
+    "laws.elliptic": "Elliptic",
+    "laws.viscous": "Viscous",
+    "laws.power_law": "PowerLaw",
+    "laws.own_law": "OwnLaw",
+    "laws.fitted_friction": "fitted_friction FittedFriction",
+    "gaits.serpenoid": "Serpenoid",
+    "gaits.harmonic": "Harmonic Fourier ellipse",
+    "gaits.inertia": "Free",
+    "gaits.bspline": "BSpline Polygon",
+    "gaits.columns": "Basis",
+    "gaits.polygon": "Corners",
+    "studies.calls": "solve multistart Starts sweep",
+    "studies.study": "Study Axis",
+    "studies.pareto": "pareto_front",
+    "studies.steering": "steer",
+    "results.solution": "Solution",
+    "results.store": "load save",
+    "search.evaluate": "evaluate",
+    "search.certify": "certify",
+    "verification.replay": "replay",
+    "verification.slope": "slope_motion",
+    "verification.inertial_motion": "inertial_motion motion_from_rest",
+    "motion.slow_enough": "slow_enough",
+    "mechanics.fixed_point": "solve_balance",
+    "system.errors": "CollocError NotConvergedError ProblemError StoreError",
 }
-"""Public name to the module where it lives, as the stub beside this file states it."""
+"""Module to the public names that live there (`__init__.pyi` says the same to type checkers)."""
+_HOME = {name: f"colloc.{module}" for module, names in _NAMES.items() for name in names.split()}
 __all__ = sorted(_HOME)
 _GONE = {
     "FreePath": "take BSpline(knots=24), which has better gaits than paths of bounded curvature "
@@ -53,52 +82,30 @@ _GONE = {
     "heading_map": "colloc.slope_motion and a root finder find headings that last "
     "(docs/howto/slopes.md).",
 }
-"""Public names there were, and what to write instead."""
-
-# what a solution offers and packages above it do
-bind(
-    {
-        "card": "colloc.pictures.solution_card:solution_card",
-        "plot": "colloc.pictures.solution_figure:solution_figure",
-        "plot_panel": "colloc.pictures.publication:draw_panel",
-        "animate": "colloc.pictures.movie:write_movie",
-        "report": "colloc.pictures.report_page:write_report",
-        "robot": "colloc.results.robot:Robot",
-        "plot_robot": "colloc.pictures.robot_figure:robot_figure",
-        "plot_robot_panel": "colloc.pictures.robot_figure:draw_robot",
-        "sensitivity": "colloc.search.sensitivity:sensitivity",
-        "export": "colloc.pictures.export:write_export",
-        "plot_steering": "colloc.pictures.steering_figure:steering_figure",
-        "plot_steering_panel": "colloc.pictures.steering_figure:draw_steering",
-        "plot_front": "colloc.pictures.front_figure:front_figure",
-        "plot_front_values": "colloc.pictures.front_figure:draw_front",
-    }
-)
+"""Former public names, and what to write instead."""
 
 
 @functools.cache
 def _checked(function: Callable[..., object]) -> Callable[..., object]:
-    """A public function that checks its arguments, and is found here where other processes ask for
-    it."""
     from colloc.system.arguments import checked_arguments
 
     checked = checked_arguments(function)
-    checked.__module__ = __name__
+    checked.__module__ = __name__  # where other processes find it
     return checked
 
 
 def __dir__() -> list[str]:
-    """The public names, also those that nobody has used yet, and no others but those with two
-    underscores."""
     return sorted({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first used, so that the NumPy part never loads CasADi."""
+    # PEP 562: imported on first use, so that the NumPy part never loads CasADi
     if name in _HOME:
-        found = getattr(importlib.import_module(_HOME[name]), name)
-        return _checked(found) if isinstance(found, FunctionType) else found
+        value = getattr(importlib.import_module(_HOME[name]), name)
+        return _checked(value) if isinstance(value, FunctionType) else value
     if name == "__version__":
+        from colloc.system.versions import version_of
+
         return version_of("colloc")
     if name in _GONE:
         from colloc.system.errors import ProblemError

@@ -1,5 +1,4 @@
-# The one table of public names and where they live, in the order of use: for type checkers,
-# and for colloc itself.
+# Public names for type checkers, in the order of use; colloc/__init__.py says the same.
 __version__: str
 _HOME: dict[str, str]
 

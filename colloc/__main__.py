@@ -1,22 +1,25 @@
 """``python -m colloc`` and the command ``colloc``."""
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 
-from colloc.system.early_interruption import leave, listen
+from colloc.system.interruption import end_at_once
 
 
 def start(arguments: Sequence[str] | None = None) -> None:
-    """Run a command as a process of its own: Ctrl-C is heard from here on, while everything else is
-    imported."""
-    listen()
-    os.environ["MPLBACKEND"] = (
-        "Agg"  # the one of a notebook's terminal may not be installed, and none is drawn with
-    )
+    """Run a command as a process of its own; Ctrl-C is handled during its imports."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, end_at_once)
+    os.environ["MPLBACKEND"] = "Agg"  # a notebook's backend may not be installed
     from colloc.commands.main import main
 
-    leave(main(sys.argv[1:] if arguments is None else arguments))
+    code = main(sys.argv[1:] if arguments is None else arguments)
+    if signal.getsignal(signal.SIGINT) is end_at_once:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what it would end is done
+    exec("")  # else CPython ends by the signal where Ctrl-C once fell into executed text
+    sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """What a person who imports colloc holds: light, complete, documented by examples that run, and
 clear about mistakes."""
 
+import ast
 import doctest
 import importlib
 import subprocess
@@ -30,6 +31,16 @@ def test_importing_colloc_loads_nothing_heavy_and_shows_every_public_name():
         ).stdout
         == "[] True\n"
     )
+
+
+def test_stub_and_face_say_the_same():
+    stub = ast.parse((ROOT / "colloc/__init__.pyi").read_text(encoding="utf-8")).body
+    assert {
+        alias.name: node.module
+        for node in stub
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    } == colloc._HOME
 
 
 def test_completion_offers_the_public_names_and_nothing_else():

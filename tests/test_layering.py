@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 
 import colloc
+from colloc.system.lazy import higher
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
@@ -109,3 +110,11 @@ def test_data_classes_that_compare_by_their_fields_hold_no_array():
                 fields = dataclasses.fields(thing) if made and made.eq else ()
                 held = [f.name for f in fields if f.compare and "ndarray" in str(f.type)]
                 assert not held, f"{thing.__name__} compares {held}"
+
+
+def test_what_lower_packages_import_on_use_exists():
+    """`higher` names what packages above offer: the only imports that do not point down."""
+    for name in MODULES.keys() - {"system.lazy"}:
+        text = (ROOT / f"colloc/{name.replace('.', '/')}.py").read_text(encoding="utf-8")
+        for place in re.findall(r'higher\(\s*"([^"]+)"', text):
+            assert callable(higher(place)), f"{name}: {place}"

@@ -19,9 +19,8 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TextIO
 
-from colloc.system.early_interruption import INTERRUPTED
 from colloc.system.errors import CollocError, OrderWarning, ReadOnlyRunWarning, SlowWarning
-from colloc.system.interruption import interruptible
+from colloc.system.interruption import INTERRUPTED, interruptible
 
 OK, BAD_PROBLEM, NONE_FOUND, FAILED, UNREAD = 0, 2, 3, 4, 141  # the last as shells report SIGPIPE
 _IN_WORDS = {"π": " pi ", "δ": "delta", "μ": "mu", "±": "+-", "→": "->", "·": "*", "…": "..."}

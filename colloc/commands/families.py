@@ -49,7 +49,7 @@ from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import STATUSES, Outcome, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import ProblemError, StoreError
-from colloc.system.replaced_file import locked, replaced_file
+from colloc.system.files import locked, replaced_file
 
 if TYPE_CHECKING:
     from colloc.results.archive import Archive
@@ -222,10 +222,9 @@ def sweep(options: argparse.Namespace) -> int:
         raise StoreError(f"cannot write in {out}; choose another --output.")
     with locked(folder / "lock"):
         run = StudyRun(study, folder, retry=options.retry)
-        todo, total = len(run.missing), len(run.cells)
         if not quiet(options):
-            done = f"{total - todo} done already or without a problem"
-            print(f"{study.name}: {total} cells, {done}, {todo} to go", flush=True)
+            total = math.prod(study.shape)
+            print(f"{study.name}: {total} cells, {run.visited} of them in the journal", flush=True)
         try:
             interrupted = _run_cells(run, options, lambda: _save(run, out, source, options.command))
         finally:
@@ -234,7 +233,8 @@ def sweep(options: argparse.Namespace) -> int:
     if interrupted:
         complain("interrupted; what is done is kept, and the same command goes on from there.")
         return INTERRUPTED
-    return OK if all(state.best for state in run.cells.values()) else NONE_FOUND
+    solved = sum(state.best is not None for state in run.cells.values())
+    return OK if solved == math.prod(study.shape) else NONE_FOUND
 
 
 def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], Path]) -> bool:
@@ -298,17 +298,20 @@ def _verdict(state: CellState) -> str:
 def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]:
     """Facts about a study at its end, and lines for people."""
     study, cells = run.study, run.cells
-    tally = Counter(map(_verdict, cells.values()))
-    below = [cell for cell in cells if run.below_neighbour(cell)]
+    total, reached = math.prod(study.shape), list(cells)
+    tally = Counter(_verdict(cells[cell]) for cell in reached)
+    if total > len(reached):
+        tally["not tried yet"] += total - len(reached)
+    below = [cell for cell in reached if run.below_neighbour(cell)]
     facts = {
         "name": study.name,
         "file": str(path),
-        "cells": len(cells),
+        "cells": total,
         "counts": dict(tally),
         "below_neighbour": [study.coordinates(cell) for cell in below],
     }
     shares = ", ".join(f"{n} {what}" for what, n in tally.items())
-    lines = [f"{study.name}: {len(cells)} cells: {shares}; saved {path}"]
+    lines = [f"{study.name}: {total} cells: {shares}; saved {path}"]
     if below:
         lines.append(
             f"  {len(below)} of them below what a neighbour's gait achieves there as it is: more "

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from colloc.commands.ending import run, show
 from colloc.system.errors import ProblemError
+from colloc.system.files import SUFFIX, reserved_ending
 from colloc.system.progress import StatusLine
-from colloc.system.result_names import SUFFIX, reserved_ending
 
 if TYPE_CHECKING:
     from colloc.gaits.problem import Problem

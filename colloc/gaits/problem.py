@@ -42,7 +42,7 @@ from colloc.system.arguments import (
     named_arguments,
 )
 from colloc.system.errors import ProblemError
-from colloc.system.result_names import check_name
+from colloc.system.files import check_name
 
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their
@@ -66,7 +66,7 @@ class Problem:
     ----------
     name : str
         Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200, and no ending
-        that colloc itself gives to files (`colloc.system.result_names`).
+        that colloc itself gives to files (`colloc.system.files`).
     guess : Fourier, Combination or Corners, optional
         An admissible gait to start from, of any class; it is projected onto the class `gait`. By
         default a travelling wave (`colloc.gaits.guesses`).

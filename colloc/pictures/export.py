@@ -30,9 +30,9 @@ from colloc.pictures.robot_model import FORMATS, floor_of, note_of
 from colloc.results.motion import RigidMotion
 from colloc.results.robot import Robot, joint_torques, pressing, quasi_static_torques
 from colloc.results.solution import Solution
-from colloc.system.arguments import check_count
+from colloc.system.arguments import check_count, checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.replaced_file import replaced_file
+from colloc.system.files import replaced_file
 from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion
 from colloc.verification.trajectory import (
     MOST_SAMPLES,
@@ -51,6 +51,7 @@ _SETTLED = 10  # periods after which all are alike
 _UNITS = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
 
 
+@checked_arguments
 def write_export(
     solution: Solution,
     path: Path,

@@ -12,9 +12,10 @@ import numpy as np
 
 from colloc.pictures.animation import pictures
 from colloc.results.solution import Solution
+from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
+from colloc.system.files import replaced_file
 from colloc.system.progress import StatusLine
-from colloc.system.replaced_file import replaced_file
 
 _COLOURS = 64
 _MOST_PICTURES = 5000
@@ -70,6 +71,7 @@ def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
             )
 
 
+@checked_arguments
 def write_movie(
     solution: Solution,
     path: Path,

@@ -24,8 +24,9 @@ from colloc.pictures.style import INK, styled
 from colloc.pictures.templates import render
 from colloc.results.robot import SLOW_ENOUGH, Robot
 from colloc.results.solution import SOLVED, Solution
+from colloc.system.arguments import checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.replaced_file import replaced_file
+from colloc.system.files import replaced_file
 
 _MOST_PLANES = 6
 _ANY_FLOOR = 0.5  # friction of a floor, over the stated one, for which a period is stated
@@ -101,6 +102,7 @@ def report_page(
     )
 
 
+@checked_arguments
 def write_report(
     solution: Solution,
     path: Path,

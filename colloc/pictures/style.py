@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib import style
 from matplotlib.figure import Figure
 
-from colloc.system.replaced_file import replaced_file
+from colloc.system.files import replaced_file
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"

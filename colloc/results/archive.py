@@ -1,13 +1,9 @@
-"""Archives of searches over many starts: a row on the disk for each start as it ends, and one HDF5
-file of all for users.
+"""Archives of searches over many starts of one problem.
 
-An archive is about one problem. Its starts are told apart by sampler, seed and number, so searches
-with other seeds join it, also at the same time. The rows (NAME.sqlite beside NAME.h5) are what a
-search goes on from: they hold every gait as it is. The HDF5 file is made of them when a search
-ends: columns over ``start`` for numbers and texts of an outcome, ``guess_`` and ``gait_`` with
-``mean`` (start, joint), ``cos`` and ``sin`` (start, joint, harmonic) of the Fourier series that
-stand for gaits, and columns ``basin_...`` of the distinct optima, best first (``basin_row``: the
-row of the best start).
+Rows (NAME.sqlite) hold every start with its gait, by sampler, seed and number, as it ends; searches
+go on from them, also at the same time. NAME.h5 is made of them for users: columns over ``start``,
+``guess_`` and ``gait_`` ``mean`` (start, joint), ``cos`` and ``sin`` (start, joint, harmonic), and
+columns ``basin_...`` of the distinct optima, best first (``basin_row``: row of the best start).
 """
 
 from __future__ import annotations
@@ -27,12 +23,12 @@ from colloc.results.distinct_optima import basins, fourier_series
 from colloc.results.outcome import RETRIED, UNITS, Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions
 from colloc.system.errors import StoreError
-from colloc.system.replaced_file import locked
+from colloc.system.files import locked
 from colloc.system.row_file import put_rows, read_rows
-from colloc.system.table import Table, save_table
+from colloc.system.store_file import Table, save_table
 
-KIND, VERSION = "colloc archive", 4
-ROWS = "colloc starts 2"
+_KIND, _VERSION = "colloc archive", 4
+_ROWS = "colloc starts 2"
 _TEXTS = dict.fromkeys(("sampler", "status", "message"), "text")
 _COLUMNS = ("status", "message", *UNITS, "iterations", "cpu_seconds")
 _SERIES = {"mean": ("joint",), "cos": ("joint", "harmonic"), "sin": ("joint", "harmonic")}
@@ -48,8 +44,6 @@ _UNITS = {
 
 
 class StartName(NamedTuple):
-    """A start of a problem; in the order in which starts are listed."""
-
     sampler: str
     seed: int
     number: int
@@ -57,15 +51,14 @@ class StartName(NamedTuple):
 
 @dataclass(eq=False)
 class Archive:
-    """The starts of a problem that ended so far, whoever asked for them; without a path they are
-    not on the disk."""
+    """Finished starts of a problem; not on the disk without a path."""
 
     problem: Problem
     path: Path | None = None
     outcomes: dict[StartName, Outcome] = field(default_factory=dict)
 
     def of_search(self, sampler: str, seed: int, starts: float = np.inf) -> dict[int, Outcome]:
-        """Outcomes of one sampler and seed with numbers below `starts`, by number."""
+        """Outcomes of a sampler and seed by number, below `starts`."""
         return {
             name.number: self.outcomes[name]
             for name in sorted(self.outcomes)
@@ -73,21 +66,19 @@ class Archive:
         }
 
     def done(self, sampler: str, seed: int, starts: int, *, retry: bool = False) -> frozenset[int]:
-        """Numbers below `starts` that need not be solved; with `retry` not those that ended in an
-        error, a crash or the time limit."""
+        """Numbers that need not be solved; with `retry` without errors, crashes and time limits."""
         outcomes = self.of_search(sampler, seed, starts).items()
         return frozenset(k for k, o in outcomes if not (retry and o.status in RETRIED))
 
     def add(self, outcomes: Mapping[StartName, Outcome]) -> None:
-        """Put starts that ended on the disk; StoreError if that is not possible."""
+        """Put finished starts on the disk. `StoreError` if that is not possible."""
         if self.path is not None:
             rows = {" ".join(map(str, n)): [n, outcome_fields(o)] for n, o in outcomes.items()}
-            put_rows(row_path(self.path), ROWS, rows)
+            put_rows(row_path(self.path), _ROWS, rows)
         self.outcomes.update(outcomes)
 
 
 def row_path(path: str | os.PathLike[str]) -> Path:
-    """The file with the rows of the archive with this HDF5 file."""
     return Path(path).with_suffix(".sqlite")
 
 
@@ -96,8 +87,7 @@ def _lock(path: Path) -> Path:
 
 
 def _read(path: Path, problem: Problem | None = None) -> Archive | None:
-    """The archive on the disk, which has to be about a problem; None if nothing is there."""
-    rows = read_rows(row_path(path), ROWS, _row_from)
+    rows = read_rows(row_path(path), _ROWS, _decode)
     if not rows:
         return None
     if "problem" not in rows:
@@ -113,7 +103,7 @@ def _read(path: Path, problem: Problem | None = None) -> Archive | None:
     return archive
 
 
-def _row_from(row: Any) -> Problem | tuple[StartName, Outcome]:
+def _decode(row: Any) -> Problem | tuple[StartName, Outcome]:
     if isinstance(row, dict):
         return Problem.from_dict(row)
     (sampler, seed, number), outcome = row
@@ -121,9 +111,10 @@ def _row_from(row: Any) -> Problem | tuple[StartName, Outcome]:
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
-    """The archive of a problem with all starts that are on the disk, begun if there is none; the
-    path is that of its HDF5 file. `StoreError` if what is there is damaged, of an older colloc or
-    about another problem, or the folder cannot be written."""
+    """The archive of a problem with this HDF5 file, created if there is none.
+
+    `StoreError` if it is damaged, of another problem or version, or cannot be written.
+    """
     path = Path(path)
     with locked(_lock(path), wait=True):
         archive = _read(path, problem)
@@ -133,13 +124,12 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
                     f"{path} is there, but not {row_path(path).name}, which a search goes on from "
                     f"(older ones had none); choose another --output, or move it away."
                 )
-            put_rows(row_path(path), ROWS, {"problem": problem.to_dict()})
+            put_rows(row_path(path), _ROWS, {"problem": problem.to_dict()})
     return archive or Archive(problem, path)
 
 
 def archive_at(path: str | os.PathLike[str]) -> Archive:
-    """The archive with this HDF5 file, whatever its problem is, to be read: nothing is written, and
-    other runs may go on adding to it. `StoreError` if there is none, or it is damaged."""
+    """Read the archive with this HDF5 file. `StoreError` if there is none, or it is damaged."""
     path = Path(path)
     archive = _read(path.with_suffix(".h5"))
     if archive is None:
@@ -154,24 +144,27 @@ def archive_at(path: str | os.PathLike[str]) -> Archive:
 
 
 def save_archive(archive: Archive, command: str = "") -> Path:
-    """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then
-    holds as well. `StoreError` if the folder cannot be written; the file that was there before is
-    left."""
+    """Write the HDF5 file of all starts on the disk, which `archive` then holds as well."""
     assert archive.path is not None
     with locked(_lock(archive.path), wait=True):
         if stored := _read(archive.path, archive.problem):
             archive.outcomes |= stored.outcomes
-        return save_table(_table(archive, command), archive.path, KIND, VERSION)
+        return save_table(_table(archive, command), archive.path, _KIND, _VERSION)
 
 
 def _table(archive: Archive, command: str) -> Table:
     problem, names = archive.problem, sorted(archive.outcomes)
     outcomes = [archive.outcomes[name] for name in names]
-    optima = basins(problem, outcomes)
-    starts = {name: [getattr(o, name) for o in outcomes] for name in _COLUMNS}
-    starts |= {"seed": [n.seed for n in names], "sampler": [n.sampler for n in names]}
     rows = {id(o): row for row, o in enumerate(outcomes)}
-    of_basins = {
+    optima = basins(problem, outcomes)
+    columns: dict[str, tuple[Any, tuple[str, ...]]] = {
+        "problem": (json.dumps(problem.to_dict()), ()),
+        "versions": (json.dumps(versions()), ()),
+        **{name: ([getattr(o, name) for o in outcomes], ("start",)) for name in _COLUMNS},
+        "seed": ([n.seed for n in names], ("start",)),
+        "sampler": ([n.sampler for n in names], ("start",)),
+    }
+    of_basins: dict[str, list] = {
         "row": [rows[id(b.best)] for b in optima],
         "count": [len(b.starts) for b in optima],
         "frequency": [b.frequency for b in optima],
@@ -179,18 +172,13 @@ def _table(archive: Archive, command: str) -> Table:
         "value": [b.best.value for b in optima],
         "on_speed_floor": [int(on_speed_floor(problem, b.best.gait)) for b in optima],
     }
-    texts = {"problem": json.dumps(problem.to_dict()), "versions": json.dumps(versions())}
-    columns = {
-        **{name: (text, ()) for name, text in texts.items()},
-        **{name: (column, ("start",)) for name, column in starts.items()},
-        **{f"basin_{name}": (column, ("basin",)) for name, column in of_basins.items()},
-    }
+    columns |= {f"basin_{name}": (column, ("basin",)) for name, column in of_basins.items()}
     for which in ("guess", "gait") if outcomes else ():
         series = [fourier_series(problem, getattr(o, which)) for o in outcomes]
         longest = max(each.n_harmonic for each in series)
-        for part, dimensions in _SERIES.items():
+        for part, dims in _SERIES.items():
             values = [getattr(each.resized(longest), part) for each in series]
-            columns[f"{which}_{part}"] = values, ("start", *dimensions)
+            columns[f"{which}_{part}"] = values, ("start", *dims)
     return Table(
         problem.name,
         {"start": np.array([name.number for name in names])},

@@ -13,9 +13,8 @@ from pathlib import Path
 from colloc.results import store
 from colloc.results.solution import Solution
 from colloc.system.errors import StoreError
+from colloc.system.files import FAILED, INTERRUPTED, SHRUNK, alone_in, beside
 from colloc.system.interruption import interruptible
-from colloc.system.replaced_file import alone_in
-from colloc.system.result_names import FAILED, INTERRUPTED, SHRUNK, beside
 
 _HOW = {"guess", "intervals", "scheme", "formulation", "mesh_tolerance", "delta_start"}
 """Fields of a problem that say how it is solved: results that differ in these alone answer the same

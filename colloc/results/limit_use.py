@@ -1,5 +1,4 @@
-"""What a gait uses of the limits of its problem, and limits that no gait of the body could come
-near."""
+"""Utilisation of the limits of a problem by a gait, and limits that no gait could reach."""
 
 from __future__ import annotations
 
@@ -18,8 +17,7 @@ from colloc.mechanics.law import rate_independent
 from colloc.results.solution import Solution
 
 _INSTANTS = np.arange(2000) / 2000
-_BINDS = 0.99  # share of a limit at which it decides
-_MARGIN = 1.01  # beyond a bound by so much, a limit cannot decide
+_BINDS, _MARGIN = 0.99, 1.01  # share of a limit at which it binds; of a bound at which it cannot
 UNITS = {
     "joint speed": ("speed_limit", "rad per period"),
     "torque": ("torque_limit", "weight x body length"),
@@ -28,8 +26,7 @@ UNITS = {
 
 
 def shares(solution: Solution) -> dict[str, float]:
-    """The largest share of every limit that the gait uses in a period, by name; empty where no more
-    than usual is limited."""
+    """Largest utilisation of every limit over a period, by name; empty for default limits."""
     problem, body, limits = solution.problem, solution.problem.body, solution.problem.path_limits
     limited = problem.joint_limit != body.usual.limit or limits.each or problem.largest_speeds
     if not (problem.gait.free and limited):
@@ -52,7 +49,7 @@ def shares(solution: Solution) -> dict[str, float]:
 
 
 def lines(solution: Solution) -> list[str]:
-    """The shares in a line, and one for each limit that seems to be in other units."""
+    """Utilisations in a line, and a line for each limit that seems to be in other units."""
     used, texts = shares(solution), []
     for name, share in used.items():
         text = f"{name} {100 * share:.{0 if share >= 0.01 else 2}f} %"
@@ -65,8 +62,8 @@ def lines(solution: Solution) -> list[str]:
 
 
 def _beyond_any_gait(problem: Problem) -> Iterator[str]:
-    """Limits that cannot matter: torques by statics, speeds by Bernstein's inequality for the
-    derivative of a Fourier series, and powers by both."""
+    """Limits that cannot bind: torques by statics, speeds of a Fourier series by Bernstein's
+    inequality, powers by both."""
     if problem.joint_map is not None:  # motors share what their joints need
         return
     n, gait = problem.body.n_joint, problem.gait
@@ -91,8 +88,7 @@ def _beyond_any_gait(problem: Problem) -> Iterator[str]:
 
 
 def _short_swings(problem: Problem, used: dict[str, float]) -> Iterator[str]:
-    """Speeds that decide how far joints swing: to and fro within a period, by half of what they
-    could cover."""
+    """Binding speed limits: in a period a joint swings to and fro by half of what it can cover."""
     if used.get("joint speed", 0.0) > _BINDS and problem.joint_map is None:
         most, whole = np.array(problem.largest_speeds) / 2, 2 * _half_ranges(problem)
         joint = int(np.argmin(most / whole))

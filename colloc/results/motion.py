@@ -1,5 +1,4 @@
-"""The motion of a body over some instants, and the same as labelled columns: for result files,
-xarray and pandas."""
+"""Sampled motion of a body, and its labelled columns for result files, xarray and pandas."""
 
 from __future__ import annotations
 
@@ -10,19 +9,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.system.late_binding import optional
+from colloc.system.lazy import optional
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-SAMPLES = 401
-"""Instants of one period in a result file, both ends included."""
+SAMPLES = 401  # of a period in a result file, both ends included
 
 
 @dataclass(frozen=True, eq=False)
 class SampledMotion:
-    """The body at given instants, ``n_time`` columns each.
+    """Motion of a body at ``n_time`` instants.
 
     Attributes
     ----------
@@ -30,7 +28,7 @@ class SampledMotion:
         Phase.
     angles, rates : (n_joint, n_time)
     z : (3, n_time)
-        Tail velocity (u, v, omega) in the body frame, per period.
+        Tail velocity (u, v, omega) in the body frame.
     theta : (n_time,)
         Lab angle of the tail link.
     centre, tail : (2, n_time)
@@ -52,25 +50,15 @@ class SampledMotion:
 
 
 def turned(vectors: np.ndarray, theta: np.ndarray | float) -> np.ndarray:
-    """Vectors ``(2, ..., n_time)`` of the body's axes in those of the lab."""
+    """Rotate vectors ``(2, ..., n_time)`` by angles theta, from body to lab axes."""
     (x, y), c, s = vectors, np.cos(theta), np.sin(theta)
     return np.stack([c * x - s * y, s * x + c * y])
 
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """A turn about the origin, then a shift: what a period of a gait does to everything in the lab.
+    """Rotation about the origin [rad], then a shift x + iy: the effect of a period of a gait.
 
-    Attributes
-    ----------
-    rotation : float or (n,)
-        Angle, counter-clockwise [rad].
-    shift : complex or (n,)
-        x + iy of where the origin goes [body lengths]: of a gait the way of its centre of mass, a
-        chord if it turns.
-
-    Examples
-    --------
     >>> quarter = RigidMotion(np.pi / 2, 1.0 + 0.0j)
     >>> np.round(quarter.repeated(np.array([2, 4])).shift, 9) + 0.0
     array([1.+1.j, 0.+0.j])
@@ -80,24 +68,22 @@ class RigidMotion:
     shift: complex | np.ndarray
 
     def repeated(self, times: np.ndarray | int) -> RigidMotion:
-        """The motion so many times in a row, whole numbers ``(n,)`` or one; negative ones go
-        back."""
+        """Power of the motion; negative ones are inverse."""
         angle = math.remainder(self.rotation, 2 * np.pi)
-        # sum of e^(i k angle) for k = 0 to n - 1: e^(i (n - 1) angle / 2) sin(n angle / 2) /
-        # sin(angle / 2)
+        # sum_k<n e^(i k angle) = e^(i (n - 1) angle / 2) sin(n angle / 2) / sin(angle / 2)
         chords = times * np.sinc(0.5 * times * angle / np.pi) / np.sinc(0.5 * angle / np.pi)
         return RigidMotion(
             times * self.rotation, chords * np.exp(0.5j * (times - 1) * angle) * self.shift
         )
 
     def of(self, points: np.ndarray) -> np.ndarray:
-        """Where points ``(2, ..., n)`` of the lab go."""
+        """Image of points ``(2, ..., n)``."""
         x, y = turned(points, self.rotation)
         return np.stack([x + np.real(self.shift), y + np.imag(self.shift)])
 
 
 class Column(NamedTuple):
-    """Values with their units and the names of their dimensions, time last."""
+    """Values, units, and names of dimensions, time last."""
 
     values: np.ndarray
     units: str
@@ -105,16 +91,14 @@ class Column(NamedTuple):
 
 
 def motion_columns(motion: SampledMotion, power: np.ndarray, body: Body) -> dict[str, Column]:
-    """Name to column, with the power against friction ``(n_time,)``; shape coordinates are named as
-    their body names them."""
+    """Columns by name, with the power against friction ``(n_time,)``."""
     shape = body.coordinate, "t"
+    velocity_units = "length/period, length/period, rad/period"
     return {
         "t": Column(motion.t, "period", ("t",)),
         f"{body.quantity.replace(' ', '_')}s": Column(motion.angles, "rad", shape),
         f"{body.coordinate}_rates": Column(motion.rates, "rad/period", shape),
-        "tail_velocity": Column(
-            motion.z, "length/period, length/period, rad/period", ("velocity", "t")
-        ),
+        "tail_velocity": Column(motion.z, velocity_units, ("velocity", "t")),
         "theta": Column(motion.theta, "rad", ("t",)),
         "centre": Column(motion.centre, "length", ("axis", "t")),
         "tail": Column(motion.tail, "length", ("axis", "t")),
@@ -123,15 +107,12 @@ def motion_columns(motion: SampledMotion, power: np.ndarray, body: Body) -> dict
 
 
 def motion_dataset(columns: dict[str, Column], about: dict[str, Any]) -> xarray.Dataset:
-    """The columns as an xarray Dataset with the attributes `about`."""
-    arrays = optional("xarray")
-    found = {name: (c.dims, c.values, {"units": c.units}) for name, c in columns.items()}
-    return arrays.Dataset(found, _labels(columns), about)
+    arrays = {name: (c.dims, c.values, {"units": c.units}) for name, c in columns.items()}
+    return optional("xarray").Dataset(arrays, _labels(columns), about)
 
 
 def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
-    """The columns as a pandas DataFrame, a number each, with the phase as index."""
-    frames = optional("pandas")
+    """A pandas DataFrame with the phase as index."""
     flat: dict[str, np.ndarray] = {}
     for name, column in columns.items():
         if column.dims == ("t",):
@@ -139,13 +120,11 @@ def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
         else:
             named = zip(_labels(columns)[column.dims[0]], column.values, strict=True)
             flat |= {f"{name}_{label}": row for label, row in named}
-    return frames.DataFrame(flat).set_index("t")
+    return optional("pandas").DataFrame(flat).set_index("t")
 
 
 def _labels(columns: dict[str, Column]) -> dict[str, list]:
-    """Labels along the dimensions other than time: names, or numbers from 1."""
+    """Labels along dimensions other than time: names, or numbers from 1."""
     named: dict[str, list] = {"velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
-    sizes = {
-        column.dims[0]: len(column.values) for column in columns.values() if len(column.dims) > 1
-    }
+    sizes = {c.dims[0]: len(c.values) for c in columns.values() if len(c.dims) > 1}
     return {dim: named.get(dim, [*range(1, size + 1)]) for dim, size in sizes.items()}

@@ -1,10 +1,7 @@
-"""A gait on a robot of so many metres and kilograms: the one module that knows units.
+"""A gait on a robot of given length and mass: the only module in SI units.
 
-Everything else counts lengths in body lengths L, forces in weights m g and time in periods T. So a
-torque is one in m g L, work too, a power in m g L / T, and a speed in L / T; the cost of transport
-W / (m g d) has no unit. The numbers are those at the robot's pace, with inertia: what that does
-depends on the *Froude number* Fr = L / (g T^2) alone. Where the body has no masses, or the motion
-with inertia is not found, they are those of slow motion, which is said.
+Elsewhere lengths are in body lengths L, forces in weights m g, times in periods T: torque and work
+in m g L, power in m g L / T. Inertia depends on the Froude number Fr = L / (g T^2) alone.
 """
 
 from __future__ import annotations
@@ -35,22 +32,20 @@ from colloc.results.motion import Column, SampledMotion, motion_dataset, turned
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.late_binding import bound
+from colloc.system.lazy import higher
 from colloc.verification.trajectory import one_each, shortest_period
 
 if TYPE_CHECKING:
     import xarray
 
-SLOW_ENOUGH = 0.01
-"""Part of the efficiency that inertia may take from a gait that is called slow."""
-_STEP = 1e-5  # of a period, over which velocities of links are differentiated
-_SAME_PACE = 0.01  # relative difference of Froude numbers up to which a robot has a gait's pace
-_ACCURACY = 1e-6  # of the momenta in the motion with inertia
-_SMALLEST_LOSS, _SMALLEST_TURN = 1e-3, 0.1
-"""Share of the efficiency, and degrees a period, below which effects of inertia are not stated."""
-_LARGEST = 1e9  # of the metres, kilograms and seconds of a robot; one over it is the smallest
-_INSTANTS, _A_SIDE = 2000, 8
-"""Samples of a period at least, and of every side of a polygon."""
+SLOW_ENOUGH = 0.01  # share of the efficiency that inertia may take from a quasi-static gait
+_STEP = 1e-5  # of a period, for central differences of link velocities
+_SAME_PACE = 0.01  # relative difference of Froude numbers that counts as none
+_ACCURACY = 1e-6  # of the momenta with inertia
+_SMALLEST_LOSS, _SMALLEST_TURN = 1e-3, 0.1  # share, and degrees per period, that are stated
+_LARGEST = 1e9  # of metres, kilograms and seconds; the smallest is its inverse
+_INSTANTS, _A_SIDE = 2000, 8  # samples of a period, and of a side of a polygon, at least
+_UNKNOWN = ProblemError, NotConvergedError
 
 
 def joint_torques(
@@ -59,21 +54,12 @@ def joint_torques(
     motion: SampledMotion | None = None,
     froude: float | None = None,
 ) -> np.ndarray:
-    """Torques of the joints' motors [weight x body length] at phases t ``(n_time,)``, ``(n_joint,
-    n_time)``.
-
-    Those of the result, unless another `motion` at these phases is given, with the Froude number
-    that it belongs to.
-
-    Raises
-    ------
-    ProblemError
-        If the body has no joints that forces on its parts would turn.
-    """
+    """Motor torques [weight x body length] at phases t, ``(n_joint, n_time)``: of the result, or of
+    another `motion` at these phases with its Froude number."""
     problem = solution.problem
     if not problem.body.force_names:
         raise ProblemError(
-            f"{problem.name} is a smooth body: it has no joints whose torques could be told."
+            f"{problem.name} is a smooth body: joint torques are not defined for it."
         )
     motion = motion or solution.sample(t)
     froude = solution.froude if froude is None else froude
@@ -81,8 +67,8 @@ def joint_torques(
     load = problem.regime.pull(motion.theta[None])
     if not froude:
         return quasi_static_torques(solution, angles, rates, load, start=z)
-    against_friction = quasi_static_torques(solution, angles, rates, load, z)
-    return against_friction + _inertial_torques(solution, t, z, load, froude)
+    friction = quasi_static_torques(solution, angles, rates, load, z)
+    return friction + _inertial_torques(solution, t, z, load, froude)
 
 
 def quasi_static_torques(
@@ -93,9 +79,8 @@ def quasi_static_torques(
     z: np.ndarray | None = None,
     start: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Torques of the motors against friction, and a pull on the centre of mass ``(2, n_time)`` if
-    there is one, [weight x body length], at any angles and rates of joints ``(n_joint, n_time)``
-    and tail velocities z; by default these balance, and are sought near `start`."""
+    """Motor torques against friction and a load on the centre of mass ``(2, n_time)``; without tail
+    velocities z at those that balance, sought near `start`."""
     body: Any = solution.problem.body
     law, delta = solution.problem.law, solution.delta_per_period
     if z is None:
@@ -108,7 +93,7 @@ def quasi_static_torques(
 def _inertial_torques(
     solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None, froude: float
 ) -> np.ndarray:
-    """Torques of the motors that change how the links move, at phases with tail velocities z."""
+    """Motor torques that accelerate the links."""
     problem, how = solution.problem, {"delta": solution.delta_per_period, "froude": froude}
     body, joints = checked_mass(problem.body), solution.gait
     angles, rates = joints(t)
@@ -129,15 +114,13 @@ def _inertial_torques(
 
 
 class _MotionWithInertia:
-    """The periodic motion of a gait with inertia at a Froude number.
+    """Periodic motion of a gait with inertia; the distance is the chord of `colloc.results.arc`.
 
-    Distance, work and rotation are those of a period, the distance as in `colloc.results.arc.Arc`.
-    `ProblemError` if gait or body cannot move with inertia, `NotConvergedError` if no motion is
-    found.
+    `ProblemError` if gait or body cannot have inertia, `NotConvergedError` if no motion is found.
     """
 
     def __init__(self, solution: Solution, froude: float) -> None:
-        from colloc.verification.inertial_motion import GaitWithInertia  # loads what integrates
+        from colloc.verification.inertial_motion import GaitWithInertia  # slow to import
 
         problem, self._gait = solution.problem, solution.gait
         moving = GaitWithInertia(
@@ -147,48 +130,43 @@ class _MotionWithInertia:
         self._chain, rough = moving.body, moving.find_period()
         self._course = moving.periodic_run(rough.momenta, _ACCURACY, rough.slopes).course
         totals = moving.totals(self._course.states)
-        self.work, self.rotation, self.distance = (
-            totals[name] for name in ("work", "rotation", "distance")
-        )
-        self._ahead = 0.0
+        self.work, self.rotation = totals["work"], totals["rotation"]
+        self.distance, self._heading = totals["distance"], 0.0
         if not problem.regime.slides:
-            way = self._course.at(np.linspace(0.0, 1.0, _INSTANTS + 1))[4:6]
-            self.distance = arc(self.rotation, way).chord
+            path = self._course.at(np.linspace(0.0, 1.0, _INSTANTS + 1))[4:6]
+            self.distance = arc(self.rotation, path).chord
             end = self._course.states[4:6, -1]
-            self._ahead = float(np.arctan2(end[1], end[0])) - 0.5 * self.rotation
+            self._heading = float(np.arctan2(end[1], end[0])) - 0.5 * self.rotation
 
     def sample(self, t: np.ndarray) -> SampledMotion:
-        """At ascending phases in [0, 1], in the axes of `Solution.sample`."""
+        """Motion at ascending phases in [0, 1], in the axes of `Solution.sample`."""
         states, (angles, rates) = self._course.at(t), self._gait(t)
-        theta, centre = states[3] - self._ahead, turned(states[4:6], -self._ahead)
+        theta, centre = states[3] - self._heading, turned(states[4:6], -self._heading)
         z = tail_velocity(self._chain, angles, rates, states[:3])
         tail = centre - turned(np.array(self._chain.centre(angles)), theta)
         return SampledMotion(t, angles, rates, z, theta, centre, tail)
 
 
 def pressing(solution: Solution, gravity: float) -> float:
-    """The part of gravity that presses a robot on the ground: less than all of it on a slope."""
+    """Component of gravity normal to the ground."""
     return gravity * math.cos(math.atan(solution.problem.grade))
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """What a gait does on a robot: `colloc.Solution.robot` makes it, and ``print`` shows it.
+    """A gait on a robot, made by `colloc.Solution.robot`; ``print`` shows its data sheet.
 
     Parameters
     ----------
     solution : Solution
-    length : float
-        Of the robot, from tail to head, stretched [m].
-    mass : float
-        [kg]
+    length, mass : float
+        Of the stretched robot [m], [kg].
     period : float
-        Of the gait [s].
+        [s]
     gravity : float
         [m/s^2]
     max_speed, max_torque : float or (n_joint,), optional
-        Of the motors [rad/s], [N m]: then the shortest period is told, and whether the torques at
-        this one suffice.
+        Limits of the motors [rad/s], [N m].
 
     Raises
     ------
@@ -242,12 +220,12 @@ class Robot:
 
     @property
     def pressing(self) -> float:
-        """The part of gravity that presses the robot on the ground [m/s^2]."""
+        """Component of gravity normal to the ground [m/s^2]."""
         return pressing(self.solution, self.gravity)
 
     @property
     def torque_unit(self) -> float:
-        """m g L [N m], which is that of work too [J]."""
+        """m g L [N m]."""
         return self.mass * self.pressing * self.length
 
     @property
@@ -257,60 +235,58 @@ class Robot:
 
     @cached_property
     def _with_inertia(self) -> _MotionWithInertia | None:
-        """Where the result has no inertia, and the motion with it is found."""
-        with suppress(ProblemError, NotConvergedError):
+        """Motion with inertia of a quasi-static result, if it is found."""
+        with suppress(*_UNKNOWN):
             if not self.solution.problem.froude:
                 return _MotionWithInertia(self.solution, self.froude)
         return None
 
     def torques(self, t: np.ndarray) -> np.ndarray:
-        """Of the joints [N m] at ascending phases t in [0, 1] ``(n_time,)``, ``(n_joint,
-        n_time)``."""
+        """Return joint torques [N m], ``(n_joint, n_time)``, at ascending phases in [0, 1]."""
         moving = self._with_inertia
         other = () if moving is None else (moving.sample(t), self.froude)
         return self.torque_unit * joint_torques(self.solution, t, *other)
 
     @cached_property
     def columns(self) -> dict[str, Column]:
-        """The motion over a period at the gait's own pace: name to values, units and dimensions."""
+        """Motion over a period with the gait's own timing: values, units and dimensions by name."""
         n = max(_INSTANTS, _A_SIDE * (len(self.solution.gait.corner_phases) + 1))
         t = np.arange(n + 1) / n
         motion = (self._with_inertia or self.solution).sample(t)
         angles, rates = self.solution.gait.driven(t)
         torques, speeds = self.torques(t), rates / self.period
+        joint, axis = ("joint", "t"), ("axis", "t")
         return {
             "t": Column(t * self.period, "s", ("t",)),
-            "joint_angles": Column(angles, "rad", ("joint", "t")),
-            "joint_speeds": Column(speeds, "rad/s", ("joint", "t")),
-            "joint_torques": Column(torques, "N m", ("joint", "t")),
-            "joint_powers": Column(torques * speeds, "W", ("joint", "t")),
+            "joint_angles": Column(angles, "rad", joint),
+            "joint_speeds": Column(speeds, "rad/s", joint),
+            "joint_torques": Column(torques, "N m", joint),
+            "joint_powers": Column(torques * speeds, "W", joint),
             "theta": Column(motion.theta, "rad", ("t",)),
-            "centre": Column(self.length * motion.centre, "m", ("axis", "t")),
-            "tail": Column(self.length * motion.tail, "m", ("axis", "t")),
+            "centre": Column(self.length * motion.centre, "m", axis),
+            "tail": Column(self.length * motion.tail, "m", axis),
         }
 
     def to_xarray(self) -> xarray.Dataset:
-        """The motion over a period as an xarray Dataset whose units are SI ones."""
+        """Return the motion over a period as an xarray Dataset in SI units."""
         stated = {name: value for name, value in self.facts.items() if value is not None}
         return motion_dataset(self.columns, stated)
 
     def plot(self, ax: Any = None, panel: str = "torque") -> Any:
-        """Torque, speed and power of every joint over a period, as a matplotlib Figure; with `ax`,
-        a matplotlib Axes, one of them there, "torque", "speed" or "power", and the Axes is
-        returned."""
+        """Draw torque, speed and power of every joint over a period as a matplotlib Figure; with a
+        matplotlib Axes `ax` the panel "torque", "speed" or "power" there, and return the Axes."""
         if ax is None:
-            return bound("plot_robot")(self)
-        return bound("plot_robot_panel")(ax, self, panel)
+            return higher("pictures.robot_figure:robot_figure")(self)
+        return higher("pictures.robot_figure:draw_robot")(ax, self, panel)
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """All numbers by names that end in their units (JSON)."""
+        """All numbers, by names that end in their units, as JSON can hold them."""
         motion = self._with_inertia or self.solution.measured
-        work, values = (
-            self.torque_unit * motion.work,
-            {k: c.values for k, c in self.columns.items()},
+        work, values = self.torque_unit * motion.work, self.columns
+        torques, speeds, powers = (
+            values[f"joint_{x}"].values for x in ("torques", "speeds", "powers")
         )
-        torques, speeds, powers = (values[f"joint_{x}"] for x in ("torques", "speeds", "powers"))
         peak = np.abs(torques).max(axis=1)
         facts = {
             "name": self.solution.problem.name,
@@ -321,7 +297,7 @@ class Robot:
             "gravity_m_per_s2": float(self.gravity),
             "speed_m_per_s": motion.distance * self.length / self.period,
             "body_lengths_per_period": motion.distance,
-            "travels": direction_of_travel(values["centre"], values["tail"]),
+            "travels": direction_of_travel(values["centre"].values, values["tail"].values),
             "work_per_period_J": work,
             "motor_work_per_period_J": self.period * float(_mean(np.maximum(powers, 0.0)).sum()),
             "mean_power_W": work / self.period,
@@ -337,7 +313,6 @@ class Robot:
         return facts | dict(self._inertia_facts()) | dict(self._motor_facts(peak))
 
     def _inertia_facts(self) -> Iterator[tuple[str, Any]]:
-        """What inertia takes at this pace, and at which it takes little."""
         solution, problem, moving = self.solution, self.solution.problem, self._with_inertia
         if problem.froude:
             with suppress(NotConvergedError):
@@ -347,20 +322,19 @@ class Robot:
                 lost = 1.0 - moving.distance / moving.work / solution.efficiency
                 yield "inertia_takes", lost
                 yield "rotation_by_inertia_rad", moving.rotation - solution.rotation
-            with suppress(ProblemError, NotConvergedError):
+            with suppress(*_UNKNOWN):
                 if rate_independent(problem.law):
                     froude = solution.slow_enough(SLOW_ENOUGH)
                     yield "slow_enough_period_s", math.sqrt(self.length / (self.gravity * froude))
 
     def _motor_facts(self, peak: np.ndarray) -> Iterator[tuple[str, Any]]:
-        """What the motors' data say; nothing of what is not given."""
         solution, gait = self.solution, self.solution.gait.driven
         if self.max_speed is not None:
             limits = np.asarray(self.max_speed)
             shortest = shortest_period(gait, limits, keep_pace=True)
             yield "max_speed_rad_per_s", limits.tolist()
             yield "shortest_period_s", shortest
-            with suppress(ProblemError, NotConvergedError):
+            with suppress(*_UNKNOWN):
                 moving = _MotionWithInertia(solution, self.froude * (self.period / shortest) ** 2)
                 speed = moving.distance * self.length / shortest
                 yield "speed_at_shortest_period_m_per_s", speed
@@ -374,21 +348,15 @@ class Robot:
                 yield "torque_used_slowly", (self.torque_unit * slow / self.max_torque).tolist()
 
     def lines(self) -> list[str]:
-        """The sheet for people."""
+        """Return the data sheet as lines of text."""
         f, coordinate = self.facts, self.solution.gait.driven.coordinate
-        columns = (
-            f[name]
-            for name in (
-                "peak_torque_N_m",
-                "rms_torque_N_m",
-                "peak_speed_rad_per_s",
-                "rms_speed_rad_per_s",
-                "peak_joint_power_W",
-            )
+        names = (
+            *("peak_torque_N_m", "rms_torque_N_m", "peak_speed_rad_per_s"),
+            *("rms_speed_rad_per_s", "peak_joint_power_W"),
         )
         rows = (
             f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip()
-            for j, row in enumerate(zip(*columns, strict=True), 1)
+            for j, row in enumerate(zip(*(f[name] for name in names), strict=True), 1)
         )
         return [
             f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period "
@@ -396,7 +364,7 @@ class Robot:
             f"  speed              {f['speed_m_per_s']:.4g} m/s {f['travels']}; "
             f"{f['body_lengths_per_period']:.4g} body lengths a period",
             f"  work               {f['work_per_period_J']:.4g} J a period; "
-            f"{f['motor_work_per_period_J']:.4g} J if motors take none back",
+            f"{f['motor_work_per_period_J']:.4g} J without regeneration",
             f"  power              mean {f['mean_power_W']:.4g} W, peak {f['peak_power_W']:.4g} W",
             f"  cost of transport  {f['cost_of_transport']:.4g}",
             "",
@@ -408,7 +376,7 @@ class Robot:
         ]
 
     def sentences(self) -> list[str]:
-        """What has to be known of the numbers."""
+        """Return remarks on the numbers."""
         law = self.solution.problem.law
         sentences = [*self._speed_sentences(), *self._torque_sentences()]
         if not rate_independent(law):
@@ -423,17 +391,14 @@ class Robot:
         if "shortest_period_s" not in f:
             return
         speed = f.get("speed_at_shortest_period_m_per_s")
-        paced = f.get("shortest_period_paced_by_speed_s")
+        retimed = f.get("shortest_period_paced_by_speed_s")
         yield (
-            f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the "
-            f"gait's own pace{'' if speed is None else f' ({speed:.4g} m/s)'}"
-            f"{'' if paced is None else f', {paced:.3g} s as colloc export --max-speed paces it'}."
+            f"Shortest period within the speed limits: {f['shortest_period_s']:.3g} s with the "
+            f"gait's own timing{'' if speed is None else f' ({speed:.4g} m/s)'}"
+            f"{'' if retimed is None else f', {retimed:.3g} s retimed (export --max-speed)'}."
         )
         if f["shortest_period_s"] > self.period * (1 + 1e-9):
-            yield (
-                f"That is more than {self.period:g} s, at which the numbers above are: the "
-                f"joints cannot follow."
-            )
+            yield f"{self.period:g} s, the period of these numbers, is too short for the joints."
 
     def _torque_sentences(self) -> Iterator[str]:
         f = self.facts
@@ -443,19 +408,19 @@ class Robot:
         peak, limit = f["peak_torque_N_m"][worst], f["max_torque_N_m"][worst]
         if f["torque_used"][worst] <= 1:
             yield (
-                f"The torques suffice at this pace: joint {worst + 1} uses "
-                f"{100 * peak / limit:.3g} % of its own."
+                f"Torque limits are met at this pace; joint {worst + 1} comes closest "
+                f"({100 * peak / limit:.3g} %)."
             )
         elif max(f.get("torque_used_slowly", f["torque_used"])) <= 1:
             yield (
-                f"Joint {worst + 1} needs {peak:.3g} N m at this pace and has {limit:.3g}; played "
-                f"slowly no joint needs more than it has: take a longer period."
+                f"Joint {worst + 1} needs {peak:.3g} N m at this pace and has {limit:.3g}; in slow "
+                f"motion torque limits are met: take a longer period."
             )
         else:
             limits = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
             yield (
-                f"Joint {worst + 1} needs {peak:.3g} N m and has {limit:.3g}. Played slowly "
-                f"motors are too weak as well, so a longer period does not help: solve with "
+                f"Joint {worst + 1} needs {peak:.3g} N m and has {limit:.3g}. Motors are too weak "
+                f"in slow motion as well, so a longer period does not help: solve with "
                 f"torque_limit=({limits})."
             )
 
@@ -465,34 +430,34 @@ class Robot:
             text = "Torques and power include inertia"
             if (value := f.get("played_slowly")) is not None:
                 text += (
-                    f"; played slowly the gait would have {objective.short} {value:.4g} instead of "
-                    f"{solution.measured.value:.4g}"
+                    f"; in slow motion the gait would have {objective.short} {value:.4g} instead "
+                    f"of {solution.measured.value:.4g}"
                 )
             return f"{text}."
         pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
         slow, lost = f.get("slow_enough_period_s"), f.get("inertia_takes")
-        more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
+        more = "" if slow is None else f"; 1 % or less for periods of {slow:.3g} s or more"
         if self._with_inertia is None:
-            return f"All this is slow motion. What inertia does {pace} could not be computed{more}."
-        if lost is None:
-            text = f"All this includes inertia {pace}"
-        else:
-            least = f"less than {100 * _SMALLEST_LOSS:g} %"
-            share = f"{100 * abs(lost):.2g} %" if abs(lost) > _SMALLEST_LOSS else least
+            return f"Quasi-static values; the effect of inertia {pace} is not known{more}."
+        text = f"Values include inertia {pace}"
+        if lost is not None:
+            share = f"less than {100 * _SMALLEST_LOSS:g} %"
+            if abs(lost) > _SMALLEST_LOSS:
+                share = f"{100 * abs(lost):.2g} %"
             text = (
-                f"All this includes inertia. Inertia {'takes' if lost >= 0 else 'adds'} {share} of "
-                f"the efficiency {pace}{more}"
+                f"Values include inertia, which {'costs' if lost >= 0 else 'adds'} {share} of the "
+                f"efficiency {pace}{more}"
             )
             turns = math.degrees(f["rotation_by_inertia_rad"])
             if abs(turns) > _SMALLEST_TURN:
-                text += f". It also turns the robot by {turns:.2g}° a period: its way is an arc"
+                text += f". It also turns the robot by {turns:.2g}° a period: it moves on an arc"
         slowly = solution.distance * self.length / self.period
-        return f"{text}. At this period slow motion would be {slowly:.4g} m/s."
+        return f"{text}. Without inertia it would move at {slowly:.4g} m/s."
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
 
 
 def _mean(values: np.ndarray) -> np.ndarray:
-    """Over a period of equal steps, whose last instant is the first again."""
+    """Mean over a period of equal steps, whose last sample repeats the first."""
     return np.asarray(values[..., :-1].mean(axis=-1))

@@ -33,7 +33,7 @@ from colloc.results.motion import (
 )
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
-from colloc.system.late_binding import bound
+from colloc.system.lazy import higher
 from colloc.system.versions import versions
 from colloc.transcription.layout import Layout
 from colloc.verification.dry_friction import DryFriction, dry_friction
@@ -392,18 +392,20 @@ class Solution:
         or another one of ``colloc report --figures``: "filmstrip", "lab", "angles", "speeds",
         "power", "convergence", "mesh", "shape-1-2". `ProblemError` if there is none of that name.
         """
-        return bound("plot")(self) if ax is None else bound("plot_panel")(ax, self, panel)
+        if ax is None:
+            return higher("pictures.solution_figure:solution_figure")(self)
+        return higher("pictures.publication:draw_panel")(ax, self, panel)
 
     @checked_arguments
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write the motion as GIF or MP4, by the ending of `path`; options as for
         `colloc.pictures.movie.write_movie`."""
-        return bound("animate")(self, Path(path), **options)
+        return higher("pictures.movie:write_movie")(self, Path(path), **options)
 
     @checked_arguments
     def report(self, path: str | os.PathLike[str], *, robot: Any = None) -> Path:
         """Write the web page of `colloc report`; with what `robot` returns also its sheet."""
-        return bound("report")(self, Path(path), robot=robot)
+        return higher("pictures.report_page:write_report")(self, Path(path), robot=robot)
 
     @checked_arguments
     def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
@@ -411,7 +413,7 @@ class Solution:
         ``solution.export("mine.csv", period=4)``, or the robot as a model for simulators (``.xml``,
         ``.urdf``); returns what the file says. Options as for
         `colloc.pictures.export.write_export`."""
-        return bound("export")(self, Path(path), **options)
+        return higher("pictures.export:write_export")(self, Path(path), **options)
 
     def robot(self, length: float, mass: float, period: float, **options: Any) -> Any:
         """A `colloc.results.robot.Robot`: speed, power and torques of the gait on a robot of so
@@ -427,8 +429,9 @@ class Solution:
         >>> round(robot.facts["cost_of_transport"], 2)
         3.95
         """
-        return bound("robot")(self, length, mass, period, **options)
+        return higher("results.robot:Robot")(self, length, mass, period, **options)
 
+    @checked_arguments
     def sensitivity(self, resolve: bool = False) -> Any:
         """A `colloc.search.sensitivity.Sensitivity`: by how much the best value changes with every
         number of the problem.
@@ -443,7 +446,7 @@ class Solution:
         >>> round(colloc.solve(problem, starts=1).sensitivity()["friction sideways"].slope, 3)
         -0.061
         """
-        return bound("sensitivity")(self, resolve)
+        return higher("search.sensitivity:sensitivity")(self, resolve)
 
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a
@@ -475,7 +478,7 @@ class Solution:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: verdict, numbers and checks."""
-        return bound("card")(self)
+        return higher("pictures.solution_card:solution_card")(self)
 
 
 def direction_of_travel(centre: np.ndarray, tail: np.ndarray) -> str:

@@ -1,18 +1,12 @@
-"""Solutions as HDF5 files: self-describing, readable with plain h5py, replaced atomically, and
-nothing but data.
+"""Solutions as HDF5 files, readable with plain h5py; every dataset has ``units`` and ``dims``.
 
-Layout of a file (every dataset carries ``units`` and ``dims``)::
-
-    /problem            JSON text of all fields          /source     text of the problem file
-    /gait/{mean,cos,sin}                                 /versions   JSON text
-         or {corners} of a polygon, with attribute symmetry
-    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result; of a smooth body
-        modes and mode_rates
-    /answer/{edges,x,lam_x,lam_g}; attributes delta, value, distance, work,
-    kkt_error, panels, ... /history/{delta,intervals,value,distance,work,...}: how the search came
-    there, a row a step /certificate/{name,value,threshold,passed,meaning}, attributes value,
-    value_error, distance, distance_error, work, ...
-"""  # noqa: E501
+/problem (JSON), /source (problem file), /versions (JSON), /others (JSON)
+/gait/{mean,cos,sin} or {corners}, with attribute symmetry, ...
+/motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}: one period
+/answer/{edges,x,lam_x,lam_g}; attributes delta, value, distance, work, kkt_error, panels, ...
+/history/{delta,intervals,value,distance,work,...}: a row a step of the search
+/certificate/{name,value,threshold,passed,meaning}; attributes value, value_error, ...
+"""
 
 from __future__ import annotations
 
@@ -55,9 +49,7 @@ _ANSWER_ARRAYS = {
     "lam_x": (_LAYOUT, "variable"),
     "lam_g": (_LAYOUT, "constraint"),
 }
-_APART = ("problem", "gait", "second_order", "history", *_ANSWER_ARRAYS)
-"""Of an answer; the rest are attributes."""
-
+_SEPARATE = ("problem", "gait", "second_order", "history", *_ANSWER_ARRAYS)
 _GAIT_ARRAYS = {
     "mean": ("rad", "joint"),
     "cos": ("rad", "joint, harmonic"),
@@ -70,7 +62,7 @@ _DRY, _OF_SAMPLES = "dry_efficiency", "errors_of_samples"
 
 
 def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
-    """Write a solution; an existing file is replaced only once the new one is complete.
+    """Write a solution; an existing file is replaced once the new one is complete.
 
     Raises
     ------
@@ -97,9 +89,7 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
 
 
 def load(path: str | os.PathLike[str]) -> Solution:
-    """The solution in a file that `save` wrote.
-
-    What it holds is believed; `colloc verify` says whether a file is worth its numbers.
+    """Read the solution in a file that `save` wrote, unchecked: `colloc verify` checks it.
 
     Raises
     ------
@@ -118,19 +108,15 @@ def load(path: str | os.PathLike[str]) -> Solution:
 
 
 def holds_more(path: str | os.PathLike[str], solution: Solution) -> bool:
-    """Whether the file of a solution holds attributes or datasets that `save` does not write for
-    it, such as remarks."""
+    """Whether a file of a solution holds more than `save` writes, such as remarks."""
     with h5py.File(path, "r", locking=False) as file, h5py.File(io.BytesIO(), "w") as written:
         _write(written, solution)
         return not _names(file) <= _names(written)
 
 
 def _names(file: h5py.File) -> set[str]:
-    """Of all datasets, groups and attributes."""
     names = {f"/@{name}" for name in file.attrs}
-    file.visititems(
-        lambda place, item: names.update([place, *(f"{place}@{name}" for name in item.attrs)])
-    )
+    file.visititems(lambda at, item: names.update([at, *(f"{at}@{name}" for name in item.attrs)]))
     return names
 
 
@@ -138,17 +124,14 @@ def _write(file: h5py.File, solution: Solution) -> None:
     mark(file, FORMAT, FORMAT_VERSION)
     put_attribute(file, "name", solution.problem.name)
     put_attribute(file, "problem_hash", solution.problem.hash)
-    for name in ("status", "message", "seconds"):
+    for name in ("status", "message", "seconds", "starts"):
         put_attribute(file, name, getattr(solution, name))
+    put_attribute(file, "interrupted", int(solution.interrupted))
     put(file, "problem", json.dumps(solution.problem.to_dict()))
     put(file, "source", solution.source)
     put(file, "versions", json.dumps(solution.versions))
-    put_attribute(file, "starts", solution.starts)
-    others = [
-        {**dataclasses.asdict(other), "gait": fields(other.gait)} for other in solution.others
-    ]
+    others = [{**dataclasses.asdict(x), "gait": fields(x.gait)} for x in solution.others]
     put(file, "others", json.dumps(others))
-    put_attribute(file, "interrupted", int(solution.interrupted))
     _write_answer(file, solution.answer)
     _write_motion(file, solution)
     if solution.certificate.replayed:
@@ -160,7 +143,7 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
     for name, (units, dims) in _ANSWER_ARRAYS.items():
         put(group, name, getattr(answer, name), units=units, dims=dims)
     for field in dataclasses.fields(answer):
-        if field.name not in _APART:
+        if field.name not in _SEPARATE:
             put_attribute(group, field.name, getattr(answer, field.name))
     put_attribute(group, "panels", answer.problem.body.panels)
     put_attribute(group, "smallest_shape_speed", answer.problem.smallest_shape_speed)
@@ -175,9 +158,8 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
 def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     group = child(file, "answer")
     arrays = {name: array(group, name) for name in _ANSWER_ARRAYS}
-    plain = {
-        f.name: attribute(group, f.name) for f in dataclasses.fields(Answer) if f.name not in _APART
-    }
+    names = [f.name for f in dataclasses.fields(Answer) if f.name not in _SEPARATE]
+    plain = {name: attribute(group, name) for name in names}
     panels = int(attribute(group, "panels"))
     if panels:
         problem = problem.with_(body=problem.body.on_panels(panels))
@@ -188,18 +170,12 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         problem = problem.with_(
             smallest_shape_speed=attribute(group, "smallest_shape_speed"), guess=guess
         )
-    second = SecondOrder(
-        **{
-            f.name: attribute(group, f"second_order_{f.name}")
-            for f in dataclasses.fields(SecondOrder)
-        }
-    )
+    names = [f.name for f in dataclasses.fields(SecondOrder)]
+    second = SecondOrder(**{name: attribute(group, f"second_order_{name}") for name in names})
     steps = child(file, "history")
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
-    history = tuple(
-        Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)
-    )
-    # by the variables, not by what the group gait says for other readers
+    rows = zip(*columns.values(), strict=True)
+    history = tuple(Step(**dict(zip(columns, row, strict=True))) for row in rows)
     layout = layout_of(control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]))
     if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
         raise StoreError("its variables do not fit its mesh.")
@@ -212,7 +188,7 @@ def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
         if name in _GAIT_ARRAYS:
             units, dims = _GAIT_ARRAYS[name]
             put(group, name, value, units=units, dims=dims.replace("joint", coordinate))
-        elif isinstance(value, dict):  # a class, whose functions the gait is a sum of
+        elif isinstance(value, dict):  # a class
             put(group, name, json.dumps(value))
         else:
             put_attribute(group, name, value)
@@ -226,9 +202,8 @@ def _write_motion(file: h5py.File, solution: Solution) -> None:
 
 
 def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
-    """Write a certificate into a group of its own."""
     for name, number in certificate.numbers.items():
-        if name != "efficiency":  # which is the distance over the work
+        if name != "efficiency":  # distance / work
             put_attribute(group, name, number)
     if certificate.dry is not None:
         put_attribute(group, _DRY, list(certificate.dry))
@@ -239,23 +214,20 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
 
 
 def _read_certificate(group: h5py.Group) -> Certificate:
-    """The certificate that `_write_certificate` wrote."""
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
     checks = tuple(
         Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True)
     )
-    besides = {*NUMBERS, _DRY, _OF_SAMPLES, *(f"{name}_error" for name in ("distance", "work"))}
-    integrals = [name for name in group.attrs if name not in besides]  # those that were asked for
-    values = {
-        name: float(attribute(group, name)) for name in ("distance", "work", "rotation", *integrals)
-    }
+    known = {*NUMBERS, _DRY, _OF_SAMPLES, "distance_error", "work_error"}
+    integrals = [name for name in group.attrs if name not in known]
+    names = ("distance", "work", "rotation", *integrals)
+    values = {name: float(attribute(group, name)) for name in names}
     errors = {name: float(attribute(group, f"{name}_error")) for name in ("distance", "work")}
     dry = tuple(attribute(group, _DRY)) if _DRY in group.attrs else None
     samples = None
     if _OF_SAMPLES in group.attrs:
         value, efficiency, distance, work = map(float, attribute(group, _OF_SAMPLES))
         samples = value, efficiency, distance, work
-    # numbers, not arrays of them
     others = {name: type(getattr(UNCERTIFIED, name))(attribute(group, name)) for name in NUMBERS}
     return Certificate(values, errors, {}, checks, **others, dry=dry, of_samples=samples)
 
@@ -275,12 +247,8 @@ def _read(file: h5py.File) -> Solution:
         str(attribute(file, "message")),
         json.loads(array(file, "versions")),
     )
-    others = [
-        {**other, "gait": gait_from(other["gait"])} for other in json.loads(array(file, "others"))
-    ]
-    solution.starts, solution.others = (
-        int(attribute(file, "starts")),
-        tuple(Alternative(**other) for other in others),
-    )
+    others = json.loads(array(file, "others"))
+    solution.others = tuple(Alternative(**x | {"gait": gait_from(x["gait"])}) for x in others)
+    solution.starts = int(attribute(file, "starts"))
     solution.interrupted = bool(attribute(file, "interrupted"))
     return solution

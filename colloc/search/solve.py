@@ -33,7 +33,7 @@ from colloc.search.refine import refine
 from colloc.search.run import Progress, Run, this_run
 from colloc.search.spaces import space_near
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.interruption import heeded
+from colloc.system.interruption import clear_interrupt
 
 REDUCED, FULL = "reduced", "full"
 SEARCHES = (REDUCED, FULL)
@@ -99,7 +99,7 @@ def solve(
         with run.under_way(seconds):
             solution = _solved(problem, starts, search, begin + _EXPLORING * seconds, worth)
     except KeyboardInterrupt:
-        heeded()
+        clear_interrupt()
         over = time.monotonic() - begin >= seconds
         solution = _interrupted(
             problem, run, f"the {seconds:g} s allowed are over" if over else "interrupted"

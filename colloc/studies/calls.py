@@ -1,5 +1,4 @@
-"""What the commands solve, multistart and sweep do, for scripts and notebooks: functions of the
-same names."""
+"""The commands solve, multistart and sweep as functions, for scripts and notebooks."""
 
 from __future__ import annotations
 
@@ -33,7 +32,6 @@ from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.task_pool import pool_for
 
 Stated = Problem | str | os.PathLike[str]
-"""A problem, or the path of the file that states it."""
 
 
 def solve(
@@ -46,22 +44,21 @@ def solve(
     verbose: bool = False,
     progress: Callable[[Progress], object] | None = None,
 ) -> Solution:
-    """The most efficient gait of a problem, certified: what ``colloc solve`` finds.
+    """Find and certify the best gait of a problem, as ``colloc solve`` does.
 
     Parameters
     ----------
     problem : Problem or path-like
         A problem, or a problem file.
     starts : int, optional
-        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else
-        32.
+        Minimum number of starting points; 1 is the guess alone. By default what the file says,
+        else 32.
     seconds : float
-        Wall time allowed: then the best gait so far is returned.
+        Wall time, after which the best gait so far is returned.
     search : {"reduced", "full"}
         "full": IPOPT on the full program at every level of delta, from the guess alone.
     output : path-like, optional
-        Of an HDF5 file in which the solution is saved. What is found on the way is kept beside it:
-        after Ctrl-C, or a power cut, the same call goes on.
+        HDF5 file for the solution. After Ctrl-C or a crash the same call resumes.
     verbose : bool
         Print a line for every step.
     progress : callable, optional
@@ -70,15 +67,14 @@ def solve(
     Returns
     -------
     Solution
-        Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that
-        does not converge, or that Ctrl-C interrupts.
+        Its ``success`` and ``message`` say whether it converged; nothing is raised if not.
 
     Raises
     ------
     ProblemError
         If the file states no problem that can be solved.
     StoreError
-        If `output` cannot be written, or what an earlier call left beside it cannot be read.
+        If `output` cannot be written, or an earlier call's checkpoint cannot be read.
 
     Examples
     --------
@@ -113,7 +109,7 @@ def _read(problem: Stated) -> ProblemFile:
         return ProblemFile(problem, None, "")
     if not isinstance(problem, (str, os.PathLike)):
         raise ProblemError(
-            f"problem must be a Problem or the path of a problem file, not "
+            "problem must be a Problem or the path of a problem file, not "
             f"{type(problem).__name__}."
         )
     return read_problem_file(problem)
@@ -157,8 +153,7 @@ class Starts:
         return basins(self.problem, self.outcomes)
 
     def solution(self, start: int | None = None) -> Solution:
-        """The whole solution of a start (the best one by default), solved again from the gait that
-        is known.
+        """Solve a start (by default the best one) again from its gait.
 
         Raises
         ------
@@ -182,8 +177,7 @@ class Starts:
 
 
 def reopen(problem: Problem, outcome: Outcome) -> Solution:
-    """The solution that a start led to: solved at the final delta from its gait, or again from its
-    guess if it failed."""
+    """Solve a start at the final delta from its gait, or again from its guess if it failed."""
     if outcome.status != SOLVED:
         return search_solve(problem.with_(guess=outcome.guess), 1)
     return search_solve(problem.with_(guess=outcome.gait, delta_start=problem.delta), 1)
@@ -201,24 +195,26 @@ def multistart(
     verbose: bool = False,
     progress: Callable[[Outcome], object] | None = None,
 ) -> Starts:
-    """Local optima of a problem from seeded random starts: what ``colloc multistart`` finds.
+    """Find local optima of a problem from seeded random starts, as ``colloc multistart`` does.
 
     Parameters
     ----------
     problem : Problem or path-like
         A problem, or a problem file.
-    starts, seed, sampler, time_limit
-        As for `colloc.studies.multistart.run_starts`; starts 0 to `starts` - 1.
+    starts, seed : int
+        Starts 0 to `starts` - 1 of a seed, which do not depend on how many there are.
+    sampler : {"latin-hypercube", "perturbed"}
     workers : int
-        Processes; with one everything runs in this process. They import the script that asks for
-        more only if it defines a part of the problem; it has to be safe to import then (``if
-        __name__ == "__main__":``).
+        Processes; with one everything runs in this process. A script that defines a part of the
+        problem needs ``if __name__ == "__main__":`` with more.
+    time_limit : float
+        Seconds for one start.
     archive : path-like, optional
-        HDF5 file in which starts are kept; what it holds already is not solved again.
+        HDF5 file in which starts are kept and not solved again.
     verbose : bool
-        Print every outcome as it comes.
+        Print every outcome.
     progress : callable, optional
-        Called with every `colloc.results.outcome.Outcome` as it comes.
+        Called with every `colloc.results.outcome.Outcome`.
 
     Examples
     --------
@@ -265,25 +261,25 @@ def sweep(
     verbose: bool = False,
     progress: Callable[[StudyProgress], object] | None = None,
 ) -> StudyTable:
-    """Solve every problem of a study: what ``colloc sweep`` finds, as labelled arrays.
+    """Solve every problem of a study, as ``colloc sweep`` does.
 
     Parameters
     ----------
     study : Study or path-like
         A study, or a study file.
     folder : path-like, optional
-        Of the journal: what it holds already is not solved again. By default nothing is kept.
+        Folder of the journal, in which results are kept and not solved again.
     workers : int
         Processes, as for `multistart`.
     verbose : bool
-        Print every cell as it is worked on.
+        Print every cell that is solved.
     progress : callable, optional
         Called with every `colloc.studies.run.Progress`.
 
     Returns
     -------
     StudyTable
-        ``.to_xarray()`` is a Dataset.
+        Labelled arrays; ``.to_xarray()`` makes a Dataset.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Solve one cell of a study, on a worker: which starts are worth it, and what became of them."""
+"""Solve the cells of a task of a study on a worker."""
 
 from __future__ import annotations
 
@@ -21,45 +21,32 @@ from colloc.studies.study import Index
 from colloc.system.errors import CollocError
 from colloc.verification.replayer import replayer
 
-_COARSE, _FINE = (200, 200), (1600, 25600)
-"""Instants, and most instants, of a replay. 200 are within 3e-4 of 1,600 for the ellipse of
-efficiency 0.26 and delta from 1e-2 to 1e-4."""
-_LEVER = 0.5
-"""Of a net rotation, in body lengths: how far the distance depends on the point of the body that is
-followed."""
+_COARSE, _FINE = (200, 200), (1600, 25600)  # instants of a replay, and at most; 200 are within 3e-4
+_LEVER = 0.5  # body lengths by which the distance depends on the point followed, per net rotation
 _SAME_START = 1e-3
-BETTER = 1e-3
-"""Relative gain in value that is worth a solve, and that a coarse replay can tell."""
+BETTER = 1e-3  # relative gain in value that is worth a solve, and that a coarse replay resolves
 GUESS, WARM, COLD, RESCUE = "guess", "warm", "cold", "rescue"
 
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """A cell to solve."""
+    """A cell to solve; the last three as in `colloc.studies.study.Study`."""
 
     cell: Index
     problem: Problem
-    first: bool
-    """Whether the cell has its own starts, the guess and the cold ones, still before it."""
-    inside: tuple[Index, ...]
-    """Cells of the same task, earlier in it, whose gaits are warm starts."""
-    gaits: tuple[AnyGait, ...]
-    """Warm starts from elsewhere."""
-    cold: tuple[int, ...]
-    """Numbers of the seeded starts."""
-    incumbent: float
-    """The best certified value so far; 0 if there is none."""
-    tried: frozenset[str]
-    """Keys of starts solved before."""
+    first: bool  # its guess and cold starts are still to be solved
+    inside: tuple[Index, ...]  # earlier cells of the task, whose gaits are warm starts
+    gaits: tuple[AnyGait, ...]  # warm starts of other tasks
+    cold: tuple[int, ...]  # numbers of the seeded starts
+    incumbent: float  # best certified value so far, or 0
+    tried: frozenset[str]  # keys of starts solved before
     warm_starts: int
     time_limit: float
     seed: int
-    """These three: see `colloc.studies.study.Study`."""
 
 
 def failed_visit(work: Work, status: str, message: str) -> Visit:
-    """The visit of which nothing came. If the cell's own starts may be to blame, gaits from
-    elsewhere have another chance."""
+    """A visit without result; gaits of others may be tried again if own starts may be to blame."""
     guess = work.problem.guess
     attempt = Attempt(GUESS, start_key(guess), Outcome(0, status, message, guess, guess))
     scores = {} if work.first else {start_key(gait): np.nan for gait in work.gaits}
@@ -67,8 +54,7 @@ def failed_visit(work: Work, status: str, message: str) -> Visit:
 
 
 def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
-    """The member of the problem's class next to a gait of any class; None if there is none that is
-    admissible and moves."""
+    """Project a gait of any class into the problem's class; None if that is not admissible."""
     body, gaits = problem.body, problem.gait
     if gait.n_joint != body.n_joint or not gaits.free:
         return None
@@ -83,11 +69,7 @@ def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
 
 
 def value_of(problem: Problem, gait: AnyGait, instants: tuple[int, int] = _COARSE) -> float:
-    """The objective of a gait without a search, from a replay; 0 if that fails.
-
-    A net rotation makes the distance depend on the point that is followed. By how much it can be
-    too large for that is taken off, where the rotation is not asked for.
-    """
+    """Objective of a gait by replay, or 0; reduced by what an unwanted net rotation may add."""
     rotation = problem.rotation or 0.0
     try:
         period = replayer(problem.regime)(
@@ -110,12 +92,11 @@ def value_of(problem: Problem, gait: AnyGait, instants: tuple[int, int] = _COARS
 
 
 def visit(work: Work) -> Visit:
-    """Solve a cell from its starts.
+    """Solve a cell from its starts, the most promising gaits of others first.
 
-    A gait from elsewhere is a start while it does better, as it is, than all results so far; the
-    best ones come first. What leads to the gait that is certified by then, or to no better one, is
-    passed over. If the best from elsewhere promises more than the search from it keeps, it is tried
-    once more from the problem's own delta_start.
+    These are starts while they do better, unchanged, than all results so far. Optima that are no
+    better than, or the same as, the certified one are passed over. If the best one promises more
+    than the search from it keeps, it is tried once more from the problem's own delta_start.
     """
     problem, attempts = work.problem, list[Attempt]()
     gaits = {start_key(gait): gait for gait in work.gaits}
@@ -159,13 +140,13 @@ def visit(work: Work) -> Visit:
     if warm and (scores[warm[0]] > enough() or nothing):
         solve(RESCUE, members[warm[0]], problem.delta_start)
     for key, gait in members.items():
-        if scores[key] > enough():  # for good, then: measured as finely as a certificate does
+        if scores[key] > enough():  # what remains is measured as finely as a certificate
             scores[key] = value_of(problem, gait, _FINE)
     return Visit(problem.hash, attempts, scores)
 
 
 def _new_starts(work: Work, members: dict[str, AnyGait], scores: dict[str, float]) -> list[str]:
-    """Keys of the gaits that make different starts not solved before, the best first."""
+    """Keys of distinct gaits that were not solved before, best first."""
     paths = {key: fourier_series(work.problem, gait) for key, gait in members.items()}
     distinct: list[str] = []
     for key in sorted(members, key=lambda key: -scores[key]):
@@ -176,7 +157,7 @@ def _new_starts(work: Work, members: dict[str, AnyGait], scores: dict[str, float
 
 
 def run_chunk(chunk: tuple[Work, ...]) -> list[Visit]:
-    """Solve the cells of a task one after the other; nothing is raised."""
+    """Solve the cells of a task in order; nothing is raised."""
     earlier: dict[Index, AnyGait] = {}
     visits = []
     for work in chunk:

@@ -1,5 +1,4 @@
-"""Attempts at the cells of a study, and their journal: every finished visit to a cell is a row on
-the disk before it is reported."""
+"""Attempts at the cells of a study, and the journal that holds every finished visit to a cell."""
 
 from __future__ import annotations
 
@@ -19,13 +18,13 @@ KIND, NAME = "colloc journal 2", "journal.sqlite"
 
 
 def start_key(gait: AnyGait) -> str:
-    """A name for a gait, the same wherever it comes from."""
+    """Hash of a gait."""
     return statement_hash(fields(gait))[:16]
 
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """One start of a cell: where it came from, a key so that none is solved twice, its outcome."""
+    """Outcome of one start of a cell; its origin, and a key so that it is not solved again."""
 
     origin: str
     key: str
@@ -37,22 +36,22 @@ class Attempt:
 
 
 def best_attempt(attempts: Iterable[Attempt]) -> Attempt | None:
-    """The certified one of largest value, or None."""
+    """The certified attempt of largest value."""
     certified = (a for a in attempts if a.outcome.status == SOLVED)
     return max(certified, key=lambda a: a.outcome.value, default=None)
 
 
 @dataclass(frozen=True, eq=False)
 class Visit:
-    """Attempts at a cell, named by the hash of its problem; and `scores`: the value there of every
-    gait that came from elsewhere, as it is, by its `start_key` (NaN if nobody knows)."""
+    """Attempts at the cell of a problem, and values there of gaits of other cells by `start_key`,
+    evaluated without optimising (NaN if unknown)."""
 
     problem_hash: str
     attempts: list[Attempt]
     scores: dict[str, float] = field(default_factory=dict)
 
 
-def _visit_fields(visit: Visit) -> dict[str, Any]:
+def _encode(visit: Visit) -> dict[str, Any]:
     return {
         "problem": visit.problem_hash,
         "attempts": [
@@ -63,7 +62,7 @@ def _visit_fields(visit: Visit) -> dict[str, Any]:
     }
 
 
-def _visit_from(row: dict[str, Any]) -> Visit:
+def _decode(row: dict[str, Any]) -> Visit:
     attempts = [
         Attempt(str(a["origin"]), str(a["key"]), outcome_from(a["outcome"]))
         for a in row["attempts"]
@@ -73,12 +72,11 @@ def _visit_from(row: dict[str, Any]) -> Visit:
 
 
 def read_journal(folder: Path) -> list[Visit]:
-    """All visits of a folder, in order; none if there is no such folder. `StoreError` if the
-    journal cannot be read or is damaged."""
-    return [*read_rows(folder / NAME, KIND, _visit_from).values()]
+    """All visits in a folder, in order. `StoreError` if the journal cannot be read."""
+    return [*read_rows(folder / NAME, KIND, _decode).values()]
 
 
 def append_visits(folder: Path, visits: Iterable[Visit]) -> None:
-    """Put visits on the disk; `StoreError` if that is not possible."""
-    rows = map(_visit_fields, visits)
+    """Put visits on the disk. `StoreError` if that is not possible."""
+    rows = map(_encode, visits)
     put_rows(folder / NAME, KIND, {statement_hash(row): row for row in rows})

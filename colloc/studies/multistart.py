@@ -1,5 +1,4 @@
-"""Many starts of one problem over any `concurrent.futures` executor; one bad start never ends the
-run."""
+"""Many starts of one problem over an executor; one bad start never ends the run."""
 
 from __future__ import annotations
 
@@ -7,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
@@ -27,17 +27,11 @@ _CERTIFIED = ("value", "efficiency", "distance", "work", "value_error", "efficie
 
 
 def run_start(
-    problem: Problem,
-    sampler: str,
-    seed: int,
-    start: int,
-    time_limit: float,
-    known: AnyGait | None = None,
+    problem: Problem, sampler: str, seed: int, start: int, time_limit: float, known: AnyGait | None
 ) -> Outcome:
     """Solve and certify one start of a sampler, or from a known gait in its place."""
-    return run_guess(
-        problem, lambda: known or start_gait(problem, sampler, seed, start), start, time_limit
-    )
+    begin = partial(start_gait, problem, sampler, seed, start)
+    return run_guess(problem, lambda: known or begin(), start, time_limit)
 
 
 def run_guess(
@@ -48,11 +42,10 @@ def run_guess(
     *,
     worth: Callable[[Optimum], bool] = lambda end: True,
 ) -> Outcome:
-    """Solve and certify a problem from the gait that `start_from` makes, as start number `start`.
+    """Solve and certify a problem from the gait that `start_from` makes, within a time limit [s].
 
-    Whatever goes wrong becomes the outcome's status and message; nothing is raised. A start that
-    takes longer than the time limit [s] is given up. Where the search ends at the final delta in an
-    optimum that is not `worth` it, that is passed over.
+    Errors become the outcome's status and message. An optimum that is not `worth` it is passed
+    over.
     """
     begin, cpu = time.perf_counter(), time.process_time()
     passed, news = list[Optimum](), list[Progress]()
@@ -111,30 +104,16 @@ def run_starts(
     executor: Callable[[int], Executor] = process_pool,
     known: Mapping[int, AnyGait] | None = None,
 ) -> Iterator[Outcome]:
-    """Outcomes of the given starts, each as soon as it is there.
+    """Outcomes of starts, each as soon as it is there; some begin at `known` gaits.
 
-    Parameters
-    ----------
-    problem : Problem
-        With something free: a prescribed motion is the same from every start.
-    starts : iterable of int
-        Start numbers, each taken when a worker is free for it. A start depends only on the problem,
-        the sampler, the seed and its number.
-    sampler : {"latin-hypercube", "perturbed"}
-    seed : int
-    workers, executor
-        As for `colloc.system.task_pool.run_tasks`. A start that kills its worker twice is recorded
-        as crashed.
-    time_limit : float
-        Seconds a start may take.
-    known : mapping of int to a gait, optional
-        Gaits from which starts of these numbers begin instead of a sample.
+    A start depends only on the problem, the sampler, the seed and its number. Workers and executor
+    are as for `colloc.system.task_pool.run_tasks`; a start that kills its worker twice has crashed.
     """
     if not problem.gait.free:
         raise ProblemError(
             "a prescribed motion is the same from every start; colloc solve measures it."
         )
-    native_kernel()  # missed once for all workers, or there
+    native_kernel()  # its absence is reported once for all workers
     numbers, gaits = iter(starts), known or {}
 
     def ready() -> Task | None:
@@ -153,8 +132,7 @@ def run_starts(
 def run_archive(
     archive: Archive, starts: Iterable[int], *, sampler: str, seed: int, **settings
 ) -> Iterator[Outcome]:
-    """Outcomes of `run_starts` for the problem of an archive, each kept there before it is
-    yielded."""
+    """Outcomes of `run_starts` for an archive, each added to it before it is yielded."""
     for outcome in run_starts(archive.problem, starts, sampler=sampler, seed=seed, **settings):
         archive.add({StartName(sampler, seed, outcome.start): outcome})
         yield outcome

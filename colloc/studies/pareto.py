@@ -1,14 +1,7 @@
-"""Trade-offs between two objectives: certified gaits of which none is better in both.
+"""Pareto fronts of two objectives by the epsilon-constraint method.
 
-The ends of the front are the best gaits by one objective alone. Between them the first objective is
-maximised while the second is kept at a value (an epsilon constraint), which finds the front where
-it is not convex, too. Every point begins at the gait of a neighbour, from both ends, and the better
-one counts: so the front may pass from one kind of gait to another.
-
-Evenly spaced in the second objective, points may lie far apart in the first. Wherever neighbours
-are too far apart, a gait halfway is sought in the objective in which they are, from both of them,
-and from as many starts as the ends where that leads to nothing new. What stays empty is named as a
-gap: there the front jumps, or the search failed.
+Between its ends, the first objective is maximised at evenly spaced values of the second, from both
+neighbours. Where neighbours are too far apart, points are added halfway; what stays empty is a gap.
 """
 
 from __future__ import annotations
@@ -29,54 +22,37 @@ from colloc.search.explore import STARTS
 from colloc.studies.saved import solve_member
 from colloc.system.arguments import check_count
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.late_binding import bound
+from colloc.system.lazy import higher
 from colloc.verification.replayer import replayer
 
 POINTS, _MOST_POINTS = 9, 1000
-_BETTER = 1e-6
-"""Relative gain for which a point is replaced."""
-_CLOSE, _APART = 0.1, 2.0
-"""Neighbours are nearer than this part of the even spacing, in both objectives, or farther apart
-than that in either."""
+_BETTER = 1e-6  # relative gain for which a point is replaced
+_CLOSE, _APART = 0.1, 2.0  # spacing of duplicates, and of gaps, over the even one
 
 Objectives = tuple[Objective, Objective]
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A place where a front is empty for more than twice the even spacing of its points.
+    """Part of a front, wider than twice the even spacing, where nothing was found."""
 
-    Attributes
-    ----------
-    after : int
-        The point before it.
-    why : str
-    certified : bool
-        Whether the gaits that were found there are; then they are no better than the points beside
-        it.
-    """
-
-    after: int
+    after: int  # the point before it
     why: str
-    certified: bool
+    certified: bool  # whether gaits found there are; they are no better than its neighbours
 
 
 @dataclass(frozen=True, eq=False)
 class ParetoFront:
-    """Gaits from the best by the first objective to the best by the second.
+    """Certified gaits from the best by the first objective to the best by the second.
 
     Attributes
     ----------
     problem : Problem
-        Whatever its own objective is.
     objectives : (Objective, Objective)
     points : tuple of Solution
-        Each with a certificate of its own. By more than its errors none is worse than another one
-        in both objectives, and neighbours differ; where one gait is best in both, it is the only
-        point.
+        By more than its errors none is worse than another one in both objectives.
     gaps : tuple of Gap
-        Between which neighbours nothing was found; elsewhere they are less than twice the even
-        spacing apart.
+        Where neighbours are more than twice the even spacing apart.
     """
 
     problem: Problem
@@ -86,18 +62,20 @@ class ParetoFront:
 
     @property
     def values(self) -> np.ndarray:
-        """Both objectives of every point, replayed, ``(n, 2)``."""
+        """Both objectives of every point, by replay, ``(n, 2)``."""
         return np.array([_measure(point, self.objectives)[0] for point in self.points])
 
     @property
     def certified(self) -> bool:
-        """True if the gaits that were found in its gaps are, too."""
+        """Whether the gaits that were found in its gaps are certified, too."""
         return all(gap.certified for gap in self.gaps)
 
     def plot(self, ax: Any = None) -> Any:
-        """The front and its gaits as a matplotlib Figure; with `ax`, a matplotlib Axes, the front
-        there, and the Axes is returned."""
-        return bound("plot_front")(self) if ax is None else bound("plot_front_values")(ax, self)
+        """Draw the front and its gaits as a matplotlib Figure; with a matplotlib Axes `ax` the
+        front there, and return the Axes."""
+        if ax is None:
+            return higher("pictures.front_figure:front_figure")(self)
+        return higher("pictures.front_figure:draw_front")(ax, self)
 
     def __repr__(self) -> str:
         first, second = (aim.name for aim in self.objectives)
@@ -114,22 +92,21 @@ def pareto_front(
     starts: int = STARTS,
     progress: Callable[[int, Solution], object] | None = None,
 ) -> ParetoFront:
-    """The gaits of a problem's class that are best in one objective for what they reach in another.
+    """Find the Pareto front of two objectives of a problem.
 
     Parameters
     ----------
     problem : Problem
-        Its own objective does not matter; what else it asks for holds for every point.
+        Its own objective does not matter; its constraints hold for every point.
     first, second : Objective or str
         As for `colloc.gaits.problem.Problem`.
     points : int
-        At least 2, the ends; those between are evenly spaced in the second objective. What is no
-        better than another one, or hardly differs from it, is left out; what fills gaps is added.
+        At least 2, evenly spaced in the second objective. Dominated points and duplicates are left
+        out; what fills gaps is added.
     starts : int
-        From which both ends are the best, and what lies in a gap that no neighbour leads into.
+        Starting points for both ends, and in gaps that no neighbour leads into.
     progress : callable, optional
-        Called with the number of a point, in the order in which they are begun, and its solution,
-        also when it is replaced by a better one.
+        Called with the number of a point and its solution, also when it is replaced.
 
     Raises
     ------
@@ -157,7 +134,6 @@ def pareto_front(
     solutions: dict[int, Solution] = {}
 
     def put(k: int, solution: Solution) -> None:
-        """Keep what is the better solution of a point."""
         value, before = solution.measured.value, solutions.get(k)
         if before is None or (solution.success, value) > (
             before.success,
@@ -168,8 +144,7 @@ def pareto_front(
                 progress(k, solution)
 
     def reach(which: int, level: float, begin: Solution | None) -> Solution:
-        """Solve for the best by the other objective of what reaches a level of one, begun at a
-        gait; without one from starts."""
+        """Maximise one objective where the other reaches a level, from a gait or from starts."""
         limits = (*problem.at_least, (aims[which], level))
         stated = problem.with_(objective=aims[1 - which], at_least=limits)
         if begin is None:
@@ -191,7 +166,7 @@ def pareto_front(
             put(k, reach(1, levels[k], solutions[k + 1]))
         for k in range(1, last):
             put(k, reach(1, levels[k], solutions[k - 1]))
-        for k in backwards:  # more of the second objective, and of the first, is better here, too
+        for k in backwards:  # a point that is dominated by the next one
             here, beside = (_measure(solutions[j], aims)[0][0] for j in (k, k + 1))
             if beside > here:
                 put(k, reach(1, levels[k], solutions[k + 1]))
@@ -225,8 +200,7 @@ def pareto_front(
 
 @lru_cache(maxsize=256)
 def _measure(solution: Solution, aims: Objectives) -> np.ndarray:
-    """Objectives of a solution and their errors, ``(2, 2)``: of its certificate or, where that does
-    not hold what it takes, of a replay."""
+    """Objectives of a solution and their errors, ``(2, 2)``, from its certificate or a replay."""
     problem, gait, measured = solution.problem, solution.gait, []
     for aim in aims:
         period: Period = solution.certificate
@@ -241,8 +215,7 @@ def _measure(solution: Solution, aims: Objectives) -> np.ndarray:
 
 
 def _thin(solutions: Iterable[Solution], aims: Objectives, intervals: int) -> list[Solution]:
-    """Certified ones of which, by more than the errors, none is better in both objectives, without
-    near duplicates; of those the first counts."""
+    """Non-dominated certified solutions (by more than the errors), without near duplicates."""
     front: list[Solution] = []
     for each in (solution for solution in solutions if solution.success):
         (values, errors), others = _measure(each, aims), [_measure(other, aims) for other in front]
@@ -265,8 +238,7 @@ def _thin(solutions: Iterable[Solution], aims: Objectives, intervals: int) -> li
 def _wide(
     front: list[Solution], aims: Objectives, intervals: int
 ) -> dict[tuple[Solution, Solution], np.ndarray]:
-    """Neighbours that are too far apart, and how far in each objective, as a share of the whole
-    front."""
+    """Neighbours that are too far apart, and their distance in each objective over the front's."""
     apart = np.abs(np.diff([_measure(each, aims)[0] for each in front], axis=0))
     shares = zip(pairwise(front), apart / apart.sum(axis=0), strict=True)
     return {pair: size for pair, size in shares if size.max() * intervals > _APART}

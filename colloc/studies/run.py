@@ -1,21 +1,20 @@
-"""Run a study: a wavefront of tasks over any executor, then rounds in which good gaits spread to
-all their neighbours.
+"""Run a study: a wavefront of tasks over an executor, then rounds in which gaits spread.
 
-A task waits for the cells its warm starts come from, and takes from nowhere else. So the results of
-a study do not depend on how many workers there are or which is faster. Rounds end when no gait does
-better in a neighbouring cell, as it is, than what is known there; a cell of which that cannot be
-said although it was tried is marked (`StudyRun.neighbour_value`).
+A task waits for the cells that its warm starts come from, so results do not depend on the workers.
+Rounds end when no gait does better in a neighbouring cell, unchanged, than what is known there.
+Problems are made when their cells are reached.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from graphlib import TopologicalSorter
 from pathlib import Path
+from typing import Any
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.native_kernel import native_kernel
@@ -33,13 +32,10 @@ from colloc.studies.study import Index, Study
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, process_pool, run_tasks
 
-Chunk = tuple[Index, ...]
-
 
 @dataclass(eq=False)
 class CellState:
-    """A cell: its problem (or why there is none), all attempts, and what gaits
-    of others achieve there."""
+    """Problem of a cell (or why there is none), attempts, and values of gaits of other cells."""
 
     problem: Problem | None
     message: str = ""
@@ -54,6 +50,11 @@ class CellState:
     def tried(self) -> frozenset[str]:
         return frozenset(a.key for a in self.attempts)
 
+    @property
+    def missing(self) -> bool:
+        """Whether the problem's own guess was not tried yet."""
+        return self.problem is not None and start_key(self.problem.guess) not in self.tried
+
     def add(self, visit: Visit) -> None:
         self.attempts += visit.attempts
         self.scores |= visit.scores
@@ -61,7 +62,7 @@ class CellState:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """A cell that was just worked on; `done` of `total` cells of a round."""
+    """A cell that was just visited; `done` of `total` cells of a round."""
 
     cell: Index
     state: CellState
@@ -71,60 +72,64 @@ class Progress:
     total: int
 
 
-class StudyRun:
-    """A study under way: the state of every cell, kept in the journal of a folder; what that holds
-    already is not solved again, unless `retry` forgets it: errors, crashes and time limits.
+class _Cells(dict[Index, CellState]):
+    """States of the cells that were reached, each made from the journal on first use."""
 
-    `ProblemError` if the study's function gives no problem for any cell, `StoreError` if the
-    journal cannot be read.
+    def __init__(self, study: Study, visits: list[Visit], retry: bool) -> None:
+        self._study, self._retry = study, retry
+        self._visits: dict[str, list[Visit]] = {}
+        for visit in visits:
+            self._visits.setdefault(visit.problem_hash, []).append(visit)
+
+    def __missing__(self, cell: Index) -> CellState:
+        try:
+            state = CellState(problem := self._study.problem_at(cell))
+        except ProblemError as error:
+            state = CellState(None, str(error))
+        else:
+            for visit in self._visits.get(problem.hash, []):
+                state.add(visit)
+        if self._retry:
+            state.attempts = [a for a in state.attempts if a.outcome.status not in RETRIED]
+        self[cell] = state
+        return state
+
+
+class StudyRun:
+    """A study under way, kept in the journal of a folder; what that holds is not solved again, but
+    with `retry` errors, crashes and time limits are.
+
+    `ProblemError` if no cell has a problem, `StoreError` if the journal cannot be read.
     """
 
     def __init__(self, study: Study, folder: Path, *, retry: bool = False) -> None:
         self.study, self.folder = study, folder
-        visits: dict[str, list[Visit]] = {}
-        for visit in read_journal(folder):
-            visits.setdefault(visit.problem_hash, []).append(visit)
-        self.cells: dict[Index, CellState] = {}
-        for cell in study.cells():
-            try:
-                state = CellState(study.problem_at(cell))
-            except ProblemError as error:
-                state = CellState(None, str(error))
-            for visit in visits.get(state.problem.hash, []) if state.problem else ():
-                state.add(visit)
-            if retry:
-                state.attempts = [a for a in state.attempts if a.outcome.status not in RETRIED]
-            self.cells[cell] = state
-        if all(state.problem is None for state in self.cells.values()):
-            raise ProblemError(
-                f"the study {study.name} has no problem in any cell; "
-                f"{next(iter(self.cells.values())).message}"
-            )
+        visits = read_journal(folder)
+        self.visited = len({visit.problem_hash for visit in visits})
+        self.cells = _Cells(study, visits, retry)
+        if all(self.cells[cell].problem is None for cell in study.cells()):
+            message = next(iter(self.cells.values())).message
+            raise ProblemError(f"the study {study.name} has no problem in any cell; {message}")
 
     @property
     def missing(self) -> list[Index]:
         """Cells with a problem whose own guess was not tried yet."""
-        return [
-            cell
-            for cell, state in self.cells.items()
-            if state.problem is not None and start_key(state.problem.guess) not in state.tried
-        ]
+        return [cell for cell in self.study.cells() if self.cells[cell].missing]
 
     def neighbours(self, cell: Index) -> list[Attempt]:
-        """The best attempts of the cells around one, as far as there are any."""
+        """Best attempts of the cells around one."""
         bests = (self.cells[other].best for other in self.study.around(cell))
         return [best for best in bests if best is not None]
 
     def neighbour_value(self, cell: Index) -> float:
-        """The most that the best gait of a neighbour, moved into the cell's class and otherwise as
-        it is, achieves there; NaN if there is none."""
+        """Largest value in a cell of a neighbour's best gait, projected but not optimised; or
+        NaN."""
         known = self.cells[cell].scores
         scores = (known.get(best.gait_key, math.nan) for best in self.neighbours(cell))
         return max((score for score in scores if not math.isnan(score)), default=math.nan)
 
     def below_neighbour(self, cell: Index) -> bool:
-        """True if a neighbour's gait does clearly better in the cell than its own best, though it
-        was tried there."""
+        """Whether a neighbour's gait does clearly better in the cell than its own best."""
         best = self.cells[cell].best
         return best is not None and self.neighbour_value(cell) > (1 + BETTER) * best.outcome.value
 
@@ -135,14 +140,13 @@ class StudyRun:
         executor: Callable[[int], Executor] = process_pool,
         ahead: int | None = None,
     ) -> Iterator[Progress]:
-        """Work on all that is missing (see `colloc.system.task_pool.run_tasks`); each cell is on
-        the disk before it is yielded. Cells in which nothing was tried are not."""
-        native_kernel()  # missed once for all workers, or there
+        """Visit what is missing, yielding each cell that was tried when it is on the disk;
+        arguments as for `colloc.system.task_pool.run_tasks`."""
+        native_kernel()  # its absence is reported once for all workers
         ahead = 1 + workers // 4 if ahead is None else ahead
-        number, chunks = 0, self._first_chunks()
-        while number == 0 or chunks:
-            tasks = _Round(self, number, chunks)
-            total, done = sum(map(len, chunks)), 0
+        tasks: _Wavefront | _Round = _Wavefront(self)
+        for number in itertools.count():
+            done = 0
             for task, result in run_tasks(
                 run_chunk, tasks.ready, workers=workers, executor=executor, ahead=ahead
             ):
@@ -152,77 +156,98 @@ class StudyRun:
                 append_visits(self.folder, [v for v in result if v.attempts or v.scores])
                 for work, visit in zip(works, result, strict=True):
                     self.cells[work.cell].add(visit)
-                tasks.order.done(tuple(work.cell for work in works))
+                tasks.finish(task.key)
                 for work, visit in zip(works, result, strict=True):
                     done += 1
                     if visit.attempts:
-                        state = self.cells[work.cell]
+                        state, total = self.cells[work.cell], tasks.total
                         yield Progress(work.cell, state, visit.attempts, number, done, total)
-            number, chunks = number + 1, self._improvable()
+            improvable = [
+                cell
+                for cell, state in list(self.cells.items())
+                if state.problem is not None
+                and any(best.gait_key not in state.scores for best in self.neighbours(cell))
+            ]
+            if not improvable:
+                return
+            tasks = _Round(self, improvable)
 
-    def _first_chunks(self) -> list[Chunk]:
-        """Missing cells in runs along the last axis."""
-        size = self.study.chunk
-        groups: dict[Index, list[Index]] = {}
-        for cell in self.missing:
-            groups.setdefault((*cell[:-1], cell[-1] // size), []).append(cell)
-        return [tuple(cells) for cells in groups.values()]
-
-    def _improvable(self) -> list[Chunk]:
-        """Cells with a neighbour whose best gait was not looked at there."""
-        return [
-            (cell,)
-            for cell, state in self.cells.items()
-            if state.problem is not None
-            and any(best.gait_key not in state.scores for best in self.neighbours(cell))
-        ]
-
-
-class _Round:
-    """Tasks of one round, each ready when those that its warm starts come from are done.
-
-    In the first round gaits come from the cells before, as the tasks end. In later ones all cells
-    start from what is known when the round begins, whatever order they come in.
-    """
-
-    def __init__(self, run: StudyRun, number: int, chunks: list[Chunk]) -> None:
-        self.study, self.cells, self.first = run.study, run.cells, number == 0
-        self.known = {cell: state.best for cell, state in run.cells.items()} if number else None
-        where = {cell: chunk for chunk in chunks for cell in chunk}
-        self.order: TopologicalSorter[Chunk] = TopologicalSorter()
-        for chunk in chunks:
-            before = {c for cell in chunk for c in self.study.before(cell)} & where.keys()
-            self.order.add(chunk, *({where[c] for c in before - set(chunk)} if self.first else ()))
-        self.order.prepare()
-        self.queue: deque[Chunk] = deque()
-
-    def ready(self) -> Task | None:
-        """The next task, if there is one now."""
-        self.queue.extend(self.order.get_ready())
-        if not self.queue:
-            return None
-        chunk = self.queue.popleft()
-        return Task(chunk, (tuple(self._work(cell, chunk) for cell in chunk),))
-
-    def _best(self, cell: Index) -> Attempt | None:
-        return self.cells[cell].best if self.known is None else self.known[cell]
-
-    def _work(self, cell: Index, chunk: Chunk) -> Work:
-        study, state, best = self.study, self.cells[cell], self._best(cell)
+    def work(
+        self, cell: Index, best: Callable[[Index], Attempt | None], chunk: tuple[Index, ...] = ()
+    ) -> Work:
+        """Work on a cell: in the first round within a chunk, later with none."""
+        study, state, own = self.study, self.cells[cell], best(cell)
         assert state.problem is not None
-        sources = study.before(cell) if self.first else study.around(cell)
-        inside = tuple(c for c in sources if c in chunk) if self.first else ()
-        others = (self._best(c) for c in sources if c not in inside)
+        sources = study.before(cell) if chunk else study.around(cell)
+        inside = tuple(c for c in sources if c in chunk)
+        others = (best(c) for c in sources if c not in inside)
         return Work(
             cell,
             state.problem,
-            self.first,
+            bool(chunk),
             inside,
             tuple(a.outcome.gait for a in others if a and a.gait_key not in state.scores),
-            study.cold_numbers(cell) if self.first else (),
-            best.outcome.value if best else 0.0,
+            study.cold_numbers(cell) if chunk else (),
+            own.outcome.value if own else 0.0,
             state.tried,
             study.warm_starts,
             study.time_limit,
             study.seed,
         )
+
+
+class _Round:
+    """Tasks of a later round: cells that start from what is known when it begins."""
+
+    def __init__(self, run: StudyRun, cells: list[Index]) -> None:
+        known = {cell: state.best for cell, state in run.cells.items()}
+        self.total = len(cells)
+        self._tasks = (Task(cell, ((run.work(cell, known.get),),)) for cell in cells)
+
+    def ready(self) -> Task | None:
+        return next(self._tasks, None)
+
+    def finish(self, chunk: Any) -> None:
+        pass
+
+
+class _Wavefront:
+    """Tasks of the first round: chunks of missing cells along the last axis, each ready when those
+    before it are finished."""
+
+    def __init__(self, run: StudyRun) -> None:
+        self._run, self._study = run, run.study
+        self.total = math.prod(run.study.shape)  # less what is not missing, as it is reached
+        *sizes, last = run.study.shape
+        counts = (*sizes, -(-last // run.study.chunk))
+        self._counts, self._travels = counts, [axis.travels for axis in run.study.axes]
+        first = ((0,) if goes else range(n) for n, goes in zip(counts, self._travels, strict=True))
+        self._first: Iterator[Index] = itertools.product(*first)
+        self._released: deque[Index] = deque()
+        self._finished: set[Index] = set()
+
+    def ready(self) -> Task | None:
+        while True:
+            chunk = self._released.popleft() if self._released else next(self._first, None)
+            if chunk is None:
+                return None
+            first = chunk[-1] * self._study.chunk
+            every = range(first, min(first + self._study.chunk, self._study.shape[-1]))
+            cells = tuple(c for k in every if self._run.cells[c := (*chunk[:-1], k)].missing)
+            self.total -= len(every) - len(cells)
+            if cells:
+                works = (self._run.work(c, lambda x: self._run.cells[x].best, cells) for c in cells)
+                return Task(chunk, (tuple(works),))
+            self.finish(chunk)
+
+    def finish(self, chunk: Any) -> None:
+        """Release the chunks after one of which all others before them are finished, too."""
+        self._finished.add(chunk)
+        for following in self._shifted(chunk, 1):
+            if self._finished.issuperset(self._shifted(following, -1)):
+                self._released.append(following)
+
+    def _shifted(self, chunk: Index, by: int) -> Iterable[Index]:
+        for a, goes in enumerate(self._travels):
+            if goes and 0 <= (i := chunk[a] + by) < self._counts[a]:
+                yield (*chunk[:a], i, *chunk[a + 1 :])

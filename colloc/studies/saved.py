@@ -1,5 +1,4 @@
-"""A solve whose result is a file, or several that belong together: they go on from a run that was
-interrupted, and their end removes what was kept for that."""
+"""Solves that resume from a checkpoint, which their successful end removes."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from colloc.gaits.problem_file import ProblemFile
 from colloc.results.kept import Saved, save_result
 from colloc.results.solution import Solution
 from colloc.search.solve import solve
-from colloc.system.result_names import run_file
+from colloc.system.files import run_file
 
 _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 
@@ -22,11 +21,7 @@ _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 def resume(
     stated: ProblemFile, path: Path | None, *, fresh: bool = False, **settings: Any
 ) -> Solution:
-    """The solution of a problem, from where an interrupted run left it; `fresh`: from the start.
-
-    The run is kept beside the path of the result, ``NAME.h5``. Settings are those of
-    `colloc.search.solve.solve`. `StoreError` if what an earlier run left cannot be read.
-    """
+    """Solve with a checkpoint beside the result's path, or from the beginning if `fresh`."""
     keep = None if path is None else run_file(path)
     if fresh and keep is not None:
         keep.unlink(missing_ok=True)
@@ -38,8 +33,7 @@ def resume(
 
 
 def save_and_clear(solution: Solution, path: Path) -> list[Saved]:
-    """Save a solution (`colloc.results.kept.save_result`); the run that led to it is kept only if
-    it was interrupted. `StoreError` if a file cannot be written."""
+    """Save a solution, and remove the checkpoint unless it was interrupted."""
     saved = save_result(solution, path)
     if not solution.interrupted:
         run_file(path).unlink(missing_ok=True)
@@ -48,9 +42,7 @@ def save_and_clear(solution: Solution, path: Path) -> list[Saved]:
 
 @contextmanager
 def checkpoints_in(folder: Path) -> Iterator[None]:
-    """A block that solves several problems (`solve_member`), of which each keeps its results in a
-    folder until the block ends well. After Ctrl-C, which says so, or a power cut, the same block
-    goes on from there."""
+    """Have `solve_member` keep checkpoints in a folder until the block succeeds."""
     token = _FOLDER.set(folder)
     try:
         yield
@@ -64,7 +56,7 @@ def checkpoints_in(folder: Path) -> Iterator[None]:
 
 
 def solve_member(problem: Problem, starts: int) -> Solution:
-    """The solution of a problem of several that belong together; Ctrl-C is raised."""
+    """Solve one problem of a family. KeyboardInterrupt if that is interrupted."""
     folder = _FOLDER.get()
     keep = None if folder is None else run_file(folder / f"member-{problem.hash[:16]}.h5")
     solution = solve(problem, starts, keep=keep)

@@ -1,11 +1,7 @@
-"""Gaits that steer: the best of a problem for every turn of a period that is asked for, from sharp
-right to sharp left.
+"""Families of gaits that steer: the best one of a problem for every turn per period.
 
-The straight gait comes first, of the problem's own class. The others are sought in the class
-without symmetry, for no symmetric gait turns, each from its neighbour outwards; a turn to the right
-from the mirror image of that to the left, if that is asked for, too, and is of the same body. Gaits
-that turn on the spot are those of least work for their turn. Joint angles between those of two
-neighbours turn by about as much as lies between, so that a controller can interpolate.
+After the straight gait, others are sought in the class without symmetry, each from its neighbour,
+or from the mirror image of the opposite turn. Controllers can interpolate between neighbours.
 """
 
 from __future__ import annotations
@@ -26,27 +22,24 @@ from colloc.search.explore import STARTS
 from colloc.studies.saved import solve_member
 from colloc.system.arguments import check_count, is_number
 from colloc.system.errors import ProblemError
-from colloc.system.late_binding import bound
+from colloc.system.lazy import higher
 
-LEAST_WORK = Objective("1 / work", "least work")
-"""Of gaits that turn by a given angle: on the spot, for going anywhere takes work."""
-_PHASES = 1000
-"""That are tried for the begin of a gait."""
+LEAST_WORK = Objective("1 / work", "least work")  # turning on the spot: moving takes work
+_PHASES = 1000  # tried for the begin of a gait
 
 
 @dataclass(frozen=True, eq=False)
 class Steering:
-    """A family of gaits, by the angle that a period turns.
+    """Family of gaits by the angle that a period turns.
 
     Attributes
     ----------
     problem : Problem
     turns : tuple of float
-        Counter-clockwise [rad], rising.
+        Counter-clockwise [rad], ascending.
     points : tuple of Solution
-        One for each, with a certificate of its own.
     on_the_spot : Steering, optional
-        Those that turn with the least work, and hardly leave their place.
+        Gaits that turn with the least work.
     """
 
     problem: Problem
@@ -56,20 +49,19 @@ class Steering:
 
     @property
     def certified(self) -> bool:
-        """True if every gait is."""
+        """Whether every gait is certified."""
         spot = self.on_the_spot is None or self.on_the_spot.certified
         return spot and all(point.success for point in self.points)
 
     @property
     def efficiency(self) -> np.ndarray:
-        """Chord of the arc of a period per work, of every gait: it does not depend on the phase it
-        is begun at."""
+        """Chord of the arc of a period per work, independent of the phase at which it begins."""
         return np.array([point.arc.chord / point.work for point in self.points])
 
     @property
     def begins(self) -> tuple[float, ...]:
-        """Phases at which to begin the gaits, each as near as can be to its neighbour that turns
-        less: where a period begins matters for nothing else."""
+        """Phases at which to begin the gaits, so that each is near its neighbour that turns
+        less."""
         t, straight = np.arange(_PHASES) / _PHASES, min(self.turns, key=abs)
         begins = dict.fromkeys(self.turns, 0.0)
         gaits = {turn: point.gait for turn, point in zip(self.turns, self.points, strict=True)}
@@ -80,8 +72,8 @@ class Steering:
         return tuple(begins.values())
 
     def table(self, phases: int = 100) -> dict[str, Any]:
-        """Plain numbers for a controller: the turns, their arcs, and joint angles at
-        equal phases from those of `begins`; between two turns angles are interpolated linearly."""
+        """Return turns, their arcs, and joint angles at equal phases from `begins`, as JSON can
+        hold them; angles are interpolated linearly between turns."""
         t, points = np.arange(phases) / phases, self.points
         radii = [point.arc.radius for point in points]
         more = {} if self.on_the_spot is None else {"on_the_spot": self.on_the_spot.table(phases)}
@@ -100,11 +92,11 @@ class Steering:
         }
 
     def plot(self, ax: Any = None, panel: str = "cost") -> Any:
-        """Efficiency against the turn, and the tracks, as a matplotlib Figure; with `ax`, a
-        matplotlib Axes, one of them there, "cost" or "tracks", and the Axes is returned."""
+        """Draw efficiency against the turn, and the tracks, as a matplotlib Figure; with a
+        matplotlib Axes `ax` the panel "cost" or "tracks" there, and return the Axes."""
         if ax is None:
-            return bound("plot_steering")(self)
-        return bound("plot_steering_panel")(ax, self, panel)
+            return higher("pictures.steering_figure:steering_figure")(self)
+        return higher("pictures.steering_figure:draw_steering")(ax, self, panel)
 
     def __repr__(self) -> str:
         turns = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)
@@ -113,7 +105,7 @@ class Steering:
 
 
 def _outwards(turns: Sequence[float], middle: float) -> Iterator[tuple[float, float]]:
-    """Turns to the left of the middle, then to the right, each with its neighbour inwards."""
+    """Turns to the left of the middle, then to the right, each with its inner neighbour."""
     for side in (
         [turn for turn in turns if turn > middle],
         [turn for turn in reversed(turns) if turn < middle],
@@ -129,18 +121,18 @@ def steer(
     starts: int = STARTS,
     progress: Callable[[float, Solution], object] | None = None,
 ) -> Steering:
-    """The best gaits of a problem for given turns of a period.
+    """Find the best gaits of a problem for given turns per period.
 
     Parameters
     ----------
     problem : Problem
-        Of gaits that go straight; its objective is that of all of them.
+        States the gait that goes straight; its objective is that of all.
     turns : sequence of float
-        Counter-clockwise [rad], less than half a turn; 0 need not be among them.
+        Counter-clockwise [rad], less than half a turn.
     spot : sequence of float
-        Turns on the spot, the same way; not 0.
+        Turns on the spot, not 0.
     starts : int
-        From which the straight gait is the best, and the first on the spot.
+        Starting points for the straight gait, and the first on the spot.
     progress : callable, optional
         Called with a turn and its solution.
 
@@ -163,7 +155,7 @@ def steer(
             "steering begins at a gait that is free and goes straight on the level: rotation 0, "
             "grade 0."
         )
-    # by more than half a turn a period the body could as well turn the other way
+    # by more than half a turn the body could turn the other way
     possible = all(is_number(turn) and abs(turn) < math.pi for turn in (*turns, *spot))
     if not len(turns) or not possible or 0 in spot:
         raise ProblemError(
@@ -192,8 +184,7 @@ def steer(
     def family(
         stated: Problem, wanted: Sequence[float], known: dict[float, Solution]
     ) -> tuple[Solution, ...]:
-        """Outwards from those that are known, to the left first; from all starts if there is
-        none."""
+        """Solve outwards from known members, or from all starts if there is none."""
         for turn, inner in _outwards(wanted, 0.0):
             begin = known[inner].gait if inner in known else None
             if -turn in known and mirrors:

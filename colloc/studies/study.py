@@ -1,7 +1,6 @@
-"""A study: a grid of problems over named axes, and how hard to search each cell.
+"""A study: a grid of problems over named axes. A cell is an index into the axes.
 
-A cell is an index into the axes. Good starts travel between neighbours: along an axis of numbers
-from the value before, along an axis of texts (a class of gaits, say) from every value before.
+Warm starts travel along an axis of numbers from the value before, of texts from every one before.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from colloc.gaits.problem_file import place_of, stated_names, words_of
 from colloc.gaits.starts import LARGEST_SEED
 from colloc.system.arguments import is_whole, named_arguments, shown
 from colloc.system.errors import ProblemError
-from colloc.system.result_names import check_name
+from colloc.system.files import check_name
 
 Index = tuple[int, ...]
 NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
@@ -32,7 +31,7 @@ COLUMNS: dict[str, float | str] = {
     **dict.fromkeys(("below_neighbour", "starts", "starts_certified"), 0),
     **dict.fromkeys(("status", "message", "origin", "gait_class", "problem_hash"), ""),
 }
-"""Results of a cell, one value each, as they are where there is none."""
+"""Results of a cell with one value, and its placeholder."""
 ARRAYS = {"mean": ("joint",), "cos": ("joint", "harmonic"), "sin": ("joint", "harmonic")}
 _RESERVED = {*COLUMNS, *ARRAYS, "joint", "harmonic"}
 MOST_CELLS = 1_000_000
@@ -41,16 +40,16 @@ MOST_CELLS = 1_000_000
 @named_arguments
 @dataclass(frozen=True)
 class Axis:
-    """One direction of a grid.
+    """Axis of a grid.
 
     Parameters
     ----------
     name : str
-        A Python name: the keyword the study's function is called with.
+        The keyword with which the study's function is called.
     values : sequence of float or of str
-        In the order in which starts travel.
+        In the order in which warm starts travel.
     label, units : str
-        For figures and files; the name, and "1", by default.
+        For figures and files; by default the name, and "1".
     travels : bool
         Whether warm starts travel along this axis.
 
@@ -109,19 +108,15 @@ class Study:
         Of the results; letters, digits, ``_``, ``-`` and ``.``, as for a problem.
     axes : tuple of Axis
     problem : callable
-        The `Problem` of a cell, called with a keyword for every axis. A cell for which it raises is
-        recorded and skipped.
+        Returns the `Problem` of a cell; called with a keyword for every axis. A cell for which it
+        raises is recorded and skipped.
     cold_starts : int
-        Seeded random starts of every cell, besides the guess of its problem and the warm ones, so
-        that a poor basin does not spread. Each cell has numbers of its own: together they are one
-        search over the grid.
+        Seeded random starts of every cell, besides its problem's guess and the warm ones.
     warm_starts : int
-        Of the warm starts that reach a cell first so many are solved: those whose gaits do best
-        there as they are. Any other is solved only if its gait, as it is, does better than all
-        results so far.
+        Warm starts that are solved in any case: those whose gaits do best in the cell unchanged.
+        Others are solved if their gaits do better, unchanged, than all results so far.
     chunk : int
-        Cells along the last axis that make one task, with warm starts travelling inside. More cells
-        cost less scheduling.
+        Cells along the last axis that make one task, with warm starts travelling inside.
     time_limit : float
         Seconds for one start.
     seed : int
@@ -174,27 +169,27 @@ class Study:
         return tuple(len(axis.values) for axis in self.axes)
 
     def cells(self) -> Iterator[Index]:
-        """All cells, the last axis fastest."""
+        """Return all cells, the last axis fastest."""
         return itertools.product(*map(range, self.shape))
 
     def coordinates(self, cell: Index) -> dict[str, float | str]:
-        """Values of the axes at a cell, by name."""
+        """Return the values of the axes at a cell, by name."""
         return {axis.name: axis.values[i] for axis, i in zip(self.axes, cell, strict=True)}
 
     def label(self, cell: Index) -> str:
-        """Coordinates of a cell for people."""
+        """Return the coordinates of a cell as text."""
         return ", ".join(
             f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
             for name, value in self.coordinates(cell).items()
         )
 
     def problem_at(self, cell: Index) -> Problem:
-        """The problem of a cell.
+        """Return the problem of a cell.
 
         Raises
         ------
         ProblemError
-            Whatever the study's function raises, with the coordinates, its file and the line.
+            With what the study's function raises, where.
         """
         coordinates = self.coordinates(cell)
         where = ", ".join(f"{name} = {value}" for name, value in coordinates.items())
@@ -212,11 +207,11 @@ class Study:
         return problem
 
     def before(self, cell: Index) -> list[Index]:
-        """Neighbours that warm starts come from in the first round."""
+        """Return the neighbours from which warm starts come first."""
         return self._neighbours(cell, (-1,))
 
     def around(self, cell: Index) -> list[Index]:
-        """All neighbours."""
+        """Return all neighbours."""
         return self._neighbours(cell, (-1, 1))
 
     def _neighbours(self, cell: Index, steps: tuple[int, ...]) -> list[Index]:
@@ -233,19 +228,13 @@ class Study:
         return neighbours
 
     def cold_numbers(self, cell: Index) -> tuple[int, ...]:
-        """Numbers of the seeded starts of a cell."""
+        """Return the numbers of the seeded starts of a cell."""
         first = self.cold_starts * int(np.ravel_multi_index(cell, self.shape))
         return tuple(range(first, first + self.cold_starts))
 
 
 def read_study_file(path: str | os.PathLike[str]) -> tuple[Study, str]:
-    """Execute a study file; its study and its text.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such file, it fails (with the line), or states no ``STUDY``.
-    """
+    """Execute a study file; returns its study and text. `ProblemError` if it states none."""
     path, names, source = stated_names(path, "study")
     study = names.get("STUDY")
     if isinstance(study, Study):

@@ -1,11 +1,8 @@
-"""Results of a study as labelled arrays over its axes: the best certified gait of each cell, its
-kind and its bounds; and the netCDF-4 file that holds them.
+"""Results of a study as labelled arrays over its axes, and the netCDF-4 file that holds them.
 
-Numbers of cells without a certified gait are NaN, and ``status`` and ``message`` say why. ``delta``
-is per period for every class; ``mean``, ``cos`` and ``sin`` are the Fourier series of a gait, cut
-(the journal has the gait itself). ``below_neighbour`` is 1 where a neighbour's gait, as it is, does
-better (``neighbour_value``) than the cell's own. Attributes of the file: name, source, command,
-versions (JSON).
+Numbers are those of the best certified gait of a cell, or NaN, with ``status`` and ``message``.
+``delta`` is per period; ``mean``, ``cos`` and ``sin`` are the gait's truncated Fourier series.
+``below_neighbour`` is 1 where a neighbour's gait does better, unchanged (``neighbour_value``).
 """
 
 from __future__ import annotations
@@ -29,7 +26,7 @@ from colloc.results.solution import SOLVED, versions
 from colloc.studies.gait_class import gait_class
 from colloc.studies.run import StudyRun
 from colloc.studies.study import ARRAYS, COLUMNS, KINDS, NUMBERS, Index
-from colloc.system.table import Table, load_table, save_table
+from colloc.system.store_file import Table, load_table, save_table
 
 KIND, VERSION = "colloc study", 2
 NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
@@ -39,12 +36,12 @@ _UNITS = {
     "neighbour_value": "of the objective",
     **dict.fromkeys(ARRAYS, "rad"),
 }
-KnownBound = Callable[[Problem], float | None]
+_KnownBound = Callable[[Problem], float | None]
 
 
 @dataclass(frozen=True, eq=False)
 class StudyTable(Table):
-    """Labelled arrays over the axes of a study."""
+    """Results of a study as labelled arrays over its axes."""
 
     def __repr__(self) -> str:
         status = self.variables["status"]
@@ -52,11 +49,11 @@ class StudyTable(Table):
         return f"<StudyTable {self.name}: {certified} of {status.size} cells have a certified gait>"
 
 
-def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> StudyTable:
-    """All cells of a run; `known_bound` gives an upper bound on the efficiency of every gait of a
-    problem's body, if one is known."""
-    study = run.study
-    problems = [state.problem for state in run.cells.values() if state.problem is not None]
+def study_table(run: StudyRun, known_bound: _KnownBound = lambda _: None) -> StudyTable:
+    """Results of all cells; `known_bound` gives an upper bound on d/W that is known for a
+    problem."""
+    study, cells = run.study, list(run.cells)
+    problems = [p for state in run.cells.values() if (p := state.problem) is not None]
     sizes = {
         "joint": max(p.body.n_joint for p in problems),
         "harmonic": max(series_class(p).harmonics for p in problems),
@@ -65,9 +62,10 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
     for name, empty in COLUMNS.items():
         kind = object if isinstance(empty, str) else type(empty)
         variables[name] = np.full(study.shape, empty, dtype=kind)
+    variables["status"][:] = NOT_TRIED
     for name, extra in ARRAYS.items():
         variables[name] = np.full((*study.shape, *(sizes[e] for e in extra)), np.nan)
-    for cell in run.cells:
+    for cell in cells:
         for name, value in _row(run, cell, known_bound).items():
             if name in ARRAYS:
                 variables[name][cell][tuple(map(slice, np.shape(value)))] = value
@@ -88,7 +86,7 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
     )
 
 
-def _row(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]:
+def _row(run: StudyRun, cell: Index, known_bound: _KnownBound) -> dict[str, Any]:
     state = run.cells[cell]
     problem, best = state.problem, state.best
     if problem is None:
@@ -128,12 +126,10 @@ def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
 def save_study(
     table: StudyTable, path: str | os.PathLike[str], *, source: str = "", command: str = ""
 ) -> Path:
-    """Write the results; an existing file is replaced only once the new one is complete."""
     facts = {"source": source, "command": command, "versions": json.dumps(versions())}
     stated = replace(table, attributes=facts | {"Conventions": "CF-1.8"})
     return save_table(stated, path, KIND, VERSION)
 
 
 def load_study(path: str | os.PathLike[str]) -> Table:
-    """The results in a file that `save_study` wrote."""
     return load_table(path, KIND, VERSION)

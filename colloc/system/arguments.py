@@ -1,4 +1,4 @@
-"""Arguments of what people call by hand: misspelt or unusable ones meet a sentence that says so."""
+"""Checks of arguments: misspelt or unusable ones raise a `ProblemError` in one sentence."""
 
 from __future__ import annotations
 
@@ -17,23 +17,16 @@ from colloc.system.errors import OrderWarning, ProblemError
 
 T = TypeVar("T")
 P = ParamSpec("P")
-MOST_PERIODS = 10_000
-"""That are followed one by one."""
+MOST_PERIODS = 10_000  # simulated one by one
 STATED_IF_SET = {"stated if set": True}
-"""Metadata of a field that statements name only where it is not its default: what was stated before
-there was one, stays."""
+"""Metadata of a dataclass field that is left out of statements while it has its default."""
 
 
 def named_arguments(cls: type[T]) -> type[T]:
-    """Make a dataclass refuse arguments it does not have, or lacks, by a `ProblemError` that says
-    which one is meant.
+    """Make a dataclass check its arguments, and convert numbers to the type of their field.
 
-    Numbers become Python's own, of the kind that the field has: equal values have equal hashes.
-    Those of `by_name`, if the class has it, are to be given so where they differ: else an
-    `OrderWarning` says how they are read.
+    Positional ones among `by_name`, if the class has it, cause an `OrderWarning` if they differ.
 
-    Examples
-    --------
     >>> from colloc import Friction
     >>> Friction(mu_x=1)
     Traceback (most recent call last):
@@ -42,56 +35,46 @@ def named_arguments(cls: type[T]) -> type[T]:
     >>> Friction(1) == Friction(1.0)
     True
     """
-    made = cls.__init__
-    _, *taken = inspect.signature(made).parameters.values()  # without self
-    known, needed = (
-        [each.name for each in taken],
-        [each.name for each in taken if each.default is each.empty],
-    )
+    init, owner = cls.__init__, cls.__name__
+    _, *parameters = inspect.signature(init).parameters.values()  # without self
+    known = [each.name for each in parameters]
+    required = [each.name for each in parameters if each.default is each.empty]
 
-    @functools.wraps(made)
-    def checked(self: T, *given: Any, **named: Any) -> None:
+    @functools.wraps(init)
+    def checked(self: T, *values: Any, **named: Any) -> None:
         for name in named:
             if name not in known:
                 import difflib
 
-                near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
-                hint = f"did you mean {_either(near)}?" if near else f"it takes {', '.join(known)}."
-                raise ProblemError(f"{cls.__name__} has no argument {name!r}; {hint}")
-        if len(given) > len(known):
+                close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
+                hint = f"did you mean {_or(close)}?" if close else f"it takes {', '.join(known)}."
+                raise ProblemError(f"{owner} has no argument {name!r}; {hint}")
+        if (count := len(values)) > len(known):
             raise ProblemError(
-                f"{cls.__name__} has {len(known)} arguments, {', '.join(known)}, and {len(given)} "
-                f"were given."
+                f"{owner} has {len(known)} arguments, {', '.join(known)}, and {count} were given."
             )
-        if missing := [
-            name for name in needed if name in known[len(given) :] and name not in named
-        ]:
-            raise ProblemError(f"{cls.__name__} needs {' and '.join(missing)}.")
-        stated = {**dict(zip(known, given, strict=False)), **named}
-        if len(stated) < len(given) + len(named):
+        if missing := [x for x in required if x in known[count:] and x not in named]:
+            raise ProblemError(f"{owner} needs {' and '.join(missing)}.")
+        stated = {**dict(zip(known, values, strict=False)), **named}
+        if len(stated) < count + len(named):
             raise ProblemError(
-                f"{cls.__name__} was given {known[len(given) - 1]} twice, by its place and by "
-                f"its name."
+                f"{owner} was given {known[count - 1]} twice, by its place and by its name."
             )
-        scalars = _scalars(made)
+        scalars = {x: types for x, types in _types(init).items() if set(types) <= _SCALARS}
         try:
-            made(
-                self,
-                **{name: _plain(value, scalars.get(name, ())) for name, value in stated.items()},
-            )
+            init(self, **{x: _plain(value, scalars.get(x, ())) for x, value in stated.items()})
         except ProblemError:
             raise
         except Exception:
-            _check_kinds(scalars, stated)
+            _check_types(scalars, stated)
             raise
-        _check_kinds(scalars, stated)  # last, as its own checks know better what is wrong
+        _check_types(scalars, stated)  # last: the class knows better what is wrong
         order = {name: getattr(self, name) for name in getattr(cls, "by_name", ())}
-        if len(set(order.values())) > 1 and order.keys() & known[: len(given)]:
+        if len(set(order.values())) > 1 and order.keys() & known[:count]:
             read = ", ".join(f"{name}={value:g}" for name, value in order.items())
             warnings.warn(
-                f"coefficients by their place, which others write in another order, are read as "
-                f"{cls.__name__}({read}): name "
-                "them, as here.",
+                "coefficients by their place, which others write in another order, are read as "
+                f"{owner}({read}): name them, as here.",
                 OrderWarning,
                 stacklevel=2,
             )
@@ -101,100 +84,81 @@ def named_arguments(cls: type[T]) -> type[T]:
 
 
 def checked_arguments(function: Callable[P, T]) -> Callable[P, T]:
-    """The same function, which refuses arguments that are of no kind its annotations name, by a
-    `ProblemError`."""
+    """Make a function check its arguments against their annotations."""
 
     @functools.wraps(function)
-    def checked(*given: P.args, **named: P.kwargs) -> T:
+    def checked(*values: P.args, **named: P.kwargs) -> T:
         try:
-            stated = inspect.signature(function).bind(*given, **named).arguments
+            stated = inspect.signature(function).bind(*values, **named).arguments
         except TypeError as error:
             raise ProblemError(f"{function.__name__}: {error}.") from None
-        _check_kinds(_kinds(function), stated)
-        return function(*given, **named)
+        _check_types(_types(function), stated)
+        return function(*values, **named)
 
     return checked
 
 
 @functools.cache
-def _kinds(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
-    """What the annotations of a function allow; not those that only type checkers can resolve."""
-    found = {}
+def _types(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
+    """Allowed types by argument; without those that only type checkers can resolve."""
+    types = {}
     for name, each in inspect.signature(function).parameters.items():
         try:
-            found[name] = _alternatives(eval(each.annotation, function.__globals__))
+            types[name] = _alternatives(eval(each.annotation, function.__globals__))
         except (NameError, TypeError):
             continue
         if each.default is None:
-            found[name] = *found[name], NoneType
-    return found
-
-
-@functools.cache
-def _scalars(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
-    return {name: kinds for name, kinds in _kinds(function).items() if set(kinds) <= _SCALARS}
+            types[name] = *types[name], NoneType
+    return types
 
 
 def _alternatives(kind: Any) -> tuple[Any, ...]:
-    return (
-        get_args(kind)
-        if get_origin(kind) in (Union, UnionType)
-        else (NoneType if kind is None else kind,)
-    )
+    if get_origin(kind) in (Union, UnionType):
+        return get_args(kind)
+    return (NoneType if kind is None else kind,)
 
 
-def _check_kinds(kinds: Mapping[str, tuple[Any, ...]], stated: Mapping[str, Any]) -> None:
+def _check_types(types: Mapping[str, tuple[Any, ...]], stated: Mapping[str, Any]) -> None:
     for name, value in stated.items():
-        allowed = kinds.get(name, (Any,))
+        allowed = types.get(name, (Any,))
         if not any(_fits(value, kind) for kind in allowed):
-            words = _either(list(dict.fromkeys(map(_words, allowed))))
+            words = _or(list(dict.fromkeys(map(_words, allowed))))
             raise ProblemError(f"{name} must be {words}, not {shown(value)}.")
 
 
 def _fits(value: Any, kind: Any) -> bool:
-    if kind is float:  # whether infinite ones will do is for others to say
+    if kind is float:  # infinite ones are checked elsewhere
         return is_number(value) or (isinstance(value, (float, np.floating)) and not np.isnan(value))
     if kind is int:
         return is_whole(value, -(2**63), 2**63)
     if kind is bool:
         return isinstance(value, (bool, np.bool_))
     if kind is np.ndarray:
-        return _are_numbers(value)
+        try:
+            array = np.asarray(value)
+        except ValueError:  # rows of different lengths
+            return False
+        if array.ndim == 1 and array.size and array.dtype.kind in "iuf":
+            return bool(np.isfinite(array).all())
+        return (array.dtype.kind in "iuf" or not array.size) and array.ndim >= 1
     kind, (item, *_) = get_origin(kind) or kind, (*get_args(kind), Any)
     if kind is Callable:
         return callable(value)
     if kind in _SEQUENCES:
-        many = (
-            isinstance(value, Iterable)
-            and hasattr(value, "__len__")
-            and not isinstance(value, (str, bytes, Mapping))
-        )
-        return many and all(
-            any(_fits(part, each) for each in _alternatives(item)) for part in value
-        )
-    return (
-        kind is Any
-        or not isinstance(kind, type)
-        or (not isinstance(value, type) and isinstance(value, kind))
-    )
-
-
-def _are_numbers(value: Any) -> bool:
-    try:
-        array = np.asarray(value)
-    except ValueError:  # rows of different lengths
-        return False
-    numbers = array.dtype.kind in "iuf" or not array.size
-    # of tables others know more
-    return numbers and (bool(np.isfinite(array).all()) if array.ndim == 1 else array.ndim > 1)
+        if not isinstance(value, Iterable) or isinstance(value, (str, bytes, Mapping)):
+            return False
+        items = _alternatives(item)
+        return hasattr(value, "__len__") and all(any(_fits(x, t) for t in items) for x in value)
+    if kind is Any or not isinstance(kind, type):
+        return True
+    return not isinstance(value, type) and isinstance(value, kind)
 
 
 _SEQUENCES = tuple, list, Sequence, Iterable
 _SCALARS = {float, int, bool, str, NoneType}
 _WORDS = {
     float: "a number", int: "a whole number", bool: "True or False", str: "text", NoneType: "None",
-    np.ndarray: "numbers",
-    Callable: "a function",
+    np.ndarray: "numbers", Callable: "a function",
 }  # fmt: skip
 
 
@@ -205,39 +169,38 @@ def _words(kind: Any) -> str:
     return _WORDS.get(kind) or f"a {kind.__name__.removeprefix('PathLike') or 'path'}"
 
 
-def _plain(value: Any, kinds: tuple[Any, ...]) -> Any:
-    """A number as a field of its kind stores it; all else as it is."""
-    found = (each(value) for each in kinds if each in (float, int, bool) and _fits(value, each))
-    return next(found, value)
+def _plain(value: Any, types: tuple[Any, ...]) -> Any:
+    """Convert a number to the scalar type of its field; leave all else."""
+    scalars = (each(value) for each in types if each in (float, int, bool) and _fits(value, each))
+    return next(scalars, value)
 
 
 def shown(value: object) -> str:
-    """A value as a message shows it, in one short line."""
+    """Short text of a value for a message."""
     try:
         return reprlib.repr(value)
-    except Exception:  # of a `__repr__` of somebody's own
+    except Exception:  # of somebody's `__repr__`
         return f"<{type(value).__name__}>"
 
 
-def _either(names: list[str]) -> str:
+def _or(names: list[str]) -> str:
     return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether it is a finite real number, and no truth value; a whole one that NumPy takes."""
+    """Whether a value is a finite real number, not a bool, that NumPy can hold."""
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     return real and (abs(value) < 2**63 if isinstance(value, int) else math.isfinite(float(value)))  # type: ignore[arg-type]
 
 
 def is_whole(value: object, least: float = -math.inf, most: float = math.inf) -> TypeGuard[int]:
-    """Whether it is a whole number between two others, and no truth value."""
+    """Whether a value is a whole number in [least, most], not a bool."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     return whole and bool(least <= value <= most)  # type: ignore[operator]
 
 
 def check_finite(positive: bool = False, **numbers: object) -> None:
-    """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is
-    asked)."""
+    """Raise a `ProblemError` for the first number that is not finite (and positive)."""
     for name, value in numbers.items():
         if not is_number(value) or (positive and not value > 0):
             raise ProblemError(
@@ -246,8 +209,7 @@ def check_finite(positive: bool = False, **numbers: object) -> None:
 
 
 def check_count(most: float = math.inf, **numbers: object) -> None:
-    """A `ProblemError` for the first of some numbers that is not whole, at least 1 and at most
-    another."""
+    """Raise a `ProblemError` for the first value that is no whole number in [1, most]."""
     for name, value in numbers.items():
         if not is_whole(value, 1, most):
             ends = "of at least 1" if most == math.inf else f"from 1 to {most}"
@@ -255,5 +217,5 @@ def check_count(most: float = math.inf, **numbers: object) -> None:
 
 
 def check_positive(owner: object, *names: str, of: str = "") -> None:
-    """The same for numbers of an object that have to be positive; `of` heads their names."""
+    """`check_finite` for attributes that must be positive; `of` precedes their names."""
     check_finite(positive=True, **{of + name: getattr(owner, name) for name in names})

@@ -13,26 +13,24 @@ import numpy as np
 from colloc.system.errors import ProblemError
 
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "bars"}
-"""And what they are called; spaces count as one, however many there are."""
 _BLANK = frozenset(
     ("", "nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "?", "inf", "+inf", "-inf")
 )
-"""What loggers write where there is no number."""
 _COMMENT = re.compile(r"\s*(#|%|//)[\s#%/]*")
-_MANY = 500  # lines, from which delimiter and width are told
+_MANY = 500  # lines from which delimiter and width are determined
 _LARGEST = 1e150  # sums of squares of smaller numbers are finite
 
 
 class Table(NamedTuple):
-    """Numbers of a text file, with what stands about them."""
+    """Numbers of a text file and what surrounds them."""
 
-    names: list[str]  # of the columns; none if the file does not say
-    units: list[str]  # of a row below the names; as many empty ones if there is none
+    names: list[str]  # of the columns; empty if the file has none
+    units: list[str]  # from a row below the names, else empty texts
     values: np.ndarray  # (n_row, n_column); NaN where there is no number
-    cells: list[list[str]]  # the same as text
-    lines: list[int]  # of the rows in the file, from 1
-    preamble: str  # what stands before the names, and comments
-    notes: list[str]  # what a person should know of the format, in words
+    cells: list[list[str]]  # the rows as text
+    lines: list[int]  # line numbers of the rows, from 1
+    preamble: str  # what precedes the names, and comments
+    notes: list[str]  # remarks on the format for people
 
 
 class _Row(NamedTuple):
@@ -42,24 +40,21 @@ class _Row(NamedTuple):
 
 
 def read_table(path: Path) -> Table:
-    """Everything that a text file of numbers holds, whatever its encoding, delimiters, decimal
-    marks and preamble.
+    """Read a text file of numbers, whatever its encoding, delimiter, decimal mark and preamble.
 
-    Blank lines and comments (``#``, ``%``, ``//``) are left out, and a last line that was cut
-    short. `ProblemError` if the file cannot be read, or its rows are not of one width.
+    Blank lines, comments (``#``, ``%``, ``//``) and a truncated last line are left out.
+    `ProblemError` if the file cannot be read, or its rows have different widths.
     """
     lines = _text(path).splitlines()
     plain = [line for line in lines[: 4 * _MANY] if line.strip() and not _COMMENT.match(line)]
     delimiter = max(_DELIMITERS, key=lambda mark: _fit(plain[-_MANY:], mark))
-    split = (
-        (k, _split(_COMMENT.sub("", line, count=1), delimiter)) for k, line in enumerate(lines)
-    )
-    rows = [_Row(k + 1, cells, bool(_COMMENT.match(lines[k]))) for k, cells in split if cells]
+    rows = []
+    for k, line in enumerate(lines):
+        if cells := _split(_COMMENT.sub("", line, count=1), delimiter):
+            rows.append(_Row(k + 1, cells, bool(_COMMENT.match(line))))
     usual = [row.cells for row in rows[: 4 * _MANY] if not row.comment][-_MANY:]
     if usual and all(cells[-1] == "" for cells in usual):  # a delimiter at the end of every line
-        rows = [
-            row._replace(cells=row.cells[: -1 if row.cells[-1] == "" else None]) for row in rows
-        ]
+        rows = [row._replace(cells=row.cells[: -1 if not row.cells[-1] else None]) for row in rows]
         usual = [cells[:-1] for cells in usual]
     width = Counter(map(len, usual)).most_common(1)[0][0] if usual else 0
     first = _first_row(rows, width, [cells for cells in usual if len(cells) == width])
@@ -91,8 +86,7 @@ def read_table(path: Path) -> Table:
 
 
 def _first_row(rows: list[_Row], width: int, usual: list[list[str]]) -> int:
-    """The first row of numbers: it looks like those that most are like; a cell of it may be
-    spoilt."""
+    """Index of the first row with numbers in the columns where most rows have some."""
     count = [sum(_number(cells[j]) is not None for cells in usual) for j in range(width)]
     numeric = [j for j in range(width) if 2 * count[j] >= len(usual)]
 
@@ -111,11 +105,9 @@ def _first_row(rows: list[_Row], width: int, usual: list[list[str]]) -> int:
 
 
 def csv_table(path: Path, fewest: int) -> tuple[list[str], np.ndarray]:
-    """Names of the columns, in lower case, or none, and the numbers ``(n_row, n_column)`` of a file
-    (`read_table`).
+    """Read column names, in lower case, and numbers ``(n_row, n_column)``.
 
-    `ProblemError` if it cannot be read, a cell is no finite number, or there are fewer than
-    `fewest` rows of two columns or more.
+    `ProblemError` as `read_table`, for a cell that is no number, or too few rows.
     """
     table = read_table(path)
     check_size(path, table, fewest)
@@ -129,7 +121,6 @@ def csv_table(path: Path, fewest: int) -> tuple[list[str], np.ndarray]:
 
 
 def check_size(path: Path, table: Table, fewest: int) -> None:
-    """A `ProblemError` if a table has fewer than `fewest` rows of two columns or more."""
     rows, width = table.values.shape
     if rows < fewest:
         raise ProblemError(
@@ -145,10 +136,8 @@ def _text(path: Path) -> str:
     except OSError as error:
         raise ProblemError(f"cannot read {path}: {error.strerror or error}.") from None
     marks = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
-    named = next(
-        (encoding for mark, encoding in marks.items() if content.startswith(mark)), "utf-8"
-    )
-    for encoding in (named, "cp1252"):  # the degree sign of a spreadsheet on Windows
+    marked = (encoding for mark, encoding in marks.items() if content.startswith(mark))
+    for encoding in (next(marked, "utf-8"), "cp1252"):  # a spreadsheet's degree sign on Windows
         try:
             text = content.decode(encoding)
         except UnicodeDecodeError:
@@ -162,7 +151,7 @@ def _text(path: Path) -> str:
 
 
 def _split(line: str, delimiter: str) -> list[str]:
-    """Its cells; none of a blank line."""
+    """Cells of a line; none if it is blank."""
     if delimiter == " ":
         return line.split()
     try:
@@ -174,12 +163,9 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 
 def _fit(lines: list[str], delimiter: str) -> tuple[float, float]:
-    """Share of cells that are numbers, and how many are, in the line in the middle of all by
-    that."""
-    rows = [_split(line, delimiter) for line in lines]
-    counts = sorted(
-        (sum(_number(cell) is not None for cell in row) / len(row), len(row)) for row in rows if row
-    )
+    """Share of numbers among the cells, and cells, of the median line."""
+    rows = [row for line in lines if (row := _split(line, delimiter))]
+    counts = sorted((sum(_number(x) is not None for x in row) / len(row), len(row)) for row in rows)
     return counts[len(counts) // 2] if counts else (0.0, 0.0)
 
 
@@ -188,7 +174,7 @@ def is_blank(cell: str) -> bool:
 
 
 def _number(cell: str) -> float | None:
-    """What a cell says, with a decimal point or comma; None if it is no finite number."""
+    """Parse a number with a decimal point or comma; None if it is not finite."""
     try:
         number = float(cell)
     except ValueError:
@@ -203,20 +189,19 @@ def _number(cell: str) -> float | None:
 
 
 def _names(path: Path, rows: list[_Row], width: int) -> tuple[list[str], list[str]]:
-    """Names of the columns and their units, from the lines before the first row of numbers."""
+    """Column names and units from the lines before the first row of numbers."""
     plain = [row for row in rows if not row.comment]
     fitting = [row.cells for row in plain if len(row.cells) == width]
     if rows and not fitting and len(rows[-1].cells) == width > 1:
         fitting = [rows[-1].cells]  # the names are a comment, as NumPy and ROS write them
-    elif plain and (found := len(plain[-1].cells)) != width and (fitting or found > 1):
+    elif plain and (count := len(plain[-1].cells)) != width and (fitting or count > 1):
         raise ProblemError(
-            f"{path}, line {plain[-1].line}, has {found} cells, and the lines below have {width}: "
+            f"{path}, line {plain[-1].line}, has {count} cells, and the lines below have {width}: "
             f"write a name for each column and a number for each name, with decimal points, or "
             f"semicolons between, if numbers have decimal commas."
         )
     units = [""] * width
-    if len(fitting) > 1 and all(
-        not cell or re.fullmatch(r"[\[(]?[°µ\w/·%-]{0,12}[\])]?", cell) for cell in fitting[-1]
-    ):
+    unit = re.compile(r"[\[(]?[°µ\w/·%-]{0,12}[\])]?")
+    if len(fitting) > 1 and all(not cell or unit.fullmatch(cell) for cell in fitting[-1]):
         units = fitting.pop()
     return (fitting[-1] if fitting else []), units

@@ -1,7 +1,4 @@
-"""Workers of a Dask cluster as an executor that says so when nobody works any more.
-
-Dask itself waits without a word: for a scheduler to come back, and for workers to come.
-"""
+"""Workers of a Dask cluster as an executor that does not wait for ever for scheduler or workers."""
 
 from __future__ import annotations
 
@@ -15,22 +12,17 @@ from typing import Any
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import EngineGone, worker_environment
 
-PATIENCE = 60.0
-"""Seconds for which a scheduler may be without workers, or give no answer."""
-_CONNECT = 20.0
-_LOOK, _ANSWER = 1.0, 10.0
-_HOW = "dask worker ADDRESS --nthreads 1"
+_PATIENCE = 60.0  # seconds without workers, or without an answer
+_CONNECT, _LOOK, _ANSWER = 20.0, 1.0, 10.0  # seconds to connect, between looks, for an answer
 
 
 def connect(
-    address: str, workers: int, say: Callable[[str], None] = print, patience: float = PATIENCE
+    address: str, workers: int, say: Callable[[str], None] = print, patience: float = _PATIENCE
 ) -> tuple[Callable[[int], Executor], int]:
-    """A maker of executors for `colloc.system.task_pool.run_tasks`, and the number of workers, of
-    the cluster at an address (``tcp://host:8786``; "local": so many processes on this machine).
+    """Connect to the cluster at an address ("local": processes of this machine).
 
-    Seconds of `patience` are waited for a first worker, which `say` is told, and whenever there is
-    none later. `ProblemError` if Dask is not installed, there is no scheduler, or no worker in
-    time.
+    Returns a maker of executors for `colloc.system.task_pool.run_tasks`, and the number of workers.
+    `ProblemError` if Dask is not installed, there is no scheduler, or no worker within `patience`.
     """
     try:
         from distributed import Client
@@ -38,16 +30,14 @@ def connect(
         raise ProblemError(
             "--dask needs the package distributed: pip install 'colloc[dask]'."
         ) from None
-    # for the study alone: what else the process does with Dask, xarray for one, is not sent there
     how: dict[str, Any] = {"address": address, "timeout": _CONNECT}
-    if address == "local":  # any port that is free, for this machine alone
+    if address == "local":  # any free port, for this machine alone
         how = {"n_workers": workers, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
     try:
         with worker_environment():
-            client = Client(**how, set_as_default=False)
+            client = Client(**how, set_as_default=False)  # xarray must not use it
     except (OSError, TimeoutError, ValueError) as error:
         raise ProblemError(f"no Dask scheduler at {address}: {error}") from None
-    # what it has to say is said in a sentence
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL + 1)
     if not client.nthreads():
         say(
@@ -58,10 +48,11 @@ def connect(
         client.wait_for_workers(1, timeout=patience)
     except TimeoutError:
         client.close()
-        raise ProblemError(f"{_without_workers(address, patience)}, for example: {_HOW}.") from None
-    return lambda _: _DaskExecutor(client, address, patience), max(
-        1, sum(client.nthreads().values())
-    )
+        raise ProblemError(
+            f"{_without_workers(address, patience)}, for example: dask worker ADDRESS --nthreads 1."
+        ) from None
+    count = max(1, sum(client.nthreads().values()))
+    return lambda _: _DaskExecutor(client, address, patience), count
 
 
 def _without_workers(address: str, patience: float) -> str:
@@ -69,9 +60,6 @@ def _without_workers(address: str, patience: float) -> str:
 
 
 class _DaskExecutor(Executor):
-    """The executor of a Dask client, whose `check` raises `EngineGone` when its scheduler dies or
-    has no workers."""
-
     def __init__(self, client: Any, address: str, patience: float) -> None:
         self._client, self._address, self._patience = client, address, patience
         self._pool = client.get_executor(pure=False)
@@ -85,7 +73,7 @@ class _DaskExecutor(Executor):
             raise
 
     def check(self) -> None:
-        """Look, at most every second, whether somebody works."""
+        """Raise `EngineGone` if the scheduler died, is silent, or has no workers."""
         if self._client.status != "running":
             raise EngineGone(
                 f"the Dask scheduler at {self._address} is gone; what is done is kept. Start it "
@@ -94,7 +82,11 @@ class _DaskExecutor(Executor):
         pause = time.monotonic() - self._looked
         if pause < _LOOK:
             return
-        workers = self._workers()
+        ask, timeout = self._client.scheduler.ncores, min(_ANSWER, self._patience)
+        try:
+            workers = len(self._client.sync(ask, callback_timeout=timeout))
+        except Exception:  # stopped, cut off, or about to die
+            workers = None
         now = self._looked = time.monotonic()
         if workers is not None or pause > _ANSWER:  # or nobody was waiting until now
             self._heard = now
@@ -111,14 +103,6 @@ class _DaskExecutor(Executor):
                 f"{_without_workers(self._address, self._patience)}. What is done is kept."
             )
 
-    def _workers(self) -> int | None:
-        """Number of workers; None if the scheduler does not say so in time."""
-        ask, timeout = self._client.scheduler.ncores, min(_ANSWER, self._patience)
-        try:
-            return len(self._client.sync(ask, callback_timeout=timeout))
-        except Exception:  # stopped, cut off, or about to die
-            return None
-
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        with suppress(Exception):  # of a client that is closed already
+        with suppress(Exception):  # the client may be closed
             self._pool.shutdown(wait=wait)

@@ -1,4 +1,4 @@
-"""Errors that are meant to be read by the person who stated the problem."""
+"""Errors and warnings written for the person who stated the problem."""
 
 
 class CollocError(Exception):
@@ -15,8 +15,7 @@ class CollocError(Exception):
     """
 
     def __str__(self) -> str:
-        """The sentence, with what would drive a terminal made visible: it may quote files of
-        others."""
+        # control characters made visible: the text may quote files of others
         return "".join(
             c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in super().__str__()
         )
@@ -59,14 +58,12 @@ class StoreError(CollocError, OSError):
 
 
 class ReadOnlyRunWarning(UserWarning):
-    """A file that saves work, such as what a solve has found so far, cannot be read or written; the
-    work goes on without it."""
+    """A file that saves work cannot be read or written; the work goes on without it."""
 
 
 class OrderWarning(UserWarning):
-    """Coefficients that differ were given by their place, and texts and programs do not agree on
-    their order."""
+    """Coefficients that differ were given by position, in an order on which texts disagree."""
 
 
 class SlowWarning(UserWarning):
-    """Everything is computed, but more slowly than it could be."""
+    """Something is computed more slowly than it could be."""

@@ -1,178 +1,141 @@
-"""Ctrl-C, which compiled code would swallow or turn into another error: it is remembered, and stays
-an interruption.
+"""Ctrl-C and time limits.
 
-CasADi reports a KeyboardInterrupt inside a callback on standard error, in nine lines, and lets
-IPOPT end as if a function had failed. So a solve is not interrupted by an exception: it asks
-between iterations whether to stop (`interrupted`).
+CasADi would swallow a KeyboardInterrupt raised in a callback, so compiled solves poll `interrupted`
+between iterations. Nothing slow is imported here.
 """
 
 from __future__ import annotations
 
 import _thread
-import contextlib
-import ctypes
+import os
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from colloc.system.early_interruption import end_at_once
-
-
-@dataclass
-class _Heard:
-    """Whether Ctrl-C came since the outermost block began, and whether the code that runs asks for
-    it by itself."""
-
-    asked: bool = False
-    polled: bool = False
-
-
-_heard = _Heard()  # of the process, as signals are; only the main thread writes to it
+INTERRUPTED = 130
+_NOTHING = "interrupted; nothing was written."
+_MOMENT = 0.01  # seconds after which Ctrl-C that Python could not raise comes again
 _DEADLINE: ContextVar[float] = ContextVar("deadline", default=float("inf"))
+_requested = False  # Ctrl-C came since the outermost `interruptible` began
+_polled = False  # the innermost `interruptible` polls
+
+
+def end_at_once(number: int, frame: FrameType | None) -> None:
+    """Handle Ctrl-C in a process that has nothing to lose: one line, and an exit code."""
+    if "--json" in sys.argv:
+        said = f'{{"status": "interrupted", "message": "{_NOTHING}", "exit_code": {INTERRUPTED}}}\n'
+        os.write(1, said.encode())
+    os.write(2, f"colloc: {_NOTHING}\n".encode())
+    os._exit(INTERRUPTED)
 
 
 def interrupted() -> bool:
-    """Whether Ctrl-C came, or a `time_limit` is over, for code within `interruptible` that can stop
-    by itself."""
-    return (_heard.asked and _in_main_thread()) or _time_is_over()
+    """Whether code within `interruptible` should stop: Ctrl-C came, or a `time_limit` is over."""
+    return (_requested and _in_main_thread()) or time.monotonic() > _DEADLINE.get()
 
 
-def _time_is_over() -> bool:
-    return time.monotonic() > _DEADLINE.get()
-
-
-def heeded() -> None:
-    """Say that what an interrupt asked for was done: the process goes on."""
+def clear_interrupt() -> None:
+    """Go on after an interrupt that has been dealt with."""
+    global _requested
     if _in_main_thread():
-        _heard.asked = False
+        _requested = False
 
 
 def _in_main_thread() -> bool:
     return threading.current_thread() is threading.main_thread()
 
 
-@contextlib.contextmanager
+@contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """A block that ends in KeyboardInterrupt, as by Ctrl-C, when so many seconds are over.
-
-    It does so wherever the block is, in the main thread if `interruptible` is around it; compiled
-    code that calls Python has to ask `interrupted`.
-    """
+    """Interrupt the block after so many seconds: as by Ctrl-C in the main thread within
+    `interruptible`; in other threads where the block polls `interrupted`."""
     if seconds == float("inf"):
         yield
         return
     token = _DEADLINE.set(time.monotonic() + seconds)
-    # signals reach the main thread alone
-    here = None if _in_main_thread() else threading.get_ident()
-    timer = threading.Timer(
-        seconds, _again if here is None else lambda: _raise_in(here, KeyboardInterrupt)
-    )
+    timer = threading.Timer(seconds, _press_again)
     timer.daemon = True
     try:
         try:
-            timer.start()  # where it is over at once, this is where it comes
+            if _in_main_thread():  # which alone receives signals
+                timer.start()
             yield
         finally:
-            try:
-                timer.cancel()
-                if timer.is_alive():
-                    timer.join()
-            except KeyboardInterrupt:
-                # Sent to a thread whose block had just ended. It has to come: CPython 3.11 looks
-                # for a withdrawn one for ever, and a profiler or debugger that is switched on later
-                # stands still at the first function.
-                if here is None:
-                    raise
+            timer.cancel()
+            if timer.is_alive():
+                timer.join()  # what it sends arrives here
     finally:
         _DEADLINE.reset(token)
 
 
-def _raise_in(thread: int, error: type[BaseException]) -> None:
-    """Let an exception come in a thread as soon as it runs Python."""
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(error))
-
-
-def _hear(number: int, frame: FrameType | None) -> None:
-    again, _heard.asked = _heard.asked, True
-    if again or not _heard.polled:
+def _handle(number: int, frame: FrameType | None) -> None:
+    global _requested
+    again, _requested = _requested, True
+    if again or not _polled:
         raise KeyboardInterrupt
 
 
-_MOMENT = 0.01
-
-
-def _again() -> None:
-    if signal.getsignal(signal.SIGINT) is not _hear:
-        return  # what was to be interrupted has ended
+def _press_again() -> None:
+    if signal.getsignal(signal.SIGINT) is not _handle:
+        return  # the block has ended
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
-    else:  # a main thread that sleeps hears this when it wakes up
+    else:
         _thread.interrupt_main()
 
 
-def _hushed(before: Callable[[Any], object]) -> Callable[[Any], object]:
-    """What to do with exceptions that Python cannot raise, as in a weak reference's callback, where
-    Ctrl-C may fall too.
-
-    Python would print it and go on; so it comes again a moment later, without a word.
-    """
+def _unraisable(before: Callable[[Any], object]) -> Callable[[Any], object]:
+    """Have Ctrl-C in a weak reference's callback, where Python cannot raise it, come again."""
 
     def hook(unraisable: Any) -> None:
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):
             before(unraisable)
             return
-        timer = threading.Timer(_MOMENT, _again)
+        timer = threading.Timer(_MOMENT, _press_again)
         timer.daemon = True
         timer.start()
 
     return hook
 
 
-@contextlib.contextmanager
+@contextmanager
 def interruptible(*, polled: bool = True) -> Iterator[None]:
-    """A block that ends in KeyboardInterrupt if Ctrl-C came inside it and became an error there, or
-    nothing at all.
+    """End the block in KeyboardInterrupt if Ctrl-C came inside, also where it became another error.
 
-    Only the main thread receives signals, and a handler that somebody else has installed is left
-    alone.
-
-    Parameters
-    ----------
-    polled : bool
-        The block asks `interrupted` now and then: the first Ctrl-C raises nothing before its end, a
-        second one does at once. False, for a whole command: every Ctrl-C raises at once, and the
-        command may end well after it.
+    With `polled` the block asks `interrupted` now and then: a first Ctrl-C raises at its end, a
+    second one at once. Otherwise every Ctrl-C raises at once. Handlers of others are left alone.
     """
+    global _requested, _polled
     handler = signal.getsignal(signal.SIGINT) if _in_main_thread() else None
-    if handler not in (signal.default_int_handler, end_at_once, _hear):
+    if handler not in (signal.default_int_handler, end_at_once, _handle):
         yield
-        if polled and _time_is_over():
+        if polled and time.monotonic() > _DEADLINE.get():
             raise KeyboardInterrupt
         return
-    outermost = handler is not _hear
+    outermost, hook = handler is not _handle, sys.unraisablehook
     if outermost:
-        _heard.asked = False
-        unraisable, sys.unraisablehook = sys.unraisablehook, _hushed(sys.unraisablehook)
-        signal.signal(signal.SIGINT, _hear)
-    elif _heard.asked:  # swallowed before the block began
+        _requested = False
+        sys.unraisablehook = _unraisable(hook)
+        signal.signal(signal.SIGINT, _handle)
+    elif _requested:  # swallowed before the block began
         raise KeyboardInterrupt
-    outer, _heard.polled = _heard.polled, polled
+    outer, _polled = _polled, polled
     try:
         yield
     except Exception:
-        if _heard.asked:  # what became of the interruption
+        if _requested:
             raise KeyboardInterrupt from None
         raise
     finally:
-        _heard.polled = outer
+        _polled = outer
         if outermost:
             signal.signal(signal.SIGINT, handler)
-            sys.unraisablehook = unraisable
-    if _heard.asked and polled:
+            sys.unraisablehook = hook
+    if _requested and polled:
         raise KeyboardInterrupt

@@ -1,10 +1,7 @@
-"""Values as plain numbers, strings, lists and dictionaries, and back, exact to the last bit: for
-files of rows.
+"""Values as JSON and back, exact to the last bit.
 
-Arrays become the base64 text of their bytes. A dataclass or named tuple becomes its fields and the
-name of its kind; kinds are listed by whoever reads, and nothing else is made from a file. Reading
-does not run what a kind does when it is made, such as scaling vectors to length 1, which would
-change the last bit.
+Arrays become base64 text; dataclasses and named tuples their fields and the name of their class, of
+which only listed ones are made again, without calling ``__init__``, which could change a last bit.
 """
 
 from __future__ import annotations
@@ -20,24 +17,15 @@ KIND, ARRAY = "kind", "array"
 
 
 class Own(NamedTuple):
-    """How a kind is written and read where its fields are not what should be kept."""
+    """Encoder and decoder of a class whose fields are not what should be stored."""
 
     written: Callable[[Any], Any]
     read: Callable[[Any], Any]
 
 
 class Codec:
-    """Writes and reads values of some kinds.
+    """Encoder and decoder of values of listed classes; those of `own` have their own encoding.
 
-    Parameters
-    ----------
-    kinds : iterable of type
-        Dataclasses and named tuples.
-    own : mapping of type to Own, optional
-        Kinds that are written otherwise.
-
-    Examples
-    --------
     >>> from colloc.system.plain_values import Codec
     >>> from colloc.mechanics.friction import Friction
     >>> codec = Codec([Friction])
@@ -50,16 +38,15 @@ class Codec:
         self._own = {kind.__name__: how for kind, how in (own or {}).items()}
 
     def written(self, value: Any) -> Any:
-        """The value as JSON can hold it. `TypeError` for a kind that is not listed."""
+        """Encode a value as plain JSON. `TypeError` for a class that is not listed."""
         name = type(value).__name__
         if name in self._own:
             return {KIND: name, "of": self._own[name].written(value)}
         if name in self._kinds:
-            named = (
-                dict(zip(value._fields, value, strict=True))  # type: ignore[attr-defined]
-                if isinstance(value, tuple)
-                else _fields(value)
-            )
+            if isinstance(value, tuple):
+                named = value._asdict()  # type: ignore[attr-defined]
+            else:
+                named = {x.name: getattr(value, x.name) for x in dataclasses.fields(value)}
             return {KIND: name, "of": {key: self.written(part) for key, part in named.items()}}
         if isinstance(value, np.ndarray):
             data = np.ascontiguousarray(value)
@@ -75,16 +62,14 @@ class Codec:
         if isinstance(value, list):
             return [self.written(part) for part in value]
         if isinstance(value, dict):
-            return {
-                KIND: "dict",
-                "of": [[self.written(k), self.written(v)] for k, v in value.items()],
-            }
+            items = [[self.written(k), self.written(v)] for k, v in value.items()]
+            return {KIND: "dict", "of": items}
         if value is None or isinstance(value, (bool, int, float, str)):
             return value
         raise TypeError(f"cannot write a {name}.")
 
     def read(self, plain: Any) -> Any:
-        """The value that `written` wrote. `KeyError`, `TypeError` or `ValueError` if it did not."""
+        """Decode. `KeyError`, `TypeError` or `ValueError` if `written` did not write it."""
         if isinstance(plain, list):
             return [self.read(part) for part in plain]
         if not isinstance(plain, dict):
@@ -106,7 +91,3 @@ class Codec:
         for key, value in values.items():
             object.__setattr__(made, key, value)
         return made
-
-
-def _fields(value: Any) -> dict[str, Any]:
-    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}

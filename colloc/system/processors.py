@@ -1,15 +1,13 @@
-"""How many processors there are for this process, and how many of them a batch of work may use."""
+"""Numbers of processes and threads to use."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 
-_SAID = "OMP_NUM_THREADS"
-
 
 def available_processes() -> int:
-    """Processes this process may use."""
+    """Processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on Linux
@@ -17,19 +15,17 @@ def available_processes() -> int:
 
 
 def available_threads() -> int:
-    """Threads for a batch: ``$OMP_NUM_THREADS`` as for BLAS, else all processors; one in a process
-    that shares them."""
+    """Threads for a batch: ``$OMP_NUM_THREADS``, else all processors; one in a child process."""
     if multiprocessing.parent_process() is not None:
         return 1
-    said = os.environ.get(_SAID, "")
-    return max(1, int(said)) if said.isdigit() else available_processes()
+    stated = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, int(stated)) if stated.isdigit() else available_processes()
 
 
 def one_thread_each() -> None:
-    """Have linear algebra use one thread, unless the environment says otherwise; before NumPy is
-    loaded.
+    """Have BLAS use one thread unless the environment says otherwise; before NumPy is imported.
 
-    The matrices of a search are small. On two busy cores two threads that wait for each other made
-    SQP with 360 parameters take thirty times the processor time.
+    On two busy cores, two threads that wait for each other made SQP with 360 parameters take thirty
+    times the processor time.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -1,5 +1,4 @@
-"""Progress in a terminal: one line that is rewritten, with the time left; nothing where nobody
-watches."""
+"""Progress in a terminal: one line that is rewritten; nothing where nobody watches."""
 
 from __future__ import annotations
 
@@ -23,12 +22,10 @@ def duration(seconds: float) -> str:
 
 
 class StatusLine:
-    """A line at the bottom of the terminal: what is being done, for how long, and how long it will
-    take where that is known.
+    """Line at the bottom of a terminal with what is being done, elapsed and remaining time.
 
-    Rich redraws it twice a second, since a solve reports nothing for long, and it vanishes at the
-    end. Where the stream (by default standard error) is not a terminal, or the line is not enabled,
-    nothing is written, and Rich is not loaded.
+    Rich redraws it twice a second. If the stream (standard error) is no terminal, or the line is
+    not enabled, nothing is written and Rich is not imported.
     """
 
     def __init__(self, stream: TextIO | None = None, *, enabled: bool = True) -> None:
@@ -45,7 +42,7 @@ class StatusLine:
         self.clear()
 
     def say(self, text: str, left: float = 0.0) -> None:
-        """Show a text from now on; `left` are the seconds it will probably take, 0 if unknown."""
+        """Show a text from now on; `left` is the estimated remaining time [s], 0 if unknown."""
         self._text, self._since = text, time.monotonic()
         self._left = left if math.isfinite(left) else 0.0
         if not self._shown:
@@ -59,15 +56,14 @@ class StatusLine:
                 console=Console(file=self._stream, highlight=False, markup=False),
                 refresh_per_second=2,
                 transient=True,
-                # it may go elsewhere; what is for this terminal is printed after `clear`
                 redirect_stdout=False,
-                redirect_stderr=True,  # warnings stand above the line
+                redirect_stderr=True,  # warnings appear above the line
             )
             self._live.start()
         self._live.refresh()
 
     def clear(self) -> None:
-        """Wipe the line, so that something else can be printed there; `say` shows it again."""
+        """Wipe the line, so that something else can be printed; `say` shows it again."""
         if self._live is not None:
             self._live.stop()
             self._live = None
@@ -76,5 +72,4 @@ class StatusLine:
         now = time.monotonic()
         line = f"{self._text}   {duration(now - self._begin)}"
         left = self._left - (now - self._since)
-        # one that has run out is worth nothing
         return f"{line}, about {duration(left)} left" if left > 0.5 else line

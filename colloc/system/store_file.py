@@ -1,9 +1,6 @@
-"""HDF5 files of results: written whole, for plain h5py, netCDF and xarray to read. Nothing in a
-file is executed.
+"""HDF5 files of results, for plain h5py, netCDF and xarray. Nothing in a file is executed.
 
-Datasets carry ``units`` and ``dims``; texts are UTF-8 of fixed length, padded with NUL, so that
-**trailing NULs are not kept**. What UTF-8 cannot hold (undecodable bytes of a command line) becomes
-"?".
+Datasets have ``units`` and ``dims``; texts are UTF-8 of fixed length, without trailing NULs.
 """
 
 from __future__ import annotations
@@ -11,26 +8,29 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.replaced_file import replaced_file
+from colloc.system.files import replaced_file
+from colloc.system.lazy import optional
+
+if TYPE_CHECKING:
+    import xarray
 
 BETWEEN_DIMS = ", "
-_NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 
 
 @contextlib.contextmanager
 def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """An HDF5 file to write, which takes its place if the block ends well. `StoreError` if it
-    cannot be written."""
+    """An HDF5 file to write, which replaces `path` if the block succeeds. `StoreError` if not."""
     with replaced_file(Path(path)) as temporary:
-        # in memory: where the disk is full, HDF5 closing a file on it can end the process
+        # in memory: on a full disk HDF5 can end the process
         image = io.BytesIO()
         with h5py.File(image, "w", libver="v108") as file:
             yield file
@@ -41,27 +41,22 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 def open_file(path: str | os.PathLike[str], kind: str, version: int) -> Iterator[h5py.File]:
     """An HDF5 file of a kind ("colloc solution") and version to read.
 
-    Raises
-    ------
-    StoreError
-        If it is missing, damaged, of another kind or version, or if reading in the block fails.
+    `StoreError` if it is missing, damaged or another one, or reading in the block fails.
     """
     path = Path(path)
     if not path.is_file():
         raise StoreError(f"there is no file {path}.")
     try:
-        # files of colloc are replaced whole, and need no lock, which some file systems do not have
+        # files are replaced as a whole, and need no lock, which some file systems do not have
         with h5py.File(path, "r", locking=False) as file:
-            if (found := attribute(file, "format")) != kind:
-                raise StoreError(f"it is a {found}.")
-            if (found := attribute(file, "format_version")) != version:
-                remedy = (
-                    "Update colloc to read it"
-                    if found > version
-                    else "Make it again with the command that wrote it"
-                )
+            if (stated := attribute(file, "format")) != kind:
+                raise StoreError(f"it is a {stated}.")
+            if (stated := attribute(file, "format_version")) != version:
+                remedy = "Make it again with the command that wrote it"
+                if stated > version:
+                    remedy = "Update colloc to read it"
                 raise StoreError(
-                    f"its format is {found}, where this colloc reads {version}. {remedy}."
+                    f"its format is {stated}, where this colloc reads {version}. {remedy}."
                 )
             yield file
     except Exception as error:  # h5py raises many kinds for a damaged file
@@ -70,20 +65,19 @@ def open_file(path: str | os.PathLike[str], kind: str, version: int) -> Iterator
 
 
 def mark(file: h5py.File, kind: str, version: int) -> None:
-    """Say what a new file is."""
     put_attribute(file, "format", kind)
     put_attribute(file, "format_version", version)
 
 
 def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Dataset:
-    """A new dataset of numbers or texts, with texts such as its units as attributes.
+    """Write a dataset of numbers or texts, with texts such as its units as attributes.
 
-    ``dims="joint, time"`` names its dimensions also in the way of netCDF: the dataset named like
-    its one dimension is the coordinate, and a dimension without one has a dataset with no data.
+    ``dims="joint, time"`` also names its dimensions as netCDF does: the dataset named like its one
+    dimension is the coordinate; a dimension without one has a dataset with no data.
     """
-    dataset = group.create_dataset(name, data=_stored(value))
+    dataset = group.create_dataset(name, data=_encode(value))
     if dataset.dtype.kind == "S":
-        put_attribute(dataset, "_Encoding", "utf-8")  # for xarray, which gives bytes without it
+        put_attribute(dataset, "_Encoding", "utf-8")  # xarray would give bytes
     for key, text in described.items():
         put_attribute(dataset, key, text)
     dims = described["dims"].split(BETWEEN_DIMS) if described.get("dims") else []
@@ -93,53 +87,107 @@ def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Data
     for axis, (dim, size) in enumerate(zip(dims, dataset.shape, strict=bool(dims))):
         if dim not in group:
             group.create_dataset(dim, shape=(size,), dtype=">f4").make_scale(
-                f"{_NO_VARIABLE}{size:10d}"
+                f"This is a netCDF dimension but not a netCDF variable.{size:10d}"
             )
         dataset.dims[axis].attach_scale(group[dim])
     return dataset
 
 
 def put_attribute(owner: h5py.Group | h5py.Dataset, name: str, value: Any) -> None:
-    """An attribute: a number, a text, or an array of them."""
-    owner.attrs[name] = _stored(value)
+    owner.attrs[name] = _encode(value)
 
 
-def _stored(value: Any) -> np.ndarray:
+def _encode(value: Any) -> np.ndarray:
     value = np.asarray(value)
     if value.dtype.kind not in "UO":
         return value
     encoded = [str.encode(each, "utf-8", "replace") for each in value.flat]
-    # HDF5 knows no length 0, and h5netcdf takes length 1 for a single byte, no text
+    # HDF5 has no length 0, and h5netcdf takes length 1 for a byte
     length = max(2, max(map(len, encoded), default=0))
     return np.array(encoded, dtype=h5py.string_dtype("utf-8", length)).reshape(value.shape)
 
 
-def _decoded(value: Any) -> Any:
-    """Texts of stored ones; numbers as they are."""
+def _decode(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return np.char.decode(value, "utf-8") if value.dtype.kind == "S" else value
     return value.decode("utf-8") if isinstance(value, bytes) else value
 
 
 def attribute(owner: h5py.Group | h5py.Dataset, name: str) -> Any:
-    """An attribute: a number or text of Python, or an array of them. `StoreError` if it is
-    missing."""
+    """A number, a text or an array. `StoreError` if it is missing."""
     if name not in owner.attrs:
         raise StoreError(f"attribute {name} of {owner.name} is missing.")
-    value = _decoded(owner.attrs[name])
+    value = _decode(owner.attrs[name])
     return value.item() if isinstance(value, np.generic) else value
 
 
 def array(group: h5py.Group, name: str) -> Any:
-    """The data of a dataset: numbers as a NumPy array, texts decoded. `StoreError` if there is
-    none."""
+    """A dataset as a NumPy array or text. `StoreError` if it is missing."""
     if not isinstance(group.get(name), h5py.Dataset):
         raise StoreError(f"{group.name.rstrip('/')}/{name} is missing, or not a dataset.")
-    return _decoded(group[name][()])
+    return _decode(group[name][()])
 
 
 def child(group: h5py.Group, name: str) -> h5py.Group:
-    """A group of a group. `StoreError` if there is none."""
+    """A subgroup. `StoreError` if it is missing."""
     if not isinstance(group.get(name), h5py.Group):
         raise StoreError(f"{name} is missing, or not a group.")
     return group[name]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Labelled columns over named dimensions, with the units and labels that are known."""
+
+    name: str
+    coordinates: Mapping[str, np.ndarray]
+    variables: Mapping[str, np.ndarray]
+    dimensions: Mapping[str, tuple[str, ...]]
+    units: Mapping[str, str] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the columns as an xarray Dataset."""
+        columns = {
+            name: (self.dimensions[name], values, {"units": self.units.get(name, "1")})
+            for name, values in self.variables.items()
+        }
+        return optional("xarray").Dataset(columns, dict(self.coordinates), {"name": self.name})
+
+
+def save_table(table: Table, path: str | os.PathLike[str], kind: str, version: int) -> Path:
+    """Write a table as HDF5. `StoreError` if it cannot be written."""
+    dimensions = {name: (name,) for name in table.coordinates} | dict(table.dimensions)
+    with new_file(path) as file:
+        mark(file, kind, version)
+        for name, value in {"name": table.name, **table.attributes}.items():
+            put_attribute(file, name, value)
+        for name, values in {**table.coordinates, **table.variables}.items():
+            described = {}
+            if dimensions[name]:
+                described["dims"] = BETWEEN_DIMS.join(dimensions[name])
+                described["units"] = table.units.get(name, "1")
+            if name in table.labels:
+                described["long_name"] = table.labels[name]
+            stored = values.astype("i1") if values.dtype.kind == "b" else values
+            dataset = put(file, name, stored, **described)
+            if dataset.dtype.kind == "f" and name in table.variables:
+                put_attribute(dataset, "_FillValue", [np.nan])
+    return Path(path)
+
+
+def load_table(path: str | os.PathLike[str], kind: str, version: int) -> Table:
+    """Read what `save_table` wrote. `StoreError` if it is missing, damaged, or of another kind."""
+    with open_file(path, kind, version) as file:
+        columns = {name: array(file, name) for name in file}
+        dims = {name: tuple(attribute(file[name], "dims").split(BETWEEN_DIMS)) for name in file}
+        attributes = {name: attribute(file, name) for name in file.attrs}
+    coordinates = {name: values for name, values in columns.items() if dims[name] == (name,)}
+    for name, values in columns.items():
+        sizes = (coordinates[d].size if d in coordinates else None for d in dims[name])
+        if np.shape(values) != tuple(sizes):
+            raise StoreError(f"{path} is damaged: {name} does not fit its coordinates.")
+    variables = {name: values for name, values in columns.items() if name not in coordinates}
+    dims = {name: dims[name] for name in variables}
+    return Table(attributes["name"], coordinates, variables, dims, attributes=attributes)

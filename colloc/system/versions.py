@@ -8,8 +8,8 @@ from functools import cache
 
 @cache
 def version_of(library: str) -> str:
-    """Version of an installed library, or that it is a source tree which nobody installed."""
-    from importlib import metadata  # takes longer than all of the face
+    """Version of an installed library, or "source tree"."""
+    from importlib import metadata  # slow to import
 
     try:
         return metadata.version(library)
@@ -18,6 +18,6 @@ def version_of(library: str) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions of everything a result depends on."""
+    """Versions by name, Python's among them."""
     names = ("colloc", "casadi", "numpy", "scipy", "h5py")
     return {"python": platform.python_version(), **{name: version_of(name) for name in names}}

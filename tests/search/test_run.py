@@ -27,7 +27,7 @@ from colloc.search.refine import refine
 from colloc.search.run import ROWS, STAGES, Run
 from colloc.search.solve import solve
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
-from colloc.system.result_names import run_file
+from colloc.system.files import run_file
 from colloc.system.row_file import put_rows, read_rows
 
 AT = {"delta": 1e-2, "delta_start": 0.1, "intervals": 12, "mesh_tolerance": 1e-3}

@@ -47,7 +47,7 @@ def table(folder):
         "sample", (Axis("x", (1.0, 1.5)), Axis("kind", ("a", "b"))), lambda x, kind: problem(x)
     )
     run = StudyRun(study, folder)
-    for k, state in enumerate(run.cells.values()):
+    for k, state in enumerate(run.cells[cell] for cell in study.cells()):
         state.attempts.append(Attempt("warm", "key", outcome(k)))
     return study_table(run)
 

@@ -603,7 +603,7 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     out = tmp_path / "out put"
     assert sweep_study([str(path), "--output", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert "2 cells, 0 done already or without a problem, 2 to go" in printed
+    assert "2 cells, 0 of them in the journal" in printed
     assert "2 of 2, 0 s left" in printed
     table = load_study(out / "tiny.nc").variables
     # the isotropic optimum of problems/three_link.py at a delta a hundred times larger

@@ -20,7 +20,7 @@ from colloc.commands.solve import open_archive as show_archive
 from colloc.results.archive import StartName, archive_at, open_archive
 from colloc.studies.journal import append_visits, read_journal
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.replaced_file import alone_in, locked, replaced_file
+from colloc.system.files import alone_in, locked, replaced_file
 from colloc.system.row_file import CACHE, put_rows, read_rows
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits and processes")
@@ -288,7 +288,7 @@ def test_ctrl_c_at_any_moment_leaves_no_temporary_file(moment, tmp_path, monkeyp
         raise KeyboardInterrupt
 
     (tmp_path / "x").write_text("old")
-    monkeypatch.setattr(f"colloc.system.replaced_file.os.{moment}", pressed)
+    monkeypatch.setattr(f"colloc.system.files.os.{moment}", pressed)
     with pytest.raises(KeyboardInterrupt), replaced_file(tmp_path / "x") as name:
         Path(name).write_text("new")
     monkeypatch.undo()

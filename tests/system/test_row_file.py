@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from benchmarks.tables import cached
-from colloc.system import row_file
 from colloc.system.errors import StoreError
 from colloc.system.row_file import CACHE, put_rows, read_rows
 
@@ -95,21 +94,6 @@ def test_a_reader_finishes_what_a_killed_writer_began(tmp_path):
             (tmp_path / "x.sqlite-journal").read_bytes()
         )
     assert read_rows(left, KIND) == {"a": "x" * 10_000}
-
-
-def test_without_locks_of_the_file_system_files_beside_keep_writers_apart(tmp_path, monkeypatch):
-    path = tmp_path / "x.sqlite"
-    monkeypatch.setattr(row_file, "_has_locks", lambda folder: False)
-    monkeypatch.setattr(row_file, "_PATIENCE", 0.1)
-    put_rows(path, KIND, {"a": 1})
-    with closing(
-        sqlite3.connect(f"{path.as_uri()}?vfs=unix-dotfile", uri=True, isolation_level=None)
-    ) as other:
-        other.execute("BEGIN IMMEDIATE")
-        with pytest.raises(StoreError, match="database is locked"):
-            put_rows(path, KIND, {"b": 2})
-    put_rows(path, KIND, {"b": 2})
-    assert read_rows(path, KIND) == {"a": 1, "b": 2}
 
 
 def test_a_value_is_computed_once(tmp_path):
