@@ -1,7 +1,6 @@
-"""``python -m colloc.solve problems/three_link.py``: the same as ``colloc solve``.
+"""``python -m colloc.solve problems/three_link.py`` is ``colloc solve``.
 
-Importing this module makes it the attribute ``solve`` of the package, where `colloc.solve(problem)`
-is expected. So it can be called, and is that function.
+Importing this module makes it the attribute ``colloc.solve``, so it can be called as that function.
 """
 
 import sys
@@ -13,8 +12,9 @@ from colloc.__main__ import start
 class _Callable(ModuleType):
     def __call__(self, *given: object, **named: object) -> object:
         from colloc.studies.calls import solve
+        from colloc.system.arguments import checked_arguments
 
-        return solve(*given, **named)  # type: ignore[arg-type]
+        return checked_arguments(solve)(*given, **named)  # type: ignore[arg-type]
 
 
 sys.modules[__name__].__class__ = _Callable

@@ -96,7 +96,7 @@ def test_the_module_behind_python_m_is_also_the_function():
         (lambda: colloc.Polygon(colour=1), "it takes corners, symmetry, axis"),
         (
             lambda: colloc.solve(5),
-            "problem must be a Problem or the path of a problem file, not int",
+            "problem must be a Problem, text or a path, not 5",
         ),
         (
             lambda: colloc.solve(colloc.Problem("x"), starts=0),
@@ -104,7 +104,7 @@ def test_the_module_behind_python_m_is_also_the_function():
         ),
         (
             lambda: colloc.solve(colloc.Problem("x"), seconds=np.nan),
-            "seconds must be positive, not nan",
+            "seconds must be a number, not nan",
         ),
     ],
 )
