@@ -25,7 +25,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.sloped import Slope
 from colloc.results.measured import measured
 from colloc.verification.inertial_motion import GaitWithInertia
-from colloc.verification.replayer import replayer
+from colloc.verification.replay import replayer
 from colloc.verification.slope import gait_on_slope
 
 FINER, LEAST = 1e-2, 1e-11

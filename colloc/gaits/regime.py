@@ -3,7 +3,8 @@ otherwise.
 
 A regime says what pulls the body, which way counts, what cannot be asked, and the words of reports.
 Which states its periods have, and how they are replayed, is registered for its type
-(`colloc.motion.kinds.kind_in`, `colloc.verification.replayer.replayer`).
+(`colloc.motion.kinds.kind_in`); one of your own says how it is replayed (`replay`, and
+`reference`: `colloc.verification.reference_motion`).
 """
 
 from __future__ import annotations

@@ -134,7 +134,7 @@ class Kind(Protocol):
     """By which a period is asked to turn the body [rad]."""
     followed: bool
     """Whether what a mesh misses is told by a differential equation
-    (`colloc.verification.collocated_course.course_in`)."""
+    (`colloc.verification.reference_motion`)."""
 
     def along(
         self,

@@ -93,7 +93,7 @@ def measured(
 
     Arguments are those of `colloc.verification.replay.replay`, and the net rotation that is asked
     for: the distance of a body that turns by more depends on the point that is followed. `run` is
-    what replays (`colloc.verification.replayer`).
+    what replays (`colloc.verification.replay.replayer`).
     """
     replays: list[Replay] = []
     smoothed = friction.regularised or any(each.smoothed for each in objective.integrals)

@@ -37,7 +37,7 @@ from colloc.system.lazy import higher
 from colloc.system.versions import versions
 from colloc.transcription.layout import Layout
 from colloc.verification.dry_friction import DryFriction, dry_friction
-from colloc.verification.replayer import replayer
+from colloc.verification.replay import replayer
 
 if TYPE_CHECKING:
     import pandas

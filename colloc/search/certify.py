@@ -17,7 +17,7 @@ from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.measured import astray, measured
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.played import Path, Replay
-from colloc.verification.replayer import replayer
+from colloc.verification.replay import replayer
 
 EXACT, VIOLATION, CLOSURE, WORK = 1e-6, 1e-8, 1e-9, 1e-7
 """Largest values that pass of what holds but for rounding and the ends of iterations. EXACT:

@@ -42,7 +42,7 @@ from colloc.search.solve import finished
 from colloc.search.spaces import remeshed, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
 from colloc.verification.played import Replay
-from colloc.verification.replayer import replayer
+from colloc.verification.replay import replayer
 
 CHANGE = 0.1
 """Of a number, that tables speak of: a tenth more and less."""

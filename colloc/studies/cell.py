@@ -19,7 +19,7 @@ from colloc.studies.journal import Attempt, Visit, best_attempt, start_key
 from colloc.studies.multistart import run_guess
 from colloc.studies.study import Index
 from colloc.system.errors import CollocError
-from colloc.verification.replayer import replayer
+from colloc.verification.replay import replayer
 
 _COARSE, _FINE = (200, 200), (1600, 25600)  # instants of a replay, and at most; 200 are within 3e-4
 _LEVER = 0.5  # body lengths by which the distance depends on the point followed, per net rotation

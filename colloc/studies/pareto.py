@@ -23,7 +23,7 @@ from colloc.studies.saved import solve_member
 from colloc.system.arguments import check_count
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.lazy import higher
-from colloc.verification.replayer import replayer
+from colloc.verification.replay import replayer
 
 POINTS, _MOST_POINTS = 9, 1000
 _BETTER = 1e-6  # relative gain for which a point is replaced

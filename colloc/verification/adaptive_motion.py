@@ -1,10 +1,8 @@
-"""A gait's motion by adaptive quadrature: orientation, displacement and work to a given accuracy,
-at any phase.
+"""A gait's motion by adaptive Gauss quadrature: orientation, displacement and work at any phase.
 
-Velocities are solved for at Gauss nodes of panels; a panel is halved until its two halves agree
-with it. Stick and slip give the velocities kinks whose width is of order delta, so the panels
-shrink towards them and show where they are. The panels know nothing of a collocation mesh; this is
-what a mesh is measured against.
+Panels are halved until their two halves agree with them; so they shrink towards the kinks of stick
+and slip, whose width is of order delta. They know nothing of a collocation mesh, and are what
+meshes are measured against.
 """
 
 from __future__ import annotations
@@ -28,19 +26,25 @@ _TO_MIDDLE = PANEL_RULE.integrals(np.array([0.5]))[0]
 _TO_HALVES = PANEL_RULE.lagrange(0.5 * np.concatenate([PANEL_RULE.c, 1.0 + PANEL_RULE.c]))
 _NARROWEST = 1e-9
 _MOST_PANELS = 20_000
+_PIECES = 400, 200
+"""Of a whole path, in which a quantity is summed up, and once more for the error."""
+
+Increments = tuple[np.ndarray, ...]
+"""Rotation, displacement in the initial body frame (complex), work and quantities of intervals,
+``(n,)`` each."""
 
 
 class Rates(NamedTuple):
-    """Velocities at instants, arrays that end in the same shape: tail velocity ``(3, ...)``,
-    velocity of the centre of mass in the body frame (complex; turned back evenly by the turn of a
-    period), and ``(1 + k, ...)`` power and densities of k quantities."""
+    """Velocities at instants of any shape."""
 
-    z: np.ndarray
+    z: np.ndarray  # tail velocity, (3, ...)
     centre: np.ndarray
-    gained: np.ndarray
+    """Velocity of the centre of mass in the body frame (complex), turned back evenly by the turn of
+    a period."""
+    gained: np.ndarray  # power and densities of k quantities, (1 + k, ...)
 
     def of(self, panels: np.ndarray) -> Rates:
-        """Those at the nodes of some panels."""
+        """Rates at the nodes of some panels."""
         return Rates(*(each[..., panels, :] for each in self))
 
 
@@ -55,27 +59,21 @@ def rates_at(
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> Rates:
-    """Solved velocities of a path at phases t of any shape, per period, and densities; `near` ``(3,
-    ...)``: tail velocities to start from. Without them phases ascend, and one branch is followed in
-    time where several motions are balanced."""
+    """Solve for the velocities of a path at phases t of any shape, from tail velocities `near`
+    ``(3, ...)``. Without them phases ascend, and one branch is followed in time where several
+    motions are balanced."""
     angles, rates = path(t.ravel())
+    at = body, friction, angles, rates, delta
     if near is None:
-        z = body.solve(friction, angles, rates, delta).require().z
-        start = on_one_branch(body, friction, angles, rates, delta, z)
+        z = body.solve(*at[1:]).require().z
+        start = on_one_branch(*at, z)
     else:
         start = near.reshape(3, -1)
-    solved = body.solve(friction, angles, rates, delta, start=start).require()
-    now = body.motion(friction, angles, rates, delta, solved)
-    at = Instants(
-        body, friction, angles, rates, delta, z=now.z, joint_map=getattr(path, "joint_map", None)
-    )
-    gained = np.stack([now.power, *(quantity.at(at)[0] for quantity in quantities)])
+    now = body.motion(*at[1:], body.solve(*at[1:], start=start).require())
+    seen = Instants(*at, z=now.z, joint_map=getattr(path, "joint_map", None))
+    gained = np.stack([now.power, *(quantity.at(seen)[0] for quantity in quantities)])
     rows = now.z, (now.centre[0] + 1j * now.centre[1]) * np.exp(-1j * turn * t.ravel()), gained
     return Rates(*(row.reshape(*row.shape[:-1], *t.shape) for row in rows))
-
-
-_PIECES = 400, 200
-"""Of a whole path, in which a quantity is summed up, and once more for the error."""
 
 
 def totals_along(
@@ -105,18 +103,11 @@ def whole_totals(
     return values, errors
 
 
-Increments = tuple[np.ndarray, ...]
-"""Rotation, displacement in the initial body frame (complex), work and quantities of intervals,
-``(n,)`` each."""
-
-
 def increments(
     rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | None = None
 ) -> Increments:
-    """Increments of intervals of length h ``(n,)``, from rates at the nodes of the rule ``(n, s)``.
-
-    `weights` are those of the rule, or of its integral over a part of the interval.
-    """
+    """Increments of intervals of length h ``(n,)``, from rates at the nodes of the rule ``(n, s)``;
+    with the weights of an integral over a part of the interval, or the rule's own."""
     omega, b = rates.z[2], rule.b if weights is None else weights
     turn = np.exp(1j * h[:, None] * (omega @ rule.A.T))
     return h * (omega @ b), h * ((turn * rates.centre) @ b), *(h * (rates.gained @ b))
@@ -137,7 +128,6 @@ class FineMotion:
 
     @property
     def work(self) -> np.ndarray:
-        """Up to the edges."""
         return np.asarray(self.totals[0])
 
     @property
@@ -146,23 +136,22 @@ class FineMotion:
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
     def _locate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Panels of phases, where in these they lie, from 0 to 1, and the lengths of all panels."""
+        """Panels of phases, fractions of these, and the lengths of all panels."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = np.diff(self.edges)
         return k, (t - self.edges[k]) / h[k], h
 
     def velocity(self, t: np.ndarray) -> np.ndarray:
-        """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``: good
-        to start a solve from."""
-        k, place, _ = self._locate(t)
-        weights = PANEL_RULE.lagrange(place.ravel()).reshape(*t.shape, -1)
+        """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``."""
+        k, fraction, _ = self._locate(t)
+        weights = PANEL_RULE.lagrange(fraction.ravel()).reshape(*t.shape, -1)
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
     def at(self, t: np.ndarray) -> Increments:
         """Orientation, displacement, work and quantities at phases t ``(n_time,)``, by the panels'
         polynomials."""
-        k, place, h = self._locate(t)
-        weights = PANEL_RULE.integrals(place) * h[k][:, None]
+        k, fraction, h = self._locate(t)
+        weights = PANEL_RULE.integrals(fraction) * h[k][:, None]
         omega = self.rates.z[2]
         turn = np.exp(1j * (self.theta[:-1, None] + h[:, None] * (omega @ PANEL_RULE.A.T)))
         moved = turn * self.rates.centre
@@ -184,40 +173,19 @@ def fine_motion(
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> FineMotion:
-    """Integrate a path between the first and the last of `edges`, which are those of the first
-    panels, to a relative error of the efficiency, or another objective.
+    """Integrate a path between the first and the last of `edges`, those of the first panels, to a
+    relative error of the efficiency, or another objective.
 
-    Panels are halved until the sum of their disagreements is below the tolerance; what remains is
-    in the result. `shares` makes of way, work, rotation and quantities what a small change of each
-    changes in the objective, relative to it. The way is seen from axes that turn evenly, by `turn`
-    a period (`colloc.gaits.period`). `NotConvergedError` if the balance cannot be solved at some
-    instant.
+    `shares` gives the relative change of the objective per unit of way, work, rotation and
+    quantities. The way is seen from axes that turn evenly, by `turn` a period.
+    `NotConvergedError` if the balance cannot be solved at some instant.
     """
-    asked: Any = {"quantities": quantities, "turn": turn}
-
-    def evaluate(
-        left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None
-    ) -> tuple[Rates, Increments]:
-        nodes = left[:, None] + width[:, None] * PANEL_RULE.c
-        rates = rates_at(body, friction, path, delta, nodes, near=near, **asked)
-        return rates, increments(PANEL_RULE, width, rates)
-
-    def error_weights(parts: Increments) -> tuple[list[float], float, float]:
-        """What a change of the work and quantities, of displacement and of rotation in a panel
-        changes in the objective, relative."""
-        turned, travelled, totals = _cumulative(parts)
-        period = dict(zip(names, totals[:, -1], strict=True))
-        period |= {"distance": max(abs(travelled[-1]), 1e-300), "rotation": turned[-1]}
-        period["work"] = max(period["work"], 1e-300)
-        share = {name: abs(value) for name, value in shares(period).items()}
-        reach = np.abs(travelled - travelled[-1]).max()
-        on_spin = share["distance"] * reach + share["rotation"]
-        return [share.get(name, 0.0) for name in names], share["distance"], on_spin
-
     names = "work", *(quantity.name for quantity in quantities)
+    asked: Any = {"quantities": quantities, "turn": turn}
     left, width = edges[:-1], np.diff(edges)
-    rates, parts = evaluate(left, width)
-    gap = np.full(left.size, np.inf)
+    nodes = left[:, None] + width[:, None] * PANEL_RULE.c
+    rates, gap = rates_at(body, friction, path, delta, nodes, **asked), np.full(left.size, np.inf)
+    parts = increments(PANEL_RULE, width, rates)
     while True:
         # halve the panels that hold the excess over the tolerance
         order = np.argsort(gap)[::-1]
@@ -227,48 +195,60 @@ def fine_motion(
             break
         half, start = 0.5 * np.repeat(width[chosen], 2), np.repeat(left[chosen], 2)
         start[1::2] += half[1::2]
+        wanted = start[:, None] + half[:, None] * PANEL_RULE.c
         if friction.associated:
             near = (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1)
         else:  # no mean of branches is near any of them
             nodes = left[:, None] + width[:, None] * PANEL_RULE.c
-            wanted = start[:, None] + half[:, None] * PANEL_RULE.c
             before = np.maximum(np.searchsorted(nodes.ravel(), wanted) - 1, 0)
             near = rates.z.reshape(3, -1)[:, before]
-        new_rates, new = evaluate(start, half, near)
-        middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
+        new = rates_at(body, friction, path, delta, wanted, near=near, **asked)
         # the whole panel, and its polynomials half way, against the two halves
-        first, second = ([part[k::2] for part in new] for k in (0, 1))
+        first, second = ([x[k::2] for x in increments(PANEL_RULE, half, new)] for k in (0, 1))
         second[1] = np.exp(1j * first[0]) * second[1]
-        both = [one + other for one, other in zip(first, second, strict=True)]
-        pairs = zip(both, (part[chosen] for part in parts), strict=True)
-        differences = (
-            [halves - whole for halves, whole in pairs],
-            [half_way - polynomial for half_way, polynomial in zip(first, middle, strict=True)],
+        middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
+        whole = (part[chosen] for part in parts)
+        at_end = [a + b - both for a, b, both in zip(first, second, whole, strict=True)]
+        half_way = [a - both for a, both in zip(first, middle, strict=True)]
+        rest = np.setdiff1d(np.arange(left.size), chosen)
+        place = np.argsort(np.concatenate([left[rest], start]))
+        left, width = (
+            np.concatenate([old[rest], added])[place]
+            for old, added in ((left, start), (width, half))
         )
-        kept = np.setdiff1d(np.arange(left.size), chosen)
-        place = np.argsort(np.concatenate([left[kept], start]))
-
-        def merge(old: np.ndarray, new: np.ndarray, kept: Any = kept, place: Any = place) -> Any:
-            return np.concatenate([old[kept], new])[place]
-
-        joined = zip(rates.of(kept), new_rates, strict=True)
+        joined = zip(rates.of(rest), new, strict=True)
         rates = Rates(*(np.concatenate(pair, axis=-2) for pair in joined)).of(place)
-        parts = tuple(merge(old, added) for old, added in zip(parts, new, strict=True))
-        on_sums, on_move, on_spin = error_weights(parts)
+        parts = increments(PANEL_RULE, width, rates)
+        on_spin, on_move, *on_sums = _error_weights(parts, names, shares)
         change = sum(
             np.abs(move) * on_move
             + np.abs(spin) * on_spin
-            + sum(np.abs(part) * share for share, part in zip(on_sums, gained, strict=True))
-            for spin, move, *gained in differences
+            + sum(np.abs(part) * share for share, part in zip(on_sums, sums, strict=True))
+            for spin, move, *sums in (at_end, half_way)
         )
-        gap = merge(gap, np.repeat(0.5 * change, 2))
-        left, width = merge(left, start), merge(width, half)
+        gap = np.concatenate([gap[rest], np.repeat(0.5 * change, 2)])[place]
     return FineMotion(np.append(left, edges[-1]), rates, *_cumulative(parts), gap)
 
 
+def _error_weights(
+    parts: Increments,
+    names: tuple[str, ...],
+    shares: Callable[[Mapping[str, float]], Mapping[str, float]],
+) -> list[float]:
+    """Relative change of the objective per unit of rotation, displacement, work and quantities in a
+    panel."""
+    theta, path, totals = _cumulative(parts)
+    period = dict(zip(names, totals[:, -1], strict=True))
+    period |= {"distance": max(abs(path[-1]), 1e-300), "rotation": theta[-1]}
+    period["work"] = max(period["work"], 1e-300)
+    share = {name: abs(value) for name, value in shares(period).items()}
+    reach = np.abs(path - path[-1]).max()
+    on_spin = share["distance"] * reach + share["rotation"]
+    return [on_spin, share["distance"], *(share.get(name, 0.0) for name in names)]
+
+
 def _cumulative(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Orientation, lab displacement, and work and quantities at the edges, from every interval's
-    own."""
+    """Orientation, lab displacement, and work and quantities at the edges, from increments."""
     theta, *totals = (np.append(0.0, np.cumsum(part)) for part in (parts[0], *parts[2:]))
     moved = np.exp(1j * theta[:-1]) * parts[1]
     return theta, np.append(0.0, np.cumsum(moved)), np.stack(totals)

@@ -1,5 +1,4 @@
-"""What is played, a path through shapes in time, and what a period of it comes to, by whatever
-method."""
+"""Paths through shapes in time, and the record of a period that was simulated."""
 
 from __future__ import annotations
 
@@ -19,18 +18,14 @@ Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 Ran = TypeVar("Ran")
 Numbers = dict[str, float]
 _TENTH = 0.1  # error of each run over that of the last
-LEAST = 1e-12
-"""The smallest error that is tried."""
+LEAST = 1e-12  # the smallest error that is tried
 
 
 @dataclass(frozen=True)
 class Replay(Period):
-    """A gait replayed over one period: the quantities of a `Period`, and what tells how far they
-    can be trusted.
+    """A simulated period of a gait: the quantities of a `Period`, and how far they can be trusted.
 
     The distance is that of the centre of mass, by `colloc.gaits.period` where a turn is asked for.
-    Errors are what halving the panels would change, summed as magnitudes, and the residual. Of laws
-    with equal coefficients there are no other motions.
 
     Attributes
     ----------
@@ -40,20 +35,18 @@ class Replay(Period):
         Work of the joints, from the moments of the friction forces about them; equals `work` in
         balance.
     residual : float
-        Largest force or torque left over, at any instant, in units of the largest friction
-        coefficient.
+        Largest force or torque left over, in units of the largest friction coefficient; with
+        inertia the change of the momenta in a period.
     error : float
-        Relative error of the objective, for the same reasons.
+        Relative error of the objective.
     several : float
-        Part of the period at which several motions are balanced; 0 for equal coefficients, where
-        there is one.
+        Part of the period at which several motions are balanced; 0 for equal coefficients.
     shares : (n_share,)
         Largest shares of the actuators' limits; none unless limits were given.
     instants : int
     tail : ((n,), (3, n))
         Phases and tail velocities there.
     objective : Objective
-        That the replay is to measure; the efficiency unless another was asked for.
     across : float
         On a slope the way across the direction that counts.
     multipliers : tuple of complex
@@ -80,24 +73,24 @@ class Replay(Period):
         )
 
     def tail_velocity(self, t: np.ndarray) -> np.ndarray:
-        """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a
-        solve from."""
+        """Tail velocities ``(3, n_time)`` interpolated at phases t, to start solves from."""
         known, z = self.tail
         return np.stack([np.interp(t, known, row, period=1.0) for row in z])
 
     @property
     def value(self) -> float:
+        """The objective."""
         return self.objective(self.values)
 
     @property
     def ambiguity(self) -> float:
-        """How much other balanced motions could change it, relative, at most."""
+        """Largest relative change of the objective by other balanced motions."""
         return self.ambiguity_of(self.objective)
 
     @property
     def turning(self) -> float:
-        """How much the distance depends on the point of the body that is followed, relative:
-        rotation times lever over it."""
+        """Rotation times lever over distance: relative change of the distance by another followed
+        point of the body."""
         return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
 
 
@@ -109,23 +102,20 @@ def to_tolerance(
     known: tuple[Numbers, Numbers],
     errors_of: Callable[[Ran, Ran], Numbers] | None = None,
 ) -> tuple[Ran, Numbers, Numbers]:
-    """A differential equation solved with ever smaller errors a step, until these change an
-    objective by less than a relative error: what ran last, the numbers of its period, and their
-    errors.
+    """Solve a differential equation with ever smaller errors a step, from `first`, until these
+    change an objective by less than a relative error: the last run, its numbers and their errors.
 
-    `run` takes an error, `first` to begin with, and gives what ran and its numbers; `known` are
-    other numbers, and their errors; `errors_of` says how wrong numbers of what ran may be, seen
-    from what ran with ten times the error. By default that is what they differ by, but half of the
-    error that was asked for at least: differences vanish now and then. `NotConvergedError` if
-    rounding hides the accuracy that is asked for.
+    `run` takes an error and gives the run and its numbers; `known` are other numbers, and their
+    errors; `errors_of` tells the errors of a run from one with ten times the error: by default
+    their difference, but half of the error asked for at least, as differences vanish now and then.
+    `NotConvergedError` if rounding hides the accuracy.
     """
     aim, before = max(first, LEAST / _TENTH), None
     while aim > 0.5 * LEAST:
         ran, now = run(aim)
         if before is not None:
             if errors_of is None:
-                changes = {name: abs(value - before[1][name]) for name, value in now.items()}
-                errors = {name: max(change, 0.5 * aim) for name, change in changes.items()}
+                errors = {x: max(abs(now[x] - before[1][x]), 0.5 * aim) for x in now}
             else:
                 errors = dict.fromkeys(now, 0.0) | errors_of(ran, before[0])
             values, errors = now | known[0], errors | known[1]

@@ -1,12 +1,9 @@
-"""Independent replay of a gait: from the joint angles alone to distance, work and rotation, by the
+"""Independent replay of a gait: distance, work and rotation from the joint angles alone, by the
 NumPy solver.
 
-It shares nothing with collocation but the friction law: no scheme, no mesh, no symmetry, no
-interpolant. Velocities are solved for at five instants of every panel of the period and integrated
-by Simpson's rule, once over the panel and once over its halves; panels are halved where the two
-differ. `colloc.verification.panels` judges what that leaves of the difference. These errors add up
-as magnitudes: kinks of stick and slip lie anywhere between the instants, so those of different
-panels may well cancel by accident.
+It shares nothing with collocation but the friction law. Velocities are solved for at five instants
+of every panel of the period and integrated by Simpson's rule; panels are halved where the rule on
+the panel and on its halves differ (`colloc.verification.panels`).
 
 With unequal coefficients several velocities may balance an instant. The replay then follows one
 branch in time, and says how far the others would lead (`colloc.motion.followed_motion`).
@@ -14,15 +11,18 @@ branch in time, and says how far the others would lead (`colloc.motion.followed_
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import chord_per_way
+from colloc.gaits.regime import Regime
+from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import (
     LENGTH,
@@ -40,12 +40,11 @@ from colloc.system.errors import ProblemError
 from colloc.verification.panels import (
     WHOLE,
     Panels,
-    begun,
     changes,
-    halves,
+    first_panels,
     increments,
-    left_over,
-    travelled,
+    poses,
+    remaining_error,
 )
 from colloc.verification.played import Path, Replay, lever
 
@@ -54,54 +53,56 @@ MOST_INSTANTS = 10_000_000
 _NARROWEST = 1e-10
 
 
-def _evaluated(
-    body: Body,
-    friction: Law,
-    path: Path,
-    delta: float,
-    t: np.ndarray,
-    near: np.ndarray | None,
-    *,
-    sense: int,
-    whole: bool,
-    quantities: tuple[Quantity, ...],
-    limits: PathLimits,
-    turn: float,
-) -> tuple[np.ndarray, ...]:
-    """`Panels` from z to apart at instants t ``(n, k)``; solves start from the tail velocities
-    `near`, ``(3, n k)``.
+class _Solver:
+    """Panels' values at instants, with the largest residual, lever and shares so far."""
 
-    Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole` period,
-    the branch in time.
-    """
-    (angles, rates), start, apart = path(t.ravel()), near, np.zeros((3 + len(quantities), t.size))
-    joint_map = getattr(path, "joint_map", None)
-    if not friction.associated:
-        before = None if whole else near
-        followed = followed_motion(
-            body, friction, angles, rates, delta, before=before, sense=sense,
-            quantities=quantities, joint_map=joint_map,
-        )  # fmt: skip
-        if followed is not None:
-            start, apart = np.nan_to_num(followed.z), followed.apart
-    motion, residual = body.replayed(friction, angles, rates, delta, start)
-    now, z, centre = (
-        Instants(body, friction, angles, rates, delta, z=motion.z, joint_map=joint_map),
-        motion.z,
-        motion.centre,
-    )
-    densities = np.concatenate([quantity.at(now) for quantity in quantities])
-    used = limits.sizes(limits.at(now)) if limits.names else np.empty((0, t.size))
-    seen = (
-        z,
-        z[2] - turn,
-        centre[0] + 1j * centre[1],
-        motion.power,
-        motion.actuator_power,
-        densities,
-    )
-    values: tuple[np.ndarray, ...] = (*seen, residual, lever(body, angles), used, apart)
-    return tuple(value.T.reshape(*t.shape, *value.shape[:-1]) for value in values)
+    def __init__(
+        self,
+        body: Body,
+        friction: Law,
+        path: Path,
+        delta: float,
+        sense: int,
+        quantities: tuple[Quantity, ...],
+        limits: PathLimits,
+        turn: float,
+    ) -> None:
+        self.body, self.friction, self.path, self.delta = body, friction, path, delta
+        self.sense, self.quantities, self.limits, self.turn = sense, quantities, limits, turn
+        self.joint_map = getattr(path, "joint_map", None)
+        self.residual = self.lever = 0.0
+        self.shares = np.full(len(limits.names), -np.inf)
+
+    def values(
+        self, t: np.ndarray, near: np.ndarray | None, *, whole: bool = False
+    ) -> tuple[np.ndarray, ...]:
+        """`Panels` z, rates, joint_power and apart at instants t ``(n, k)``; solves start from the
+        tail velocities `near`, ``(3, n k)``.
+
+        Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole`
+        period, the branch in time.
+        """
+        angles, rates = self.path(t.ravel())
+        at = self.body, self.friction, angles, rates, self.delta
+        given: Any = {"quantities": self.quantities, "joint_map": self.joint_map}
+        start, apart = near, np.zeros((3 + len(self.quantities), t.size))
+        if not self.friction.associated:
+            before = None if whole else near
+            followed = followed_motion(*at, before=before, sense=self.sense, **given)
+            if followed is not None:
+                start, apart = np.nan_to_num(followed.z), followed.apart
+        motion, residual = self.body.replayed(*at[1:], start)
+        now = Instants(*at, z=motion.z, joint_map=self.joint_map)
+        self.residual = float(np.maximum(self.residual, residual.max()))
+        self.lever = max(self.lever, float(lever(self.body, angles).max()))
+        if self.limits.names:
+            used = self.limits.sizes(self.limits.at(now)).max(axis=1)
+            self.shares = np.maximum(self.shares, used)
+        densities = [quantity.at(now) for quantity in self.quantities]
+        centre = motion.centre[0] + 1j * motion.centre[1]
+        rows = np.vstack([motion.z[2] - self.turn, centre, motion.power, *densities])
+        found = motion.z, rows, motion.actuator_power, apart
+        return tuple(each.T.reshape(*t.shape, *each.shape[:-1]) for each in found)
 
 
 def replay(
@@ -148,17 +149,15 @@ def replay(
         Whether branches are followed with or against time, where several motions are balanced.
     objective : Objective
     quantities : iterable of Quantity or str
-        What is asked for besides, whatever the objective is, as ``["driven_work"]``.
+        Further quantities, as ``["driven_work"]``.
     limits : iterable of PathLimit
-        Of which the largest shares are asked for; with limits of 1 these are the largest values
-        themselves.
+        Their largest shares are measured; with limits of 1 these are the largest values.
     turn : float
         Net rotation that the path is asked for [rad]: the distance is the chord of an arc that
         turns by as much.
     froude : float
-        Froude number L/(g T^2) at which the path is played; 0 is so slow that inertia does not
-        matter. At another one only `tolerance`, `breaks`, `objective`, `quantities` and `turn`
-        count (`colloc.verification.inertial_motion.inertial_replay`).
+        Froude number L/(g T^2) at which the path is played; 0 is quasi-static motion. At another
+        one only `tolerance`, `breaks`, `objective`, `quantities` and `turn` count.
 
     Raises
     ------
@@ -176,11 +175,9 @@ def replay(
     0.26
     """
     if froude:
-        from colloc.verification.inertial_motion import inertial_replay  # loads what integrates
-
-        return inertial_replay(
-            body, friction, path, delta, regime=Paced(froude), tolerance=tolerance, breaks=breaks,
-            objective=objective, quantities=quantities, turn=turn,
+        return replayer(Paced(froude))(
+            body, friction, path, delta, tolerance=tolerance, breaks=breaks, objective=objective,
+            quantities=quantities, turn=turn,
         )  # fmt: skip
     if "period" in objective.uses:
         raise ProblemError(
@@ -192,113 +189,97 @@ def replay(
             f"instants must be an even number of at least 4, and at most {MOST_INSTANTS}, not "
             f"{instants!r}."
         )
-    friction = body.law(friction)
-    ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
-    counts = [2 * max(1, round(instants * (b - a) / 8)) for a, b in pairwise(ends)]
-    edges = np.concatenate(
-        [np.linspace(a, b, n + 1)[:-1] for (a, b), n in zip(pairwise(ends), counts, strict=True)]
-        + [[1.0]]
-    )
-    left, width = edges[:-1], np.diff(edges)
-    t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
-    # one-sided limits at jumps
-    t[np.isin(left, breaks), 0] += ONE_SIDED
-    t[np.isin(edges[1:], breaks), 4] -= ONE_SIDED
-    start = None if near is None else near.tail_velocity(t.ravel())
+    law = body.law(friction)
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
-    names = "rotation", "distance", "work", *(each.name for each in asked)
     joint_map = getattr(path, "joint_map", None)
     limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)
-    at = partial(
-        _evaluated,
-        body,
-        friction,
-        path,
-        delta,
-        sense=sense,
-        quantities=asked,
-        limits=limits,
-        turn=turn,
-    )
-    panels, chord = begun(left, width, at(t, start, whole=True)), chord_per_way(turn)
+    solver = _Solver(body, law, path, delta, sense, asked, limits, turn)
+    panels = _grid(solver, instants, breaks, near)
+    names = "rotation", "distance", "work", *(each.name for each in asked)
+    chord = chord_per_way(turn)
     while True:
-        spin, move, spent, *sums = increments(WHOLE, panels, 1)
-        heading, place = travelled(spin, move)
+        spin, move, *sums = increments(panels)
+        heading, place = poses(spin, move)
         distance = max(chord * float(abs(place[-1])), 1e-300)
-        values = {
-            "distance": distance,
-            "work": float(spent.sum()),
-            "rotation": float(heading[-1]) + turn,
-        }
-        values |= {each.name: float(part.sum()) for each, part in zip(asked, sums, strict=True)}
+        work, *totals = (float(part.sum()) for part in sums)
+        values = {"distance": distance, "work": work, "rotation": float(heading[-1]) + turn}
+        values |= dict(zip(names[3:], totals, strict=True))
         if not values["work"] > 0:
             raise ProblemError(
                 "the path does not move, or too little to do work against friction: it has no "
                 "efficiency."
             )
-        changed, near_by, far = changes(panels)
-        missed = left_over(near_by, far, panels.wider).T
+        changed, one_beside, two_beside = changes(panels)
+        missed = remaining_error(one_beside, two_beside, panels.wider).T
         missed[1] *= chord
         lost = dict(zip(names, missed, strict=True))
         gap = objective.relative_error(values, lost)
-        residual = float(panels.residual.max())
-        order = np.argsort(gap)
+        order, residual = np.argsort(gap), solver.residual
         # finer panels do not make up for what the balance leaves over
         excess = (np.cumsum(gap[order]) + residual > tolerance) & (residual < tolerance)
-        chosen = _with_wider_neighbours(
-            order[excess & (panels.width[order] > _NARROWEST)], panels.width
-        )
-        n = 4 * (panels.left.size + chosen.size)
-        if chosen.size == 0 or n > most_instants:
+        excess &= panels.width[order] > _NARROWEST
+        chosen = _with_wider_neighbours(order[excess], panels.width)
+        if chosen.size == 0 or 4 * (panels.left.size + chosen.size) > most_instants:
             break
         old = panels.take(chosen)
-        between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
-        start = _starts(old.z, friction, sense).reshape(-1, 3).T
-        new = at(between, start, whole=False)
-        panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new, changed[chosen]))
-    several, apart = _others(panels, np.abs(place - place[-1]).max())
+        middles = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
+        if law.associated:
+            start = 0.5 * (old.z[:, :-1] + old.z[:, 1:])
+        else:  # the branch on which the body is before
+            start = old.z[:, :-1] if sense == FORWARDS else old.z[:, 1:]
+        halves = old.halves(solver.values(middles, start.reshape(-1, 3).T), changed[chosen])
+        panels = panels.take(np.setdiff1d(order, chosen)).joined(halves)
+    several, others = _others(panels, float(np.abs(place - place[-1]).max()))
     known = panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)
     known[np.isin(panels.left, breaks), 0] += ONE_SIDED
-    balanced = [
-        1.0,
-        values["distance"],
-        values["work"],
-        *(each.needs_forces * abs(values[each.name]) for each in asked),
-    ]
+    # what the balance leaves over counts in proportion to each
+    forces = [each.needs_forces * abs(values[each.name]) for each in asked]
+    off = [1.0, values["distance"], values["work"], *forces]
     return Replay(
         values=values,
         errors={
             name: float(lost[name].sum() + residual * size)
-            for name, size in zip(names, balanced, strict=True)
+            for name, size in zip(names, off, strict=True)
         },
-        others=dict(zip(names, apart, strict=True)),
-        lever=float(panels.lever.max()),
-        actuator_work=float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
+        others=dict(zip(names, others, strict=True)),
+        lever=solver.lever,
+        actuator_work=float(((panels.joint_power @ WHOLE[-1]) * panels.width).sum()),
         residual=residual,
         error=float(gap.sum()) + residual,
         several=several,
         instants=4 * panels.left.size,
         tail=(known.ravel(), panels.z[:, :4].reshape(-1, 3).T),
-        shares=panels.shares.max(axis=(0, 1)),
+        shares=solver.shares,
         objective=objective,
     )
 
 
+def _grid(
+    solver: _Solver,
+    instants: int,
+    breaks: np.ndarray | tuple[float, ...],
+    near: Replay | None,
+) -> Panels:
+    """The first panels: equal ones between any two corners, where rates are one-sided."""
+    ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
+    counts = [2 * max(1, round(instants * (b - a) / 8)) for a, b in pairwise(ends)]
+    pieces = zip(pairwise(ends), counts, strict=True)
+    edges = np.concatenate([*(np.linspace(a, b, n + 1)[:-1] for (a, b), n in pieces), [1.0]])
+    left, width = edges[:-1], np.diff(edges)
+    t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
+    t[np.isin(left, breaks), 0] += ONE_SIDED
+    t[np.isin(edges[1:], breaks), 4] -= ONE_SIDED
+    start = None if near is None else near.tail_velocity(t.ravel())
+    return first_panels(left, width, solver.values(t, start, whole=True))
+
+
 def _with_wider_neighbours(chosen: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Panels to be halved, and those beside them that are not narrower: the halves are judged with
-    instants beside them."""
+    """Add to panels to be halved those beside them that are not narrower: the halves are judged
+    with instants beside them."""
     narrow = np.full(width.size, np.inf)
     narrow[chosen] = width[chosen]
     beside = np.minimum(np.roll(narrow, 1), np.roll(narrow, -1))
     return np.flatnonzero((width >= beside) | np.isfinite(narrow))
-
-
-def _starts(z: np.ndarray, friction: Law, sense: int) -> np.ndarray:
-    """Velocities ``(n, 4, 3)`` to solve from half way between instants with velocities z ``(n, 5,
-    3)``: the mean, or where there may be several branches, that on which the body is before."""
-    if friction.associated:
-        return 0.5 * (z[:, :-1] + z[:, 1:])
-    return z[:, :-1] if sense == FORWARDS else z[:, 1:]
 
 
 def _others(panels: Panels, reach: float) -> tuple[float, list[float]]:
@@ -311,3 +292,20 @@ def _others(panels: Panels, reach: float) -> tuple[float, list[float]]:
     speed, spin, *others = map(float, np.einsum("n,nki->i", 0.25 * panels.width, worse))
     several = 0.25 * panels.width @ worse.any(axis=2).sum(axis=1)
     return float(several), [spin, speed + reach * spin, *others]
+
+
+def replayer(regime: Regime) -> Callable[..., Replay]:
+    """The replay of a regime, with the arguments of `replay`; a regime of one's own has it as
+    ``replay``."""
+    own = getattr(regime, "replay", None)
+    if own is not None:
+        return own
+    if isinstance(regime, Paced):
+        from colloc.verification.inertial_motion import inertial_replay  # loads what integrates
+
+        return partial(inertial_replay, regime=regime)
+    if isinstance(regime, Slope):
+        from colloc.verification.slope import slope_replay
+
+        return partial(slope_replay, slope=regime)
+    return replay

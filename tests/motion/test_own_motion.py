@@ -22,10 +22,9 @@ from colloc.motion.kinds import Along, SlowOnLevel, kind_in
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.collocated_course import CourseOfGait, course_in
 from colloc.verification.played import Replay, to_tolerance
-from colloc.verification.replay import replay
-from colloc.verification.replayer import replayer
+from colloc.verification.reference_motion import ReferenceMotion
+from colloc.verification.replay import replay, replayer
 
 
 @dataclass(frozen=True)
@@ -48,6 +47,40 @@ class Pushed(Regime):
 
     def pull(self, theta):
         return namespace(theta).stack([self.push + 0 * theta, 0 * theta])
+
+    def reference(self, control, gait, delta, mesh, error):
+        ran = Gait(*control.dynamics[:2], gait, delta, self.push).run(error)
+        return ReferenceMotion(lambda t: ran.at(t)[:4], error)
+
+    def replay(
+        self, body, friction, path, delta, *, tolerance=1e-6, objective=EFFICIENCY, quantities=(),
+        **_,
+    ):  # fmt: skip
+        gait = Gait(body, friction, path, delta, self.push)
+
+        def run(error):
+            ran = gait.run(error)
+            theta, x, y, work, _ = ran.states[:, -1]
+            way = float(np.hypot(x, y))
+            return ran, {"distance": way, "work": float(work), "rotation": float(theta)}
+
+        totals = whole_totals([LENGTH, *quantities], path)
+        ran, values, errors = to_tolerance(run, tolerance, objective, tolerance, totals)
+        t = ran.phases % 1.0
+        solved, _ = gait.balanced(t)
+        return Replay(
+            values=values,
+            errors=errors,
+            others={},
+            lever=1.0,
+            actuator_work=float(ran.states[4, -1]),
+            residual=float(solved.residual.max()),
+            error=float(objective.relative_error(values, errors)),
+            several=0.0,
+            instants=t.size,
+            tail=(t, solved.z),
+            objective=objective,
+        )
 
 
 class PushedMotion(SlowOnLevel):
@@ -118,51 +151,6 @@ class Gait:
 
     def run(self, error):
         return followed(self.rates, np.zeros(5), error, longest=4e-3)
-
-
-@course_in.register
-def _(regime: Pushed, control, gait, delta, mesh, error):
-    ran = Gait(*control.dynamics[:2], gait, delta, regime.push).run(error)
-    return CourseOfGait(lambda t: ran.at(t)[:4], error)
-
-
-@replayer.register
-def _(regime: Pushed):
-    def run(
-        body, friction, path, delta, *, tolerance=1e-6, objective=EFFICIENCY, quantities=(), **_
-    ):
-        gait, totals = (
-            Gait(body, friction, path, delta, regime.push),
-            whole_totals([LENGTH, *quantities], path),
-        )
-
-        def followed_to(error):
-            ran = gait.run(error)
-            theta, x, y, work, _ = ran.states[:, -1]
-            return ran, {
-                "distance": float(np.hypot(x, y)),
-                "work": float(work),
-                "rotation": float(theta),
-            }
-
-        ran, values, errors = to_tolerance(followed_to, tolerance, objective, tolerance, totals)
-        t = ran.phases % 1.0
-        solved, _ = gait.balanced(t)
-        return Replay(
-            values=values,
-            errors=errors,
-            others={},
-            lever=1.0,
-            actuator_work=float(ran.states[4, -1]),
-            residual=float(solved.residual.max()),
-            error=float(objective.relative_error(values, errors)),
-            several=0.0,
-            instants=t.size,
-            tail=(t, solved.z),
-            objective=objective,
-        )
-
-    return run
 
 
 PROBLEM = Problem(

@@ -19,7 +19,7 @@ from colloc.results.solution import Solution
 from colloc.results.store import save
 from colloc.search import certify as verify
 from colloc.search.certify import _one_motion, certify, gait_certificate
-from colloc.verification import replayer
+from colloc.verification import replay as replay_module
 from colloc.verification.replay import replay
 from colloc.verification.slope import slope_motion
 
@@ -36,7 +36,7 @@ def replays(three_link):
         return found[arguments[3]]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(replayer, "replay", kept)
+        patch.setattr(replay_module, "replay", kept)
         assert certify(three_link.answer).passed
     return found
 
@@ -49,7 +49,7 @@ def failures(three_link, replays, monkeypatch):
     def names(solution=three_link, change=lambda part, replayed: replayed):
         largest = max(replays)
         monkeypatch.setattr(
-            replayer, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]])
+            replay_module, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]])
         )
         return {check.name for check in certify(solution.answer).failures}
 
@@ -284,7 +284,9 @@ def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(thre
 
 
 def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
-    monkeypatch.setattr(replayer, "replay", lambda *a, **k: changed(replays[a[3]], rotation=3e-5))
+    monkeypatch.setattr(
+        replay_module, "replay", lambda *a, **k: changed(replays[a[3]], rotation=3e-5)
+    )
     known, fine = certify(three_link.answer), replays[max(replays)]
     assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
     assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
@@ -308,7 +310,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(
     gapped = with_answer(three_link, value=fine.efficiency * (1 + 3e-4))
     assert failures(gapped) == {"replay gap"}
     assert failures(gapped, open_by(2.5e-4)) == set()
-    monkeypatch.setattr(replayer, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
+    monkeypatch.setattr(replay_module, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
     known = certify(three_link.answer)
     assert (
         min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency)

@@ -9,14 +9,12 @@ import pytest
 from benchmarks.audit import path_of, random_problem
 from colloc.verification.panels import (
     HALF,
-    WHOLE,
     Panels,
-    begun,
     changes,
-    halves,
+    first_panels,
     increments,
-    left_over,
-    travelled,
+    poses,
+    remaining_error,
 )
 from colloc.verification.replay import replay
 from tests.conftest import ROOT
@@ -24,31 +22,25 @@ from tests.conftest import ROOT
 WORK = 2
 
 
+def at_rest(power):
+    """Values at instants of a body that rests and does work: z, rates, power of joints, spread."""
+    none = 0.0 * power
+    vectors = np.stack([none] * 3, axis=-1)
+    return vectors, np.stack([none, none, power], axis=-1).astype(complex), none, vectors
+
+
 def panels_of(power, n=16, corner=None):
-    """Of a body that rests and does work, with a corner at the end of a panel or none."""
+    """With a corner at the end of a panel or none."""
     left, width = np.arange(n) / n, np.full(n, 1 / n)
     t = left[:, None] + width[:, None] * np.linspace(0, 1, 5)
     if corner is not None:
         t[np.isclose(left, corner), 0] += 1e-12
         t[np.isclose(left + width, corner), 4] -= 1e-12
-    nothing, vectors, shares = np.zeros((n, 5)), np.zeros((n, 5, 3)), np.zeros((n, 5, 0))
-    values = (
-        vectors,
-        nothing,
-        nothing.astype(complex),
-        power(t),
-        nothing,
-        shares,
-        nothing,
-        nothing,
-        shares,
-        vectors,
-    )
-    return begun(left, width, values)
+    return first_panels(left, width, at_rest(power(t)))
 
 
 def stated_work(panels):
-    return left_over(*changes(panels)[1:], panels.wider)[:, WORK].sum()
+    return remaining_error(*changes(panels)[1:], panels.wider)[:, WORK].sum()
 
 
 def slope_jump(x):
@@ -74,7 +66,7 @@ def test_stated_errors_cover_a_kink_wherever_it_lies(share):
 
         panels = panels_of(lambda t: kink(t)[0])
         exact = kink(1.0)[1] - kink(0.0)[1]
-        true.append(abs((panels.power @ WHOLE[-1] * panels.width).sum() - exact))
+        true.append(abs(increments(panels)[WORK].sum() - exact))
         stated.append(stated_work(panels))
     assert np.all(np.array(true) <= stated)
     assert np.median(np.array(stated) / true) < 8
@@ -84,8 +76,8 @@ def test_what_smooth_motion_would_leave_is_stated_even_where_nothing_changes_by_
     """A rule of fourth order leaves a fifteenth of a sixteenth of the change on the panel twice as
     wide, on both halves; and a kink a quarter of each change."""
     nothing, wide = np.zeros((1, 5)), np.ones((1, 5))
-    assert left_over(nothing, nothing, wide).min() >= 1 / (2 * 16 * 15)
-    np.testing.assert_allclose(left_over(wide, wide, wide), 1 / 3)
+    assert remaining_error(nothing, nothing, wide).min() >= 1 / (2 * 16 * 15)
+    np.testing.assert_allclose(remaining_error(wide, wide, wide), 1 / 3)
 
 
 def test_corners_are_not_taken_for_kinks():
@@ -100,30 +92,14 @@ def test_halves_carry_on_and_know_what_halving_their_panel_changed():
     panels, n = panels_of(np.exp), 16
     changed = changes(panels)[0]
     between = panels.left[:, None] + panels.width[:, None] * (np.arange(4) + 0.5) / 4
-    nothing, vectors, shares = np.zeros((n, 4)), np.zeros((n, 4, 3)), np.zeros((n, 4, 0))
-    new = (
-        vectors,
-        nothing,
-        nothing.astype(complex),
-        np.exp(between),
-        nothing,
-        shares,
-        nothing,
-        nothing,
-        shares,
-        vectors,
-    )
-    finer = halves(panels, new, changed)
+    finer = panels.halves(at_rest(np.exp(between)), changed)
     for side in (0, 1):
         np.testing.assert_array_equal(finer.wider[side::2], changed)
     np.testing.assert_array_equal(finer.left, np.arange(2 * n) / (2 * n))
     instants = finer.left[:, None] + finer.width[:, None] * np.linspace(0, 1, 5)
-    np.testing.assert_allclose(finer.power, np.exp(instants), rtol=1e-15)
-    np.testing.assert_allclose(
-        changed[:, WORK].sum(),
-        15 * abs(increments(WHOLE, panels, 1)[2].sum() - np.e + 1),
-        rtol=0.01,
-    )
+    np.testing.assert_allclose(finer.rates[..., WORK], np.exp(instants), rtol=1e-15)
+    off = abs(increments(panels)[WORK].sum() - np.e + 1)
+    np.testing.assert_allclose(changed[:, WORK].sum(), 15 * off, rtol=0.01)
 
 
 @pytest.mark.parametrize("steady", [False, True])
@@ -131,21 +107,15 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
     """The rest of the path turns with the panel, which is all that changes where a panel goes
     straight on at one speed."""
     rng, n = np.random.default_rng(3), 8
-    z, centre = rng.normal(size=(n, 5, 3)), rng.normal(size=(n, 5)) + 1j * rng.normal(size=(n, 5))
+    spin, centre = 1e-3 * rng.normal(size=(n, 5)), rng.normal(size=(n, 5, 2)) @ np.array([1, 1j])
     centre[:] = centre[:, :1] if steady else centre
-    z[..., 2] *= 1e-3  # to first order in the turn
-    power, actuator, residual, lever = (rng.uniform(1, 2, (n, 5)) for _ in range(4))
-    densities, shares, apart = (
-        rng.uniform(1, 2, (n, 5, 2)),
-        np.zeros((n, 5, 0)),
-        np.zeros((n, 5, 5)),
-    )
-    values = (z, z[..., 2], centre, power, actuator, densities, residual, lever, shares, apart)
+    rates = np.stack([spin, centre, *rng.uniform(1, 2, (3, n, 5))], axis=-1)
+    values = rng.normal(size=(n, 5, 3)), rates, spin, np.zeros((n, 5, 5))
     panels = Panels(np.arange(n) / n, np.full(n, 1 / n), *values, np.zeros((n, 5)))
-    once, twice = increments(HALF, panels, 2), increments(WHOLE, panels, 1)
+    once, twice = increments(panels, HALF), increments(panels)
 
     def distance(turn, move):
-        return abs(travelled(turn, move)[1][-1])
+        return abs(poses(turn, move)[1][-1])
 
     for k in range(n):
         turn, move = twice[0].copy(), twice[1].copy()

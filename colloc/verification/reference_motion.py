@@ -1,22 +1,15 @@
-r"""How wrong a collocated motion with states is, interval by interval.
-
-What the scheme says of every interval (`colloc.motion.kinds`) is held against the differential
-equation, solved with steps of its own: on a slope that of the heading
-(`colloc.verification.slope`), with inertia that of the momenta
-(`colloc.verification.inertial_motion`).
-"""
+r"""Errors of collocating a motion with states: what the scheme says of every interval
+(`colloc.motion.kinds`) against the differential equation, solved with steps of its own."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.inertia import Paced
-from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope
 from colloc.gaits.symmetry import NONE
 from colloc.motion.collocated import CollocatedPose, stage_weights
@@ -38,14 +31,13 @@ from colloc.verification.played import LEAST
 from colloc.verification.slope import gait_on_slope
 
 
-class CourseOfGait(NamedTuple):
+class ReferenceMotion(NamedTuple):
     """A gait's motion by the differential equation."""
 
     at: Callable[[np.ndarray], np.ndarray]
     """Momenta if they are states, theta, place, work against friction, ``(4 or 7, n)``, at phases
     in order, seen from axes that turn evenly."""
-    error: float
-    """About that of these states."""
+    error: float  # about that of these states
     sums: Callable[[np.ndarray], np.ndarray] | None = None
     """Quantities that forces are needed for up to phases in order, ``(k, n)``; None if there are
     none."""
@@ -54,51 +46,43 @@ class CourseOfGait(NamedTuple):
     seen in the whole motion."""
 
 
-def course(
+def reference_motion(
     control: ControlProblem, gait: Any, delta: float, mesh: Mesh, tolerance: float
-) -> CourseOfGait:
-    """The motion of a gait, delta per period, to a relative error of the objective, from what the
-    states count in it on a mesh; with inertia it is sought near the motion there."""
+) -> ReferenceMotion:
+    """The motion of a gait, delta per period, to a relative error of the objective; with inertia it
+    is sought near the motion on the mesh. A regime of one's own has it as ``reference``, by an
+    error of the states."""
     period = _collocated(control, mesh, gait, delta).period
     counts = sum(map(abs, control.aims.objective.shares(period).values()))
     error = tolerance / counts if np.isfinite(counts) else tolerance
-    return course_in(control.dynamics.regime, control, gait, delta, mesh, error)
-
-
-@singledispatch
-def course_in(
-    regime: Regime, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
-) -> CourseOfGait:
-    """The motion of a gait in a regime; that of another is registered with
-    ``course_in.register``."""
+    regime = control.dynamics.regime
+    if hasattr(regime, "reference"):
+        return regime.reference(control, gait, delta, mesh, error)
+    if isinstance(regime, Paced):
+        return _with_inertia(control, gait, delta, mesh, error)
+    if isinstance(regime, Slope):
+        asked = [each for each in control.aims.integrals if each.needs_forces]
+        body, law, *_ = control.dynamics
+        on = gait_on_slope(body, law, gait, delta, regime.grade, gait.corner_phases)
+        ran = on.integrate(np.array([gait.theta]), error)
+        return ReferenceMotion(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
     raise NotImplementedError(
-        f"no differential equation is known for {type(regime).__name__}: register one."
+        f"no differential equation is known for {type(regime).__name__}: give it a reference."
     )
 
 
-@course_in.register
-def _on_slope(
-    regime: Slope, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
-) -> CourseOfGait:
-    asked = [each for each in control.aims.integrals if each.needs_forces]
-    body, law, *_ = control.dynamics
-    on = gait_on_slope(body, law, gait, delta, regime.grade, gait.corner_phases)
-    ran = on.integrate(np.array([gait.theta]), error)
-    return CourseOfGait(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
-
-
-@course_in.register
 def _with_inertia(
-    regime: Paced, control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
-) -> CourseOfGait:
-    dynamics, regime, kind = control.dynamics, regime.at(gait), _kind(control)
+    control: ControlProblem, gait: Any, delta: float, mesh: Mesh, error: float
+) -> ReferenceMotion:
+    dynamics, kind = control.dynamics, _kind(control)
+    regime = dynamics.regime.at(gait)
     how: Any = {"froude": regime.froude, "turn": dynamics.turn, "regime": regime}
     moving = GaitWithInertia(dynamics.body, dynamics.law, gait, delta, **how)
     along = kind.along(mesh, _shapes(gait, mesh, delta), begin_of(kind, gait))
     begin, _, slopes = moving.rough_period(along.edges[:, 0])
     times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
     ran = moving.periodic_run(begin, max(error / times, LEAST), slopes)
-    return CourseOfGait(ran.course.at, times * ran.aim, alone=kind.alone)
+    return ReferenceMotion(ran.course.at, times * ran.aim, alone=kind.alone)
 
 
 def _kind(control: ControlProblem) -> Any:
@@ -111,12 +95,12 @@ def _shapes(gait: Any, mesh: Mesh, delta: float) -> Shapes:
 
 
 class _Collocated(NamedTuple):
-    """A gait on a mesh: its motion, and what its intervals and a period come to."""
+    """A gait on a mesh."""
 
     along: Along
     pose: CollocatedPose
     work: np.ndarray  # against friction, (n,)
-    integrals: dict[str, np.ndarray]
+    integrals: dict[str, np.ndarray]  # of intervals
     period: dict[str, float]
 
 
@@ -141,12 +125,11 @@ def _period(kind: Kind, passed: Passed, sums: dict[str, np.ndarray]) -> dict[str
     return kind.counted(passed) | totals
 
 
-def course_defects(
-    control: ControlProblem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait
+def state_errors(
+    control: ControlProblem, mesh: Mesh, gait: Any, delta: float, exact: ReferenceMotion
 ) -> dict[str, Any]:
-    """Errors of collocating a gait whose motion has states, delta per period, by the names of
-    `colloc.verification.mesh_error.MeshError`: of the work against friction, and none of
-    velocities."""
+    """Errors by the names of `colloc.verification.mesh_error.MeshError`; the work is that against
+    friction, velocities have none."""
     kind, objective = _kind(control), control.aims.objective
     along, pose, collocated_work, sums, other = _collocated(control, mesh, gait, delta)
     at_edges = exact.at(mesh.edges)
