@@ -1,11 +1,8 @@
-"""Joint angles that were measured or invented, as a gait: closed and smooth, with the error of that
-stated.
+"""Measured or invented joint angles as a gait: a Fourier series of the phase by least squares.
 
-The angles are fitted by a Fourier series of the phase, by least squares: so steps of time need not
-be equal, and noise is smoothed. How many harmonics that takes is told by generalised
-cross-validation: what a further harmonic gains has to be worth its coefficients. By the same
-measure the record gets a drift, which is taken out so that the gait closes, and a period: a time
-from its last sample to the first one of the next period, or that after which it repeats itself.
+Generalised cross-validation tells how many harmonics the samples are worth, whether the record
+drifts, which is taken out so that the gait closes, and the period: from the last sample to the
+first one of the next period, or after which the record repeats itself.
 """
 
 from __future__ import annotations
@@ -31,33 +28,26 @@ _WORTH, _EXACT = 1.05, 1e-16
 [rad^2]."""
 _PHASES = 1024  # at which a function is sampled
 _GAP, _GAPS = 5.0, 21
-"""The first sample is the next one within so many typical steps after the last; gaps at which that
-is tried at first."""
-_DRIFT = 0.1
-"""Share of what a joint moves that it may be off after a period: no more is closed."""
-_LARGEST = 2 * np.pi
-"""An angle beyond it is taken for one in degrees."""
+"""Steps after the last sample at which the next period begins, at most; gaps that are tried."""
+_DRIFT = 0.1  # drift a period that still closes, as a share of a joint's range
+_LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
 _ALIKE = 1e-3, 0.03, 0.2
-"""How much more a record may differ from itself a period later than several periods later, of what
-it does on average: the first length of which that holds is tried as the period."""
+"""Excess of the mean square difference of a record from itself a period later over that several
+periods later: the first length below each is a candidate for the period."""
 _REPEATED, _SLOW, _SMALL = 2.0, 10.0, 1e-2
-"""How much more mean square distance is allowed to periods that repeat than to as many harmonics as
-one long period may have: the first factor, and the second, for noise that is slower than the
-samples, up to such a share of what the joints move."""
+"""How much larger the score of several periods may be than that of one long one with as many
+harmonics: a factor, and a larger one, for slow noise, up to a share of the variance."""
 _DRIFTS, _OPEN = 1.3, 4.0
-"""The same for a record without a drift, as a part of a wave, with noise, looks a little like one;
-and for one that would not close else."""
-_TOLD = 0.5
-"""A period longer than this share of a record is told without a drift: a part of a wave and a drift
-are much alike."""
-_ROUGH = 6  # harmonics by which the length of a period is told
+"""The same for no drift, as a part of a wave with noise looks like one, and if the record would not
+close else."""
+_TOLD = 0.5  # share of a record beyond which a period is told without a drift
+_ROUGH = 6  # harmonics by which the period is told
 SEVERAL = 1.1
 """Periods from which a record holds more than one."""
-_STEP = 1e-5  # of differences by the period, relative
+_STEP = 1e-5  # relative, of differences by the period
 _HIGHEST = 64  # harmonics of a class at most
 _CHANCE = 0.05  # that noise alone seems worth more harmonics
-_COVERED = 0.97725
-"""The probability that the standard normal distribution has up to two standard deviations."""
+_COVERED = 0.97725  # standard normal distribution at two standard deviations
 
 Given = Fourier | np.ndarray | str | os.PathLike[str] | Callable[[np.ndarray], np.ndarray]
 """A series; angles ``(n_joint, n_time)`` at equal steps of a period, or labelled by xarray; a CSV
@@ -66,42 +56,41 @@ file; or a function of phases ``(n_time,)``."""
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """By what the coefficients of a series may be off that goes through samples."""
+    """Uncertainty of the coefficients of a series through samples."""
 
     directions: np.ndarray
-    """Changes of (mean, cos 1, sin 1, cos 2, ...), independent of one another, each of a standard
-    deviation, ``(n_direction, n_joint, n_coefficient)``; also of harmonics beyond the series."""
+    """Independent changes of (mean, cos 1, sin 1, cos 2, ...) of a standard deviation each,
+    ``(n_direction, n_joint, n_coefficient)``; also of harmonics beyond the series."""
     factor: float
-    """Standard deviations within which 95 % of all records lie: two, or Student's for few
-    samples."""
+    """Standard deviations that cover 95 %: two, or Student's for few samples."""
     richer: Fourier | None
-    """A series of more harmonics, if what smoothing leaves out is more than noise."""
+    """A series of more harmonics, if smoothing leaves out more than noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedGait:
     gait: Fourier
-    rms: float = 0.0  # distance of the joint angles from those given [rad]: root mean square
-    largest: float = 0.0  # and the largest of any joint at any sample
-    samples: int = 0  # how many there are; 0 for a series, which is taken as it is
-    drift: float = 0.0  # the most that any joint was off after a period [rad]; taken out evenly
-    degrees: bool = False  # whether angles were given in degrees, and are stated so
-    periods: float = 1.0  # that the samples hold, of the length `period`
+    rms: float = 0.0  # root-mean-square residual of the angles [rad]
+    largest: float = 0.0  # and the largest
+    samples: int = 0  # 0 for a series, which is taken as it is
+    drift: float = 0.0  # largest drift of a joint a period [rad], taken out
+    degrees: bool = False  # whether angles were given in degrees
+    periods: float = 1.0  # that the samples hold
     period: float = 1.0  # in the unit of time of a file
     uncertainty: Uncertainty | None = None  # None for a series
     taken: str = ""  # what was read from a file, in words
-    centre: int = 0  # about what all joints of a file are centred [degrees], as servos are
+    centre: int = 0  # `colloc.gaits.record.Record.centre`
 
     def describe(self) -> str:
         """How the gait was made, in words."""
         if not self.samples:
             return "the series as it was given"
-        many = f"{self.gait.n_harmonic} harmonic{'s' * (self.gait.n_harmonic > 1)}"
+        plural = "s" * (self.gait.n_harmonic > 1)
         rms, largest = (_shown(a, self.degrees, ".1e") for a in (self.rms, self.largest))
         text = f"{self.taken}; " if self.taken else ""
         if self.centre:
             text += f"all joints move about {self.centre}°, which servos may count from; "
-        text += f"{many} through {self.samples} samples"
+        text += f"{self.gait.n_harmonic} harmonic{plural} through {self.samples} samples"
         if self.periods > SEVERAL:
             text += f" of {self.periods:.3g} periods of {self.period:.4g}"
         if self.drift:
@@ -121,7 +110,7 @@ def fitted_gait(
     harmonics: int | None = None,
     degrees: bool = False,
 ) -> FittedGait:
-    """The gait that joint angles are samples of.
+    """Fit a gait to joint angles.
 
     Parameters
     ----------
@@ -129,7 +118,7 @@ def fitted_gait(
         See `Given`. A file has a column of times and one for each joint
         (`colloc.gaits.record.read_record`).
     n_joint : int
-        That the body has.
+        Of the body.
     period : float, optional
         Of a file, in its unit of time; more than one may be recorded. By default it is told from
         the samples.
@@ -147,8 +136,8 @@ def fitted_gait(
     Examples
     --------
     >>> t = np.arange(40) / 40
-    >>> found = fitted_gait(np.stack([np.cos(2 * np.pi * t), 0.5 * np.sin(2 * np.pi * t)]), 2)
-    >>> np.allclose(found.gait.sin, [[0], [0.5]]), found.largest < 1e-12
+    >>> fit = fitted_gait(np.stack([np.cos(2 * np.pi * t), 0.5 * np.sin(2 * np.pi * t)]), 2)
+    >>> np.allclose(fit.gait.sin, [[0], [0.5]]), fit.largest < 1e-12
     (True, True)
     """
     name, record = "the gait", None
@@ -211,17 +200,16 @@ def _numbers(name: str, given: object) -> np.ndarray:
 
 
 class _Fit(NamedTuple):
-    """Which series is to go through angles at times from 0."""
+    """A series to be fitted to angles at times from 0."""
 
     harmonics: int
     drifts: bool  # whether the record drifts
-    score: float  # mean square distance over the square of the share of numbers that are left
+    score: float  # mean square residual over the square of the share of numbers that are left
     period: float
     chosen: bool = False  # whether the period was told from the samples
 
     def columns(self, time: np.ndarray) -> np.ndarray:
-        """The drift, if there is one, then 1, the first cosine and sine, the second ...: ``(n_time,
-        n_number)``."""
+        """The drift, if there is one, 1, cos 1, sin 1, cos 2, ...: ``(n_time, n_number)``."""
         phases = time / self.period
         turns = 2 * np.pi * phases[:, None] * np.arange(1, self.harmonics + 1)
         waves = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(phases.size, -1)
@@ -237,27 +225,37 @@ class _Samples(NamedTuple):
 
     @property
     def step(self) -> float:
-        """Between samples; of many at one instant, as where stamps are rounded, the mean."""
+        """Median time step; the mean if most samples share a rounded time."""
         time = self.time
         return float(np.median(np.diff(time))) or float(time[-1] - time[0]) / (time.size - 1)
 
+    def table(self, fit: _Fit) -> np.ndarray:
+        """Coefficients of the columns of a fit, ``(n_joint, n_number)``."""
+        return np.linalg.lstsq(fit.columns(self.time), self.angles.T, rcond=None)[0].T
+
+    def drift_and_ranges(self, fit: _Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Drift a period and range of angles of each joint, ``(n_joint,)`` each."""
+        table = self.table(fit)
+        waves = Fourier.from_table(table[:, int(fit.drifts) :]).angles(np.arange(_PHASES) / _PHASES)
+        return np.abs(table[:, 0]) * fit.drifts, np.ptp(waves, axis=1)
+
     def fits(self, fit: _Fit, fewest: int = 1, chosen: int = 0) -> list[_Fit]:
-        """By one factorisation those of up to as many harmonics; so many numbers were `chosen`
-        besides."""
+        """Scores of `fewest` to all harmonics of a fit, with `chosen` more numbers, by one QR."""
         q = np.linalg.qr(fit.columns(self.time))[0]
         parts = q.T @ self.angles.T
         gains, left = (parts**2).sum(axis=1), ((self.angles.T - q @ parts) ** 2).sum()
-        missed = left + np.append(np.cumsum(gains[::-1])[::-1], 0.0)
+        residual = left + np.append(np.cumsum(gains[::-1])[::-1], 0.0)
         numbers = 1 + fit.drifts + 2 * np.arange(1, fit.harmonics + 1)
         free = 1 - (numbers + chosen) / self.time.size
-        scores = (missed[numbers] / self.angles.size / free**2).tolist()
-        return [
+        scores = (residual[numbers] / self.angles.size / free**2).tolist()
+        fits = [
             fit._replace(harmonics=k, score=score, chosen=chosen > 0)
             for k, score in enumerate(scores, 1)
-        ][fewest - 1 :]
+        ]
+        return fits[fewest - 1 :]
 
     def check(self, period: float | None, harmonics: int | None) -> None:
-        """A `ProblemError` if the samples cannot tell so many harmonics of such a period."""
+        """Raise a `ProblemError` if the samples do not determine such a series."""
         step, most = self.step, (self.time.size - 3) // 2
         if period is not None:
             if not np.isfinite(period) or period <= 0:
@@ -278,7 +276,7 @@ class _Samples(NamedTuple):
             )
 
     def best_fit(self, period: float | None, harmonics: int | None) -> _Fit:
-        """The fit of the fewest numbers that does about as well as any."""
+        """The fit of the fewest numbers that scores about as well as any."""
         self.check(period, harmonics)
         time, step = self.time, self.step
 
@@ -289,6 +287,9 @@ class _Samples(NamedTuple):
             most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
             return self.fits(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
 
+        def both_fits(period: float, chosen: int) -> list[_Fit]:
+            return [*fit_up_to(period, False, chosen), *fit_up_to(period, True, chosen)]
+
         def smallest_score(period: float) -> float:
             return _best(fit_up_to(period, False, most=_ROUGH))
 
@@ -296,60 +297,46 @@ class _Samples(NamedTuple):
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
             return float(minimize_scalar(smallest_score, bounds=(low, high), **how).x)
 
-        def both_fits(period: float, chosen: int) -> list[_Fit]:
-            return [*fit_up_to(period, False, chosen), *fit_up_to(period, True, chosen)]
-
-        found = (
-            both_fits(period, 0)
-            if period
-            else [*both_fits(time[-1], 0), *both_fits(time[-1] + step, 0)]
-        )
+        if period:
+            fits = both_fits(period, 0)
+        else:
+            fits = [*both_fits(time[-1], 0), *both_fits(time[-1] + step, 0)]
         if period is None:
             grid = time[-1] + step * np.linspace(0.0, _GAP, _GAPS)
             near = min(grid, key=smallest_score)
             around = max(near - grid[1] + grid[0], grid[0]), near + grid[1] - grid[0]
             repeats = [best_period(low, high) for low, high in self.find_repeats()]
-            found += both_fits(best_period(*around), 1)
+            fits += both_fits(best_period(*around), 1)
             for each in repeats:
-                found += fit_up_to(each, False, 1) if each > _TOLD * time[-1] else []
+                fits += fit_up_to(each, False, 1) if each > _TOLD * time[-1] else []
             several = [both_fits(each, 1) for each in sorted(repeats) if each <= _TOLD * time[-1]]
-            best = min(map(_best, (found, *several)))
+            best = min(map(_best, (fits, *several)))
             slow = min(_SLOW * best, _SMALL * float(self.angles.var(axis=1).mean()))
             enough = max(_REPEATED * best, slow) + _EXACT
-            found = next((fits for fits in several if _best(fits) <= enough), found)
-        closed = [fit for fit in found if not fit.drifts]
-        if _best(closed) <= _DRIFTS * _best(found) + _EXACT:
-            found = closed
-        fit = _cheapest(found)
-        open_ended = fit.drifts and not _closes(*self.coefficients(fit)[1:])
-        return _cheapest(closed) if open_ended and _best(closed) <= _OPEN * fit.score else fit
-
-    def coefficients(self, fit: _Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The numbers of every joint, how much it drifts in a period, and through what angle it
-        moves, ``(n_joint, ...)``."""
-        table = np.linalg.lstsq(fit.columns(self.time), self.angles.T, rcond=None)[0].T
-        waves = _series(table[:, int(fit.drifts) :]).angles(np.arange(_PHASES) / _PHASES)
-        return table, np.abs(table[:, 0]) * fit.drifts, np.ptp(waves, axis=1)
+            fits = next((each for each in several if _best(each) <= enough), fits)
+        closed = [fit for fit in fits if not fit.drifts]
+        if _best(closed) <= _DRIFTS * _best(fits) + _EXACT:
+            fits = closed
+        fit = _cheapest(fits)
+        if fit.drifts and not _closes(*self.drift_and_ranges(fit)):
+            return _cheapest(closed) if _best(closed) <= _OPEN * fit.score else fit
+        return fit
 
     def find_repeats(self) -> list[tuple[float, float]]:
-        """Between what lengths of time a record may repeat itself, the likeliest ones: where it
-        differs least from itself that much later. Of many periods a length is told by as many as
-        there are."""
+        """Likely brackets of the period: least differences of the record from itself that much
+        later, by as many periods as there are."""
         step = self.step
         even = np.arange(0.0, self.time[-1], step)
         moved = np.array([np.interp(even, self.time, row - row.mean()) for row in self.angles])
         n = even.size
-        spectrum = np.abs(np.fft.rfft(moved, 2 * n, axis=1)) ** 2
-        alike = np.fft.irfft(spectrum.sum(axis=0), 2 * n)[:n]
+        alike, later = _autocorrelation(moved), np.arange(n)
         squares = np.append(0.0, np.cumsum((moved**2).sum(axis=0)))
-        later = np.arange(n)
         differs = squares[n - later] + squares[n] - squares[later] - 2 * alike
         differs = (differs / (n - later) / (2 * squares[n] / n + 1e-300))[: n - 1]
         inner = np.arange(FEWEST, differs.size - 1)
-        least = inner[
-            (differs[inner] <= differs[inner - 1]) & (differs[inner] < differs[inner + 1])
-        ]
-        found = set()
+        falls, rises = differs[inner] <= differs[inner - 1], differs[inner] < differs[inner + 1]
+        least = inner[falls & rises]
+        brackets = set()
         for more in _ALIKE if least.size else ():
             first = least[np.argmax(differs[least] <= 1.5 * differs[least].min() + more)]
             around, length, times = 0.25 * first, float(first), 1
@@ -358,19 +345,19 @@ class _Samples(NamedTuple):
                 low, high = (round(times * length + side * around) for side in (-1, 1))
                 length = float(low + np.argmin(differs[low : high + 1])) / times
             low, high = length - 2.0 / times, length + 2.0 / times
-            # what a gap in the record may hide
-            found |= {(low * step / k, high * step / k) for k in (1, 2, 3) if low > k * FEWEST}
-        return sorted(found)
+            # a gap in the record may hide whole parts
+            brackets |= {(low * step / k, high * step / k) for k in (1, 2, 3) if low > k * FEWEST}
+        return sorted(brackets)
 
     def gait(self, fit: _Fit) -> FittedGait:
-        """A gait without the drift of its record. `ProblemError` if that is no small one."""
-        table, drift, moves = self.coefficients(fit)
-        gait, joint = _series(table[:, int(fit.drifts) :]), int(drift.argmax())
-        if not _closes(drift, moves):
+        """The gait without the drift of its record. `ProblemError` if that is not small."""
+        table, (drift, ranges) = self.table(fit), self.drift_and_ranges(fit)
+        gait, joint = Fourier.from_table(table[:, int(fit.drifts) :]), int(drift.argmax())
+        if not _closes(drift, ranges):
             raise ProblemError(
                 f"{self.name} does not close: after a period joint {joint + 1} is off by "
                 f"{_shown(drift[joint], self.degrees)}, and it moves through "
-                f"{_shown(moves[joint], self.degrees)}. Give one whole period, or say how long it "
+                f"{_shown(ranges[joint], self.degrees)}. Give one whole period, or say how long it "
                 f"is (period=, --period)."
             )
         off = gait.angles(self.time / fit.period) - self.angles
@@ -387,12 +374,11 @@ class _Samples(NamedTuple):
         )
 
     def uncertainty(self, fit: _Fit, table: np.ndarray) -> Uncertainty:
-        """By what a least-squares fit may be off: the covariance of its numbers, and of the period
-        where samples told it.
+        """Covariance of a least-squares fit, and of the period if it was told from the samples.
 
-        So large harmonics may be that the samples do not show: those up to twice the highest are in
-        the covariance, too. Where they hold more of the residuals than their share, noise is slower
-        than the samples, and there is as much of it in the others.
+        Harmonics up to twice the highest are in it, as large as the samples leave open. Where they
+        hold more of the residuals than their share, noise is slower than the samples, and as much
+        of it is in the others.
         """
         time, first = self.time, int(fit.drifts)
         most = min(time.size - first, round(fit.period / self.step))
@@ -421,21 +407,20 @@ class _Samples(NamedTuple):
             beside = ((by_period - along @ u.T) / deviation[:, None]) ** 2
             change = -((along / s) @ v)[None, :, first:] / np.sqrt(beside.sum() + 1e-300)
             directions = np.concatenate([directions, change])
-        more = None if richer is None else _series(richer[:, first:])
-        return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), more)
+        series = None if richer is None else Fourier.from_table(richer[:, first:])
+        return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), series)
 
     def richer(self, fit: _Fit, table: np.ndarray, far: _Fit) -> np.ndarray | None:
-        """The numbers of a fit of more harmonics, if these are worth more than noise would be (F
-        test)."""
+        """Coefficients of more harmonics, if they fit better than by chance (F test)."""
         columns, joints = far.columns(self.time), len(table)
         more, left = columns.shape[1] - table.shape[1], self.time.size - columns.shape[1]
-        richer = np.linalg.lstsq(columns, self.angles.T, rcond=None)[0].T
-        missed = ((self.angles - table @ fit.columns(self.time).T) ** 2).sum()
-        still = ((self.angles - richer @ columns.T) ** 2).sum()
-        worth = (missed / (still + 1e-300) - 1) * left / max(more, 1)
-        if more < 1 or (left > 0 and fdtrc(joints * more, joints * left, worth) > _CHANCE):
+        richer = self.table(far)
+        before = ((self.angles - table @ fit.columns(self.time).T) ** 2).sum()
+        after = ((self.angles - richer @ columns.T) ** 2).sum()
+        ratio = (before / (after + 1e-300) - 1) * left / max(more, 1)
+        if more < 1 or (left > 0 and fdtrc(joints * more, joints * left, ratio) > _CHANCE):
             return None
-        return np.asarray(richer)
+        return richer
 
 
 def _best(fits: list[_Fit]) -> float:
@@ -448,28 +433,20 @@ def _cheapest(fits: list[_Fit]) -> _Fit:
     return min(fit for fit in fits if fit.score <= enough)
 
 
-def _closes(drift: np.ndarray, moves: np.ndarray) -> bool:
-    return bool(drift.max() <= _DRIFT * moves.max())
+def _closes(drift: np.ndarray, ranges: np.ndarray) -> bool:
+    return bool(drift.max() <= _DRIFT * ranges.max())
+
+
+def _autocorrelation(rows: np.ndarray) -> np.ndarray:
+    n = rows.shape[1]
+    spectrum = np.abs(np.fft.rfft(rows, 2 * n, axis=1)) ** 2
+    return np.fft.irfft(spectrum.sum(axis=0), 2 * n)[:n]
 
 
 def _correlation_time(residuals: np.ndarray) -> float:
-    """How many samples in a row have one residual: 1 for noise without memory, more where a fit
-    lacks something."""
-    n = residuals.shape[1]
-    spectrum = np.abs(np.fft.rfft(residuals, 2 * n, axis=1)) ** 2
-    correlation = np.fft.irfft(spectrum.sum(axis=0), 2 * n)[:n]
+    """Samples in a row that share a residual: 1 for white noise, more if a fit lacks something."""
+    correlation = _autocorrelation(residuals)
     correlation /= correlation[0] + 1e-300
     ends = np.flatnonzero(correlation <= 0)
-    return float(1 + 2 * correlation[1 : ends[0] if ends.size else n].sum())
-
-
-def _series(table: np.ndarray) -> Fourier:
-    """The series of coefficients (mean, cos 1, sin 1, ...)."""
-    return Fourier(table[:, 0], table[:, 1::2], table[:, 2::2])
-
-
-def coefficients(gait: Fourier) -> np.ndarray:
-    """(mean, cos 1, sin 1, cos 2, ...) of every joint, ``(n_joint, 2 n_harmonic + 1)``."""
-    table = np.empty((gait.n_joint, 2 * gait.n_harmonic + 1))
-    table[:, 0], table[:, 1::2], table[:, 2::2] = gait.mean, gait.cos, gait.sin
-    return table
+    end = ends[0] if ends.size else correlation.size
+    return float(1 + 2 * correlation[1:end].sum())

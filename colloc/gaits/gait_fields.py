@@ -1,8 +1,4 @@
-"""Problems, gaits, classes of gaits, bodies and laws of friction as plain dictionaries (JSON), and
-back.
-
-The names of the fields tell the kind; of laws other than Coulomb's their name does.
-"""
+"""Problems, gaits, classes of gaits, bodies and laws as plain dictionaries (JSON), and back."""
 
 from __future__ import annotations
 
@@ -39,48 +35,44 @@ from colloc.system.arguments import STATED_IF_SET
 from colloc.system.errors import ProblemError
 
 AnyGait: TypeAlias = Any
-"""One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are
-of some kind."""
+"""One of `GAITS`."""
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
-# what files can hold, and is asked for; parts of your own making are added to these lists
+# what files can hold; parts of your own making are added to these lists
 GAITS: list[type] = [Fourier, Combination, Corners, Phases, SerpenoidSeries]
 CLASSES: list[type] = [Harmonic, BSpline, Basis, Coupled, Polygon, Prescribed, Serpenoid]
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 MOTIONS: list[type] = []
-"""Kinds of motion, `colloc.gaits.regime.Regime`, other than those that a grade and a Froude number
-ask for."""
+"""`colloc.gaits.regime.Regime` of one's own."""
 PARTS: list[type] = [Foot, FeetLaw]
-"""What bodies and laws hold."""
+"""Parts of bodies and laws."""
 
 
 def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None) -> None:
-    """A `ProblemError` for a part of a problem that is of none of some kinds, or does not answer
-    what they do."""
-    if isinstance(value, type) or not isinstance(value, answers or tuple(kinds)):
-        what = type(value).__name__
-        if answers is not None and type(value) in kinds:
-            lacks = [each for each in vars(answers) if each[0] != "_" and not hasattr(value, each)]
-            raise ProblemError(
-                f"{name}: a {what} does not say its {', '.join(lacks)} ({answers.__module__})."
-            )
+    """Raise a `ProblemError` for a part of a problem of none of some kinds, or that lacks members
+    of `answers`."""
+    if not isinstance(value, type) and isinstance(value, answers or tuple(kinds)):
+        return
+    what = type(value).__name__
+    if answers is not None and type(value) in kinds:
+        lacks = [each for each in vars(answers) if each[0] != "_" and not hasattr(value, each)]
         raise ProblemError(
-            f"{name} must be a {' or '.join(kind.__name__ for kind in kinds)}, not {what}."
+            f"{name}: a {what} does not say its {', '.join(lacks)} ({answers.__module__})."
         )
+    known = " or ".join(kind.__name__ for kind in kinds)
+    raise ProblemError(f"{name} must be a {known}, not {what}.")
 
 
 def fields(value: Any) -> dict[str, Any]:
-    """The kind of a gait, a class of gaits, a body or a law, and its fields as numbers, strings and
-    lists."""
-    stated = [
-        f
-        for f in dataclasses.fields(value)
-        if f.metadata != STATED_IF_SET or getattr(value, f.name) != f.default
-    ]
-    found = {f.name: getattr(value, f.name) for f in stated}
-    return {KIND: type(value).__name__, **{name: _plain(own) for name, own in found.items()}}
+    """The kind of a part of a problem, and its fields as numbers, strings and lists."""
+    found = {KIND: type(value).__name__}
+    for f in dataclasses.fields(value):
+        own = getattr(value, f.name)
+        if f.metadata != STATED_IF_SET or own != f.default:
+            found[f.name] = _plain(own)
+    return found
 
 
 def _plain(value: Any) -> Any:
@@ -92,19 +84,16 @@ def _plain(value: Any) -> Any:
 
 
 def _revived(value: Any) -> Any:
-    """A part of a body, a law or a gait, such as a foot, from what `fields` made of it; anything
-    else as it is."""
     if isinstance(value, list) and any(isinstance(part, dict) for part in value):
-        return tuple(_revived(part) for part in value)
-    return (
-        _from([*LAWS, *PARTS, *CLASSES, *BODIES], value)
-        if isinstance(value, dict) and KIND in value
-        else value
-    )
+        return tuple(map(_revived, value))
+    if isinstance(value, dict) and KIND in value:
+        return _from([*LAWS, *PARTS, *CLASSES, *BODIES], value)
+    return value
 
 
-def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
-    values = dict(given)
+def _from(kinds: Sequence[type], stated: dict[str, Any]) -> Any:
+    """The part that `fields` described. KeyError, TypeError or ProblemError if it did not."""
+    values = dict(stated)
     name = values.pop(KIND)
     # of one defined again the last
     kind = next((kind for kind in reversed(kinds) if kind.__name__ == name), None)
@@ -113,53 +102,51 @@ def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
     return kind(**{name: _revived(value) for name, value in values.items()})
 
 
-def gait_from(given: dict[str, Any]) -> AnyGait:
-    """The gait that `fields` described. KeyError, TypeError or ProblemError if it did not."""
-    return _from(GAITS, given)
+def gait_from(stated: dict[str, Any]) -> AnyGait:
+    return _from(GAITS, stated)
 
 
-def class_from(given: dict[str, Any]) -> AnyClass:
-    """The class of gaits that `fields` described; as `gait_from`."""
-    return _from(CLASSES, given)
+def class_from(stated: dict[str, Any]) -> AnyClass:
+    return _from(CLASSES, stated)
 
 
-def law_from(given: dict[str, Any]) -> Law:
-    """The law that `fields` described; as `gait_from`."""
-    return _from([*LAWS, FeetLaw], given)
+def law_from(stated: dict[str, Any]) -> Law:
+    return _from([*LAWS, FeetLaw], stated)
 
 
-def body_from(given: dict[str, Any]) -> Body:
-    """The body that `fields` described; as `gait_from`."""
-    return _from(BODIES, given)
+def body_from(stated: dict[str, Any]) -> Body:
+    return _from(BODIES, stated)
 
 
 def problem_fields(problem: Any) -> dict[str, Any]:
-    """All fields of a problem; what is usual of what it asks for is left out."""
-    stated = {f.name: getattr(problem, f.name) for f in dataclasses.fields(problem)}
-    usual = [
-        f.name
-        for f in dataclasses.fields(problem)
-        if f.metadata == STATED_IF_SET and stated[f.name] == f.default
-    ]
-    stated["gait"] = problem.gait.level  # the grade says that it is on a slope
-    stated |= {name: fields(stated[name]) for name in ("guess", "gait", "body", "friction")}
-    stated |= {
+    """All fields of a problem; those `STATED_IF_SET` only if they are not the default."""
+    plain: dict[str, Any] = {
+        name: fields(getattr(problem, name)) for name in ("guess", "body", "friction")
+    }
+    plain |= {
+        "gait": fields(problem.gait.level),
         "objective": problem.objective.fields(),
         "at_least": [[aim.fields(), least] for aim, least in problem.at_least],
+        "limits": [limit.fields() for limit in problem.limits],
     }
     if problem.motion is not None:
-        stated["motion"] = fields(problem.motion)
-    stated["limits"] = [limit.fields() for limit in problem.limits]
-    return {name: value for name, value in stated.items() if name not in usual}
+        plain["motion"] = fields(problem.motion)
+    return {
+        f.name: plain.get(f.name, value)
+        for f in dataclasses.fields(problem)
+        if (value := getattr(problem, f.name)) != f.default or f.metadata != STATED_IF_SET
+    }
 
 
 def problem_arguments(stated: dict[str, Any]) -> dict[str, Any]:
-    """The arguments of the problem that `problem_fields` described; as `gait_from`."""
+    """The arguments of the problem that `problem_fields` described."""
     kinds = {"guess": gait_from, "body": body_from, "friction": law_from, "gait": class_from}
-    own = {"motion": _from(MOTIONS, stated["motion"])} if "motion" in stated else {}
-    return {**stated, **{name: kind(stated[name]) for name, kind in kinds.items()}, **own}
+    parts = {name: kind(stated[name]) for name, kind in kinds.items()}
+    if "motion" in stated:
+        parts["motion"] = _from(MOTIONS, stated["motion"])
+    return stated | parts
 
 
 def statement_hash(stated: Any) -> str:
-    """SHA-256 of plain numbers, strings, lists and dictionaries, such as `problem_fields` gives."""
+    """SHA-256 of plain numbers, strings, lists and dictionaries."""
     return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()

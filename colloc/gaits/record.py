@@ -1,8 +1,5 @@
-"""Joint angles over time, from a file as robots, loggers and spreadsheets write it.
-
-Columns are known by their names: numbers of joints, whatever their order, units, times. What cannot
-be told is refused, not guessed; what was taken is said in one line.
-"""
+"""Joint angles over time from a file of a robot, logger or spreadsheet, whose columns are known by
+their names. What is ambiguous is refused; what was taken is said in one line."""
 
 from __future__ import annotations
 
@@ -18,32 +15,12 @@ from colloc.system.errors import ProblemError
 
 FEWEST = 6
 """Samples of a gait, and of each of its periods."""
-_LARGEST = 2 * np.pi
-"""An angle beyond it is taken for one in degrees."""
+_LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
 
 
-def _units(table: dict[str, float]) -> dict[str, float]:
-    return {word: unit for words, unit in table.items() for word in words.split()}
-
-
-_ANGLES = _units(
-    {
-        "rad rads radian radians": 1.0,
-        "mrad": 1e-3,
-        "deg degs degree degrees grad °": np.pi / 180,  # Grad is German for degrees
-    }
-)
-_NOT_READ = _units({"rev revs revolutions turn turns gon gons tick ticks counts": 0.0})
-"""Words of names that say another unit of angles."""
-_TIMES = _units(
-    {
-        "s sec secs second seconds": 1.0,
-        "ms msec millis milliseconds": 1e-3,
-        "us µs usec micros microseconds": 1e-6,
-        "ns nsec nsecs nanosec nanosecs nanoseconds": 1e-9,
-        "min": 60.0,
-    }
-)
+_ANGLES = dict.fromkeys(("rad", "rads", "radian", "radians"), 1.0) | {"mrad": 1e-3}
+# Grad is German for degrees
+_ANGLES |= dict.fromkeys(("deg", "degs", "degree", "degrees", "grad", "°"), np.pi / 180)
 _WORDS = {
     "time": "t|time|timestamp|stamp|zeit|temps|tiempo|tempo|clock|elapsed|datetime|date|uptime|n?secs|nanosecs?",  # noqa: E501
     "other": "vel.*|speeds?|rate|dot|qd|dq|omega|effort|torques?|tau|load|volt.*|temp.*|power|acc.*|pwm|force|currents?|err.*|"  # noqa: E501
@@ -53,13 +30,13 @@ _WORDS = {
     "commanded": "cmd|command(ed)?|target|goal|setpoint|des(ired)?|ref(erence)?|sp",
     "link": "links?|segments?|heading|abs(olute)?|orientation",
     "end": "head|tail|front|rear|back",
+    "unit of time": "m?s|[uµn]s|secs?|seconds?|[mu]sec|nsecs?|nanosecs?|(milli|micro|nano)seconds|"
+    "millis|micros|min",
+    "unit not read": "revs?|revolutions|turns?|gons?|ticks?|counts",
 }
-"""What words of the names of columns speak of, as regular expressions; "other" are columns that are
-no angles."""
+"""Words in names of columns, as regular expressions; "other" are columns that are no angles."""
 _CALLED = "call columns of joints joint_1 (at the tail), joint_2 and so on"
-"""What makes an order plain."""
-_ROUNDED = 0.15
-"""Share of steps of time that differ from the usual one, from which equal steps were rounded."""
+_ROUNDED = 0.15  # share of unequal time steps from which equal steps were rounded
 _MOST = 5_000  # samples; of more, every second, third ... is taken
 _CENTRED = np.radians(20)
 """All joints are centred within it of a right angle, or a straight one: so are servos that know no
@@ -72,20 +49,16 @@ class Record(NamedTuple):
     degrees: bool  # whether all were given in degrees
     period: float | None  # that the file states, in its unit of time
     taken: str  # what was read, and what was left out, in one sentence without its full stop
-    centre: int
-    """About what servos are centred, to the next right angle [degrees]; 0 where that is nothing to
-    be asked about."""
+    centre: int  # right angle about which servos are centred [degrees]; 0 if about none
 
 
 class _Column(NamedTuple):
     at: int
     name: str
-    words: tuple[str, ...]
-    """Letters and numbers of the name and the unit below it, in lower case."""
+    words: tuple[str, ...]  # letters and numbers of the name and the unit below it, lower case
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Of the name, or the one letter that stands for one."""
         return tuple(int(word) for word in self.words if word.isdecimal())
 
     @property
@@ -94,15 +67,19 @@ class _Column(NamedTuple):
         words = (word for word in self.words if word not in _ANGLES)
         return tuple("#" if word.isdecimal() else word for word in words)
 
+    def last(self, what: str) -> str:
+        """The last of its words that speaks of something; else empty."""
+        return next((word for word in reversed(self.words) if re.fullmatch(_WORDS[what], word)), "")
+
     def speaks_of(self, what: str) -> bool:
-        return any(re.fullmatch(_WORDS[what], word) for word in self.words)
+        return bool(self.last(what))
 
     @property
     def kind(self) -> str:
-        """What the column holds, by its name: "time", "count", "other", "place", or "angle" if
-        nothing else."""
+        """By the name "time", "count", "other", "place", or "angle" if nothing else."""
         words, unit = set(self.words), self.words[-2:]
-        if self.speaks_of("time") or (words and words <= set(_TIMES)):
+        all_units = all(re.fullmatch(_WORDS["unit of time"], word) for word in words)
+        if self.speaks_of("time") or (words and all_units):
             return "time"
         after_number = len(unit) > 1 and unit[0].isdecimal() and unit[1] in ("w", "a", "v", "c")
         rate = re.search(r"(rad|deg|°|rev)\w*\s*/\s*s|n·m", self.name, re.I)
@@ -122,17 +99,16 @@ def _column(at: int, name: str, unit: str) -> _Column:
 
 
 def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
-    """Joint angles over time of a text file with a line for each instant, for a body of so many
-    joints; with `degrees` angles are degrees where the file does not say what they are.
+    """Read joint angles over time from a text file, a line a sample; `degrees` holds where the file
+    does not name a unit.
 
-    `ProblemError` if the file is no such record, or one that could be read in several ways; it
-    names line, column and cure.
+    `ProblemError`, with line, column and cure, if the file is no such record, or an ambiguous one.
     """
     table = read_table(path)
     check_size(path, table, FEWEST)
     numeric, width = np.isfinite(table.values).any(axis=0), table.values.shape[1]
-    named = enumerate(zip(table.names, table.units, strict=True)) if table.names else ()
-    columns = [_column(j, *both) for j, both in named]
+    pairs = zip(table.names, table.units, strict=True) if table.names else ()
+    columns = [_column(j, *pair) for j, pair in enumerate(pairs)]
     if columns:
         clock = _clock(table, columns)
         others = [column for column in columns if column.at not in clock]
@@ -150,8 +126,7 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
         rows = rows[time[rows] >= 0]
         notes.append("the way into the gait, before time 0, left out")
     time = time[rows]
-    falls = np.flatnonzero(np.diff(time) < 0)
-    if falls.size:
+    if (falls := np.flatnonzero(np.diff(time) < 0)).size:
         raise ProblemError(
             f"{path}: the times{' in the first column' * (not columns)} fall after line "
             f"{table.lines[rows[falls[0]]]}: give one record, its lines in the order of time."
@@ -168,46 +143,46 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
     angles, in_degrees = _radians(path, table, joints, rows, degrees)
     unwrapped = np.unwrap(angles, discont=1.5 * np.pi, axis=1)
     unwrapped -= 2 * np.pi * np.round(unwrapped.mean(axis=1, keepdims=True) / (2 * np.pi))
-    turned = _names(joints, np.abs(unwrapped - angles).max(axis=1) > 1.0)
-    in_words = "degrees"
-    if not in_degrees.all():
-        mixed = _names(joints, in_degrees)
-        in_words = f"radians (but {mixed} degrees)" if mixed else "radians"
-    if turned:
+    if turned := _names(joints, np.abs(unwrapped - angles).max(axis=1) > 1.0):
         notes.append(f"whole turns taken out of {turned}")
     if left:
         more = f" and {len(left) - 3} more" if len(left) > 3 else ""
         notes.append(f"left out: {', '.join(left[:3])}{more}")
-    facts = [
-        f"read {n_joint} joint{'s' * (n_joint > 1)} {how} from {_listed(joints)}, {in_words}",
-        f"time {unit}{even}",
-        *table.notes,
-        *notes,
-    ]
+    angle_unit = "degrees"
+    if not in_degrees.all():
+        mixed = _names(joints, in_degrees)
+        angle_unit = f"radians (but {mixed} degrees)" if mixed else "radians"
+    plural = "s" * (n_joint > 1)
+    facts = [f"read {n_joint} joint{plural} {how} from {_listed(joints)}, {angle_unit}"]
+    facts += [f"time {unit}{even}", *table.notes, *notes]
     stated = re.search(r"^#\s*period_s:\s*([\d.eE+-]+)\s*$", table.preamble, re.M)
-    period, taken = float(stated[1]) if stated and unit == "in s" else None, "; ".join(facts)
-    all_degrees, centre = bool(in_degrees.all()), _centre(unwrapped)
-    return Record(time - time[0], unwrapped, all_degrees, period, taken, centre)
+    return Record(
+        time - time[0],
+        unwrapped,
+        bool(in_degrees.all()),
+        float(stated[1]) if stated and unit == "in s" else None,
+        "; ".join(facts),
+        _centre(unwrapped),
+    )
 
 
 def _names(columns: list[_Column], which: np.ndarray) -> str:
     return ", ".join(columns[j].name for j in np.flatnonzero(which))
 
 
-def _count(path: Path, found: int, n_joint: int) -> str:
-    many = (
-        f"{found} column{'s' * (found != 1)} of angles, and the body has {n_joint} "
-        f"joint{'s' * (n_joint != 1)}"
-    )
-    return f"{path} has {many}: write a column of times, then one for each joint; {_CALLED}."
-
-
 def _listed(columns: list[_Column]) -> str:
     return " ... ".join(dict.fromkeys((columns[0].name, columns[-1].name)))
 
 
+def _count(path: Path, count: int, n_joint: int) -> str:
+    return (
+        f"{path} has {count} column{'s' * (count != 1)} of angles, and the body has {n_joint} "
+        f"joint{'s' * (n_joint != 1)}: write a column of times, then one for each joint; {_CALLED}."
+    )
+
+
 def _clock(table: Table, columns: list[_Column]) -> list[int]:
-    """The column of times, or of seconds and what they lack; none for equal steps."""
+    """The column of times, or those of seconds and nanoseconds; none for equal steps."""
     varies = [column for column in columns if len({row[column.at] for row in table.cells}) > 1]
     times = [column for column in varies if column.kind == "time"]
     whole = next((c for c in times if {"sec", "secs"} & set(c.words)), None)
@@ -216,12 +191,13 @@ def _clock(table: Table, columns: list[_Column]) -> list[int]:
         return [whole.at, part.at]
     rising = [column for column in varies if (np.diff(table.values[:, column.at]) > 0).all()]
     counts = [column for column in rising if column.kind == "count"]
-    # called in another language
+    # times in another language
     others = [column for column in rising if column.at == 0 and not column.numbers]
     return [column.at for column in (times or counts or others)[:1]]
 
 
 def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Column], str]:
+    """The columns of the joints from tail to head, and by what they are known."""
     angles = [column for column in columns if column.kind == "angle"]
     places = [column for column in columns if column.kind == "place"]
     if not angles and places:
@@ -246,10 +222,9 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
         each.sort(key=lambda column: (column.numbers, column.words))
     full = [each for each in numbered if len(each) == n_joint]
     if len(full) > 1:
-        both = f"{_listed(full[0])}, and {_listed(full[1])}"
         raise ProblemError(
-            f"{path}: two sets of columns may be the {n_joint} joints, {both}: leave one of "
-            f"them out."
+            f"{path}: two sets of columns may be the {n_joint} joints, {_listed(full[0])}, and "
+            f"{_listed(full[1])}: leave one of them out."
         )
     beyond = next((each for each in numbered if len(each) == n_joint + 1), None)
     if full:
@@ -265,11 +240,8 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
         return full[0], "by name"
     if len(angles) != n_joint:
         raise ProblemError(_count(path, len(angles), n_joint))
-    turned = any(
-        [column.numbers for column in each] != [c.numbers for c in angles if c in each]
-        for each in numbered
-    )
-    if turned or any(column.speaks_of("end") for column in angles):
+    in_order = all(each == [column for column in angles if column in each] for each in numbered)
+    if not in_order or any(column.speaks_of("end") for column in angles):
         names = ", ".join(column.name for column in angles)
         raise ProblemError(f"{path}: the order of the columns {names} is not clear: {_CALLED}.")
     return angles, "in the file's order, tail to head,"
@@ -278,7 +250,7 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
 def _times(
     path: Path, table: Table, columns: list[_Column], clock: list[int]
 ) -> tuple[np.ndarray, str]:
-    """Times of all rows, from a first one, and their unit in words."""
+    """Times of all rows, and their unit in words."""
     if not clock:
         samples = np.arange(len(table.lines), dtype=float)
         return samples, "in equal steps, a sample each, as no column holds it"
@@ -288,38 +260,37 @@ def _times(
     time = table.values[:, clock[0]]
     if not np.isfinite(time).any():
         stamps = [_stamp(row[clock[0]]) for row in table.cells]
-        if stamps[0] is None:
+        if np.isnan(stamps[0]):
             raise ProblemError(
                 f"{path}, line {table.lines[0]}: the time {table.cells[0][clock[0]]!r} is no "
                 f"number, and no date and time as 2026-01-31T12:00:00.05: write seconds."
             )
-        first = stamps[0]
-        return np.array([np.nan if x is None else x - first for x in stamps]), "of day, in s"
+        return np.array(stamps) - stamps[0], "of day, in s"
     if not columns:
         return time, "in the first column"
     column = columns[clock[0]]
     if column.kind == "count":
         return time, f"in samples ({column.name or 'the first column'})"
-    unit = next((word for word in reversed(column.words) if word in _TIMES), "")
+    unit = column.last("unit of time")
     return time, f"in {unit}" if unit else f"from {column.name}"
 
 
-def _stamp(text: str) -> float | None:
-    """Seconds that a date and time, or a time of day, stands for."""
+def _stamp(text: str) -> float:
+    """Seconds of a date and time, or a time of day; NaN if it is none."""
     text = text.replace(",", ".")
     if re.match(r"\d{1,2}:", text):
         text = f"2000-01-01 {text:0>8}"
     try:
         return datetime.fromisoformat(text).timestamp()
     except ValueError:
-        return None
+        return np.nan
 
 
 def _rows(
     path: Path, table: Table, values: list[np.ndarray], at: list[int]
 ) -> tuple[np.ndarray, list[str]]:
-    """Which rows are samples, and what is said of the others; `at` are the columns of the last
-    values."""
+    """Numbers of the rows that are samples, and notes on the others; `at` are the columns of the
+    last values."""
     together = np.array(values)
     whole = np.isfinite(together).all(axis=0)
     for k in np.flatnonzero(~whole):
@@ -330,7 +301,7 @@ def _rows(
                     f"{path}, line {table.lines[k]}, column {name}: {cell[:40]!r} is no number: "
                     f"mend it, or leave the line out."
                 )
-    rows = np.flatnonzero(whole)
+    rows, blank = np.flatnonzero(whole), int((~whole).sum())
     if 2 * rows.size < whole.size or rows.size < FEWEST:
         first = table.lines[int(np.flatnonzero(~whole)[0])]
         raise ProblemError(
@@ -338,17 +309,14 @@ def _rows(
             f"that are needed (line {first} has not), and at least {FEWEST} are: write all joints "
             f"in every line."
         )
-    blank = int((~whole).sum())
-    said = [f"{blank} row{'s' * (blank > 1)} with blank cells left out"] if blank else []
-    again = np.concatenate([[False], (np.diff(together[:, rows], axis=1) == 0).all(axis=0)])
-    if again.any():
-        equal = int(again.sum())
-        said.append(f"{equal} row{'s' * (equal > 1)} like the one before left out")
-    return rows[~again], said
+    again = np.append(False, (np.diff(together[:, rows], axis=1) == 0).all(axis=0))
+    counts = {"with blank cells": blank, "like the one before": int(again.sum())}
+    notes = [f"{n} row{'s' * (n > 1)} {what} left out" for what, n in counts.items() if n]
+    return rows[~again], notes
 
 
 def _even_steps(time: np.ndarray) -> tuple[np.ndarray, str]:
-    """Times without what rounding did to equal steps, and that in words."""
+    """Undo the rounding of equal steps of time, and say so."""
     steps = np.diff(time)
     unit = steps[steps > 0].min()
     whole = np.round(steps / unit)
@@ -366,10 +334,9 @@ def _even_steps(time: np.ndarray) -> tuple[np.ndarray, str]:
 def _radians(
     path: Path, table: Table, joints: list[_Column], rows: np.ndarray, degrees: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Angles in radians ``(n_joint, n_time)``, and which were degrees. `ProblemError` if they are
-    something else."""
+    """Angles in radians ``(n_joint, n_time)``, and whether each was in degrees."""
     for column in joints:
-        if unread := next((word for word in column.words if word in _NOT_READ), None):
+        if unread := column.last("unit not read"):
             raise ProblemError(
                 f"{path}: the column {column.name} holds {unread}: write degrees or radians, and "
                 f"say so in its name."
@@ -385,37 +352,37 @@ def _radians(
     if re.search(r"in_?degrees\s*=\s*yes|angles are in degrees", table.preamble, re.I):
         degrees = True
     if not degrees and 0.0 in stated and max(stated) > 0.0:
-        silent, told = joints[stated.index(0.0)].name, joints[stated.index(max(stated))].name
+        silent, other = joints[stated.index(0.0)].name, joints[stated.index(max(stated))].name
         raise ProblemError(
-            f"{path}: the column {told} says its unit, and {silent} does not: call it {silent}_deg "
-            f"or {silent}_rad."
+            f"{path}: the column {other} says its unit, and {silent} does not: call it "
+            f"{silent}_deg or {silent}_rad."
         )
     units = np.array([unit or (np.pi / 180 if degrees else 1.0) for unit in stated])
     raw = table.values[rows][:, [column.at for column in joints]].T
-    largest, of = np.abs(raw).max(axis=1), np.isclose(units, np.pi / 180)
+    largest, in_degrees = np.abs(raw).max(axis=1), np.isclose(units, np.pi / 180)
     worst = int((largest * units).argmax())
     name, most = joints[worst].name, largest[worst]
+    too_large = most * units[worst] > _LARGEST
     if most > 360 and raw.min() >= 0:
         raise ProblemError(
             f"{path}: {name} goes up to {most:.4g}, like ticks or pulses of a servo: write "
             f"degrees, such as (ticks - 512) * 300 / 1023 or (ticks - 2048) * 360 / 4096 for "
             f"Dynamixel, and (microseconds - 1500) * 0.09 for pulses."
         )
-    if most * units[worst] > _LARGEST and not of[worst]:
+    if too_large and not in_degrees[worst]:
         raise ProblemError(
             f"{path} has an angle of {most:.4g} rad ({name}): if angles are degrees, say so "
             f"(degrees=True, --degrees)."
         )
-    if most * units[worst] > _LARGEST and most > 720:
+    if too_large and most > 720:
         raise ProblemError(
             f"{path}: {name} has an angle of {most:.4g} degrees: is it the right column?"
         )
-    return raw * units[:, None], of
+    return raw * units[:, None], in_degrees
 
 
 def _centre(angles: np.ndarray) -> int:
-    """The angle about which all joints are centred as servos are, to the next right angle
-    [degrees]."""
+    """The right angle about which all joints are centred, as servos are [degrees], or 0."""
     centres = 0.5 * (angles.max(axis=1) + angles.min(axis=1))
     near = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
     centred = centres.size > 1 and np.abs(centres - near).max() < _CENTRED
