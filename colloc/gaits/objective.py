@@ -1,9 +1,4 @@
-"""What a gait is to be best at: one expression of what a period comes to.
-
-The expression is stated once, as text (`colloc.numerics.expression`). It is evaluated with floats
-for a value, with numbers that carry their gradient for the search in the reduced space and for
-error bars, and with CasADi for the full program.
-"""
+"""Objectives: expressions of the quantities of a period (`colloc.numerics.expression`)."""
 
 from __future__ import annotations
 
@@ -27,21 +22,20 @@ QUANTITIES = {
     **{name: quantity.meaning for name, quantity in INTEGRALS.items()},
     "period": "time that a period takes, of a body with inertia [sqrt(length / gravity)]",
 }
-"""What every expression may speak of."""
+"""Variables of every expression."""
 _SAMPLES = (
     {"distance": 0.4, "work": 1.7, "rotation": 0.3, "length": 7.0},
     {"distance": 0.7, "work": 2.9, "rotation": 0.8, "length": 11.0},
 )
-_FLATTEST = 1e-30
-"""Slope of an objective, over which there is something to climb; one over it is too steep."""
 _OTHERS = 1.9, 3.3
-"""Periods at which an expression is tried when it is stated, and all other quantities there."""
+"""Typical periods at which expressions are tried, and their other quantities."""
+_FLATTEST = 1e-30  # least slope of an objective; its inverse is the largest
 
 
 @named_arguments
 @dataclass(frozen=True)
 class Objective:
-    """A value of what a period comes to.
+    """A function of the quantities of a period.
 
     Parameters
     ----------
@@ -87,14 +81,16 @@ class Objective:
             known = f"It may be one of {', '.join(NAMED)}, or a formula like 'distance / work'."
             raise ProblemError(f"objective: {error} {known}") from None
         if not stated.names & {*self._names}:
-            known = ", ".join(self._names)
             raise ProblemError(
                 f"the objective {stated.text!r} speaks of nothing that a gait does; it may of "
-                f"{known}."
+                f"{', '.join(self._names)}."
             )
-        object.__setattr__(self, "expression", stated.text)
         names = {expression: name for name, expression in NAMED.items()}
-        object.__setattr__(self, "name", self.name or names.get(self.expression, self.expression))
+        object.__setattr__(self, "expression", stated.text)
+        object.__setattr__(self, "name", self.name or names.get(stated.text, stated.text))
+        self._check_values()
+
+    def _check_values(self) -> None:
         try:
             with np.errstate(all="ignore"):
                 values = [self(sample) for sample in self._samples]
@@ -114,8 +110,7 @@ class Objective:
         if min(each.get("distance", 0.0) for each in partials) < 0:
             raise ProblemError(
                 f"the objective {self.expression!r} falls with the distance; a body counts its "
-                f"distance in the direction in "
-                "which it moves, so it can only be asked to go far."
+                f"distance in the direction in which it moves, so it can only be asked to go far."
             )
 
     def __call__(self, period: Mapping[str, Any]) -> Any:
@@ -137,35 +132,30 @@ class Objective:
 
     @property
     def _samples(self) -> list[dict[str, float]]:
-        return [
-            dict.fromkeys(self._names, other) | sample
-            for sample, other in zip(_SAMPLES, _OTHERS, strict=True)
-        ]
+        pairs = zip(_SAMPLES, _OTHERS, strict=True)
+        return [dict.fromkeys(self._names, other) | sample for sample, other in pairs]
 
     @cached_property
     def uses(self) -> tuple[str, ...]:
-        """The quantities that it speaks of, in the order of `QUANTITIES`, its own last."""
+        """Names of its variables, in the order of `QUANTITIES`, its own last."""
         return tuple(name for name in self._names if name in self._formula.names)
 
     @cached_property
     def integrals(self) -> tuple[Quantity, ...]:
-        """Those of them that are integrals of functions of an instant."""
+        """Its variables that are integrals of functions of an instant."""
         return tuple(self._known[name] for name in self.uses if name in self._known)
 
     @cached_property
     def degree(self) -> float | None:
-        """The power of the friction coefficients that the value is proportional to; None if to
-        none."""
-        if "period" in self.uses:  # it depends on the ratio of weight to friction
+        """Power of the friction coefficients that the value is proportional to, if to any."""
+        degrees = {"work": 1.0} | {each.name: each.friction_degree for each in self.integrals}
+        # a period depends on the ratio of weight to friction
+        if "period" in self.uses or None in degrees.values():
             return None
-        degrees, powers = {"work": 1.0}, []
-        for each in self.integrals:
-            if each.friction_degree is None:
-                return None
-            degrees[each.name] = each.friction_degree
+        powers = []
         for sample in self._samples:
             for factor in (2.0, 16.0):
-                scaled = {k: v * factor ** degrees.get(k, 0.0) for k, v in sample.items()}
+                scaled = {k: v * factor ** degrees.get(k, 0.0) for k, v in sample.items()}  # type: ignore[operator]
                 ratio = self(scaled) / self(sample) if self(sample) else np.nan
                 powers.append(np.log(ratio) / np.log(factor) if ratio > 0 else np.nan)
         near = float(np.round(powers[0], 6))
@@ -174,28 +164,25 @@ class Objective:
     def gradient(
         self, period: Mapping[str, float], slopes: Mapping[str, np.ndarray]
     ) -> np.ndarray | float:
-        """Of the value, from the quantities of a period and their gradients."""
-        return self._formula.differentiated(
-            {name: Dual(period[name], (slopes[name],)) for name in self.uses}
-        ).slopes[0]
+        """Gradient of the value, from the quantities of a period and their gradients."""
+        variables = {name: Dual(period[name], (slopes[name],)) for name in self.uses}
+        return self._formula.differentiated(variables).slopes[0]
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
-        """Derivative with respect to each quantity that it uses."""
-        unit = np.eye(len(self.uses))
-        slope = self.gradient(period, dict(zip(self.uses, unit, strict=True)))
-        return dict(zip(self.uses, np.broadcast_to(slope, len(self.uses)).tolist(), strict=True))
+        """Derivative with respect to each of its variables."""
+        n = len(self.uses)
+        slope = self.gradient(period, dict(zip(self.uses, np.eye(n), strict=True)))
+        return dict(zip(self.uses, np.broadcast_to(slope, n).tolist(), strict=True))
 
     def shares(self, period: Mapping[str, float]) -> dict[str, float]:
-        """What a small change of each quantity changes in the value, over its magnitude, per unit
-        of the change."""
+        """Relative change of the value per unit of each quantity."""
         size = max(abs(self(period)), 1e-300)
         return dict.fromkeys(self._names, 0.0) | {
             name: slope / size for name, slope in self.partials(period).items()
         }
 
     def relative_error(self, period: Mapping[str, float], errors: Mapping[str, Any]) -> Any:
-        """Relative error of the value from those of quantities, numbers or arrays, whose signs are
-        not known."""
+        """Relative error of the value, from errors of unknown sign of quantities."""
         shares = self.shares(period)
         return sum(abs(shares.get(name, 0.0)) * error for name, error in errors.items())
 
@@ -216,8 +203,7 @@ class Objective:
 
 
 def integrals_of(aims: Iterable[Objective]) -> tuple[Quantity, ...]:
-    """The integrals that any of some objectives speaks of. `ProblemError` if two of them have one
-    name."""
+    """The integrals of objectives. `ProblemError` if two of them have one name."""
     found: dict[str, Quantity] = {}
     for each in (quantity for aim in aims for quantity in aim.integrals):
         if found.setdefault(each.name, each) != each:
@@ -234,11 +220,10 @@ NAMED = {
     "driven efficiency": "distance / driven_work",
     "towing": "distance ** 2 / work",
 }
-"""Objectives that a problem may name: distance per work; per path in shape space, which is the
-speed of a body whose shape changes at unit rate; rotation per work; distance per work where no
-actuator recovers energy from being driven backwards (`colloc.mechanics.actuators`); and for viscous
-drag, whose work grows with the pace, Lighthill's efficiency: the work of towing the straight body
-as far in the same time, at unit drag along it, per work."""
+"""Speed is that of a body whose shape changes at unit rate. No actuator recovers energy from being
+driven backwards in "driven efficiency". For viscous drag, whose work grows with the pace, "towing"
+is Lighthill's efficiency: the work of towing the straight body as far in the same time, at unit
+drag along it, per work."""
 _SHORT = {
     "efficiency": "d/W",
     "speed": "d/L",
@@ -250,7 +235,7 @@ EFFICIENCY, SPEED, TURNING, DRIVEN, TOWING = (Objective(name) for name in NAMED)
 
 
 def objective_from(stated: object) -> Objective:
-    """An objective, as it is, by its name or expression, or as `Objective.fields` wrote it."""
+    """An objective by itself, its name, its expression, or its `fields`."""
     if isinstance(stated, Objective):
         return stated
     if isinstance(stated, dict):
@@ -261,7 +246,7 @@ def objective_from(stated: object) -> Objective:
 
 
 def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
-    """Objectives and the values that they must reach at least, from a mapping or pairs."""
+    """Objectives and their least values, from a mapping or pairs."""
     pairs = stated.items() if isinstance(stated, Mapping) else () if stated is None else stated
     if not isinstance(pairs, Iterable) or not all(
         isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in pairs

@@ -1,5 +1,4 @@
-"""A problem: body, friction, class of gaits, objective, guess and discretisation; frozen and
-validated when it is made."""
+"""The statement of a problem."""
 
 from __future__ import annotations
 
@@ -44,17 +43,10 @@ from colloc.system.arguments import (
 from colloc.system.errors import ProblemError
 from colloc.system.files import check_name
 
-SMALLEST_DELTA = 1e-14
-"""Balances are verified down to it; at speeds of order 1, less is below the rounding of their
-differences."""
-
-LARGEST_DELTA = 1e3
-"""Body lengths per period, far above the speeds of any gait, and far from where numbers
-overflow."""
-
+SMALLEST_DELTA = 1e-14  # differences of speeds of order 1 are rounded to less
+LARGEST_DELTA = 1e3  # body lengths per period, far above the speeds of any gait
 MOST_COORDINATES = 100
-"""Of a shape: contact is looked for in every pair of links at thousands of phases, which takes 10 s
-at so many, and no search ends with more."""
+"""Contact is checked in every pair of links at thousands of phases, which takes 10 s at so many."""
 
 
 @named_arguments
@@ -390,20 +382,19 @@ class Problem:
 
     @property
     def path_limits(self) -> PathLimits:
-        """What motors can do, joint by joint, and the other `limits`."""
+        """Limits of motors, joint by joint, and `limits`."""
         n = self.n_motor
         motors = torque_and_power(of_each(self.torque_limit, n), of_each(self.power_limit, n))
         return PathLimits((*motors, *(each.on(n) for each in self.limits)))
 
     @property
     def largest_speeds(self) -> tuple[float, ...]:
-        """Of the joints at any instant [rad per period], joint by joint; nothing where there is no
-        limit."""
+        """`speed_limit` joint by joint [rad per period]; empty without one."""
         return of_each(self.speed_limit, self.n_motor)
 
     @property
     def joint_map(self) -> JointMap | None:
-        """From motors to joints, where several hang on one or some are stuck."""
+        """The map from motors to joints, if several joints hang on one or some are stuck."""
         return self.gait.joint_map(self.body.n_joint)
 
     @property
@@ -423,13 +414,12 @@ class Problem:
 
     @property
     def law(self) -> Law:
-        """The law of friction of all that touches the floor: `friction`, unless feet of the body
-        have their own."""
+        """The law of friction of all contacts: `friction`, unless feet have their own."""
         return self.body.law(self.friction)
 
     @property
     def regime(self) -> Regime:
-        """How gaits are played. `ProblemError` if they cannot be."""
+        """The kind of motion. `ProblemError` if there is none like it."""
         slope = slope_from(self.body, self.friction, self.grade, self.towards)
         if self.motion is not None and (slope is not None or self.froude != 0):
             raise ProblemError(
@@ -441,13 +431,12 @@ class Problem:
 
     @property
     def scene(self) -> str:
-        """Where the body is and how fast, in words; "" on the level and slow."""
+        """The kind of motion in words; empty for slow motion on the level."""
         return self.regime.describe()
 
     @property
     def paced_by(self) -> str:
-        """Why the pace of a gait matters, in words; "" where distance and work belong to its
-        path."""
+        """Why the pace of a gait matters; empty if it does not."""
         if self.power_limit is not None:
             return "the joints' power is limited"
         if self.speed_limit is not None:
@@ -458,29 +447,27 @@ class Problem:
             return self.regime.pace
         if paced := [each.name for each in self.integrals if each.pace_degree != 1.0]:
             return f"the {paced[0]} of a path depends on how fast it is followed"
-        return (
-            "" if rate_independent(self.law) else f"work depends on the pace under {self.law.label}"
-        )
+        if not rate_independent(self.law):
+            return f"work depends on the pace under {self.law.label}"
+        return ""
 
     @property
     def aims(self) -> tuple[Objective, ...]:
-        """The objective, then the values that are to be reached at least."""
+        """The objective, then those of `at_least`."""
         return (self.objective, *(aim for aim, _ in self.at_least))
 
     def uses(self, quantity: str) -> bool:
-        """Whether the objective or what must be reached speaks of a quantity of a period, by its
-        name."""
+        """Whether one of the `aims` depends on a quantity."""
         return any(quantity in aim.uses for aim in self.aims)
 
     @property
     def integrals(self) -> tuple[Quantity, ...]:
-        """The quantities of which these speak that are integrals of functions of an instant."""
+        """Quantities in the `aims` that are integrals of functions of an instant."""
         return integrals_of(self.aims)
 
     @property
     def keeps_heading(self) -> bool:
-        """Whether the body is its own mirror image in every shape: then it moves along its own axis
-        and never turns."""
+        """Whether the body is its own mirror image in every shape, and so never turns."""
         return (
             self.body.n_joint == 1
             and self.law.reversible
@@ -490,8 +477,7 @@ class Problem:
 
     @property
     def asked(self) -> str:
-        """What is asked, in a line: the objective if it is not the efficiency, joints, friction,
-        scene and class of gaits."""
+        """The problem in a line, for reports."""
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
         return f"{best}{coordinates}, {self.law.label}{self.regime.label}, {self.gait.describe()}"

@@ -1,5 +1,4 @@
-"""Problem files: plain Python that states ``PROBLEM`` (and usually ``REFERENCE``). They are code,
-and are executed."""
+"""Problem files: Python that is executed and defines ``PROBLEM``, and perhaps ``REFERENCE``."""
 
 from __future__ import annotations
 
@@ -55,22 +54,17 @@ class Reference:
 
 @dataclass(frozen=True)
 class ProblemFile:
-    """What a problem file states."""
-
     problem: Problem
     reference: Reference | None
-    source: str
-    """Its text."""
-    starts: int | None = None
-    """``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess
-    leads to."""
+    source: str  # text of the file
+    starts: int | None = None  # starts of the search; 1 for the optimum that the guess leads to
 
 
 def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
-    """Execute a problem file. `ProblemError` if there is no such file, it cannot be read, it fails
-    (with the line), or states no ``PROBLEM``, or more than results can keep."""
+    """Execute a problem file. `ProblemError` if it cannot be read, fails (with the line), defines
+    no ``PROBLEM``, or more than results can keep."""
     path, names, source = stated_names(path, "problem")
-    problem, reference = names.get("PROBLEM"), names.get("REFERENCE")
+    problem, reference, starts = (names.get(each) for each in ("PROBLEM", "REFERENCE", "STARTS"))
     if problem is None:
         raise ProblemError(f"{path} states no PROBLEM; end it with PROBLEM = Problem(...).")
     if not isinstance(problem, Problem):
@@ -84,7 +78,6 @@ def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
     length = len(json.dumps(problem.to_dict()).encode())
     if length > LONGEST_TEXT:
         raise ProblemError(f"{path}: {_too_long('the description of PROBLEM', length)}")
-    starts = names.get("STARTS")
     if starts is not None and not is_whole(starts, 1):
         raise ProblemError(f"{path}: STARTS must be a whole number of at least 1, not {starts!r}.")
     return ProblemFile(problem, reference, source, starts)
@@ -108,14 +101,7 @@ def load_problem(path: str | os.PathLike[str]) -> Problem:
 
 
 def problem_file_text(problem: Problem) -> str:
-    """A problem file that states this problem, whatever it was stated by.
-
-    Examples
-    --------
-    >>> from colloc import Problem
-    >>> print(problem_file_text(Problem("mine")).splitlines()[2])
-    PROBLEM = Problem.from_dict(
-    """
+    """A problem file for a problem."""
     stated = pprint.pformat(problem.to_dict(), sort_dicts=False, width=100)
     return f"from colloc import Problem\n\nPROBLEM = Problem.from_dict(\n{stated}\n)\n"
 
@@ -129,9 +115,8 @@ def _too_long(what: str, size: int) -> str:
 
 
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
-    """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is
-    for the messages. What the file prints goes to standard error.
-    `ProblemError` as for `read_problem_file`."""
+    """Execute a file; its path, the names it leaves and its text. Its output goes to standard
+    error. `kind` ("problem", "study") is for messages."""
     path = Path(path)
     if not os.path.isfile(path):  # Path.is_file raises for a name that is too long
         raise ProblemError(f"there is no {kind} file {path}.")
@@ -173,15 +158,14 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
 
 
 def place_of(error: BaseException) -> str:
-    """File and line of somebody's code that raised, seen from where that was called; "" if it was
-    not reached."""
+    """File and line of a user's code that raised; "" if it was not reached."""
     theirs = traceback.extract_tb(error.__traceback__)[1:]
     lines = [frame.lineno for frame in theirs if frame.filename == theirs[0].filename]
     return f"{theirs[0].filename}, line {lines[-1]}" if lines else ""
 
 
 def words_of(error: BaseException) -> str:
-    """What an exception says; with its kind, unless it was made for people."""
+    """The message of an exception, with its kind unless it is a `ProblemError`."""
     if isinstance(error, ProblemError):
         return str(error)
     try:
