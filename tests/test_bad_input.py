@@ -9,83 +9,94 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import (
-    Axis,
-    Chain,
-    CollocError,
-    Foot,
-    Free,
-    Friction,
-    Harmonic,
-    Objective,
-    OwnLaw,
-    PathLimit,
-    PowerLaw,
-    Problem,
-    ProblemError,
-    Quantity,
-    Study,
-    Viscous,
-    ellipse,
-)  # fmt: skip
+from colloc import Chain, CollocError, Foot, Friction, Harmonic, PowerLaw, Problem, ProblemError
+from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.smooth.balance import solve_smooth
+from colloc.smooth.motion import Motion, sine_wave
 from colloc.system.errors import OrderWarning
+from colloc.verification.slope import checked_chain
+from colloc.verification.trajectory import plan_trajectory
 
-GAIT = ellipse(0.0, 1.2, 0.8)
+GAIT = colloc.ellipse(0.0, 1.2, 0.8)
 PROBLEM = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2)
 ON = {"body": Chain(), "friction": Friction(), "gait": GAIT, "delta": 1e-2}
-TABLE = [[0.1, 1, 2], [0.2, 1, 2], [0.3, 1, 2], [0.5, 1, 2], [1, 1, 2]]
-NEEDED = {
-    "Axis": {"name": "mu_t", "values": (1, 2)},
-    "Basis": {"columns": (np.sin(np.arange(64) * np.pi / 32),)},
-    "Corners": {"corners": np.array([[1, 0, -1.0], [0, 1, 0]])}, "Coupled": {
-    "gears": ((1.0,), (1.0,))},
-    "Foot": {"link": 0}, "Fourier": {"mean": [0, 0], "cos": [[1.0], [0]], "sin": [[0], [1.0]]},
-    "Pad": {"link": 0},
-    "Objective": {"expression": "distance/work"}, "PathLimit": {"name": "x", "function": "moment",
-    "most": 1.0},
-    "Problem": {"name": "x"}, "Quantity": {"name": "heat", "density": "sum(moment**2)"},
-    "Reference": {"efficiency": 1.0, "tolerance": 0.1, "source": "x"}, "Wheel": {"link": 0},
-    "Study": {"name": "s", "axes": (Axis("mu_t", (1, 2)),), "problem": lambda mu_t: PROBLEM},
-    "certify": {"answer": None}, "ellipse": {"A0": 0.0, "A1": 1.0, "B1": 1.0},
-    "evaluate": {"problem": PROBLEM, "gait": None}, "fitted_friction": {"table": TABLE},
-    "inertial_motion": {**ON, "froude": 0.0},
-    "load": {"path": "none.h5"}, "load_problem": {"path": "none.py"}, "motion_from_rest": {**ON,
-    "froude": 0.0},
-    "multistart": {"problem": "none.py"}, "pareto_front": {"problem": PROBLEM, "points": 1},
-    "replay": {"body": Chain(), "friction": Friction(), "path": GAIT, "delta": 0.0},
-    "save": {"solution": None, "path": "s.h5"},
-    "slope_motion": {**ON, "grade": 2.0}, "slow_enough": {**ON, "loss": 0.0},
-    "solve": {"problem": "none.py"},
-    "solve_balance": {"body": Chain(), "friction": Friction(), "angles": GAIT.mean,
-    "rates": GAIT.mean, "delta": 0.0},
-    "steer": {"problem": PROBLEM, "turns": []}, "sweep": {"study": "none.py"},
-}  # fmt: skip
+AT = (Chain(), Friction())
+TINY = 1e-9
+ONES = np.ones((2, 4))
+
+
+def motion(stages, antipodal=False):
+    return Motion(lambda s, t: s, lambda s, t: s, stages=stages, antipodal=antipodal)
+
+
+def samples(count, rate=2.0, limits=None):
+    return plan_trajectory(GAIT, rate, period=count / rate, limits=limits)
+
+
+def bound(limit, **changes):
+    budget = Budget(intervals=2, shapes=2, directions=2, rounds=1, starts=1, first=2, **changes)
+    return efficiency_bound(Chain((0.5, 0.5)), Friction(), limit, budget=budget)
+
+
+def with_one(value):
+    return np.where(np.arange(8).reshape(2, 4) == 6, value, 1.0)
+
+
+def path(angles, rates):
+    return lambda t: (np.full((2, t.size), angles), np.full((2, t.size), rates))
+
+
+NAMES = {name: getattr(colloc, name) for name in colloc.__all__} | globals()
+NAMES |= {each.__name__: each for each in (checked_chain, sine_wave, solve_smooth)}
+
+
+def cases(text, separator, most=-1):
+    return [line.split(separator, most) for line in text.strip().splitlines()]
+
+
+NEEDED = """
+Axis: name="mu_t", values=(1, 2)
+Basis: columns=(np.sin(np.arange(64) * np.pi / 32),)
+Corners: corners=np.array([[1, 0, -1.0], [0, 1, 0]])
+Coupled: gears=((1.0,), (1.0,))
+Foot: link=0
+Fourier: mean=[0, 0], cos=[[1.0], [0]], sin=[[0], [1.0]]
+Pad: link=0
+Objective: expression="distance/work"
+PathLimit: name="x", function="moment", most=1.0
+Problem: name="x"
+Quantity: name="heat", density="sum(moment**2)"
+Reference: efficiency=1.0, tolerance=0.1, source="x"
+Wheel: link=0
+Study: name="s", axes=(Axis("mu_t", (1, 2)),), problem=lambda mu_t: PROBLEM
+certify: answer=None
+ellipse: A0=0.0, A1=1.0, B1=1.0
+evaluate: problem=PROBLEM, gait=None
+fitted_friction: table=[[0.1, 1, 2], [0.2, 1, 2], [0.3, 1, 2], [0.5, 1, 2], [1, 1, 2]]
+inertial_motion: **ON, froude=0.0
+load: path="none.h5"
+load_problem: path="none.py"
+motion_from_rest: **ON, froude=0.0
+multistart: problem="none.py"
+pareto_front: problem=PROBLEM, points=1
+replay: body=Chain(), friction=Friction(), path=GAIT, delta=0.0
+save: solution=None, path="s.h5"
+slope_motion: **ON, grade=2.0
+slow_enough: **ON, loss=0.0
+solve: problem="none.py"
+solve_balance: body=Chain(), friction=Friction(), angles=GAIT.mean, rates=GAIT.mean, delta=0.0
+steer: problem=PROBLEM, turns=[]
+sweep: study="none.py"
+"""
+NEEDED = {name: eval(f"dict({words})", NAMES) for name, words in cases(NEEDED, ": ", 1)}
 """Arguments that are there in any case; of what would compute for long, one is wrong, so that
 nothing is computed."""
-MADE_BY_COLLOC = {"FittedFriction", "Known", "Solution", "Starts", "Free", "CollocError",
-"NotConvergedError", "ProblemError",
-                  "StoreError"}  # fmt: skip
+MADE_BY_COLLOC = "FittedFriction Known Solution Starts Free CollocError NotConvergedError ProblemError StoreError"
+BAD = [None, "a", -1, np.nan, np.inf, [], {}, 10**400, b"x", 1j, np.bool_(True), object()]
+BAD += [Friction, ["a"]]
 
 
-BAD = [
-    None,
-    "a",
-    -1,
-    float("nan"),
-    float("inf"),
-    [],
-    {},
-    10**400,
-    b"x",
-    1j,
-    np.bool_(True),
-    object(),
-    Friction,
-    ["a"],
-]
-
-
-@pytest.mark.parametrize("name", [name for name in colloc.__all__ if name not in MADE_BY_COLLOC])
+@pytest.mark.parametrize("name", [n for n in colloc.__all__ if n not in MADE_BY_COLLOC.split()])
 def test_a_wrong_argument_of_a_public_name_ends_in_a_sentence(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     made, needed, said = getattr(colloc, name), NEEDED.get(name, {}), []
@@ -99,9 +110,7 @@ def test_a_wrong_argument_of_a_public_name_ends_in_a_sentence(name, tmp_path, mo
     assert said or not inspect.signature(made).parameters
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in NEEDED if name[0].islower() and name != "ellipse"]
-)
+@pytest.mark.parametrize("name", [n for n in NEEDED if n[0].islower() and n != "ellipse"])
 def test_a_function_that_lacks_an_argument_or_has_none_of_that_name_says_so(name):
     with pytest.raises(ProblemError, match=f"{name}: missing a required argument"):
         getattr(colloc, name)()
@@ -109,59 +118,52 @@ def test_a_function_that_lacks_an_argument_or_has_none_of_that_name_says_so(name
         getattr(colloc, name)(**NEEDED[name], colour=1)
 
 
-KINDS = [np.float32, np.float16, np.float64, np.longdouble]
+FIELDS = ("delta", "delta_start", "smallest_shape_speed", "froude", "joint_limit", "torque_limit")
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
-    "field",
-    ["delta", "delta_start", "smallest_shape_speed", "froude", "joint_limit", "torque_limit"],
-)
+@pytest.mark.parametrize("kind", [np.float32, np.float16, np.float64, np.longdouble])
+@pytest.mark.parametrize("field", FIELDS)
 def test_numbers_of_numpy_are_the_numbers_of_python(kind, field):
-    usual = {"gait": Harmonic(1), "smallest_shape_speed": 0.01}
-    stated = Problem("x", **usual | {field: kind(0.5)})
-    if field != "torque_limit" and field != "froude":
+    stated = Problem("x", **{"gait": Harmonic(1), "smallest_shape_speed": 0.01, field: kind(0.5)})
+    if field not in ("torque_limit", "froude"):
         stated = stated.with_(torque_limit=np.array([kind(0.25), kind(0.5)]))
     assert type(getattr(stated, field)) is float
     json.dumps(stated.to_dict())
-    assert (
-        Problem.from_dict(stated.to_dict()).hash == stated.hash == stated.with_(**{field: 0.5}).hash
-    )
+    again = Problem.from_dict(stated.to_dict())
+    assert again.hash == stated.hash == stated.with_(**{field: 0.5}).hash
 
 
 def test_equal_problems_have_equal_hashes_however_their_numbers_are_written():
-    feet, same_feet = (
-        (Foot(0, 1), Foot(1), Foot(2, 0)),
-        (Foot(np.int64(0), 1.0), Foot(1, np.float32(0.5)), Foot(2, 0.0)),
-    )
-    one = Problem(
-        "x", body=Chain(feet=feet), friction=Friction(1, 1, 1), gait=Harmonic(1), joint_limit=2
-    )
-    other = Problem(
-        "x", body=Chain(feet=same_feet), friction=Friction(1.0, np.float32(1), np.int8(1)),
-        gait=Harmonic(np.int32(1)),
-        joint_limit=2.0, shrinking=np.bool_(False), intervals=np.int64(24),
-    )  # fmt: skip
-    assert one.with_(intervals=24).hash == other.hash
+    feet = Foot(0, 1), Foot(1), Foot(2, 0)
+    same = Foot(np.int64(0), 1.0), Foot(1, np.float32(0.5)), Foot(2, 0.0)
+    kinds = {
+        "gait": Harmonic(np.int32(1)),
+        "joint_limit": np.array(2.0),
+        "shrinking": np.bool_(False),
+    }
+    laws = Friction(1, 1, 1), Friction(1.0, np.float32(1), np.int8(1))
+    one = Problem("x", None, Chain(feet=feet), laws[0], Harmonic(1), joint_limit=2, intervals=24)
+    other = Problem("x", None, Chain(feet=same), laws[1], **kinds, intervals=np.int64(24))
+    assert one.hash == other.hash
     assert one.friction == other.friction
     assert isinstance(one.friction.mu_t, float)
     assert other.shrinking is False
 
 
-@pytest.mark.parametrize(
-    ("made", "read"),
-    [
-        (lambda: Friction(0.11, 0.14, 0.20), "mu_t=0.11, mu_f=0.14, mu_b=0.2"),
-        (lambda: Friction(0.3), "mu_t=0.3, mu_f=1, mu_b=1"),
-        (lambda: Friction(1, 1, mu_b=2), "mu_t=1, mu_f=1, mu_b=2"),
-        (lambda: colloc.Elliptic(2, 1, 1), "Elliptic.mu_t=2, mu_f=1, mu_b=1"),
-        (lambda: PowerLaw(0.5, 2.0), "mu_t=2, mu_f=1, mu_b=1"),
-        (lambda: Viscous(2, 1), "normal=2, tangential=1"),
-    ],
-)
+ORDERS = """
+Friction(0.11, 0.14, 0.20) -> mu_t=0.11, mu_f=0.14, mu_b=0.2
+Friction(0.3) -> mu_t=0.3, mu_f=1, mu_b=1
+Friction(1, 1, mu_b=2) -> mu_t=1, mu_f=1, mu_b=2
+Elliptic(2, 1, 1) -> Elliptic.mu_t=2, mu_f=1, mu_b=1
+PowerLaw(0.5, 2.0) -> mu_t=2, mu_f=1, mu_b=1
+Viscous(2, 1) -> normal=2, tangential=1
+"""
+
+
+@pytest.mark.parametrize(("made", "read"), cases(ORDERS, " -> "))
 def test_coefficients_that_differ_and_have_no_names_warn_how_they_are_read(made, read):
     with pytest.warns(OrderWarning, match=f"read as .*{read}"):
-        made()
+        eval(made, NAMES)
 
 
 def test_coefficients_that_are_equal_or_named_do_not_warn():
@@ -173,137 +175,179 @@ def test_coefficients_that_are_equal_or_named_do_not_warn():
         assert law.in_units_of(0.1).mu_b == pytest.approx(1.4)
 
 
-SENTENCES = {
-    "a constant objective": (lambda: Objective("1"), "speaks of nothing"),
-    "a constant objective without a value": (lambda: Objective("log(-1)"), "speaks of nothing"),
-    "an objective that is flat": (lambda: Objective("distance ** 1000"), "too flat or too steep"),
-    "an objective times nothing": (lambda: Objective("0 * distance"), "too flat or too steep"),
-    "an objective over nothing": (lambda: Objective("distance / work + 1/0"),
-    "no finite real number"),
-    "a root of what is negative": (lambda: Objective("distance * (-1) ** 0.5"),
-    "no finite real number"),
-    "a power beyond all bounds": (lambda: Quantity("heat", "sum(moment ** 2) * 9.0**9**9"),
-    "no finite real number"),
-    "a number beyond all bounds": (lambda: Objective(f"distance * 1{'0' * 400}"),
-    "no value|no finite"),
-    "a function of too many": (lambda: OwnLaw("-sqrt(vs, vn)", "-vn"),
-    "sqrt takes 1 argument, not 2"),
-    "a function of too few": (lambda: PathLimit("p", "where(power > 0)", 1.0),
-    "where takes 3 arguments, not 1"),
-    "friction over zero": (lambda: OwnLaw("1/0", "-vn/speed"), "no finite real number"),
-    "friction over the norm": (lambda: OwnLaw("-vs/sqrt(vs**2+vn**2)", "-2*vn/sqrt(vs**2+vn**2)"),
-    "divide by speed"),
-    "friction of lists": (lambda: OwnLaw([], "-vn"), "must be text"),
-    "a class for a law": (lambda: Foot(0, friction=Friction), r"as Friction\(\)"),
-    "a text for yes": (lambda: Problem("x", shrinking="no"), "shrinking must be True or False, "
-                                                             "not 'no'"),
-    "a number for yes": (lambda: colloc.Concertina(backwards=1), "backwards must be True or False"),
-    "a goal without a value": (lambda: Problem("x", at_least="distance"), "at_least names what "
-                                                                          "must be reached"),
-    "goals in threes": (lambda: Problem("x", at_least=[("distance", 0.1, 0.2)]),
-    "at_least names what must be reached"),
-    "friction that is viscous": (lambda: Problem("x", delta=1e308), "delta .* at most 1000"),
-    "an axis called like a column": (lambda: Axis("efficiency", (1, 2)),
-    "as a column of the results is"),
-    "an axis called like a dimension": (lambda: Axis("joint", (1, 2)),
-    "as a column of the results is"),
-    "an axis without a name": (lambda: Axis(None, (1, 2)), "must be a Python name"),
-    "a seed of 23 digits": (lambda: colloc.multistart(PROBLEM, 1, seed=10**22), "seed must be"),
-    "a seed of a study of 23 digits": (lambda: Study("s", (Axis("x", (1,)),), lambda x: PROBLEM,
-    seed=10**22), "seed must be"),
-    "no workers": (lambda: colloc.multistart(PROBLEM, workers=0), "workers must be a whole number "
-                                                                  "of at least 1"),
-    "no time": (lambda: colloc.multistart(PROBLEM, time_limit=-1), "time_limit must be positive"),
-    "a million years of periods": (
-        lambda: colloc.slope_motion(**ON, grade=0.1, heading=0.0, periods=10**9),
-        "periods must be .* from 1 to 10000",
-    ),
-    "periods from rest": (lambda: colloc.motion_from_rest(**ON, froude=0.1, periods=10**9),
-    "periods must be"),
-    "quantities that are a number": (lambda: Objective("distance", quantities=3),
-    "3 is no quantity"),
-    "a list of lists of different lengths": (
-        lambda: colloc.solve_balance(Chain(), Friction(), [[1.0, 2.0], [3.0]], np.ones((2, 1)),
-        1e-3), "angles must be numbers",
-    ),
-    "complex angles": (
-        lambda: colloc.solve_balance(Chain(), Friction(), 1j * np.ones((2, 4)), np.ones((2, 4)),
-        1e-3), "angles must be",
-    ),
-    "a law by its name": (lambda: colloc.replay(Chain(), "friction", GAIT, 1e-3),
-    "friction must be a Law"),
-    "a body by its length": (lambda: colloc.replay(3, Friction(), GAIT, 1e-3), "body must be a"),
-    "a path of numbers": (lambda: colloc.replay(Chain(), Friction(), [1.0, 2.0], 1e-3),
-    "path must be a function"),
-    "an argument twice": (lambda: Friction(1, mu_t=2), "was given mu_t twice"),
-    "a pace that is no number": (lambda: Problem("x", froude=Free("a", 1)), "two numbers above 0"),
-    "a start that points nowhere": (lambda: colloc.Fourier([0], [[1]], [[0]], theta=float("nan")),
-    "theta must be a number"),
-    "a whole number as a text": (lambda: colloc.solve(PROBLEM, starts="3"),
-    "starts must be a whole number or None, not '3'"),
-    "a fraction of a start": (lambda: colloc.solve(PROBLEM, starts=1.5), "starts must be a whole "
-                                                                         "number or None, not 1.5"),
-    "starts that are true": (lambda: colloc.solve(PROBLEM, starts=True), "starts must be a whole "
-                                                                         "number or None, not True"),
-    "a reference of words": (lambda: colloc.Reference("high", 0.1, "me"), "efficiency must be a "
-                                                                          "number"),
-    "an axis that is a number": (lambda: Axis("x", 3), "values of an axis must be"),
-    "an axis beyond all bounds": (lambda: Axis("x", (10**400,)), "values of an axis must be"),
-    "a sampler that is none": (lambda: colloc.multistart(PROBLEM, 1, sampler="x"),
-    "sampler must be one of latin-hypercube"),
-    "an output that is a folder": (lambda: colloc.solve(PROBLEM, 1, output="."),
-    "output must name a file"),
-    "breaks that are no phases": (
-        lambda: colloc.replay(Chain(), Friction(), GAIT, 1e-2, breaks=(float("nan"), 5.0)),
-        "breaks must be numbers",
-    ),
-    "a billion instants": (lambda: colloc.replay(Chain(), Friction(), GAIT, 1e-2, instants=10**9),
-    "at most 10000000"),
-    "a billion points": (lambda: colloc.pareto_front(PROBLEM, points=10**9), "2 to 1000 points"),
-    "a word that Python keeps": (lambda: Quantity("lambda", "sum(rate**2)"),
-    "a name of its own that is a word"),
-    "a motion that is nothing": (lambda: Problem("x", motion=[]), "motion must be"),
-    "more links than memory can compare": (
-        lambda: Problem.from_dict({**PROBLEM.to_dict(), "body": {"kind": "Chain",
-        "lengths": [1e-4] * 10_000}}),
-        "the body has 9999 joints, and 100 are allowed",
-    ),
-    "a link that is nothing": (lambda: Chain((1e-12, 0.5 - 1e-12, 0.5)), "no link may be shorter "
-                                                                         "than 1e-06"),
-    "a joint limit of no dimension": (lambda: Problem("x", joint_limit=np.array(9.0)),
-    "joint_limit must lie"),
-}  # fmt: skip
+SENTENCES = r"""
+Objective("1") -> speaks of nothing
+Objective("log(-1)") -> speaks of nothing
+Objective("distance ** 1000") -> too flat or too steep
+Objective("0 * distance") -> too flat or too steep
+Objective("distance / work + 1/0") -> no finite real number
+Objective("distance * (-1) ** 0.5") -> no finite real number
+Quantity("heat", "sum(moment ** 2) * 9.0**9**9") -> no finite real number
+Objective(f"distance * 1{'0' * 400}") -> no value|no finite
+OwnLaw("-sqrt(vs, vn)", "-vn") -> sqrt takes 1 argument, not 2
+PathLimit("p", "where(power > 0)", 1.0) -> where takes 3 arguments, not 1
+OwnLaw("1/0", "-vn/speed") -> no finite real number
+OwnLaw("-vs/sqrt(vs**2+vn**2)", "-2*vn/sqrt(vs**2+vn**2)") -> divide by speed
+OwnLaw([], "-vn") -> must be text
+Foot(0, friction=Friction) -> as Friction\(\)
+Problem("x", shrinking="no") -> shrinking must be True or False, not 'no'
+Concertina(backwards=1) -> backwards must be True or False
+Problem("x", at_least="distance") -> at_least names what must be reached
+Problem("x", at_least=[("distance", 0.1, 0.2)]) -> at_least names what must be reached
+Problem("x", delta=1e308) -> delta .* at most 1000
+Axis("efficiency", (1, 2)) -> as a column of the results is
+Axis("joint", (1, 2)) -> as a column of the results is
+Axis(None, (1, 2)) -> must be a Python name
+multistart(PROBLEM, 1, seed=10**22) -> seed must be
+Study("s", (Axis("x", (1,)),), lambda x: PROBLEM, seed=10**22) -> seed must be
+multistart(PROBLEM, workers=0) -> workers must be a whole number of at least 1
+multistart(PROBLEM, time_limit=-1) -> time_limit must be positive
+slope_motion(**ON, grade=0.1, heading=0.0, periods=10**9) -> periods must be .* from 1 to 10000
+motion_from_rest(**ON, froude=0.1, periods=10**9) -> periods must be
+Objective("distance", quantities=3) -> 3 is no quantity
+solve_balance(*AT, [[1.0, 2.0], [3.0]], np.ones((2, 1)), 1e-3) -> angles must be numbers
+solve_balance(*AT, 1j * ONES, ONES, 1e-3) -> angles must be
+solve_balance(*AT, "bent", ONES, 1e-3) -> angles must be
+solve_balance(*AT, ONES, None, 1e-3) -> rates must be
+solve_balance(*AT, ONES, ONES, "1e-3") -> delta must be
+solve_balance(*AT, ONES, ONES, 1e-3, tolerance=0) -> tolerance must be
+replay(Chain(), "friction", GAIT, 1e-3) -> friction must be a Law
+replay(3, Friction(), GAIT, 1e-3) -> body must be a
+replay(*AT, [1.0, 2.0], 1e-3) -> path must be a function
+replay(*AT, path(0.7, 0.0), 1e-4) -> does not move
+Friction(1, mu_t=2) -> was given mu_t twice
+Problem("x", froude=Free("a", 1)) -> two numbers above 0
+Fourier([0], [[1]], [[0]], theta=float("nan")) -> theta must be a number
+solve(PROBLEM, starts="3") -> starts must be a whole number or None, not '3'
+solve(PROBLEM, starts=1.5) -> starts must be a whole number or None, not 1.5
+solve(PROBLEM, starts=True) -> starts must be a whole number or None, not True
+Reference("high", 0.1, "me") -> efficiency must be a number
+Axis("x", 3) -> values of an axis must be
+Axis("x", (10**400,)) -> values of an axis must be
+multistart(PROBLEM, 1, sampler="x") -> sampler must be one of latin-hypercube
+solve(PROBLEM, 1, output=".") -> output must name a file
+replay(*AT, GAIT, 1e-2, breaks=(float("nan"), 5.0)) -> breaks must be numbers
+replay(*AT, GAIT, 1e-2, instants=10**9) -> at most 10000000
+pareto_front(PROBLEM, points=10**9) -> 2 to 1000 points
+Quantity("lambda", "sum(rate**2)") -> a name of its own that is a word
+Problem("x", motion=[]) -> motion must be
+Problem.from_dict({**PROBLEM.to_dict(), "body": {"kind": "Chain", "lengths": [1e-4] * 10_000}}) -> 9999 joints, and 100
+Chain((1e-12, 0.5 - 1e-12, 0.5)) -> no link may be shorter than 1e-06
+Problem("x", joint_limit=np.array(9.0)) -> joint_limit must lie
+Corners(corner=np.eye(2)) -> has no argument 'corner'
+Fourier(np.eye(2), np.eye(2)) -> Fourier
+Fourier(*(1,) * 9) -> Fourier
+Problem("x", frction=1) -> did you mean friction
+Problem() -> Problem needs name
+Friction(mu=1) -> did you mean mu_t, mu_f or mu_b
+Harmonic(harmonic=2) -> did you mean harmonics
+Problem("x").with_(intervalls=3) -> did you mean intervals
+Polygon(colour=1) -> it takes corners, symmetry, axis
+solve(5) -> problem must be a Problem
+solve(PROBLEM, starts=0) -> starts must be a whole number of at least 1
+solve(PROBLEM, seconds=np.nan) -> seconds must be .*, not nan
+"""
 
 
-@pytest.mark.parametrize("case", SENTENCES)
-def test_what_cannot_be_meant_is_refused_in_a_sentence(case):
-    made, words = SENTENCES[case]
+@pytest.mark.parametrize(("made", "words"), cases(SENTENCES, " -> "))
+def test_what_cannot_be_meant_is_refused_in_a_sentence(made, words):
     with pytest.raises(ProblemError, match=words):
-        made()
+        eval(made, NAMES)
 
 
-@pytest.mark.parametrize("value", [None, -1, float("nan"), {}, object()])
+LIMITS = """
+ModalBody(modes={}); 1, 20; 0, 21
+ModalBody(panels={}); 1, 200; 0, 201
+ModalBody(order={}); 2, 12; 1, 13
+ModalBody(modes={}, basis="fourier"); 2; 3
+ModalBody(basis={}); "fourier"; "x"
+CrawlerBody(epsilon={}); TINY, 0.5 - TINY; 0, 0.5
+CrawlerBody(share={}); TINY, 1 - TINY; 0, 1
+CrawlerBody(modes={}); 2, 12; 1, 13
+Concertina(bumps={}); 1, 2; 0, 3
+Concertina(epsilon={}); TINY, 0.5 - TINY; 0, 0.5
+Concertina(bumps=2, epsilon={}); 0.25 - TINY; 0.25
+Concertina(share={}); TINY, 1 - TINY; 0, 1
+Concertina(amplitude={}); TINY, np.pi / 2 - TINY; 0, np.pi / 2
+Wave(profile={}); "standing"; "x"
+Wave(amplitude={}); TINY; 0
+Wave(waves={}); 1; 0
+Wave(steepness={}); TINY; 0
+motion({}); (0.0, 0.1, 1.0); (0.1, 1.0), (0.0, 0.5), (0.0, 0.6, 0.6, 1.0)
+motion({}, antipodal=True); (0.0, 0.5); (0.0, 1.0)
+PowerLaw({}); 0, 2; -TINY, 2 + TINY
+replay(*AT, GAIT, 1e-2, instants={}, tolerance=10.0); 4; -2, 0, 2, 3, 5
+samples({}); 4; 3
+samples(9, {}); 0.5; -1.0, np.inf
+samples(90, limits={}); 9.0, (9.0, 8.0); 0.0, (1.0, 1.0, 1.0)
+samples(9, limits={}); 100.0; 1.0
+bound({}); 0.2, np.pi; 0.0, np.pi + 1e-6
+bound(1.0, harmonics={}); (1, 3); (1, 2)
+checked_chain(*AT, {}); 0, 1 - TINY; -TINY, 1.0, True, np.inf
+checked_chain({}, Friction(), 0.1); Chain(); ModalBody()
+"""
+
+
+@pytest.mark.parametrize(("made", "taken", "refused"), cases(LIMITS, "; "))
+def test_the_last_that_is_allowed_is_taken_and_what_lies_beyond_is_refused(made, taken, refused):
+    for value in eval(f"[{taken}]", NAMES):
+        assert eval(made.format("value"), NAMES | {"value": value}) is not None
+    for value in eval(f"[{refused}]", NAMES):
+        with pytest.raises(ProblemError):
+            eval(made.format("value"), NAMES | {"value": value})
+
+
+WITHIN = """
+Fourier([0, 0], [[1], [1]], [[{}], [1]])
+Chain(({}, 0.5, 0.5))
+Problem("p", GAIT, mesh_tolerance={})
+solve_balance(*AT, with_one({}), ONES, 1e-3)
+solve_balance(*AT, ONES, with_one({}), 1e-3)
+solve_balance(*AT, ONES, ONES, 1e-3, start=np.full((3, 4), {}))
+solve_balance(*AT, ONES, ONES, 1e-3, tolerance={})
+replay(*AT, path({}, 1.0), 1e-3)
+replay(*AT, path(1.0, {}), 1e-3)
+solve_smooth(sine_wave(), Friction(), np.array([0.1]), {})
+"""
+
+
+@pytest.mark.parametrize("value", ["np.nan", "np.inf", "-np.inf"])
+@pytest.mark.parametrize("made", WITHIN.strip().splitlines())
+def test_not_a_number_and_infinity_are_refused_within_arrays_too(made, value):
+    with pytest.raises(ProblemError, match=r".{15}"):
+        eval(made.format(value), NAMES)
+
+
+WRONG_OF_A_SOLUTION = """
+sample("a")
+sample([np.nan])
+export(value, period=4)
+export("x.csv", period=4, rate=value)
+export("x.csv", period=4, periods=10**9)
+export("x.txt", period=4)
+export("x.csv", period=4, length=1.0)
+export("x.csv", period=4, mass=2.0)
+animate(value)
+robot(1, 1, 1, max_speed="fast")
+robot(1e300, 1, 1)
+robot(1, 1, value)
+"""
+
+
+@pytest.mark.parametrize("value", [None, -1, np.nan, {}, object()])
 def test_a_solution_refuses_what_cannot_be_meant(value, three_link, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    wrong = [
-        lambda: three_link.sample("a"), lambda: three_link.export(value, period=4),
-        lambda: three_link.animate(value),
-        lambda: three_link.export("x.csv", period=4, rate=value), lambda: three_link.robot(1, 1, 1,
-        max_speed="fast"),
-        lambda: three_link.robot(1e300, 1, 1), lambda: three_link.robot(1, 1, value),
-        lambda: colloc.save(three_link, "."),
-        lambda: three_link.export("x.csv", period=4, periods=10**9),
-        lambda: three_link.sample([float("nan")]),
-    ]  # fmt: skip
-    for each in wrong:
+    for call in WRONG_OF_A_SOLUTION.strip().splitlines():
         with pytest.raises(ProblemError):
-            each()
+            eval(f"solution.{call}", NAMES | {"solution": three_link, "value": value})
+    with pytest.raises(ProblemError):
+        colloc.save(three_link, ".")
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_a_problem_file_raises_is_told_even_if_it_cannot_say_itself(tmp_path):
-    (tmp_path / "x.py").write_text(
-        "class Mute(Exception):\n    def __str__(self):\n        raise KeyError\nraise Mute\n"
-    )
+    text = "class Mute(Exception):\n    def __str__(self):\n        raise KeyError\nraise Mute\n"
+    (tmp_path / "x.py").write_text(text)
     with pytest.raises(ProblemError, match="line 4: Mute"):
         colloc.load_problem(tmp_path / "x.py")
     (tmp_path / "y.py").write_bytes(b"\x00")
@@ -318,9 +362,8 @@ def test_a_problem_file_with_a_byte_order_mark_is_read(tmp_path):
 
 
 def test_what_a_problem_file_raises_cannot_drive_the_terminal(tmp_path):
-    (tmp_path / "x.py").write_text(
-        "raise ValueError('\\x1b]0;owned\\x07\\x1b[2J \\u202e backwards \\r gone')\n"
-    )
+    text = "raise ValueError('\\x1b]0;owned\\x07\\x1b[2J \\u202e backwards \\r gone')\n"
+    (tmp_path / "x.py").write_text(text)
     with pytest.raises(ProblemError) as caught:
         colloc.load_problem(tmp_path / "x.py")
     assert str(caught.value).isprintable()

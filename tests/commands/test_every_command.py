@@ -1,6 +1,9 @@
-"""What holds for every command alike: options, and refusals in one sentence or one JSON object."""
+"""What holds for every command alike: refusals in one sentence or one JSON object, help, exit
+codes, and failed solves that harm nothing."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -12,179 +15,204 @@ PROBLEM = "from colloc import *\nPROBLEM = Problem('quick', gait=Harmonic(1, 'bi
 STUDY = """from colloc import *
 STUDY = Study("quick", (Axis("mu_t", (1, 2)),), lambda mu_t: Problem("q", friction=Friction(mu_t=mu_t)))
 """
+GOOD = """
+from colloc import *
+PROBLEM = Problem(name="quick", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 1.4, 0.8),
+                  delta=0.3, delta_start=0.3, intervals=12, mesh_tolerance=1e-4)
+"""
 
 
 @pytest.fixture
 def place(three_link, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     save(three_link, tmp_path / "good.h5")
-    (tmp_path / "text.h5").write_text("hello")
-    (tmp_path / "fails.py").write_text("1 / 0\n")
-    (tmp_path / "empty.py").write_text("x = 1\n")
     (tmp_path / "folder.py").mkdir()
-    (tmp_path / "problem.py").write_text(PROBLEM)
-    (tmp_path / "study.py").write_text(STUDY)
+    texts = {"text.h5": "hello", "fails.py": "1 / 0\n", "empty.py": "x = 1\n", "study.py": STUDY}
+    for name, text in {**texts, "problem.py": PROBLEM}.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
     return tmp_path
 
 
-REFUSED = {
-    "init": [
-        "",
-        "x.txt",
-        "problem.py",
-        "nowhere/below.py",
-        "a,b.py",
-        "new.py --links 2",
-        "new.py --links x",
-    ],
-    "solve": ["", "nope.py", "folder.py", "fails.py", "empty.py", "good.h5", "text.h5"]
-    + [
-        f"problem.py --{option}"
-        for option in ("delta nan", "delta x", "mesh 1.5", "scheme no", "start nope.h5", "starts 0")
-    ]
-    + [
-        f"problem.py --{option}"
-        for option in ("seconds 0", "seconds nan", "search no", "output x.txt", "no-such")
-    ],
-    "multistart": ["", "nope.py", "fails.py", "good.h5"]
-    + [
-        f"problem.py --{option}"
-        for option in ("starts 0", "workers 0", "seed -1", "sampler no", "time-limit nan")
-    ],
-    "open": ["", "nope.h5", "text.h5", "good.h5", "good.h5 --start 1"],
-    "sweep": [
-        "",
-        "nope.py",
-        "fails.py",
-        "problem.py",
-        "study.py --workers 0",
-        "study.py --chunk 0",
-        "study.py --workers x",
-    ],
-    "verify": [
-        "",
-        "nope.h5",
-        "text.h5",
-        "problem.py",
-        "good.h5 --tolerance 0",
-        "good.h5 --tolerance nan",
-    ],
-    "compare": ["", "good.h5", "good.h5 nope.h5", "text.h5 good.h5"],
-    "report": [
-        "",
-        "nope.h5",
-        "text.h5",
-        "good.h5 --problem nope.py",
-        "good.h5 --output x.txt",
-        "good.h5 --period 1",
-    ],
-    "animate": ["", "nope.h5", "text.h5"]
-    + [
-        f"good.h5 --{option}"
-        for option in ("periods 0", "seconds nan", "fps 0", "width 0", "format avi", "output x.avi")
-    ],
-    "export": ["", "nope.h5", "text.h5", "good.h5"]
-    + [
-        f"good.h5 --period 4 --{option}"
-        for option in (
-            "rate nan",
-            "max-speed 0",
-            "max-speed 1 2 3",
-            "periods 0",
-            "format x",
-            "mass 1",
-        )
-    ],
-    "evaluate": [
-        "",
-        "problem.py",
-        "problem.py nope.csv",
-        "nope.py text.h5",
-        "problem.py text.h5",
-        "problem.py good.h5",
-        "problem.py text.h5 --period x",
-    ],
-    "robot": [
-        "",
-        "nope.h5 --length 1 --mass 1 --period 1",
-        "good.h5",
-        "good.h5 --length 1 --mass 1",
-    ]
-    + [
-        f"good.h5 --{words}"
-        for words in ("length 0 --mass 1 --period 1", "length 1 --mass nan --period 1")
-    ]
-    + [
-        f"good.h5 --length 1 --mass 1 --period {words}"
-        for words in ("-5", "1 --max-speed 0", "1 --max-torque 1 2 3")
-    ],
-    "steer": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
-    + [
-        f"problem.py --{option}"
-        for option in ("turn 200", "turn x", "turn nan", "starts 0", "output x.txt")
-    ],
-    "pareto": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
-    + [
-        f"problem.py --{option}"
-        for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")
-    ],
-    "sensitivity": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --no-such"],
-}
+REFUSED = """
+init | x.txt | problem.py | nowhere/below.py | a,b.py | new.py --links 2 | new.py --links x
+init new.py --feet 99 -> 0 (a line) to 20
+init | new.py --lengths 1 1e-9 1
+solve | folder.py | fails.py | empty.py | text.h5
+solve nope.py -> there is no problem file
+solve good.h5 -> is a results file (HDF5), not a problem file
+solve LONG -> there is no problem file
+solve problem.py --delta x -> --delta must be a number, not 'x'
+solve problem.py --delta 0 -> delta must be positive
+solve problem.py --delta 1e-30 -> delta must be at least 1e-14
+solve problem.py --mesh x -> --mesh must be a whole number, not 'x'
+solve problem.py --mesh 1 -> mesh is too small
+solve problem.py --scheme euler -> unknown scheme
+solve problem.py --start nope.h5 -> there is no file
+solve problem.py --start study.py -> not a readable colloc solution
+solve problem.py --output /proc/nowhere/x.h5 -> cannot
+solve problem.py --output out.txt -> out.txt should end in .h5
+solve problem.py --output LONG.h5 -> too long
+solve problem.py --output LONG -> File name too long
+solve problem.py --turbo -> unrecognized arguments: --turbo
+solve | problem.py --delta nan | problem.py --starts 0 | problem.py --seconds 0 | problem.py --search no
+multistart | nope.py | fails.py | good.h5 | problem.py --workers 0 | problem.py --sampler no
+multistart problem.py --starts 0 -> --starts must be at least 1
+multistart problem.py --time-limit 0 -> --time-limit must be positive, not 0
+multistart | problem.py --seed -1 | problem.py --time-limit nan
+open | nope.h5 | text.h5 | good.h5 --start 1
+open good.h5 -> good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not beside it
+sweep | fails.py | problem.py | study.py --workers 0 | study.py --workers x
+sweep nope.py -> there is no study file
+sweep study.py --chunk 0 -> --chunk must be at least 1
+sweep study.py --output z.nc -> z.nc should be a folder
+sweep study.py --output text.h5/x -> cannot make the folder
+verify | nope.h5 | text.h5 | problem.py | good.h5 --tolerance 0 | good.h5 --tolerance nan
+verify LONG -> File name too long
+compare | good.h5 | good.h5 nope.h5 | text.h5 good.h5
+report | nope.h5 | text.h5 | good.h5 --problem nope.py | good.h5 --period 1
+report good.h5 --output x.htm -> x.htm should end in .html
+animate | nope.h5 | text.h5 | good.h5 --periods 0 | good.h5 --seconds nan | good.h5 --fps 0
+animate | good.h5 --fps 1e9 | good.h5 --width 5 | good.h5 --format avi
+animate good.h5 --output x.avi -> x.avi should end in .gif or .mp4
+animate good.h5 --format mp4 --output x.gif -> x.gif should end in .mp4
+export | nope.h5 | text.h5 | good.h5 | good.h5 --period 4 --rate nan | good.h5 --period 4 --mass 1
+export | good.h5 --period 4 --max-speed 0 | good.h5 --period 4 --max-speed 1 2 3 | good.h5 --period 4 --periods 0
+export good.h5 --format x -> --format must be one of 'csv', 'json', 'mjcf', 'urdf', not 'x'
+export good.h5 --period 4 --output x.xlsx -> x.xlsx should end in .csv or .json
+evaluate | problem.py | problem.py nope.csv | nope.py text.h5 | problem.py text.h5 | problem.py text.h5 --period x
+evaluate problem.py good.h5 -> good.h5 is no text of numbers in UTF-8: a CSV file is read here
+robot | nope.h5 --length 1 --mass 1 --period 1 | good.h5 | good.h5 --length 1 --mass 1
+robot | good.h5 --length 0 --mass 1 --period 1 | good.h5 --length 1 --mass nan --period 1
+robot | good.h5 --length 1 --mass 1 --period -5 | good.h5 --length 1 --mass 1 --period 1 --max-torque 1 2 3
+steer | nope.py | fails.py | empty.py | good.h5 | problem.py --turn 200 | problem.py --turn x | problem.py --output x.txt
+pareto | nope.py | fails.py | empty.py | good.h5 | problem.py --points 1 | problem.py --objectives speed no
+sensitivity | nope.h5 | text.h5 | problem.py | good.h5 --no-such
+"""
+
+
+def refused(name):
+    for line in REFUSED.strip().splitlines():
+        words, _, message = line.partition(" -> ")
+        if words.split()[0] == name:
+            for each in words.removeprefix(name).split(" | "):
+                yield each.replace("LONG", "x" * 300).split(), message
 
 
 @pytest.mark.parametrize("name", SUBCOMMANDS)
 def test_bad_input_is_refused_in_one_sentence_and_as_one_json_object(name, place, capsys):
     before = sorted(place.iterdir())
-    for words in REFUSED[name]:
+    assert list(refused(name))
+    for words, message in refused(name):
         said = []
         for more in ([], ["--json"]):
-            assert colloc([name, *words.split(), *more]) == 2, words
+            assert colloc([name, *words, *more]) == 2, words
             printed = capsys.readouterr()
             assert printed.err.startswith("colloc: "), words
             assert printed.err.count("\n") == 1, words
+            assert message in printed.err
             said.append(printed)
         assert said[0].out == "", words
-        told = json.loads(said[1].out)
-        assert told == {
-            "status": "error",
-            "message": said[0].err.removeprefix("colloc: ").rstrip("\n"),
-            "exit_code": 2,
-        }, words
+        sentence = said[0].err.removeprefix("colloc: ").rstrip("\n")
+        known = {"status": "error", "message": sentence, "exit_code": 2}
+        assert json.loads(said[1].out) == known, words
     assert sorted(place.iterdir()) == before
 
 
-def test_what_is_wrong_is_named_without_words_of_programmers(place, capsys):
-    for words, message in (
-        ("solve problem.py --mesh x", "--mesh must be a whole number, not 'x'"),
-        ("solve problem.py --delta x", "--delta must be a number, not 'x'"),
-        ("multistart problem.py --starts 0", "--starts must be at least 1"),
-        ("multistart problem.py --time-limit 0", "--time-limit must be positive, not 0"),
-        ("sweep study.py --chunk 0", "--chunk must be at least 1"),
-        ("sweep nope.py", "there is no study file"),
-        (
-            "export good.h5 --format x",
-            "--format must be one of 'csv', 'json', 'mjcf', 'urdf', not 'x'",
-        ),
-        (
-            "evaluate problem.py good.h5",
-            "good.h5 is no text of numbers in UTF-8: a CSV file is read here",
-        ),
-        (
-            "open good.h5",
-            "good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not "
-            "beside it",
-        ),
-    ):
-        assert colloc(words.split()) == 2
-        assert message in capsys.readouterr().err
+BAD_PROBLEMS = {
+    "x = 1": "states no PROBLEM",
+    "PROBLEM = 3": "must be a colloc.Problem",
+    "a = 1\nb = = 2": "line 2",
+    "a = 1\n\nb = 1/0": "line 3",
+    "import sys\nsys.exit(0)": "p.py, line 2: the file ends the program",
+    "x = 1\nraise SystemExit": "p.py, line 2: the file ends the program",
+    "x = 1\nraise GeneratorExit": "p.py, line 2: ",
+    "x = 1\nraise type('Own', (BaseException,), {})('no')": "p.py, line 2: ",
+    "x = 1\nraise BaseExceptionGroup('x', [GeneratorExit()])": "p.py, line 2: ",
+    GOOD.replace("delta=0.3,", "delta=0.3, friction=Friction(mu_t=-1, mu_f=1, mu_b=1),"): "mu_t",
+    GOOD.replace("delta=0.3", "delta=-1e-4"): "delta must be positive",
+    GOOD.replace("1.4, 0.8", "4.0, 0.8"): "inadmissible: joint",
+    GOOD.replace("ellipse(0.0, 1.4, 0.8)", "ellipse(0, 1.0, 2.2)"): "cross each other",
+    GOOD.replace("intervals=12", "intervals=1"): "mesh is too small",
+    GOOD.replace("ellipse(0.0, 1.4, 0.8)", "Fourier([0], [[1]], [[1]])"): "1 joints",
+    GOOD.replace('"quick"', '"../quick"'): "name must be",
+    GOOD.replace('"quick"', f'"{"x" * 300}"'): "name has 300 characters; files are named after it",
+    GOOD.replace("1.4, 0.8", "0.0, 0.0"): "hardly moves",
+}
+
+
+@pytest.mark.parametrize("text", BAD_PROBLEMS, ids=lambda text: BAD_PROBLEMS[text])
+def test_bad_problems_get_one_clear_sentence_and_exit_code_two(text, tmp_path, capsys):
+    (tmp_path / "p.py").write_text(text, encoding="utf-8")
+    assert colloc(["solve", f"{tmp_path}/p.py", "--output", f"{tmp_path}/out"]) == 2
+    printed = capsys.readouterr()
+    assert BAD_PROBLEMS[text] in printed.err
+    assert printed.err.startswith("colloc: ")
+    assert printed.err.count("\n") == 1
+    assert "Traceback" not in printed.err
+    assert printed.out == ""
+
+
+def test_a_good_problem_is_solved_saved_and_drawn(tmp_path, capsys):
+    (tmp_path / "p.py").write_text(GOOD, encoding="utf-8")
+    assert colloc(["solve", f"{tmp_path}/p.py", "--output", f"{tmp_path}/out", "--pdf"]) == 0
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"quick.h5", "quick.png", "quick.pdf"}
+    printed = capsys.readouterr().out
+    assert "efficiency d/W" in printed
+    assert "delta had to be lowered from 0.3" in printed
+
+
+def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(
+    tmp_path, capsys, monkeypatch
+):
+    (tmp_path / "p.py").write_text(GOOD, encoding="utf-8")
+    good = tmp_path / "quick.h5"
+    good.write_bytes(b"a good result")
+    monkeypatch.setattr("colloc.search.ipopt.EXACT", 1e-30)
+    assert colloc(["solve", f"{tmp_path}/p.py", "--output", str(tmp_path), "--no-figure"]) == 3
+    assert "not converged" in capsys.readouterr().out
+    assert good.read_bytes() == b"a good result"
+    assert (tmp_path / "quick.failed.h5").exists()
 
 
 def test_a_sensitivity_is_told_as_a_table_and_as_json(place, capsys):
     assert colloc(["sensitivity", "good.h5"]) == 0
     table = capsys.readouterr().out
     assert colloc(["sensitivity", "good.h5", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    for effect in told["effects"]:
+    for effect in json.loads(capsys.readouterr().out)["effects"]:
         assert effect["name"] in table
         if abs(effect["slope"]) > 1e-6:
             assert f"{effect['slope']:+.5f}" in table
+
+
+def test_every_subcommand_answers_help_without_casadi():
+    code = (
+        "import sys; from colloc.commands.main import SUBCOMMANDS, main\n"
+        "for name in SUBCOMMANDS:\n"
+        "    try: main([name, '--help'])\n"
+        "    except SystemExit as ended: print(name, ended.code, 'casadi' in sys.modules)"
+    )
+    words = [sys.executable, "-c", code]
+    printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    for name in SUBCOMMANDS:
+        assert f"usage: colloc {name} " in printed
+        assert f"\n{name} 0 False\n" in printed
+    assert printed.count("--json") >= printed.count("Exit codes") >= len(SUBCOMMANDS)
+
+
+def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
+    assert colloc(["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert all(f"  {name} " in printed for name in SUBCOMMANDS)
+    assert colloc([]) == 2
+    capsys.readouterr()
+    for word, hint in (
+        ("repot", "colloc report?"),
+        ("x.py", "colloc solve x.py?"),
+        ("zzzz", "choose one of init,"),
+        ("referee", "python -m benchmarks.referee"),
+    ):
+        assert colloc([word]) == 2
+        assert hint in capsys.readouterr().err
+    assert colloc(["--version"]) == 0
+    assert "casadi" in capsys.readouterr().out

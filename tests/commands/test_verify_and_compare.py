@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from colloc.commands import verify as recheck
-from colloc.commands.main import SUBCOMMANDS, main
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
@@ -171,36 +170,3 @@ def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_pat
     assert report["same"]
     assert report["problem"] == {"intervals": ["24", "30"]}
     assert recheck.compare([str(a), str(tmp_path / "none.h5")]) == 2
-
-
-def test_every_subcommand_answers_help_without_casadi():
-    code = (
-        "import sys; from colloc.commands.main import SUBCOMMANDS, main\n"
-        "for name in SUBCOMMANDS:\n"
-        "    try: main([name, '--help'])\n"
-        "    except SystemExit as ended: print(name, ended.code, 'casadi' in sys.modules)"
-    )
-    printed = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout
-    for name in SUBCOMMANDS:
-        assert f"usage: colloc {name} " in printed
-        assert f"\n{name} 0 False\n" in printed
-
-
-def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
-    assert main(["--help"]) == 0
-    printed = capsys.readouterr().out
-    assert all(f"  {name} " in printed for name in SUBCOMMANDS)
-    assert main([]) == 2
-    capsys.readouterr()
-    for words, hint in (
-        (["repot"], "colloc report?"),
-        (["x.py"], "colloc solve x.py?"),
-        (["zzzz"], "choose one of init,"),
-        (["referee"], "python -m benchmarks.referee"),
-    ):
-        assert main(words) == 2
-        assert hint in capsys.readouterr().err
-    assert main(["--version"]) == 0
-    assert "casadi" in capsys.readouterr().out
