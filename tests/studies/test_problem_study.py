@@ -14,20 +14,17 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from colloc import BSpline, Chain, Corners, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.commands.families import sweep as sweep_study
 from colloc.commands.families import sweep_summary
-from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
+from colloc.gaits.harmonic import shifted
 from colloc.gaits.linear import Combination
-from colloc.gaits.polygon import Corners
-from colloc.gaits.problem import Problem
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from colloc.results.distinct_optima import reversed_in_time, swapped
 from colloc.results.outcome import CRASHED, PASSED_OVER, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
+from colloc.studies import run as study_run
 from colloc.studies.cell import GUESS, RESCUE, WARM, Work, value_of
 from colloc.studies.gait_class import (
     DIRECT,
@@ -38,17 +35,12 @@ from colloc.studies.gait_class import (
     wave_direction,
     winding,
 )
-from colloc.studies.journal import (
-    Visit,
-    append_visits,
-    best_attempt,
-    read_journal,
-    start_key,
-)
+from colloc.studies.journal import Visit, append_visits, best_attempt, read_journal, start_key
 from colloc.studies.run import StudyRun
 from colloc.studies.study import Axis, Study, read_study_file
 from colloc.studies.table import NO_PROBLEM, load_study, save_study, study_table
 from colloc.system.errors import ProblemError
+from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay
 
 FILE = """
@@ -61,17 +53,12 @@ def problem(mu_t, mu_b):
 
 STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1)), Axis("mu_b", (1.0,))), problem, cold_starts=0)
 """
+START = ellipse(0.0, 1.2, 0.4)
 
 
 def problem(x=1.0, y=1.0, kind="a"):
-    guess = ellipse(0.0, 1.0 + 0.01 * len(kind), 0.5)
-    return Problem(
-        "p",
-        guess,
-        friction=Friction(mu_t=x, mu_f=1, mu_b=y),
-        gait=Harmonic(1, "bilateral"),
-        intervals=10,
-    )
+    law, guess = Friction(mu_t=x, mu_f=1, mu_b=y), ellipse(0.0, 1.0 + 0.01 * len(kind), 0.5)
+    return Problem("p", guess, friction=law, gait=Harmonic(1, "bilateral"), intervals=10)
 
 
 def grid(**changes):
@@ -87,41 +74,37 @@ def landscape(stated, start_from, start, time_limit, **_):
     """In place of a solve: two basins, parted by the amplitude of the first joint; only 0.9 of the
     way is kept each time."""
     guess = start_from()
-    good = guess.cos[0, 0] > 1.5
-    if stated.friction.mu_t == 3.0 and stated.friction.mu_b == 2.0:
+    good, law = guess.cos[0, 0] > 1.5, stated.friction
+    if law.mu_t == 3.0 and law.mu_b == 2.0:
         return outcome(start, guess, guess, np.nan, NOT_CONVERGED)
-    top = 2.0 if good else 1.0
-    gait = Fourier(
-        guess.mean, guess.cos + 0.9 * (top - guess.cos[0, 0]) * np.array([[1], [-1]]), guess.sin
-    )
-    return outcome(start, guess, gait, (0.3 if good else 0.2) + 0.01 * stated.friction.mu_t)
+    way = 0.9 * ((2.0 if good else 1.0) - guess.cos[0, 0]) * np.array([[1], [-1]])
+    gait = Fourier(guess.mean, guess.cos + way, guess.sin)
+    return outcome(start, guess, gait, (0.3 if good else 0.2) + 0.01 * law.mu_t)
 
 
 @pytest.fixture
 def fake(monkeypatch):
+    def known(p, g, *_):
+        return (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t
+
     monkeypatch.setattr(study_cell, "run_guess", landscape)
-    monkeypatch.setattr(
-        study_cell,
-        "value_of",
-        lambda p, g, *_: (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t,
-    )
-    monkeypatch.setattr(
-        study_cell, "start_gait", lambda p, sampler, seed, k: ellipse(0.0, 1.2, 0.4)
-    )
+    monkeypatch.setattr(study_cell, "value_of", known)
+    monkeypatch.setattr(study_cell, "start_gait", lambda p, sampler, seed, k: START)
 
 
 def finished(run, **options):
     return list(run.run(**{"executor": ThreadPoolExecutor, **options}))
 
 
+def study_file(folder, text=FILE):
+    path = folder / "tiny.py"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
 def test_starts_travel_from_the_value_before_and_between_all_texts():
-    study = grid(
-        axes=(
-            Axis("x", (1.0, 2.0, 3.0)),
-            Axis("kind", ("a", "b", "c")),
-            Axis("y", (1.0, 2.0), travels=False),
-        )
-    )
+    kinds = Axis("kind", ("a", "b", "c"))
+    study = grid(axes=(Axis("x", (1.0, 2.0, 3.0)), kinds, Axis("y", (1.0, 2.0), travels=False)))
     assert study.before((0, 0, 0)) == []
     assert set(study.before((2, 2, 1))) == {(1, 2, 1), (2, 0, 1), (2, 1, 1)}
     assert set(study.around((1, 0, 0))) == {(0, 0, 0), (2, 0, 0), (1, 1, 0), (1, 2, 0)}
@@ -129,59 +112,47 @@ def test_starts_travel_from_the_value_before_and_between_all_texts():
     assert study.problem_at((1, 1, 0)).friction.mu_t == 2.0
 
 
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"axes": ()}, "at least one Axis"),
-        ({"axes": (Axis("x", (1,)), Axis("x", (2,)))}, "same name"),
-        ({"name": "a b"}, "name must be"),
-        ({"chunk": 0}, "chunk must be"),
-        ({"time_limit": 0}, "must be positive"),
-        ({"time_limit": "long"}, "must be positive"),
-        ({"problem": 3}, "must be a function"),
-        ({"axes": (Axis("x", range(1001)), Axis("y", range(1001)))}, "1000000 cells"),
-    ],
-)
-def test_bad_studies_are_refused_in_one_sentence(changes, text):
-    with pytest.raises(ProblemError, match=text):
-        grid(**changes)
+BAD = r"""
+grid(axes=()) -> at least one Axis
+grid(axes=(Axis("x", (1,)), Axis("x", (2,)))) -> same name
+grid(name="a b") -> name must be
+grid(chunk=0) -> chunk must be
+grid(time_limit="long") -> must be positive
+grid(problem=3) -> must be a function
+grid(axes=(Axis("x", range(1001)), Axis("y", range(1001)))) -> 1000000 cells
+Axis("x", (1.0, None)) -> values of an axis must be numbers
+Axis("x", ([1.0, 2.0],)) -> values of an axis must be numbers
+Axis("x", ()) -> axis x
+Axis("x", (1.0, 1.0)) -> axis x
+Axis("x", (1.0, "a")) -> axis x
+Axis("x", (float("nan"),)) -> axis x
+"""
 
 
-@pytest.mark.parametrize("values", [3.0, (1.0, None), ([1.0, 2.0],)])
-def test_what_is_no_value_of_an_axis_is_refused_in_one_sentence(values):
-    with pytest.raises(ProblemError, match="values of an axis must be numbers"):
-        Axis("x", values)
-
-
-@pytest.mark.parametrize("values", [(), (1.0, 1.0), (1.0, "a"), (float("nan"),)])
-def test_bad_axes_are_refused(values):
-    with pytest.raises(ProblemError, match="axis x"):
-        Axis("x", values)
+@pytest.mark.parametrize("line", BAD.strip().splitlines())
+def test_bad_studies_and_axes_are_refused_in_one_sentence(line):
+    made, words = line.split(" -> ")
+    with pytest.raises(ProblemError, match=words):
+        eval(made)
 
 
 def test_a_study_file_is_code_and_its_mistakes_are_named_with_their_line(tmp_path):
-    path = tmp_path / "s.py"
     for text, message in (
         ("x = 1", "states no STUDY"),
         ("\n1/0", "line 2: ZeroDivisionError"),
         ("STUDY = 3", "must be a Study"),
     ):
-        path.write_text(text)
         with pytest.raises(ProblemError, match=message):
-            read_study_file(path)
-    path.write_text(FILE)
-    study, source = read_study_file(path)
-    assert study.shape == (2, 1)
-    assert source == FILE
-    for stated, line, what in (
-        ("Frction(mu_t=mu_t, mu_b=mu_b", 6, "NameError: .*"),
-        ("Friction(mu_t=-mu_t, mu_b=mu_b", 6, "friction.mu_t must be .*"),
+            read_study_file(study_file(tmp_path, text))
+    study, source = read_study_file(study_file(tmp_path))
+    assert (study.shape, source) == ((2, 1), FILE)
+    for law, what in (
+        ("Frction(mu_t=mu_t", "NameError: "),
+        ("Friction(mu_t=-mu_t", "friction.mu_t"),
     ):
-        path.write_text(FILE.replace("Friction(mu_t=mu_t, mu_b=mu_b", stated))
-        with pytest.raises(
-            ProblemError,
-            match=rf"no problem at mu_t = 1.0, mu_b = 1.0: .*s\.py, line {line}: {what}",
-        ):
+        path = study_file(tmp_path, FILE.replace("Friction(mu_t=mu_t", law))
+        said = rf"no problem at mu_t = 1.0, mu_b = 1.0: .*tiny\.py, line 6: {what}"
+        with pytest.raises(ProblemError, match=said):
             read_study_file(path)[0].problem_at((0, 0))
 
 
@@ -190,71 +161,54 @@ def test_what_is_found_does_not_depend_on_workers_or_on_who_is_faster(fake, tmp_
         time.sleep(random.Random(arguments[2]).random() * 0.01)
         return landscape(*arguments)
 
-    best = []
+    monkeypatch.setattr(study_cell, "run_guess", slow)
+    found = []
     for k, (workers, chunk) in enumerate([(1, 1), (4, 1), (4, 1), (1, 3)]):
-        monkeypatch.setattr(study_cell, "run_guess", slow)
-        folder = tmp_path / str(k)
-        folder.mkdir()
-        run = StudyRun(grid(chunk=chunk), folder)
+        run = StudyRun(grid(chunk=chunk), tmp_path / str(k))
         finished(run, workers=workers)
-        best.append(
-            {
-                cell: state.best and (state.best.outcome.efficiency, state.best.gait_key)
-                for cell, state in run.cells.items()
-            }
-        )
-    assert best[1:] == best[:1] * 3
+        best = {cell: state.best for cell, state in run.cells.items()}
+        found.append({c: b and (b.outcome.efficiency, b.gait_key) for c, b in best.items()})
+    assert found[1:] == found[:1] * 3
 
 
 def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypatch):
-    # only one cold start of the last cell finds the good basin
-    good = lambda p, sampler, seed, k: ellipse(0.0, 1.9 if k == 23 else 1.2, 0.4)  # noqa: E731
-    monkeypatch.setattr(study_cell, "start_gait", good)
+    """Every cell has random starts of its own and its problem's guess; one start of the last cell
+    finds the good basin."""
+    numbers, rounds = [], {}
+
+    def start(p, sampler, seed, k):
+        numbers.append(k)
+        return ellipse(0.0, 1.9 if k == 23 else 1.2, 0.4)
+
+    monkeypatch.setattr(study_cell, "start_gait", start)
     run = StudyRun(grid(cold_starts=2), tmp_path)
-    rounds = {}
     for progress in run.run(executor=ThreadPoolExecutor):
-        rounds[progress.round] = sum(
-            s.best is not None and s.best.outcome.efficiency > 0.3 for s in run.cells.values()
-        )
+        best = [state.best for state in run.cells.values() if state.best is not None]
+        rounds[progress.round] = sum(each.outcome.efficiency > 0.3 for each in best)
     assert rounds[0] == 1
-    final = study_table(run).variables["efficiency"]
+    assert sorted(set(numbers)) == list(range(2 * 12))
+    for state in run.cells.values():
+        guesses = {a.key for a in state.attempts if a.origin == GUESS}
+        assert start_key(state.problem.guess) in guesses
+    table = study_table(run).variables
     # the cell that never converges is walked around
-    assert np.isnan(final[2, 1])
-    assert np.sum(final > 0.3) == 11
-    tried, certified = (study_table(run).variables[name] for name in ("starts", "starts_certified"))
+    assert np.isnan(table["efficiency"][2, 1])
+    assert np.sum(table["efficiency"] > 0.3) == 11
+    tried, certified = table["starts"], table["starts_certified"]
     assert certified[2, 1] == 0 < tried[2, 1]
     assert (np.delete(certified.ravel(), 7) == np.delete(tried.ravel(), 7)).all()
-    assert not study_table(run).variables["below_neighbour"].any()
-
-
-def test_the_guess_of_every_problem_is_tried_and_every_cell_has_random_starts_of_its_own(
-    fake, tmp_path, monkeypatch
-):
-    numbers = []
-    monkeypatch.setattr(
-        study_cell,
-        "start_gait",
-        lambda p, sampler, seed, k: numbers.append(k) or ellipse(0.0, 1.2, 0.4),
-    )
-    run = StudyRun(grid(cold_starts=3), tmp_path)
-    finished(run)
-    assert sorted(numbers) == list(range(3 * 12))
-    for state in run.cells.values():
-        assert start_key(state.problem.guess) in {
-            a.key for a in state.attempts if a.origin == GUESS
-        }
+    assert not table["below_neighbour"].any()
 
 
 def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_again_and_then_marked(
-    fake, tmp_path, monkeypatch, capsys
+    fake, tmp_path, monkeypatch
 ):
     def stubborn(stated, start_from, start, time_limit, **_):
         # in the cell (1, 1) every search ends in the poor basin; elsewhere the guess is good
-        if (stated.friction.mu_t, stated.friction.mu_b) == (2.0, 2.0):
-            return outcome(start, guess := start_from(), guess, 0.22)
-        return outcome(
-            start, start_from(), ellipse(0.0, 2.0, 0.5), 0.3 + 0.01 * stated.friction.mu_t
-        )
+        guess, law = start_from(), stated.friction
+        if (law.mu_t, law.mu_b) == (2.0, 2.0):
+            return outcome(start, guess, guess, 0.22)
+        return outcome(start, guess, ellipse(0.0, 2.0, 0.5), 0.3 + 0.01 * law.mu_t)
 
     monkeypatch.setattr(study_cell, "run_guess", stubborn)
     run = StudyRun(grid(cold_starts=0), tmp_path)
@@ -273,32 +227,32 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
 def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     gait = Fourier([0.2, -0.4], [[0.8], [-0.5]], [[0.1], [0.6]])  # no symmetry: it turns
     stated = problem().with_(gait=Harmonic(1, "none"), delta=1e-2, intervals=40)
-    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
-    exact = replay(stated.body, stated.friction, path, stated.delta)
+    at = stated.body, stated.friction
+    exact = replay(*at, gait, stated.delta)
     assert abs(exact.rotation) > 0.01
-    sure = (exact.distance - 0.5 * abs(exact.rotation)) / exact.work
-    assert study_cell.value_of(stated, gait) == pytest.approx(
-        max(sure, 0.0), abs=1e-3 * exact.efficiency
-    )
+    sure = max((exact.distance - 0.5 * abs(exact.rotation)) / exact.work, 0.0)
+    assert value_of(stated, gait) == pytest.approx(sure, abs=1e-3 * exact.efficiency)
     # where it could add all of it nothing counts, not even by the square of what is less than
     # nothing
     turning = Fourier([0.6, 0.6], [[0.5], [-0.3]], [[0.1], [0.5]])
-    turned = replay(
-        stated.body, stated.friction, turning, stated.delta, instants=200, tolerance=1e-3
-    )
+    turned = replay(*at, turning, stated.delta, instants=200, tolerance=1e-3)
     assert 0.5 * abs(turned.rotation) > turned.distance > 0.01
-    assert study_cell.value_of(stated.with_(objective="towing"), turning) == 0.0
-    closed = study_cell.member(stated, gait)
-    again = replay(
-        stated.body, stated.friction, lambda t: (closed.angles(t), closed.rates(t)), stated.delta
-    )
+    assert value_of(stated.with_(objective="towing"), turning) == 0.0
+    again = replay(*at, study_cell.member(stated, gait), stated.delta)
     assert abs(again.rotation) < 1e-4
 
 
+def test_a_start_that_turns_as_it_should_is_worth_the_same_whatever_phase_it_begins_at():
+    turning = Fourier([1.2, 0.6], [[0.9], [0.1]], [[0.1], [0.9]])
+    turned = replay(Chain(), Friction(), turning, 1e-2).rotation
+    stated = Problem("turning", gait=Harmonic(1), delta=1e-2, rotation=turned)
+    values = [value_of(stated, shifted(turning, phase)) for phase in (0.0, 0.3, 0.6)]
+    np.testing.assert_allclose(values, values[0], rtol=2e-3)
+
+
 def test_a_run_that_is_left_goes_on_where_it_stopped_and_solves_nothing_twice(fake, tmp_path):
-    run = StudyRun(grid(), tmp_path)
     seen = []
-    for progress in run.run(executor=ThreadPoolExecutor, ahead=0):
+    for progress in StudyRun(grid(), tmp_path).run(executor=ThreadPoolExecutor, ahead=0):
         seen.append(progress.cell)
         if len(seen) == 5:
             break
@@ -323,10 +277,8 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
     finished(run)
     table = study_table(run).variables
     assert set(table["status"][1]) == {NO_PROBLEM}
-    assert re.search(
-        r"x = 2.0, y = 1.0: .*study.py, line \d+: ZeroDivisionError: not here",
-        table["message"][1, 0],
-    )
+    said = r"x = 2.0, y = 1.0: .*study.py, line \d+: ZeroDivisionError: not here"
+    assert re.search(said, table["message"][1, 0])
     assert set(table["status"][0]) == {"error"}
     assert "division by zero" in table["message"][0, 0]
     assert StudyRun(grid(problem=stated), tmp_path).missing == []
@@ -335,36 +287,9 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
         StudyRun(grid(problem=lambda x, y: 3), tmp_path)
 
 
-def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path, monkeypatch):
-    solved = []
-
-    def counted(stated, start_from, start, time_limit, **_):
-        solved.append((stated.hash, stated.delta_start, start_key(start_from())))
-        return landscape(stated, start_from, start, time_limit)
-
-    monkeypatch.setattr(study_cell, "run_guess", counted)
-    run = StudyRun(grid(cold_starts=2), tmp_path)
-    finished(run)
-    assert (
-        len(solved) == len(set(solved)) == sum(len(state.attempts) for state in run.cells.values())
-    )
-    # a visit that is told what was tried solves what is left, be it the guess, a start of its own
-    # or a gait from elsewhere
-    stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
-    work = Work((0,), stated, True, (), (elsewhere,), (0,), 0.0, frozenset(), 1, 300.0, 1)
-    first = study_cell.visit(work)
-    assert {a.origin for a in first.attempts} == {GUESS, "cold", WARM}
-    for attempt in first.attempts:
-        told = dataclasses.replace(work, tried=frozenset({attempt.key}))
-        again = {a.key for a in study_cell.visit(told).attempts}
-        assert again == {a.key for a in first.attempts} - {attempt.key}
-
-
 def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_gait_of_all_its_starts():
-    stated = Problem(
-        "two", ellipse(0.0, 2.0, 1.0), gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12
-    )
-    elsewhere = ellipse(0.0, 2.85, 1.3)
+    start, elsewhere = ellipse(0.0, 2.0, 1.0), ellipse(0.0, 2.85, 1.3)
+    stated = Problem("two", start, gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12)
     work = Work((0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 300.0, 1)
     done = study_cell.visit(work)
     assert [a.outcome.status for a in done.attempts if a.origin == WARM] == [SOLVED]
@@ -379,6 +304,9 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
         again = dataclasses.replace(work, incumbent=incumbent, cold=())
         attempts = {a.origin: a.outcome.status for a in study_cell.visit(again).attempts}
         assert attempts[WARM] == status
+    # and what was tried is not tried again
+    told = dataclasses.replace(work, tried=frozenset(a.key for a in done.attempts))
+    assert not study_cell.visit(told).attempts
 
 
 def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
@@ -388,9 +316,6 @@ def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
 
 
 def test_a_task_whose_worker_dies_is_recorded_as_crashed(fake, tmp_path, monkeypatch):
-    from colloc.studies import run as study_run
-    from colloc.system.task_pool import Lost
-
     def run_tasks(function, ready, **_):
         while (task := ready()) is not None:
             first = task.arguments[0][0].cell == (0, 1) and not task.arguments[0][0].tried
@@ -410,8 +335,8 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
     axes = (Axis("x", (1.0, 2.0, 3.0), "mu_t / mu_f"), Axis("kind", ("ä", "bb")))
     run = StudyRun(grid(axes=axes, problem=lambda x, kind: problem(x, 1.0, kind)), tmp_path)
     finished(run)
-    table = study_table(run, lambda p: 0.5 / p.friction.mu_t)
-    path = save_study(table, tmp_path / "a b" / "ü.nc", source="text", command="ä" * 70_000)
+    table, command = study_table(run, lambda p: 0.5 / p.friction.mu_t), "ä" * 70_000
+    path = save_study(table, tmp_path / "a b" / "ü.nc", source="text", command=command)
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert dict(data.sizes) == {"x": 3, "kind": 2, "joint": 2, "harmonic": 1}
         assert data.efficiency.sel(x=2.0, kind="bb").item() == table.variables["efficiency"][1, 1]
@@ -425,22 +350,16 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
         np.testing.assert_allclose(data.trivial_bound, 1.0)
         assert not data.at_slowest.values.any()
         assert data.attrs["source"] == "text"
-        assert data.attrs["command"] == "ä" * 70_000  # more than one block of HDF5 holds
+        assert data.attrs["command"] == command  # more than one block of HDF5 holds
         assert json.loads(data.attrs["versions"])["numpy"] == np.__version__
-        assert data.joint.attrs["units"] == "1"
         assert data.message.values[0, 0] == ""
-        assert {
-            name: data[name].dtype.kind for name in ("kind", "status", "message", "gait_class")
-        } == dict.fromkeys(("kind", "status", "message", "gait_class"), data.kind.dtype.kind)
-        assert all(
-            isinstance(value, str)
-            for variable in data.variables.values()
-            for value in variable.attrs.values()
-        )
+        texts = {data[name].dtype.kind for name in ("kind", "status", "message", "gait_class")}
+        assert len(texts) == 1
+        attributes = [each.attrs.values() for each in data.variables.values()]
+        assert all(isinstance(text, str) for values in attributes for text in values)
     back = load_study(path)
     np.testing.assert_array_equal(back.variables["efficiency"], table.variables["efficiency"])
     assert back.dimensions["mean"] == ("x", "kind", "joint")
-    assert json.loads(back.attributes["versions"])["numpy"] == np.__version__
 
 
 CLASSES = {
@@ -450,9 +369,8 @@ CLASSES = {
 }
 
 
-def in_class(kind, guess=None, intervals=20):
-    near = ellipse(0.1, 2.0, 1.0) if guess is None else guess
-    return Problem("p", near, gait=CLASSES[kind], delta=1e-3, intervals=intervals)
+def in_class(kind, guess=ellipse(0.1, 2.0, 1.0), intervals=20):  # noqa: B008
+    return Problem("p", guess, gait=CLASSES[kind], delta=1e-3, intervals=intervals)
 
 
 def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_kept_exactly(
@@ -461,53 +379,46 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
     def next_to(stated, start_from, start, time_limit, **_):
         guess = start_from()
         gait = study_cell.member(stated, guess)
-        return outcome(start, guess, gait, study_cell.value_of(stated, gait))
+        return outcome(start, guess, gait, value_of(stated, gait))
 
     monkeypatch.setattr(study_cell, "run_guess", next_to)
     study = Study("kinds", (Axis("kind", tuple(CLASSES)),), in_class, cold_starts=0)
     run = StudyRun(study, tmp_path)
     finished(run)
-    assert [type(run.cells[k,].best.outcome.gait) for k in range(3)] == [
-        Fourier,
-        Corners,
-        Combination,
-    ]
+    ellipses, triangles, splines = (run.cells[k,] for k in range(3))
+    kinds = [type(cell.best.outcome.gait) for cell in (ellipses, triangles, splines)]
+    assert kinds == [Fourier, Corners, Combination]
     # the ellipse was looked at in both other classes, as it is
-    ellipses = run.cells[0,].best
-    for k in (1, 2):
-        assert run.cells[k,].scores[ellipses.gait_key] == pytest.approx(
-            ellipses.outcome.efficiency, rel=0.02
-        )
+    for cell in (triangles, splines):
+        score = cell.scores[ellipses.best.gait_key]
+        assert score == pytest.approx(ellipses.best.outcome.efficiency, rel=0.02)
     again = StudyRun(study, tmp_path)
-    assert [again.cells[k,].best.gait_key for k in range(3)] == [
-        run.cells[k,].best.gait_key for k in range(3)
-    ]
-    table = load_study(save_study(study_table(run), tmp_path / "kinds.nc"))
-    assert set(table.variables["status"]) == {SOLVED}
-    triangle = run.cells[1,].best.outcome.gait
-    assert table.variables["delta"][1] == pytest.approx(1e-4 * triangle.length)
-    series = Fourier(*(table.variables[name][1] for name in ("mean", "cos", "sin")))
-    t = np.linspace(0, 1, 100)
+    for k in range(3):
+        assert again.cells[k,].best.gait_key == run.cells[k,].best.gait_key
+    table = load_study(save_study(study_table(run), tmp_path / "kinds.nc")).variables
+    assert set(table["status"]) == {SOLVED}
+    triangle = triangles.best.outcome.gait
+    assert table["delta"][1] == pytest.approx(1e-4 * triangle.length)
+    series, t = (
+        Fourier(*(table[name][1] for name in ("mean", "cos", "sin"))),
+        np.linspace(0, 1, 100),
+    )
     np.testing.assert_allclose(series.angles(t), triangle.angles(t), atol=0.2)
-    assert np.isnan(table.variables["cos"][0, :, 1:]).all()
+    assert np.isnan(table["cos"][0, :, 1:]).all()
 
 
 @pytest.mark.slow
 def test_a_study_over_classes_is_solved_and_certified(tmp_path):
     corners = Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
-    guesses = {
-        "ellipse": ellipse(0.0, 2.8, 1.3),
-        "triangle": corners,
-        "spline": ellipse(0.0, 2.8, 1.3),
-    }
+    guesses = {"triangle": corners}
+
+    def stated(kind):
+        return in_class(
+            kind, guesses.get(kind, ellipse(0, 2.8, 1.3)), 60 if kind == "spline" else 24
+        )
+
     axis = Axis("kind", tuple(CLASSES), travels=False)
-    study = Study(
-        "kinds",
-        (axis,),
-        lambda kind: in_class(kind, guesses[kind], 60 if kind == "spline" else 24),
-        cold_starts=0,
-    )
-    run = StudyRun(study, tmp_path)
+    run = StudyRun(Study("kinds", (axis,), stated, cold_starts=0), tmp_path)
     finished(run)
     efficiency = study_table(run).variables["efficiency"]
     # harmonics, triangles and splines: docs/gait_classes.md
@@ -519,19 +430,15 @@ def test_a_study_over_classes_is_solved_and_certified(tmp_path):
 def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
     # joint 2 repeats joint 1 a quarter period later
     quarter = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [1.0]])
-    assert winding(quarter) == 1
-    assert wave_direction(quarter) == pytest.approx(1.0)
     back = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [-1.0]])
-    assert (winding(back), wave_direction(back)) == (-1, pytest.approx(-1.0))
-    together = Fourier([0, 0], [[1.0], [1.0]], [[0.0], [0.0]])
-    assert wave_direction(together) == pytest.approx(0.0)
     # a small wave of twice the pace is as much as one of half its square: it runs twice about the
     # mean, and back
     both = Fourier([0.8, -0.5], [[1.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [1.0, -0.5]])
-    assert wave_direction(both) == pytest.approx((1 - 2 * 0.25) / (1 + 2 * 0.25))
-    assert winding(both) == 1
     twice = Fourier([0.8, -0.5], [[0.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [0.0, -0.5]])
-    assert (winding(twice), wave_direction(twice)) == (-2, pytest.approx(-1.0))
+    for gait, turns, wave in ((quarter, 1, 1), (back, -1, -1), (both, 1, 1 / 3), (twice, -2, -1)):
+        assert (winding(gait), wave_direction(gait)) == (turns, pytest.approx(wave))
+    together = Fourier([0, 0], [[1.0], [1.0]], [[0.0], [0.0]])
+    assert wave_direction(together) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
@@ -557,19 +464,14 @@ def test_what_is_off_by_a_hundredth_of_a_gait_still_counts_as_symmetric(size):
         assert gait_class(gait, Chain(), Friction(mu_t=3, mu_f=1, mu_b=1)).symmetry == symmetry
 
 
-@pytest.mark.parametrize(
-    ("retraced", "wave", "forward", "kind"),
-    [
+def test_a_gait_is_standing_if_it_goes_back_its_way_or_hardly_has_a_wave_or_hardly_moves_along_itself():
+    for retraced, wave, forward, kind in (
         (True, 1, 1, STANDING),
         (False, 0.04, 1, STANDING),
         (False, 0.5, 0.04, STANDING),
         (False, -0.5, -0.3, DIRECT),
-    ],
-)
-def test_a_gait_is_standing_if_it_goes_back_its_way_or_hardly_has_a_wave_or_hardly_moves_along_itself(
-    retraced, wave, forward, kind
-):
-    assert GaitClass(False, False, retraced, 0, wave, forward).kind == kind
+    ):
+        assert GaitClass(False, False, retraced, 0, wave, forward).kind == kind
 
 
 @pytest.mark.parametrize(("mu_t", "kind"), [(20.0, RETROGRADE), (0.1, DIRECT)])
@@ -579,29 +481,25 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
     for sign in (1, -1):
         gait = Fourier([0, 0], [[0.4], [0.0]], [[0.0], [sign * 0.4]])
         found = gait_class(gait, Chain(), Friction(mu_t=mu_t, mu_f=1, mu_b=1))
-        assert found.kind == kind
-        assert found.symmetry == "both"
-        assert not found.retraced
+        assert (found.kind, found.symmetry, found.retraced) == (kind, "both", False)
         assert abs(found.forward) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_the_name_of_a_gait_is_the_same_in_every_process():
-    gait = Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [0.4]])
-    given = f"from colloc.gaits.gait_fields import gait_from; gait = gait_from({fields(gait)})"
-    code = f"{given}; from colloc.studies.journal import start_key; print(start_key(gait))"
-    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert (
-        other.stdout.strip()
-        == start_key(gait)
-        != start_key(Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [0.5]]))
-    )
+    gait, other = (Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [end]]) for end in (0.4, 0.5))
+    made = f"from colloc.gaits.gait_fields import gait_from; gait = gait_from({fields(gait)})"
+    code = f"{made}; from colloc.studies.journal import start_key; print(start_key(gait))"
+    words = [sys.executable, "-c", code]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    assert said == start_key(gait) != start_key(other)
 
 
 def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
-    path = tmp_path / "tiny.py"
-    path.write_text(FILE, encoding="utf-8")
-    out = tmp_path / "out put"
-    assert sweep_study([str(path), "--output", str(out)]) == 0
+    words, out = (
+        [str(study_file(tmp_path)), "--output", f"{tmp_path}/out put"],
+        tmp_path / "out put",
+    )
+    assert sweep_study(words) == 0
     printed = capsys.readouterr().out
     assert "2 cells, 0 of them in the journal" in printed
     assert "2 of 2, 0 s left" in printed
@@ -609,62 +507,29 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     # the isotropic optimum of problems/three_link.py at a delta a hundred times larger
     assert table["efficiency"][0, 0] == pytest.approx(0.2600, abs=2e-3)
     assert table["gait_class"][0, 0].endswith("both")
-    assert sweep_study([str(path), "--output", str(out), "--json"]) == 0
+    assert sweep_study([*words, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
-    np.testing.assert_array_equal(
-        load_study(out / "tiny.nc").variables["efficiency"], table["efficiency"]
-    )
+    again = load_study(out / "tiny.nc").variables["efficiency"]
+    np.testing.assert_array_equal(again, table["efficiency"])
+    pytest.importorskip("distributed")
+    assert sweep_study([*words, "--dask", "nonsense://x"]) == 2
+    assert "no Dask scheduler at nonsense://x" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
-    path = tmp_path / "many.py"
-    path.write_text(
-        FILE.replace("(1.0, 1.1)", "tuple(1 + 0.01 * k for k in range(40))"), encoding="utf-8"
-    )
-    command = [sys.executable, "-m", "colloc", "sweep", str(path), "--output", str(tmp_path)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    many = FILE.replace("(1.0, 1.1)", "tuple(1 + 0.01 * k for k in range(40))")
+    words = ["-m", "colloc", "sweep", str(study_file(tmp_path, many)), "--output", str(tmp_path)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen([sys.executable, *words], **pipes)
     lines = [process.stdout.readline() for _ in range(3)]
     process.send_signal(signal.SIGINT)
     rest, errors = process.communicate(timeout=240)
     assert process.returncode == 130
-    assert (
-        errors
-        == "colloc: interrupted; what is done is kept, and the same command goes on from there.\n"
-    )
+    said = "interrupted; what is done is kept, and the same command goes on from there."
+    assert errors == f"colloc: {said}\n"
     assert " not tried yet" in rest
     assert "no certified gait" not in rest
-    reported = sum(
-        ": round 0" in line or "round 0" in line for line in [*lines, *rest.splitlines()]
-    )
+    reported = sum("round 0" in line for line in [*lines, *rest.splitlines()])
     assert reported >= 2
-    kept = sum(
-        bool(e > 0) for e in load_study(tmp_path / "tiny.nc").variables["efficiency"].ravel()
-    )
-    assert kept >= reported
-
-
-@pytest.mark.slow
-def test_dask_runs_a_study_on_a_local_cluster(tmp_path):
-    distributed = pytest.importorskip("distributed")
-    path = tmp_path / "tiny.py"
-    path.write_text(FILE, encoding="utf-8")
-    study, _ = read_study_file(path)
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=":0"
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        run = StudyRun(study, tmp_path)
-        for _ in run.run(workers=2, executor=lambda n: client.get_executor(pure=False)):
-            pass
-    assert study_table(run).variables["efficiency"].min() > 0.25
-
-
-def test_a_start_that_turns_as_it_should_is_worth_the_same_whatever_phase_it_begins_at():
-    turning = Fourier([1.2, 0.6], [[0.9], [0.1]], [[0.1], [0.9]])
-    turned = replay(Chain(), Friction(), turning, 1e-2).rotation
-    problem = Problem("turning", gait=Harmonic(1), delta=1e-2, rotation=turned)
-    values = [value_of(problem, shifted(turning, phase)) for phase in (0.0, 0.3, 0.6)]
-    np.testing.assert_allclose(values, values[0], rtol=2e-3)
+    assert np.sum(load_study(tmp_path / "tiny.nc").variables["efficiency"] > 0) >= reported
