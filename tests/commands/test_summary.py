@@ -105,14 +105,6 @@ def test_a_limit_of_all_joints_matters_if_it_does_to_one_and_one_of_each_is_name
     )
 
 
-def test_a_speed_that_decides_says_how_far_joints_can_swing():
-    _, lines = told_of_limits(joint_limit=2.0, speed_limit=7.54)
-    assert lines[1:] == [
-        "speed_limit 7.54 rad per period, its unit, lets a joint swing by 216 of 229 degrees "
-        "at most"
-    ]
-
-
 def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_path):
     """The collocated ones differ from them by more than their errors, so here they are made to
     differ by much."""

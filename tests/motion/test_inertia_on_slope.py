@@ -128,22 +128,3 @@ def test_torques_of_a_robot_lift_its_weight_too(which, request):
     x, y, z = (float(part) for part in mjcf(robot).split('gravity="')[1].split('"')[0].split())
     assert np.hypot(x, y) / abs(z) == pytest.approx(grade)
     assert np.hypot(np.hypot(x, y), z) == pytest.approx(9.81)
-
-
-@pytest.mark.slow
-def test_the_best_pace_uphill_is_found_and_the_gait_tells_pace_and_heading():
-    pace = {
-        "froude": colloc.Free(0.005, 1.0),
-        "objective": "distance / (work + 0.05 * period)",
-        "grade": 0.1,
-    }
-    stated = colloc.Problem(
-        "paced", gait=colloc.Harmonic(1), delta=1e-3, mesh_tolerance=1e-4, **pace
-    )
-    found = colloc.solve(stated, starts=2)
-    assert found.status == "solved", found.message
-    assert 0.005 < found.froude < 1.0
-    fixed = colloc.solve(stated.with_(froude=1.3 * found.froude, guess=found.gait), starts=1)
-    assert fixed.value < found.value
-    assert any("a period takes" in line for line in found.gait.lines())
-    assert any("off straight uphill" in line for line in found.gait.lines())

@@ -13,14 +13,10 @@ from colloc.mechanics.native_kernel import numpy_instead
 from colloc.motion import kinds
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
 from colloc.motion.kinds import Shapes, begin_of, kind_of_motion
-from colloc.numerics.mesh import Mesh
-from colloc.numerics.schemes import scheme
 from colloc.pictures.animation import pictures
 from colloc.reduced.program import ReducedProgram
-from colloc.search.small_starts import small_loops
 from colloc.search.spaces import space_near
 from colloc.verification.mesh_error import mesh_error
-from colloc.verification.refinement import planned_mesh
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 ROUND = colloc.ellipse(A0=0, A1=2.5, B1=1.3)
@@ -254,16 +250,6 @@ def test_bodies_of_other_kinds_find_a_certified_gait(fields):
     assert found.efficiency > 0.03
 
 
-def test_objectives_of_the_length_of_the_path_are_replayed():
-    path = program(problem())[0].space.member(program(problem())[1])
-    played = colloc.inertial_motion(
-        colloc.Chain(), colloc.Friction(), path, 1e-2, 0.1, tolerance=1e-4
-    )
-    t = np.arange(4000) / 4000
-    assert played.length == pytest.approx(np.linalg.norm(path.rates(t), axis=0).mean(), rel=1e-6)
-    assert 0 < played.error_of(objective_from("speed")) < 1e-3
-
-
 def test_a_gait_that_is_given_is_evaluated_at_its_pace():
     stated = colloc.Problem("paced", froude=0.1, delta=1e-2)
     found = colloc.evaluate(stated, ROUND)
@@ -311,35 +297,6 @@ def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
     assert np.abs(error.value).sum() > 10 * abs(error.total) > 1e-3, "of either sign"
 
 
-@pytest.mark.parametrize("size", [1.0, 0.15])
-def test_errors_are_told_apart_however_short_the_way(size):
-    """Two links go nowhere slowly, and not far fast: the differential equation is solved to a part
-    of that."""
-    gait = colloc.Fourier(mean=[0.6], cos=[[size, 0.2 * size]], sin=[[0.0, 0.3 * size]])
-    stated = problem(
-        body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2), guess=gait, froude=0.02
-    )
-    error = mesh_error(control_problem(stated), control_problem(stated).mesh(), gait, 1e-2, 3e-5)
-    assert error.unresolved == pytest.approx(0.05 * 3e-5, rel=0.1)
-
-
-def test_a_mesh_is_fine_where_errors_are_made_not_where_they_are_felt():
-    """Momenta that stick and slip leave wrong are carried through the rest of the period."""
-    stated = problem(
-        gait=colloc.Harmonic(1, "antipodal"),
-        guess=ROUND,
-        rotation=0.0,
-        delta=1e-3,
-        friction=colloc.Friction(),
-    )
-    control, mesh = control_problem(stated), Mesh(scheme("gauss-3"), np.linspace(0.0, 0.5, 81))
-    shares = np.sort(np.abs(mesh_error(control, mesh, ROUND, 1e-3, 3e-5).value))
-    assert shares[-8:].sum() > 0.9 * shares.sum()
-    plan = planned_mesh(control, mesh, ROUND, 1e-3, 3e-5)
-    assert plan.reached
-    assert plan.edges.size < mesh.n
-
-
 def test_kinetic_energy_is_that_of_dense_points():
     body, points = colloc.Chain((0.3, 0.45, 0.25)), (np.arange(400) + 0.5) / 400
     (angles, rates), z = LEANING(np.array([0.2])), np.array([[0.3], [-0.2], [0.7]])
@@ -375,18 +332,3 @@ def test_two_equal_links_go_nowhere_by_an_antipodal_gait_and_such_a_problem_is_r
     with pytest.raises(colloc.ProblemError, match="own axis of symmetry"):
         problem(body=colloc.Chain((0.5, 0.5)), **stated)
     assert problem(body=colloc.Chain((0.4, 0.6)), **stated).froude == 0.1
-
-
-def test_what_holds_slowly_alone_is_not_asked_of_a_fast_body():
-    """One joint goes somewhere with inertia, and loops too small for the pace to matter do not
-    exist."""
-    assert (
-        colloc.Problem(
-            "burst", body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2), froude=0.1
-        ).froude
-        == 0.1
-    )
-    with pytest.raises(colloc.ProblemError, match="scallop"):
-        colloc.Problem("slow", body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2))
-    assert small_loops(problem()) == []
-    assert small_loops(problem(froude=0.0))

@@ -20,7 +20,6 @@ from colloc.pictures.figure import (
     draw_allowed,
     draw_filmstrip,
     draw_lab,
-    draw_shape_path,
     forbidden,
 )
 from colloc.pictures.motion_frames import foot_kinds
@@ -68,55 +67,6 @@ def snake(size):
 def bodies(axes):
     """Outlines ``(2, n_point)`` of those that are drawn."""
     return [np.array(line.get_data()) for line in axes.lines if line.get_linewidth() == 2.4]
-
-
-@pytest.mark.parametrize("size", [0.4, 1.2])
-def test_paths_in_the_lab_go_on_until_the_body_has_left_its_place_if_it_soon_does(size, unsolved):
-    solution, axes = unsolved(snake(size)), Figure().add_subplot()
-    draw_lab(axes, solution)
-    tail, head, centre = (np.array(line.get_data()) for line in axes.lines[:3])
-    periods = (tail.shape[1] - 1) / 600
-    motion = solution.sample(np.linspace(0.0, periods, tail.shape[1]))
-    links = motion.theta + np.cumsum(np.insert(motion.angles, 0, 0.0, axis=0), axis=0)
-    np.testing.assert_allclose(tail, motion.tail, atol=1e-12)
-    np.testing.assert_allclose(centre, motion.centre, atol=1e-12)
-    np.testing.assert_allclose(
-        head, tail + np.mean([np.cos(links), np.sin(links)], axis=1), atol=1e-12
-    )
-    drawn = bodies(axes)
-    np.testing.assert_allclose(
-        drawn[-1][:, [0, -1]], np.stack([tail[:, -1], head[:, -1]], axis=1), atol=1e-12
-    )
-    if size < 1:
-        assert (periods, len(drawn)) == (1, 1)
-    else:
-        long, step = np.ptp(drawn[0][0]), centre[0, 600] - centre[0, 0]  # it advances along x
-        assert (periods - 1) * step < 1.05 * long < periods * step
-        assert drawn[0][0].max() < drawn[1][0].min()
-
-
-@pytest.mark.parametrize(("size", "half"), [(0.01, 0.03), (0.5, 0.6), (1.2, 1.02 * np.pi)])
-def test_a_path_of_shapes_is_drawn_whole_with_its_sense_and_from_close_by_if_it_is_small(
-    size, half, unsolved
-):
-    problem, axes = snake(1.2), Figure().add_subplot()
-    angle = np.linspace(0, 2 * np.pi, 500)
-    q = np.array([[0.3], [-0.2]]) + size * np.array([np.cos(angle), 0.5 * np.sin(angle)])
-    draw_shape_path(axes, problem, q)
-    pieces = axes.collections[-1].get_segments()
-    assert all((one[-1] == other[0]).all() for one, other in pairwise(pieces))
-    np.testing.assert_array_equal(
-        np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)]), q.T
-    )
-    (arrow,) = axes.texts
-    x, y = np.subtract([arrow.xyann, arrow.xy], [0.3, -0.2]).T
-    sense = np.unwrap(np.arctan2(2 * y, x))
-    np.testing.assert_allclose(np.hypot(x, 2 * y), size, rtol=1e-3)
-    assert 0 < sense[1] - sense[0] < 0.1
-    middle = (0.3, -0.2) if half < 3 else (0.0, 0.0)
-    np.testing.assert_allclose(
-        [axes.get_xlim(), axes.get_ylim()], np.add.outer(middle, [-half, half]), atol=1e-3 * half
-    )
 
 
 @pytest.mark.parametrize(
@@ -219,14 +169,6 @@ def test_panels_alone_can_be_read_and_hold_all_that_is_drawn(name, three_link):
         assert min(seen) - rounding <= min(drawn) <= max(drawn) <= max(seen) + rounding
 
 
-def test_a_reader_of_words_sees_an_overlap():
-    figure = Figure(figsize=(4, 2))
-    figure.text(0.1, 0.5, "one")
-    figure.text(0.11, 0.5, "two")
-    with pytest.raises(AssertionError, match="lies on"):
-        assert_readable(figure)
-
-
 @pytest.mark.parametrize("n_link", [2, 3, 5])
 def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved_to_their_places(
     n_link, unsolved
@@ -287,29 +229,3 @@ def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     column, row = (np.abs(grid[:, None] - allowed[j]).argmin(axis=0) for j in plane)
     # no deeper than the nearest point of the grid may be
     assert excess[row, column].max() < 2.5 * (grid[1] - grid[0])
-
-
-@pytest.mark.parametrize(("size", "times"), [(0.02, 23), (0.6, 1)])
-def test_a_flat_motion_is_drawn_higher_with_its_feet_and_says_so(size, times, unsolved):
-    body, gait = (
-        Chain((0.25,) * 4, feet=1),
-        Fourier(np.zeros(3), size * np.ones((3, 1)), size * np.array([[1.0], [0.0], [-1.0]])),
-    )
-    axes = Figure().add_subplot()
-    problem = Problem(
-        "flat", gait, body, gait=Harmonic(1), delta=1e-2, intervals=8, smallest_shape_speed=1e-3
-    )
-    draw_filmstrip(axes, unsolved(problem))
-    said = [text.get_text() for text in axes.texts if "heights" in text.get_text()]
-    drawn = bodies(axes)
-    assert np.ptp(np.concatenate(drawn, axis=1)[1]) > 0.2
-    assert said == ([] if times == 1 else [f"heights drawn {times} times as large"])
-    squares = [
-        np.array(line.get_data())
-        for line in axes.lines
-        if line.get_marker() == "s" and line.get_color() != "white"
-    ]
-    # each is there twice, and then a gap
-    feet = np.concatenate([square[:, ::3] for square in squares], axis=1)
-    middles = np.concatenate([0.5 * (body[:, 1:] + body[:, :-1]) for body in drawn], axis=1)
-    np.testing.assert_allclose(sorted(feet.T.tolist()), sorted(middles.T.tolist()), atol=1e-12)

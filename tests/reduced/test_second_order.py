@@ -158,52 +158,6 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
         assert step @ added @ step / 1e-6 == pytest.approx(moved, rel=1e-2)
 
 
-class Kinked(Quadratic):
-    """(x - 1)^2 with a gradient that falls by 1e-3 beside x = 1, as where a link begins to stick at
-    a mesh point."""
-
-    def __init__(self):
-        super().__init__(np.diag([2.0]))
-
-    def objective(self, v):
-        return super().objective(v - 1) - 1e-3 * max(v[0] - 1 - 5e-8, 0.0)
-
-    def gradient(self, v):
-        return super().gradient(v - 1) - 1e-3 * (v > 1 + 5e-8)
-
-
-def test_a_way_down_that_ends_at_once_is_none():
-    assert curvature(Kinked(), np.ones(1)).smallest > 0
-
-
-class Skew(Quadratic):
-    """-x^2 + c x^3: at a thousandth, where a way down has to go on, both parts are alike."""
-
-    def __init__(self, c):
-        super().__init__(np.diag([-2.0]))
-        self.c = c
-
-    def objective(self, v):
-        return super().objective(v) + self.c * v[0] ** 3
-
-    def gradient(self, v):
-        return super().gradient(v) + 3 * self.c * v**2
-
-
-@pytest.mark.parametrize("c", [-1e3, 1e3])
-def test_what_rises_one_way_as_it_falls_the_other_curves_nothing(c):
-    assert curvature(Skew(c), np.zeros(1)).smallest == pytest.approx(-2.0, rel=1e-6)
-
-
-def test_rows_on_both_sides_of_one_instant_hold_one_direction():
-    twice = curvature(Quadratic(np.diag([1.0, 1.0, -1.0]), [[1, 0, 0], [1, 1e-3, 0]]), np.zeros(3))
-    assert twice.n_free == 2
-
-
-def test_a_vertex_leaves_nothing_free():
-    assert curvature(Quadratic(np.diag([-1.0, -1.0]), np.eye(2)), np.zeros(2)).smallest == np.inf
-
-
 def test_the_gait_between_two_ways_of_bending_is_a_saddle():
     """Its curvature is the second difference of the efficiency along its direction."""
     program, v = program_at(PROBLEM, SADDLE)

@@ -18,7 +18,7 @@ from colloc.results.measured import extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.results.store import save
 from colloc.search import certify as verify
-from colloc.search.certify import _one_motion, certify, gait_certificate
+from colloc.search.certify import certify, gait_certificate
 from colloc.verification import replay as replay_module
 from colloc.verification.replay import replay
 from colloc.verification.slope import slope_motion
@@ -267,32 +267,6 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
     errors = [7e-3, 9e-4, 2e-4]
     assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(
         2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12
-    )
-
-
-def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(three_link, replays):
-    unequal, fine = (
-        three_link.problem.with_(friction=Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)),
-        replays[max(replays)],
-    )
-    for problem, several, said in (
-        (three_link.problem, 0.0, "leaves one balanced motion"),
-        (unequal, 0.0, "no other balanced motion was found"),
-        (unequal, 0.01, "several motions are balanced at 0.01 of the period"),
-    ):
-        assert said in _one_motion(problem, replace(fine, several=several)).meaning
-
-
-def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
-    monkeypatch.setattr(
-        replay_module, "replay", lambda *a, **k: changed(replays[a[3]], rotation=3e-5)
-    )
-    known, fine = certify(three_link.answer), replays[max(replays)]
-    assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
-    assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
-    # a point at the end of the longest lever goes by so much less or more
-    assert known.errors["distance"] == pytest.approx(
-        fine.errors["distance"] + 3e-5 * fine.lever, rel=1e-9
     )
 
 

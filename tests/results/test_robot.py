@@ -97,16 +97,6 @@ def test_work_over_a_period_is_the_mean_power_and_moves_the_body_its_way(three_l
     assert facts["peak_speed_rad_per_s"] == pytest.approx(np.abs(speeds).max(axis=1), rel=1e-4)
 
 
-def test_every_side_of_a_polygon_is_sampled_eight_times_however_many_there_are(
-    three_link, monkeypatch
-):
-    corners = np.arange(1, 400) / 400
-    monkeypatch.setattr(colloc.Fourier, "corner_phases", corners)
-    seconds = three_link.robot(**SIZE).columns["t"].values
-    sides = np.concatenate([[0.0], corners, [1.0]]) - 1e-9
-    assert np.histogram(seconds[:-1] / SIZE["period"], sides)[0].min() == 8
-
-
 def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
     """Friction is proportional to the weight, torques to the length too; at one Froude number the
     pace is in speeds and powers alone."""
@@ -166,21 +156,6 @@ def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
     np.testing.assert_allclose(
         robot.columns["centre"].values[:, -1], [played.distance, 0.0], atol=2e-3
     )
-
-
-def test_motors_share_what_inertia_asks_of_coupled_joints():
-    """Power is that of the joints: over a period the work against friction."""
-    coupled = colloc.Coupled(colloc.Harmonic(1), gears=((1, 0), (0.5, 0.5), (0, 1)))
-    gait = colloc.ellipse(0.1, 0.7, 0.6)
-    robot = colloc.evaluate(
-        colloc.Problem("belts", body=colloc.Chain((0.25,) * 4), gait=coupled, delta=1e-2), gait
-    ).robot(1.0, 1.0, 1.0)
-    powers = robot.columns["joint_powers"].values.sum(axis=0)
-    assert abs(robot.facts["inertia_takes"]) > 0.05
-    # and every sentence of the sheet ends, that one's too
-    assert abs(robot.facts["rotation_by_inertia_rad"]) > 0.005
-    assert all(sentence.endswith(".") for sentence in robot.sentences())
-    assert powers[:-1].mean() == pytest.approx(robot.facts["work_per_period_J"], rel=1e-3)
 
 
 def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_at_the_period_that_they_allow(

@@ -146,19 +146,6 @@ def test_every_contact_has_the_coefficients_of_its_own_foot_along_and_across(une
     assert [law["mu_t"] for law in stated["laws"]] == [9, 3, 1]
 
 
-def test_a_law_that_no_contact_has_leaves_the_floor_out_and_says_so(uneven, tmp_path):
-    problem = Problem(
-        "drag", friction=colloc.Viscous(normal=2, tangential=1), gait=Harmonic(1), delta=1e-2
-    )
-    stated = colloc.evaluate(problem, colloc.ellipse(0.0, 0.8, 0.6)).export(
-        tmp_path / "x.xml", **SIZE
-    )
-    assert "dry friction alone, not drag" in stated["note"]
-    root = ElementTree.parse(tmp_path / "x.xml").getroot()
-    assert not list(root.iter("pair"))
-    assert "moves_body_lengths_per_period" not in stated
-
-
 def played(path, gait, period, periods=2):
     """Places of the centre of mass and of the tail [m] through the last of some periods of a file
     in MuJoCo, as it is written: servos get the gait's angles."""

@@ -11,7 +11,6 @@ from colloc import (
     Friction,
     Harmonic,
     ModalBody,
-    OwnLaw,
     Polygon,
     PowerLaw,
     Problem,
@@ -23,10 +22,8 @@ from colloc import (
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import instant
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
-from colloc.reduced.program import ReducedProgram
 from colloc.search.explore import ENOUGH
 from colloc.search.solve import solve
-from colloc.search.spaces import space_near
 
 ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
@@ -102,19 +99,6 @@ def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
         for pace in (1.0, 3.0)
     )
     np.testing.assert_allclose(fast, 3.0 ** (1 + degree) * slow, rtol=1e-9)
-
-
-def test_of_a_law_without_a_degree_driven_power_is_the_positive_part_up_to_what_delta_hides():
-    law, (angles, rates) = (
-        OwnLaw("-vs/speed*(1 + exp(-speed))", "-vn/speed*(1 + exp(-speed))"),
-        random_instants(50),
-    )
-    assert law.degree is None
-    z = Chain().solve(law, angles, rates, 1e-3).z
-    now = Instants(Chain(), law, angles, rates, 1e-3, z=z)
-    more = DRIVEN_WORK.at(now)[0] - np.maximum(now.power, 0).sum(axis=0)
-    assert np.all(more >= 0)
-    assert more.max() <= 2 * law.largest * 1e-3 / 2
 
 
 @pytest.fixture(scope="module")
@@ -221,14 +205,6 @@ def test_where_no_start_keeps_the_limits_the_search_ends_soon_and_says_what_is_m
     assert found.status == "not converged"
     assert re.search(f"the limit on the {words}.* allow the joints more", found.message)
     assert "None of 8 starts led to a gait of the class that keeps the limits" in found.message
-
-
-def test_rows_have_bounds_in_order_for_gaits_that_do_many_times_what_is_allowed():
-    problem = USUAL.with_(torque_limit=1e-4)
-    space, v = space_near(problem, problem.guess)
-    program = ReducedProgram(space, problem.delta)
-    program.place_rows(v)
-    assert (program.row_lower <= program.row_upper).all()
 
 
 SIZED = ("guess", "joint_limit", "delta", "delta_start", "intervals", "formulation")

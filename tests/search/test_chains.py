@@ -22,8 +22,6 @@ from colloc.search.converge import crossing_pairs, last_free
 from colloc.search.spaces import program_of
 from colloc.system.errors import ProblemError
 from colloc.transcription.full_program import full_program
-from colloc.transcription.shape_checks import shape_checks
-from colloc.transcription.worst_instants import check_values, held_shares, worst_instants
 from colloc.verification.replay import replay
 
 BODIES = [Chain((0.25,) * 4), Chain((0.1, 0.4, 0.2, 0.3)), Chain((0.2,) * 5), Chain((1 / 8,) * 8)]
@@ -116,54 +114,6 @@ def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell()
         assert (program.row_upper[rows] == 0).all()
         placed += cells.size
     assert placed > 5
-
-
-def tips_passing(side):
-    """Four links near a closed square, where head and tail tip pass each other; `side` moves the
-    joints [rad]."""
-    square, body = np.full(3, np.pi / 2), Chain((0.25,) * 4)
-
-    def gap(q):
-        x, y = body.joints(q[:, None])
-        return np.array([x[-1, 0] - x[0, 0], y[-1, 0] - y[0, 0]])
-
-    step = 1e-6 * np.eye(3)
-    slope = np.stack([(gap(square + h) - gap(square - h)) / 2e-6 for h in step], axis=1)
-    # the head tip moves across the corner of what is allowed: links cross where it is right of and
-    # below the tail tip
-    across = np.linalg.lstsq(slope, np.array([0.3, 0.3]), rcond=None)[0]
-    return Fourier(square + side, np.zeros((3, 1)), across[:, None])
-
-
-def test_a_held_share_follows_the_peak_where_tips_pass_to_second_order():
-    body = Chain((0.25,) * 4)
-    check = next(c for c in shape_checks(body, ((0, 3),)) if c.name == "links 1 and 4")
-    mesh = control_problem(
-        Problem("tips", tips_passing(np.full(3, -0.3)), body, intervals=40)
-    ).mesh()
-    first = tips_passing(np.array([-0.002, 0.0, 0.001]))
-
-    def peak(gait):
-        times = worst_instants(gait, mesh, [check], np.pi)[0]
-        values = check_values(check, gait, times)
-        return times[[np.argmax(values)]], values.max()
-
-    time, height = peak(first)
-    dense = time + np.linspace(-0.01, 0.01, 200_001)
-    assert check_values(check, first, dense).max() == pytest.approx(height, abs=1e-8)
-    share = held_shares(check, first, time)
-    assert 0.1 < share[0] < 0.9
-    errors, blind = [], []
-    for size in (1e-2, 5e-3, 2.5e-3):
-        moved = tips_passing(np.array([-0.002, 0.0, 0.001]) + size * np.array([0.3, -0.8, 0.5]))
-        height = peak(moved)[1]
-        cut = float(np.array(check.cut(moved.angles(time), share)).ravel()[0])
-        errors.append(abs(cut - height))
-        blind.append(height - check_values(check, moved, time)[0])
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all(orders > 1.7)
-    assert errors[-1] < 1e-5
-    assert min(blind) > 10 * errors[-1]
 
 
 @pytest.mark.parametrize("lengths", [(0.5, 0.5), (0.3, 0.7)])

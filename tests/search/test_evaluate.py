@@ -1,8 +1,6 @@
 """A gait of one's own: whatever way the angles are given, what comes out is what a replay of them
 says."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -159,13 +157,6 @@ def test_a_gait_is_certified_in_whatever_is_asked_of_it(objective, mu):
     assert solution.answer.value == pytest.approx(solution.value, rel=1e-4)
 
 
-def test_a_gait_that_does_not_turn_is_refused_by_no_objective_of_its_turn():
-    turning = PROBLEM.with_(objective="turning", rotation=None, delta=1e-2)
-    assert colloc.evaluate(turning, colloc.ellipse(A0=0, A1=1.5, B1=1.0)).value == pytest.approx(
-        0, abs=1e-9
-    )
-
-
 REST = "5,0,0\n6,0,0\n7,0,0\n8,0,0\n"
 BAD = {
     "t,a,b\n0,1,nan\n1,2,3\n"
@@ -209,15 +200,6 @@ def test_where_a_gait_cannot_be_evaluated_alone_another_way_is_named():
         colloc.evaluate(colloc.Problem("up", gait=colloc.Harmonic(1), grade=0.1), GAIT)
 
 
-def test_a_file_may_be_called_as_it_likes(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('mine', delta=1e-3)\n")
-    written(tmp_path / "my gait (3).csv", T, GAIT.angles(T))
-    assert main(["evaluate", "p.py", "my gait (3).csv", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["name"] == "my_gait__3_-evaluated"
-    assert (tmp_path / "results/my_gait__3_-evaluated.h5").exists()
-
-
 QUICK = PROBLEM.with_(delta=3e-3, mesh_tolerance=1e-3)
 N = 40
 
@@ -247,24 +229,6 @@ def test_stated_errors_hold_for_gaits_through_noisy_samples_and_grow_with_the_no
             abs(noisy.work - exact.work) <= stated.errors["work"],
         ]
     assert sum(inside) >= 13  # of 15, 95 % each
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("degrees", "slow"), [(0.1, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.7)])
-def test_two_standard_deviations_cover_the_true_gait_in_95_of_100_records(exact, degrees, slow):
-    rng, inside = np.random.default_rng(1), []
-    for _ in range(40):
-        noise = np.radians(degrees) * rng.normal(size=(2, N))
-        for k in range(1, N):
-            noise[:, k] += slow * noise[:, k - 1]
-        noisy = colloc.evaluate(QUICK, GAIT.angles(np.arange(N) / N) + noise)
-        errors = noisy.certificate.errors
-        inside.append(
-            abs(noisy.efficiency - exact.efficiency) <= noisy.certificate.efficiency_error
-        )
-        inside.append(abs(noisy.distance - exact.distance) <= errors["distance"])
-        inside.append(abs(noisy.work - exact.work) <= errors["work"])
-    assert np.mean(inside) >= (0.75 if slow else 0.92)
 
 
 @pytest.mark.parametrize("samples", [9, 12, 40])

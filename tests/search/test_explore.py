@@ -143,38 +143,6 @@ def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkey
 
 
 @pytest.mark.parametrize(
-    ("count", "better", "tried"),
-    [
-        (1, {0: 1}, 1),
-        (8, {0: 1}, 8),
-        (8, {0: 1, 6: 2}, 15),
-        (8, {0: 1, 6: 2, 14: 3}, 23),
-        (4, {0: 1, 3: 2, 9: 3}, 12),
-    ],
-    ids=["one", "none leads on", "one leads on", "two do", "three times what was asked for"],
-)
-def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, count, better, tried):
-    numbers = itertools.count()
-
-    def follow(problem, gait, deltas, known, *, hop=False):
-        number = next(numbers)
-        if number in better:
-            found = SimpleNamespace(
-                objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem
-            )
-            known[-1].append(explore.Candidate(found))
-
-    monkeypatch.setattr(explore, "_follow", follow)
-    monkeypatch.setattr(explore, "small_loops", lambda problem: [])
-    monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
-    found, number = candidates(
-        Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, ALONE
-    )
-    assert number == tried
-    assert found[0].optimum.objective == -max(better.values())
-
-
-@pytest.mark.parametrize(
     ("asked", "meeting", "froude", "tried"),
     [
         (None, range(4), 0.0, 8),
@@ -256,15 +224,6 @@ def test_gaits_are_solved_for_until_a_certificate_holds_and_no_other_promises_mo
     optima = [SimpleNamespace(value=1.0 - 0.1 * k) for k in range(len(ends))]
     found = stages._tried(optima, lambda each: each.holds)
     assert (len(found), len(asked)) == (solved_for, solved_for)
-
-
-def test_a_gait_of_finite_size_that_shrinks_after_all_makes_room_for_the_next_one(monkeypatch):
-    ends = iter([certified(0.5, finite=False), certified(0.4)])
-    monkeypatch.setattr(stages, "finished", lambda optimum: next(ends))
-    monkeypatch.setattr(stages, "is_finite", lambda optimum: True)
-    optima = tuple(SimpleNamespace(value=value) for value in (0.5, 0.45))
-    found = stages._certified_best(UNEQUAL, optima)
-    assert [each.answer.value for each in found] == [0.5, 0.4]
 
 
 def test_where_no_certificate_holds_gaits_that_were_left_are_followed_and_the_best_of_them_is_the_answer(

@@ -14,7 +14,6 @@ from colloc import (
     Foot,
     Friction,
     Harmonic,
-    Polygon,
     Problem,
     ProblemError,
     Wheel,
@@ -24,10 +23,8 @@ from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.summary import summary_lines
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.harmonic import Fourier, ellipse
+from colloc.gaits.harmonic import Fourier
 from colloc.pictures.motion_frames import frames
-from colloc.search.solve import solve
-from colloc.verification.dry_balance import dry_balance
 from colloc.verification.replay import replay
 from research.small_gaits import small_gait
 
@@ -156,19 +153,6 @@ def test_a_gait_of_no_size_pays_no_more_than_the_least_friction_on_one_foot_a_li
     np.testing.assert_allclose(more, [0.6585, 0.5], atol=2e-4)
 
 
-def test_at_a_zigzag_every_foot_steps_the_same_way_while_two_hold_with_no_smoothing():
-    """Three steps bring the joints back, nothing turns, and all that is paid for travels: no
-    potential has a bound below 1/min(mu)."""
-    body, rates = Chain(feet=1), np.array([[-1.0, 1, 0], [0, 1, -1]])
-    angles = np.array([[2.2] * 3, [-2.2] * 3])
-    found, posture = dry_balance(body, Friction(), angles, rates), body.posture(angles)
-    foot = body.velocity(posture, rates, found.z)
-    steps = (foot.vs + 1j * foot.vn) * (posture.cos + 1j * posture.sin)
-    np.testing.assert_allclose(steps, steps[0, 0] * np.eye(3), atol=1e-7)
-    np.testing.assert_allclose(foot.w[1], 0, atol=1e-7)
-    np.testing.assert_allclose([found.least, found.most], abs(steps[0, 0]) / 3, rtol=1e-7)
-
-
 def test_what_feet_cannot_do_yet_is_refused():
     with pytest.raises(ProblemError, match="on feet no upper bound"):
         Domain(Chain(feet=1), Friction(mu_t=2, mu_f=1, mu_b=1), 2.0)
@@ -201,21 +185,3 @@ def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, th
     np.testing.assert_array_equal(on_feet.holding(motion), used < 3 / np.sqrt(10))
     assert three_link.share_held.size == 0
     assert not any("feet hold" in line for line in summary_lines(three_link, None))
-
-
-def test_along_a_path_too_a_foot_holds_where_friction_is_less_than_3_over_root_10_of_the_most():
-    """There the speed delta is stated for paths run through at unit speed, and a period is many
-    times that."""
-    path = Problem(
-        "path", ellipse(0.0, 0.8, 0.6), body=Chain(feet=1), gait=Polygon(3, "bilateral"), delta=1e-2
-    )
-    found = solve(path, 1, seconds=1e-3)
-    assert found.delta_per_period > 2 * found.answer.delta
-    body, motion = path.body, found.sample(np.linspace(0, 1, 300))
-    at = path.law, motion.angles, motion.rates, found.delta_per_period, motion.z
-    used = (
-        np.hypot(*body.rubbing(*at)[1])
-        / np.array([foot.weight for foot in body.standing_on])[:, None]
-    )
-    assert 0 < (used < 3 / np.sqrt(10)).mean() < 1
-    np.testing.assert_array_equal(found.holding(motion), used < 3 / np.sqrt(10))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import colloc
-from benchmarks.kills import contents, lost, stopped
+from benchmarks.kills import contents
 from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import on_speed_floor
@@ -115,16 +115,6 @@ def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
     assert "solved" in again.stdout
     assert contents(tmp_path / "quick.h5") == wanted
     assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("asked", [signal.SIGINT, signal.SIGKILL])
-@pytest.mark.parametrize("part", np.random.default_rng(3).uniform(0.05, 1.0, 5).round(3))
-def test_so_it_does_at_other_moments_and_if_it_is_stopped_twice(undisturbed, tmp_path, asked, part):
-    file, wanted = undisturbed
-    stopped(file, tmp_path, asked, 6.0 * part)
-    stopped(file, tmp_path, asked, 3.0 * part)
-    assert lost(file, tmp_path, wanted) == ""
 
 
 def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path, monkeypatch):
@@ -443,10 +433,3 @@ def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess(
         first.gait.angles(np.arange(9) / 9), QUICK.guess.angles(np.arange(9) / 9), atol=1e-12
     )
     assert best.value == seen[-1].value > 1.5 * first.value
-
-
-def test_friction_of_any_size_is_kept_in_the_units_of_the_problem(tmp_path, at_once):
-    light = QUICK.with_(friction=Friction(1e-3, 1e-3, 1e-3))
-    solution = solve(light, 1, keep=tmp_path / "x.run.sqlite")
-    assert solution.value == solve(light, 1, keep=tmp_path / "x.run.sqlite").value
-    assert solution.value * 1e-3 == pytest.approx(solve(QUICK, 1).value, rel=1e-6)

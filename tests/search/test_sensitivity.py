@@ -241,32 +241,6 @@ def test_a_pad_as_long_as_its_link_has_no_place_to_move_to(extent):
     assert not any(name.startswith("place") for name in names)
 
 
-def test_what_has_to_be_reached_is_known_of_the_gait_on_file(of):
-    of("length of links 1 and 3")
-    stated = {
-        "gait": colloc.Harmonic(1, "bilateral"),
-        "at_least": {"driven efficiency": 0.2},
-        "delta": 1e-2,
-    }
-    again = (
-        colloc.solve(colloc.Problem("x", **stated), starts=1)
-        .sensitivity(True)["length of links 1 and 3"]
-        .again
-    )
-    assert "driven efficiency" in again[1].breaks
-
-
-def test_a_gait_on_file_that_is_asked_to_turn_is_paid_for_its_chord(of):
-    of("friction sideways")
-    problem = colloc.Problem("x", gait=colloc.Harmonic(1), rotation=0.6, delta=1e-2)
-    solution = colloc.solve(problem, starts=1)
-    for each in solution.sensitivity(True)["friction sideways"].again:
-        law = colloc.Friction(mu_t=1 + each.change)
-        assert each.kept == pytest.approx(
-            colloc.replay(problem.body, law, solution.gait, problem.delta, turn=0.6).value, rel=1e-6
-        )
-
-
 @pytest.mark.parametrize(
     "changes",
     [

@@ -159,16 +159,6 @@ def test_what_joints_give_back_and_can_do_counts_on_slopes(uphill):
     assert error.total == pytest.approx(-program.objective(v) / found.value - 1, rel=1e-2)
 
 
-def test_friction_and_the_pull_have_one_unit():
-    heavy = PROBLEM.with_(friction=Friction(100, 100, 100), grade=10.0)
-    scaled = control_problem(heavy)
-    assert (scaled.unit, scaled.dynamics.regime, scaled.dynamics.law) == (
-        100.0,
-        PROBLEM.regime,
-        PROBLEM.law,
-    )
-
-
 @pytest.mark.slow
 def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     free = PROBLEM.with_(

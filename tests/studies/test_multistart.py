@@ -33,7 +33,7 @@ from colloc.results.distinct_optima import (
     reversed_in_time,
 )
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
-from colloc.results.solution import SOLVED, Solution
+from colloc.results.solution import SOLVED
 from colloc.search import certify
 from colloc.search.certify import is_trivial
 from colloc.search.solve import solve
@@ -382,40 +382,6 @@ def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
     assert limit.error < 1e-3 * limit.value
     assert abs(limit.value - three_link.certificate.efficiency_at_zero_delta) < 3 * limit.error
     assert resolution_warning(three_link) is None
-
-
-def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
-    stated = problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait)
-    coarse = Solution(stated, answer_near(stated))
-    assert "under-resolved by 5 intervals" in resolution_warning(coarse)
-    with pytest.raises(ValueError, match="at least two converged levels"):
-        value_at_zero_delta(coarse)
-
-
-def test_starts_run_on_a_dask_cluster_and_end_as_they_do_here():
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        found = list(
-            campaign.run_starts(
-                problem(), range(2), workers=2, executor=lambda n: client.get_executor()
-            )
-        )
-    assert sorted(o.start for o in found) == [0, 1]
-    there = {o.start: o for o in found}
-    here = campaign.run_start(problem(), SAMPLERS[0], 0, 1, 300.0)
-    assert there[1].status == here.status
-    assert there[1].efficiency == pytest.approx(here.efficiency, rel=1e-6)
-
-
-def test_known_gaits_take_the_place_of_samples():
-    stated, near = problem(), ellipse(0.1, 1.3, 0.8)
-    (found,) = campaign.run_starts(stated, [7], executor=ThreadPoolExecutor, known={7: near})
-    assert phase_distance(found.guess, near) < 1e-7
 
 
 class _Enough(Exception):

@@ -2,22 +2,16 @@
 is lost, nothing hangs."""
 
 import json
-import os
-import re
-import resource
 import signal
 import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
-import numpy as np
 import pytest
 from shared.dask_cluster import DaskProcesses
 
 from colloc.studies.journal import read_journal
-from colloc.studies.table import load_study
 from colloc.system.dask_pool import connect
 from colloc.system.task_pool import EngineGone, Task, run_tasks
 
@@ -103,26 +97,6 @@ def study_file(folder, cells):
     ]
 
 
-def test_a_worker_on_a_full_disk_finds_what_others_find(tmp_path):
-    plain = subprocess.run([*study_file(tmp_path, 3), "--json"], capture_output=True, text=True)
-    assert plain.returncode == 0, plain.stderr
-    expected = load_study(tmp_path / "out" / "tiny.nc").variables["efficiency"]
-    with DaskProcesses() as dask:
-        worker = dask.worker()
-        resource.prlimit(worker.pid, resource.RLIMIT_FSIZE, (0, 0))  # from now on
-        other = [
-            *study_file(tmp_path, 3)[:-1],
-            str(tmp_path / "starved"),
-            "--dask",
-            dask.address,
-            "--json",
-        ]
-        done = subprocess.run(other, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-    found = load_study(tmp_path / "starved" / "tiny.nc").variables["efficiency"]
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
-
-
 def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
     command, cells = study_file(tmp_path, 14), 14
     journal = tmp_path / "out" / "tiny.study"
@@ -164,65 +138,3 @@ def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
         for attempt in record.attempts
     ]
     assert len(keys) == len(set(keys))  # nothing was solved twice
-
-
-SBATCH = """#!/bin/sh
-cp "$1" "$0.job"  # as SLURM does
-setsid sh "$0.job" > "$0.log" 2>&1 &
-echo $! > "$0.pid"
-echo Submitted batch job 7
-"""
-SCANCEL = """#!/bin/sh
-kill -- -$(cat "$(dirname "$0")/sbatch.pid")
-"""
-
-
-def test_the_recipe_for_slurm_runs_with_a_stand_in_for_its_commands(tmp_path):
-    pytest.importorskip("dask_jobqueue")
-    page = (Path(__file__).resolve().parents[2] / "docs/howto/cluster.md").read_text(
-        encoding="utf-8"
-    )
-    (recipe,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    for stated, here in (
-        ('"64GB"', '"4GB"'),
-        ("cores=32", "cores=2"),
-        ("processes=32", "processes=2"),
-        ('interface="ib0"', 'interface="lo"'),
-        ("jobs=10", "jobs=1"),
-        ("source ~/colloc/.venv/bin/activate", "true"),
-    ):
-        assert stated in recipe
-        recipe = recipe.replace(stated, here)
-    (tmp_path / "workers.py").write_text(recipe, encoding="utf-8")
-    for name, program in (("sbatch", SBATCH), ("scancel", SCANCEL)):
-        (tmp_path / name).write_text(program)
-        (tmp_path / name).chmod(0o755)
-    environment = {
-        **os.environ,
-        "PATH": f"{tmp_path}:{os.environ['PATH']}",
-        "DASK_DISTRIBUTED__DASHBOARD__LINK": "",
-    }
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "env": environment}
-    with subprocess.Popen([sys.executable, str(tmp_path / "workers.py")], **pipes) as workers:
-        try:
-            address = workers.stdout.readline().strip()
-            assert address.startswith("tcp://127.0.0.1:")
-            done = subprocess.run(
-                [*study_file(tmp_path, 4), "--dask", address, "--json"],
-                capture_output=True,
-                text=True,
-            )
-            assert done.returncode == 0, done.stderr
-            assert json.loads(done.stdout)["counts"] == {"solved": 4}
-            workers.communicate(timeout=60)  # the end of its input
-            assert workers.returncode == 0
-        finally:
-            subprocess.run([str(tmp_path / "scancel")], capture_output=True, check=False)
-            workers.kill()
-    job = int((tmp_path / "sbatch.pid").read_text())
-    for _ in range(100):
-        if not Path(f"/proc/{job}").exists():
-            break
-        time.sleep(0.1)
-    else:
-        pytest.fail("the job goes on")

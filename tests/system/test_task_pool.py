@@ -13,11 +13,10 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from shared.dask_cluster import DaskProcesses
 
 from colloc.system.dask_pool import connect
 from colloc.system.errors import ProblemError
-from colloc.system.task_pool import EngineGone, Lost, Task, process_pool, run_tasks
+from colloc.system.task_pool import Lost, Task, process_pool, run_tasks
 
 ENDED = threading.Event()
 
@@ -37,13 +36,6 @@ def dying_once(x, folder):
     if x == 5 or (x == 3 and not os.path.exists(flag)):
         open(flag, "w").close()
         os.kill(os.getpid(), signal.SIGKILL)
-    return 2 * x
-
-
-def doubled_in_the_end(x):
-    """At once for 0, else when the test is over."""
-    if x:
-        ENDED.wait(30)
     return 2 * x
 
 
@@ -98,23 +90,6 @@ print(sorted(result for _, result in run_tasks(task, lambda: next(waiting, None)
     )
     assert (ran.stdout, ran.stderr) == ("[-2, -1, 0]\n", "")
     assert not (tmp_path / "elsewhere" / "ran").exists()
-
-
-def test_a_task_may_wait_for_the_result_of_another():
-    known = {0: 1}
-
-    def ready():
-        last = max(known)
-        return (
-            Task(last + 1, (known[last],))
-            if last < 6 and last + 1 not in asked and not asked.add(last + 1)
-            else None
-        )
-
-    asked = set()
-    for task, result in run_tasks(doubled, ready, workers=3, executor=ThreadPoolExecutor):
-        known[task.key] = result
-    assert known == {k: 2**k for k in range(7)}
 
 
 class Unreliable(Executor):
@@ -206,37 +181,6 @@ def test_a_dask_scheduler_without_workers_is_waited_for_a_stated_time_only(clust
     ):
         connect(cluster.scheduler_address, 1, said.append, patience=1.0)
     assert "waiting for one, 1 s at most" in said[0]
-
-
-def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_task(cluster):
-    cluster.scale(1)
-    executor, workers = connect(cluster.scheduler_address, 1, patience=1.0)
-    assert workers == 1
-    run = run_tasks(
-        doubled_in_the_end,
-        listed([Task(0, (0,)), Task(1, (0,)), Task(2, (1,))]),
-        workers=1,
-        executor=executor,
-    )
-    assert [next(run)[1] for _ in range(2)] == [0, 0]
-    cluster.scale(0)
-    with pytest.raises(EngineGone, match="no workers for 1 s"):
-        list(run)
-
-
-def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task():
-    pytest.importorskip("distributed")
-    with DaskProcesses() as dask:
-        dask.worker()
-        executor, _ = connect(dask.address, 1)
-        # a function that other processes know as well
-        run = run_tasks(
-            time.sleep, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor
-        )
-        assert next(run)[1] is None
-        dask.scheduler.kill()
-        with pytest.raises(EngineGone, match="is gone; what is done is kept"):
-            list(run)
 
 
 def test_ctrl_c_while_a_task_is_handed_over_leaves_the_executors_locks_open():
