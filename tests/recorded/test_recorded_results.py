@@ -31,7 +31,6 @@ from colloc import (
     Wheel,
     ellipse,
 )
-from colloc.bounds.infinitesimal import small_gait
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.balance import solve_smooth
@@ -138,14 +137,12 @@ def crawler():
     return replayed(body, UNEQUAL, corners, 1e-2, breaks=corners.corner_phases)
 
 
-def trajectories_and_small_gaits():
+def trajectories():
     fast, slow = (plan_trajectory(SKEW, 20.0, t, limits=(2.0, 1.5)) for t in (None, 9.0))
-    small = small_gait(Chain(), UNEQUAL, (0.9, 0.4), 36, 6, 6)
     return [
         fast.period,
         *fast.angles[:, ::9].ravel(),
         *slow.speeds[:, ::40].ravel(),
-        small.efficiency,
     ]
 
 
@@ -158,7 +155,7 @@ CASES = {
     "objectives": objectives_and_small_delta,
     "slope and inertia": slope_and_inertia,
     "crawler": crawler,
-    "trajectories and small gaits": trajectories_and_small_gaits,
+    "trajectories": trajectories,
 }
 
 
