@@ -29,8 +29,8 @@ from colloc import Chain, Friction
 from colloc.gaits.harmonic import harmonics_within
 from colloc.results.measured import Measured, measured
 from colloc.results.solution import Solution
-from colloc.search.explore import begin_at
-from colloc.search.solve import confirmed
+from colloc.search.explore import first_optimum
+from colloc.search.solve import confirm_optimum
 from colloc.system.errors import NotConvergedError
 from colloc.verification.played import Path as GaitPath
 from colloc.verification.replay import replay
@@ -110,7 +110,7 @@ def measured_again(entry: dict) -> dict:
 def solved_gait(number: int, own: bool) -> dict[str, list[float]] | None:
     """The same for the gait that the zoo's problem is solved by; None if the search fails."""
     problem = zoo_problem(number)
-    solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
+    solution = Solution(problem, confirm_optimum(first_optimum(problem, problem.guess)))
     if not solution.history or not solution.answer.optimal:
         return None
     breaks, body = solution.gait.corner_phases, problem.body

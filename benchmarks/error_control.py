@@ -26,8 +26,8 @@ from benchmarks.tables import cached
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
 from colloc.gaits.control_problem import control_problem
 from colloc.results.solution import Solution
-from colloc.search.explore import begin_at
-from colloc.search.solve import confirmed
+from colloc.search.explore import first_optimum
+from colloc.search.solve import confirm_optimum
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replay
 
@@ -125,7 +125,7 @@ def case_problem(index: int) -> Problem:
 def outcome(problem: Problem) -> dict:
     """Estimate and true errors of one case; ``optimal`` is False if there is nothing to judge."""
     begin = time.process_time()
-    solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
+    solution = Solution(problem, confirm_optimum(first_optimum(problem, problem.guess)))
     if not solution.answer.optimal or solution.answer.delta != problem.delta:
         return {"optimal": False, "message": solution.message}
     gait, delta = solution.gait, problem.delta
@@ -141,7 +141,7 @@ def outcome(problem: Problem) -> dict:
         intervals=max(problem.intervals, 24),
         mesh_tolerance=1e-7,
     )
-    reference = Solution(finer, confirmed(begin_at(finer, finer.guess)))
+    reference = Solution(finer, confirm_optimum(first_optimum(finer, finer.guess)))
     certificate = certify(reference.answer, tolerance=1e-8) if reference.answer.optimal else None
     if certificate is not None and certificate.efficiency < (1.0 - FLOOR) * fine.efficiency:
         # below the gait it started from: an optimum of another basin, not the reference of this one

@@ -33,8 +33,8 @@ from colloc.pictures.style import (
     subplots,
 )
 from colloc.results.solution import Solution
-from colloc.search.explore import begin_at
-from colloc.search.solve import confirmed
+from colloc.search.explore import first_optimum
+from colloc.search.solve import confirm_optimum
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 _MARKERS = "osD^vPX"
@@ -94,7 +94,7 @@ ELLIPSE = Picture(
 def outcome(problem: Problem) -> dict:
     """What the table needs of a solve."""
     begin = time.process_time()
-    solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
+    solution = Solution(problem, confirm_optimum(first_optimum(problem, problem.guess)))
     seconds = time.process_time() - begin
     replayed = certify(solution.answer, tolerance=1e-8, instants=6400).efficiency
     return {

@@ -11,8 +11,8 @@ from colloc.pictures.publication import mesh_errors
 from colloc.results.answer import Step
 from colloc.results.measured import Limit
 from colloc.results.solution import Solution
-from colloc.search.explore import begin_at
-from colloc.search.solve import confirmed
+from colloc.search.explore import first_optimum
+from colloc.search.solve import confirm_optimum
 
 RESOLVED = 1e-4
 """Largest relative error of the objective, of the mesh, at which delta counts as resolved: the
@@ -81,7 +81,7 @@ if __name__ == "__main__":
         delta=1e-5,
         delta_start=1e-2,
     )
-    solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
+    solution = Solution(problem, confirm_optimum(first_optimum(problem, problem.guess)))
     print(
         "\n".join(f"{step.delta:.1e} {step.value:.6f} {step.optimal}" for step in solution.history)
     )

@@ -24,7 +24,7 @@ from colloc.gaits.problem_file import Reference
 from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_shape_path
 from colloc.pictures.style import styled
 from colloc.results.solution import Solution
-from colloc.search.explore import STARTS
+from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
 from colloc.system.versions import versions
 
@@ -136,7 +136,9 @@ def main() -> None:
         if names and example.name not in names:
             continue
         begin = time.process_time()
-        solution = solve(example.stated["PROBLEM"], example.stated.get("STARTS", STARTS))
+        solution = solve(
+            example.stated["PROBLEM"], example.stated.get("OPTIONS.starts", OPTIONS.starts)
+        )
         row = solved_row(solution)
         row["cpu_seconds"] = round(time.process_time() - begin, 1)
         table[example.name] = row

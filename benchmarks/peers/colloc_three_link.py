@@ -13,8 +13,8 @@ from benchmarks.peers.runs import arguments, failed, found, run
 from benchmarks.peers.settings import INTERVALS
 from colloc import Harmonic, Problem, ellipse
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.explore import begin_at
-from colloc.search.solve import confirmed, solve
+from colloc.search.explore import first_optimum
+from colloc.search.solve import confirm_optimum, solve
 
 
 def best(refined: bool, start: np.ndarray) -> dict:
@@ -26,7 +26,7 @@ def best(refined: bool, start: np.ndarray) -> dict:
     solution = (
         solve(problem, 1)
         if refined
-        else Solution(problem, confirmed(begin_at(problem, problem.guess)))
+        else Solution(problem, confirm_optimum(first_optimum(problem, problem.guess)))
     )
     good = (
         solution.status == SOLVED

@@ -394,7 +394,7 @@ def pareto(options: argparse.Namespace) -> int:
     first, second = aims = [objective_from(text) for text in options.objectives]
     table = output_path(options.output, Path("results") / f"{problem.name}.front.csv")
     folder = table.with_suffix("")
-    from colloc.search.explore import STARTS
+    from colloc.search.options import OPTIONS
     from colloc.studies.pareto import pareto_front
     from colloc.studies.saved import checkpoints_in
 
@@ -407,7 +407,7 @@ def pareto(options: argparse.Namespace) -> int:
                 what = f"point {k} of {last}" if k <= last else "in a gap"
                 line.say(f"{problem.name}: {what}: {point}")
 
-            starts = options.starts or stated.starts or STARTS
+            starts = options.starts or stated.starts or OPTIONS.starts
             front = pareto_front(
                 problem, first, second, options.points, starts=starts, progress=report
             )
@@ -468,7 +468,7 @@ def steer(options: argparse.Namespace) -> int:
     stated, problem = read_problem(options)
     table = output_path(options.output, Path("results") / f"{problem.name}.steer.json")
     folder = table.with_suffix("")
-    from colloc.search.explore import STARTS
+    from colloc.search.options import OPTIONS
     from colloc.studies.saved import checkpoints_in
     from colloc.studies.steering import steer as steer_problem
 
@@ -480,7 +480,7 @@ def steer(options: argparse.Namespace) -> int:
                 line.say(f"{problem.name}: {math.degrees(turn):+.4g} degrees a period: {point}")
 
             turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))
-            starts = options.starts or stated.starts or STARTS
+            starts = options.starts or stated.starts or OPTIONS.starts
             family = steer_problem(problem, turns, spot=spot, starts=starts, progress=report)
         spots = () if family.on_the_spot is None else family.on_the_spot.points
         members = [(f"{k:02d}", point) for k, point in enumerate(family.points)]

@@ -1,9 +1,8 @@
-"""Rows that keep the actuators of a collocated gait within their limits.
+"""Limits of the actuators as rows of the reduced program.
 
-They are laid on the points of the mesh, where the full program has the forces. What happens between
-the points is watched: by how much the largest value in a mesh interval exceeds that at its points,
-by so much less is allowed there. Measured again whenever the checks are moved, this leaves nothing
-over once the gait rests.
+Rows stand at the points of the mesh. By as much as the largest value in an interval exceeds that at
+its points, less is allowed there; measured again whenever the rows are placed, this leaves no
+excess once the gait settles.
 """
 
 from __future__ import annotations
@@ -19,16 +18,15 @@ from colloc.reduced.density_slopes import density_slopes
 from colloc.reduced.motion import ReducedMotion
 
 _INSIDE = np.linspace(1e-9, 1 - 1e-9, SAMPLES + 1)
-"""Samples of an interval, as shares of it; rates may jump at its ends."""
+"""Samples of an interval; rates may jump at its ends."""
 _NEAR = 0.3
-"""A value that is nearer to its bound than this, over the limit, is among the rows."""
+"""Distance from the bound, over the limit, from which a value is no row."""
 _ZOOMS, _CLOSE = 1, 0.02
-"""What is nearer to its limit than the second between the samples is sampled again around the
-highest, and zoomed into."""
+"""Values this close to their limit are zoomed into between the samples."""
 _SHIFT, _STEP = 1e-2, 1e-5
-"""Shift of a peak, as a share of its interval, and step of parameters for differences."""
+"""Shift of a peak in its interval, and step of parameters for differences."""
 _EXACT = 3e-5
-"""Excess over a limit that counts as none, relative: less than a certificate allows."""
+"""Relative excess that counts as none, less than a certificate allows."""
 
 
 class ActuatorRows:
@@ -37,7 +35,6 @@ class ActuatorRows:
     Attributes
     ----------
     lower, upper : (n_share, n_point)
-        What is allowed at each point.
     placed : (2, n_row)
         Share and point of each row.
     """
@@ -54,7 +51,7 @@ class ActuatorRows:
         self.lower, self.upper = np.tile(limits.least[:, None], shape[1]), np.ones(shape)
 
     def place(self, v: np.ndarray, delta: float) -> float:
-        """Choose the rows near the gait v; by how much it exceeds any limit, relative."""
+        """Choose the rows for the gait v; return how far it exceeds any limit, relative."""
         mesh = self._motion.mesh
         here = self._limits.sizes(self._all(v, delta))
         largest = self._largest(v, delta)
@@ -70,7 +67,7 @@ class ActuatorRows:
         return excess if excess > _EXACT or np.isnan(excess) else 0.0
 
     def _largest(self, v: np.ndarray, delta: float) -> np.ndarray:
-        """In every interval, ``(n_share, n)``."""
+        """Largest shares in every interval, ``(n_share, n)``."""
         mesh = self._motion.mesh
         t = mesh.edges[:-1, None] + mesh.h[:, None] * _INSIDE
         found = self._limits.sizes(self._signed_at(v, delta, t.ravel())).reshape(-1, *t.shape)
@@ -94,14 +91,14 @@ class ActuatorRows:
         return largest
 
     def _signed_at(self, v: np.ndarray, delta: float, t: np.ndarray) -> np.ndarray:
-        """Shares of the gait of parameters v at times of the mesh, ``(n_share, n_time)``."""
+        """Shares at times of the mesh, ``(n_share, n_time)``."""
         motion = self._motion
         shapes = Shapes(*self._at_times(v, t), delta)
         return np.asarray(self._limits.at(motion.kind.instants(shapes, motion.theta(v, delta, t))))
 
     def of_moving_peaks(self, v: np.ndarray, delta: float, on_rows: np.ndarray) -> np.ndarray:
-        """What is added to the second derivatives ``(n, n)`` of multipliers times rows, as the
-        largest values between the points move with the gait (`colloc.reduced.second_order`)."""
+        """Part ``(n, n)`` of the Lagrangian's second derivatives that is due to peaks between the
+        points which move with the gait (`colloc.reduced.second_order`)."""
         held = np.flatnonzero(on_rows)
         if held.size == 0:
             return np.zeros((v.size, v.size))
@@ -127,11 +124,9 @@ class ActuatorRows:
         return np.asarray(self._limits.at(self._motion.instants(v, delta)))
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the rows, ``(n_row,)`` each."""
         return self.lower[tuple(self.placed)], self.upper[tuple(self.placed)]
 
     def values(self, v: np.ndarray, delta: float) -> np.ndarray:
-        """Of the rows, ``(n_row,)``."""
         return self._all(v, delta)[tuple(self.placed)]
 
     def slopes(self, v: np.ndarray, delta: float) -> np.ndarray:
@@ -146,11 +141,11 @@ class ActuatorRows:
         return motion.through_points(v, delta, on_points)
 
     def every_bound(self) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds at all points, point by point, as rows of the full program have them."""
+        """Bounds at all points, in the order of the full program's rows."""
         return self.lower.T.ravel(), self.upper.T.ravel()
 
     def multipliers(self, on_rows: np.ndarray) -> np.ndarray:
-        """Of the full program's rows, from those of these."""
+        """Multipliers of the full program's rows, from those of these."""
         found = np.zeros(self.upper.shape)
         found[tuple(self.placed)] = on_rows
         return found.T.ravel()

@@ -1,4 +1,4 @@
-"""What keeps gaits in their class: rows at the worst instants of one gait, as a value."""
+"""Path constraints of gaits as rows at the worst instants of one gait."""
 
 from __future__ import annotations
 
@@ -12,26 +12,19 @@ Function = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """``lower <= values(v) <= upper``: checks of the shape at the worst instants of one gait, and
-    what else a class asks.
+    """``lower <= values(v) <= upper``: shape constraints at the worst instants of one gait.
 
     Attributes
     ----------
     kinds : dict
-        The rows in order: of each kind, those of the full program's rows of that name that are
-        among them.
+        Name to the full program's rows of that name that are among these, in order.
     lower, upper : (n_row,)
     excess : float
-        How far the gait exceeds any bound at its worst instants [rad, body lengths, or relative to
-        a largest speed].
-    values : callable
-        Of parameters ``(n,)``: the rows, ``(n_row,)``.
-    slopes : callable
-        Of parameters: derivatives of the rows, ``(n_row, n)``.
+        How far the gait exceeds any bound [rad, body lengths, or relative to a largest speed].
+    values, slopes : callable
+        Parameters ``(n,)`` to the rows ``(n_row,)`` and their derivatives ``(n_row, n)``.
     moving : callable, optional
-        Makes the same rows at the worst instants of whatever gait they are asked for, in the mesh
-        cells where they stand. As long as such an instant is not on an edge, their slopes are the
-        same.
+        Makes the same rows at the worst instants of whatever gait they are evaluated at.
     """
 
     kinds: dict[str, np.ndarray]
@@ -43,12 +36,11 @@ class Constraints:
     moving: Callable[[], Constraints] | None = None
 
     def following(self) -> Constraints:
-        """The rows as the worst instants move with the gait; themselves where those do not."""
+        """Rows that follow the worst instants of the gait, where they can."""
         return self if self.moving is None else self.moving()
 
     def through(self, full: Function, slopes: Function) -> Constraints:
-        """The rows of other parameters v, from which these, ``full(v)``, follow with derivatives
-        ``slopes(v)``."""
+        """Rows of other parameters v, by the chain rule through ``full(v)``."""
 
         def moving() -> Constraints:
             return self.following().through(full, slopes)

@@ -1,8 +1,7 @@
-"""Derivatives of densities and of what is limited along (angles, rates, orientation), where forces
-follow from the balance.
+"""Total derivatives of densities and of limited quantities along (angles, rates, orientation).
 
-The tail velocity z solves balance(z, y) = 0 with y = (angles, rates) and, of a body that is pulled,
-the components of the outside force, so that dz/dy = -R_z^-1 R_y.
+The tail velocity z solves balance(z, y) = 0 with y = (angles, rates, outside force), so that dz/dy
+= -R_z^-1 R_y.
 """
 
 from __future__ import annotations
@@ -46,8 +45,7 @@ def _function(
 
 
 def density_slopes(of: Quantity | PathLimits, now: Instants) -> np.ndarray:
-    """Derivatives ``(n_row, 2 n_joint + 1, n_time)`` of a density, or of the shares of limits, at
-    balanced tail velocities."""
+    """Derivatives ``(n_row, 2 n_joint + 1, n_time)`` at balanced tail velocities."""
     pulled, n, n_time = now.load is not None, 2 * len(now.angles), now.angles.shape[1]
     y = np.concatenate([now.angles, now.rates, now.load if pulled else np.empty((0, n_time))])
     slope = (

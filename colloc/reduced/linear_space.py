@@ -1,5 +1,4 @@
-"""Gaits that are linear in their parameters as a search sees them: shapes on a mesh, and rows that
-keep them admissible."""
+"""Gaits that are linear in their parameters, on a mesh, with their path constraints."""
 
 from __future__ import annotations
 
@@ -16,7 +15,6 @@ from colloc.mechanics.bodies import Pairs
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.sqp import remembered
 from colloc.reduced.constraints import Constraints, Function
-from colloc.reduced.given import Given
 from colloc.reduced.pointed import pointed
 from colloc.transcription.shape_checks import ShapeCheck, shape_checks
 from colloc.transcription.worst_instants import (
@@ -29,9 +27,8 @@ from colloc.transcription.worst_instants import (
 
 
 class LinearSpace:
-    """Members of a linear class by their parameters v, in which angles and rates are linear, on a
-    mesh (by default the first one), with pairs of links `far` apart that are kept from crossing;
-    what it answers is told by `colloc.reduced.program.SearchSpace`."""
+    """A `SearchSpace` of a linear class on a mesh (by default the first one), with pairs of links
+    `far` kept from crossing."""
 
     def __init__(
         self,
@@ -40,7 +37,7 @@ class LinearSpace:
         scheme: str = "",
         far: Pairs = (),
     ) -> None:
-        self.control, self.given = control, Given(edges, scheme, far)
+        self.control, self.edges, self.scheme, self.far = control, edges, scheme, far
         self.mesh, self._admissible = control.mesh(edges, scheme), control.admissible
         gait, body, limit, speeds, _ = control.admissible
         self.checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
@@ -68,7 +65,6 @@ class LinearSpace:
         return self._admissible.gait.trajectory(v, self._admissible.n_joint)
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
-        """Parameters ``(n,)`` of the member nearest to a gait."""
         v = self._admissible.gait.parameters(self._admissible.gait.through(gait))
         return pointed(self.control, self.mesh, self, v)
 
@@ -76,8 +72,8 @@ class LinearSpace:
         return v
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1; where delta is relative
-        to the shape speed, rates at unit shape speed and the pace, that speed."""
+        """Angles, rates and the pace; where delta is relative to the shape speed, the pace is that
+        speed and rates are those at unit speed."""
         shapes, n_joint = (self._matrix @ v).T, self._matrix.shape[1] // 2
         angles, rates = shapes[:n_joint] + self._offset, shapes[n_joint:]
         if not self._admissible.gait.relative_delta:
@@ -103,8 +99,8 @@ class LinearSpace:
         )
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
-        """Shape checks at their worst instants in the mesh cells in which they might bind, then the
-        square of the shape speed."""
+        """Shape constraints at their worst instants in cells where they might bind, then the square
+        of the shape speed."""
         gait, n_joint, limit = (
             self.trajectory(v),
             self._admissible.n_joint,
@@ -151,7 +147,6 @@ class LinearSpace:
         return Constraints(kinds, lower, upper, excess, *self._rows(lambda v: placed), moving_on)
 
     def _rows(self, placed: Callable[[np.ndarray], list[_Placed]]) -> tuple[Function, Function]:
-        """Values and slopes of the rows, with checks where they stand for parameters v."""
         speed = self._speed
         return (
             lambda v: np.concatenate([*(each.value(v) for each in placed(v)), [speed.square(v)]]),
@@ -159,7 +154,7 @@ class LinearSpace:
         )
 
     def _at_worst(self, placed: list[_Placed], v: np.ndarray) -> list[_Placed]:
-        """Checks at the worst instants of v, in the cells where they were placed."""
+        """Constraints at the worst instants of v in the cells where they were placed."""
         gait, found = self.trajectory(v), []
         for each in placed:
             which, matrix = each.moving, each.matrix
@@ -176,7 +171,7 @@ class LinearSpace:
 
 
 class _RootMeanSquareSpeed:
-    """The square of the root-mean-square shape speed [rad per radian of phase]."""
+    """Square of the root-mean-square shape speed [rad per radian of phase]."""
 
     def __init__(self, gait: AnyClass, n_joint: int) -> None:
         self._form = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
@@ -189,7 +184,7 @@ class _RootMeanSquareSpeed:
 
 
 class _MeanSpeed:
-    """The square of the mean shape speed, which is the length of the path over 2 pi."""
+    """Square of the mean shape speed: the length of the path over 2 pi."""
 
     def __init__(self, gait: AnyClass, n_joint: int) -> None:
         self._shares, rates = gait.side_rates(n_joint)
@@ -208,8 +203,8 @@ class _MeanSpeed:
 
 
 class SerpenoidSpace(LinearSpace):
-    """Members of the class `colloc.gaits.serpenoid.Serpenoid` by their own parameters v; the chain
-    rule to what a space of series knows of their coefficients."""
+    """The space of the class `colloc.gaits.serpenoid.Serpenoid`, by the chain rule through the
+    Fourier coefficients."""
 
     def __init__(
         self,
@@ -229,7 +224,7 @@ class SerpenoidSpace(LinearSpace):
         return np.concatenate([self._admissible.gait.full(own, self._admissible.n_joint), told])
 
     def _slopes(self, v: np.ndarray) -> np.ndarray:
-        """Of the full parameters, ``(n_full, n)``."""
+        """Derivatives of the full parameters, ``(n_full, n)``."""
         n_own, coefficients = (
             self._n_own,
             self._admissible.gait.coefficient_slopes(v[: self._n_own], self._admissible.n_joint),
@@ -252,9 +247,8 @@ class SerpenoidSpace(LinearSpace):
 
 
 class _Placed(NamedTuple):
-    """A check at instants, one in each of some mesh cells: the shares that its cuts hold, what the
-    shapes there are of the parameters, ``(n, n_joint, n_parameter)``, which instants move with the
-    gait, and what is added to the shapes."""
+    """A constraint at one instant in each of some mesh cells; `matrix` ``(n, n_joint,
+    n_parameter)`` gives the shapes there."""
 
     check: ShapeCheck
     shares: np.ndarray

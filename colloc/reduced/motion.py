@@ -1,12 +1,10 @@
-r"""What a period of a collocated gait comes to as functions of the gait alone, with exact
+"""Distance, work and rotation of a collocated gait as functions of its parameters, with exact
 gradients.
 
-On a mesh every equation of the collocation fixes one unknown: the balance the tail velocity, its
-rotation rate the orientation, both the displacement D (`colloc.motion.collocated`) and the work ``W
-= sum_ki h_k b_i P_ki``, P being the power. What is left is a program of the gait's parameters v
-alone: of distance, work and rotation, which follow as the kind of motion says
-(`colloc.motion.kinds`), and of integrals (`colloc.mechanics.densities`). Gradients take one sweep
-back through the states.
+Every equation of the collocation fixes one unknown: the balance the tail velocity, its rotation
+rate the orientation, both the displacement (`colloc.motion.collocated`) and the work ``W = sum_ki
+h_k b_i P_ki``. What is left is a program of the gait's parameters alone. Gradients take one adjoint
+sweep.
 """
 
 from __future__ import annotations
@@ -34,20 +32,20 @@ from colloc.numerics.mesh import Mesh
 
 
 class Shapes(Protocol):
-    """A class of gaits on the points of a mesh."""
+    """Gaits by parameters, on the points of a mesh."""
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are
-        multiplied."""
+        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` that multiplies
+        velocities."""
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        """Derivatives ``(k, n)`` of k numbers, from those with respect to ``(angles, rates)``,
-        ``(k, n_point, 2 n_joint)``, and to the pace, ``(k, n_point)``."""
+        """Derivatives ``(k, n)`` of k numbers, from those along ``(angles, rates)``, ``(k, n_point,
+        2 n_joint)``, and along the pace, ``(k, n_point)``."""
 
 
 @dataclass(eq=False)
 class _State:
-    """The collocated motion of one v at one delta."""
+    """The collocated motion of one v at one delta; `values` are cached."""
 
     v: np.ndarray
     delta: float
@@ -59,7 +57,6 @@ class _State:
     pose: CollocatedPose
     passed: Passed
     values: dict[str, float] = field(default_factory=dict)
-    """What a period comes to, once it was asked for."""
 
     @property
     def z(self) -> np.ndarray:
@@ -67,8 +64,7 @@ class _State:
 
 
 class ReducedMotion:
-    """What a period of gaits comes to, as functions of their parameters; the mesh is that of the
-    part of the period that is solved, and `integrals` are asked for, too."""
+    """Totals of a period as functions of parameters; the mesh covers the solved part of it."""
 
     def __init__(
         self, kind: Kind, mesh: Mesh, shapes: Shapes, integrals: Sequence[Quantity] = ()
@@ -112,14 +108,14 @@ class ReducedMotion:
         return found
 
     def _even(self, pace: np.ndarray) -> float:
-        """Rotation rate of the axes that turn evenly, over the pace [rad]."""
+        """Rotation rate of axes that turn evenly, over the pace."""
         return self.kind.turn / float(self._point_weight @ pace) if self.kind.turn else 0.0
 
     def _start(
         self, angles: np.ndarray, rates: np.ndarray, begin: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """States to start from, those of the last gait, and tail velocities: those of the last gait
-        differentiated, moved along their slopes."""
+        """States and tail velocities to start from: those of the last gait, or of the last one
+        differentiated moved along its slopes."""
         if self._near is None or self.kind.states:
             last = self._last
             if last is None:
@@ -133,8 +129,7 @@ class ReducedMotion:
         return None, near.z + np.einsum("ijt,jt->it", slopes[:3], moved)
 
     def values(self, v: np.ndarray, delta: float) -> dict[str, float]:
-        """What a period comes to, as the kind of motion counts it, and the integrals; NaN where
-        there is no motion."""
+        """Totals of a period and integrals by name; NaN where there is no motion."""
         s = self.at(v, delta)
         if not s.values:
             s.values = self.kind.counted(s.passed)
@@ -147,12 +142,11 @@ class ReducedMotion:
         return s.values
 
     def instants(self, v: np.ndarray, delta: float) -> Instants:
-        """The collocated motion at the points of the mesh, as formulas see it."""
         s = self.at(v, delta)
         return self.kind.instants(Moving(s.angles, s.rates, delta), s.pose.theta_on(self.mesh), s.z)
 
     def theta(self, v: np.ndarray, delta: float, t: np.ndarray) -> np.ndarray:
-        """The orientation at places t of the mesh, ``(n_time,)``; 0 where it is no state."""
+        """Orientation at times t of the mesh, ``(n_time,)``; 0 where it is no state."""
         edges = self.mesh.edges
         if "theta" not in self.kind.states:
             return np.zeros(t.size)
@@ -181,8 +175,8 @@ class ReducedMotion:
         return dict(zip((*shares, *(each.name for each in self._integrals)), found, strict=True))
 
     def through_points(self, v: np.ndarray, delta: float, on_points: np.ndarray) -> np.ndarray:
-        """Derivatives ``(m, n)`` of m numbers, from those with respect to (angles, rates,
-        orientation) at the points, ``(m, 2 n_joint + 1, n_point)``."""
+        """Derivatives ``(m, n)`` of m numbers, from those along (angles, rates, orientation) at the
+        points, ``(m, 2 n_joint + 1, n_point)``."""
         on_pace = np.zeros((len(on_points), on_points.shape[2]))
         if not on_points[:, -1].any():
             return self.shapes.pulled_back(v, on_points[:, :-1].transpose(0, 2, 1), on_pace)
@@ -191,8 +185,7 @@ class ReducedMotion:
     def _through(
         self, s: _State, shares: Sequence[Share], on_points: np.ndarray, on_pace: np.ndarray
     ) -> np.ndarray:
-        """The same of numbers that depend on the pace, too, and have shares in what the period
-        comes to."""
+        """Derivatives of numbers that depend on shapes, pace, and totals of the period."""
         mesh, kind = self.mesh, self.kind
         slopes, on_states = self._slopes(s)
         rows, on_begin, _ = through_motion(
@@ -215,7 +208,6 @@ class ReducedMotion:
         return found
 
     def _slopes(self, s: _State) -> tuple[np.ndarray, np.ndarray]:
-        """`Kind.slopes` of a motion, near which the next is sought."""
         if self._near is None or self._near[0] is not s:
             self._near = (s, *self.kind.slopes(Moving(s.angles, s.rates, s.delta), s.along))
         return self._near[1:]

@@ -1,4 +1,4 @@
-"""A gait in which nothing is free, on a mesh, as a search sees it: a class without parameters."""
+"""A class without parameters, on a mesh."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.bodies import Pairs
 from colloc.reduced.constraints import Constraints
-from colloc.reduced.given import Given
 
 _NONE = np.empty(0)
 
 
 class OneGait:
-    """The only member of a class, or that of its parameters `full`; what it answers is told by
-    `colloc.reduced.program.SearchSpace`."""
+    """A `SearchSpace` of the only member of a class, or of that of parameters `full`."""
 
     n = 0
     lower = upper = _NONE
@@ -29,7 +27,7 @@ class OneGait:
         far: Pairs = (),
         full: np.ndarray = _NONE,
     ) -> None:
-        self.control, self.given = control, Given(edges, scheme, far)
+        self.control, self.edges, self.scheme, self.far = control, edges, scheme, far
         self.mesh, self._full = control.mesh(edges, scheme), full
         self._gait = control.admissible.member(full)
 

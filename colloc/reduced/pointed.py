@@ -1,4 +1,4 @@
-"""Where a gait points that does not say so, in a motion that depends on it."""
+"""Initial heading of a gait that does not state one."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from colloc.numerics.mesh import Mesh
 from colloc.reduced.motion import ReducedMotion, Shapes
 
 _TURNS = 0.25 * np.pi * np.array([0, 1, -1, 2, -2, 3, -3])
-"""By which a body is turned that slides down as it points."""
+"""Turns [rad] tried where the body slides down."""
 
 
 def pointed(control: ControlProblem, mesh: Mesh, shapes: Shapes, v: np.ndarray) -> np.ndarray:
-    """Parameters whose last says where the body points: where it would go, on the level, in the
-    direction that counts, or as little aside of it as it needs not to slide down. As they are if
-    they say so."""
+    """Parameters with the initial heading last: the one that travels as asked on the level, or the
+    nearest at which the body does not slide down."""
     if not np.isnan(v[-1:]).any():
         return v
     dynamics, delta, v = control.dynamics, control.delta_start, np.append(v[:-1], 0.0)

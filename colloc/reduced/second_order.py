@@ -1,19 +1,11 @@
-r"""Whether a gait that satisfies the first-order conditions is an optimum: the curvature of its
-Lagrangian.
+"""Second-order conditions: the smallest curvature of the Lagrangian on the critical subspace.
 
-On the free directions Z, along which no equation and no bound that carries a multiplier changes to
-first order, the Hessian
-
-    Z' (grad L(v + h Z) - grad L(v - h Z)) / 2h,      L = -d/W + multipliers . rows,
-
-has to be positive. A row is a shape check at the worst instant of a stretch of the gait, and that
-instant moves with the gait: rows held at their instants lack the curvature that this adds
-(`colloc.numerics.peaks`).
-
-The Hessian is formed from exact gradients by differences. Stick and slip make second derivatives
-jump as they move over a mesh point; that shows in the part that is not symmetric, and in a change
-with the step h. Beside such a jump a direction may look like a way down that ends after 1e-8 rad.
-So a negative curvature counts where it is still there at a step a thousand times as long.
+The reduced Hessian Z' (grad L(v + h Z) - grad L(v - h Z)) / 2h has to be positive, Z spanning the
+directions along which no active row changes. A path constraint stands at a worst instant that moves
+with the gait, which adds to the Hessian (`colloc.numerics.peaks`). Second derivatives jump where
+stick and slip move over a mesh point; that shows in the part that is not symmetric and in a change
+with h. So a negative curvature counts only where it is still there at a step a thousand times as
+long.
 """
 
 from __future__ import annotations
@@ -28,15 +20,13 @@ from colloc.numerics.peaks import curvature_of_moving
 from colloc.numerics.sqp import NonlinearProgram, stationarity
 
 _STEP, _LONG_STEP = 1e-6, 1e-3
-"""Of the differences, over the length of the parameters' vector; and of those that confirm a
-negative curvature."""
+"""Steps of the differences over the norm of v, and of those that confirm a negative curvature."""
 _SHIFT = 1e-3
-"""Of checks, as a share of a mesh cell, by which their derivatives in time are found."""
+"""Shift of rows, as a part of a mesh cell, for their derivatives in time."""
 _HELD = 1e-7
-"""Multiplier from which a bound counts as held."""
+"""Multiplier from which a bound is active."""
 _ONE_ROW = 1e-2
-"""Rows whose unit slopes differ by less are one: a shape check may be placed on both sides of one
-worst instant."""
+"""Unit slopes that differ by less are one: a constraint may stand on both sides of one instant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,43 +34,29 @@ class Curvature:
     """Second-order conditions of a reduced program at a point."""
 
     smallest: float
-    """Smallest eigenvalue of the Hessian of the Lagrangian on the free directions, a negative one
-    as far as it is confirmed; infinite if there are none."""
+    """Smallest eigenvalue of the reduced Hessian, a negative one as far as it is confirmed;
+    infinite if no direction is free."""
     error: float
-    """Of it: what half the step changes along its direction, and the part of the Hessian that is
-    not symmetric."""
+    """Change of it with half the step, and by the part of the Hessian that is not symmetric."""
     n_free: int
     direction: np.ndarray
-    """Unit vector of parameters along which the curvature is smallest, ``(n,)``."""
+    """Unit vector of smallest curvature, ``(n,)``."""
     kkt_error: float
-    """What the multipliers leave over of the gradient: the rest means something only where this is
-    small."""
 
 
 class CheckedProgram(NonlinearProgram, Protocol):
-    """A program whose rows are checks at instants that may be moved."""
+    """A program whose rows stand at instants that may be moved."""
 
     @property
-    def row_names(self) -> list[tuple[str, int]]:
-        """What each row is: of which kind, and of which stretch of the gait."""
+    def row_names(self) -> list[tuple[str, int]]: ...
 
-    def move_checks(self, v: np.ndarray, later: float = 0.0) -> object:
-        """Place every check at the worst instants of v, or so much later as a share of its stretch;
-        rows may appear and go."""
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> object: ...
 
-    def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray:
-        """The same curvature ``(n, n)`` of rows that no such move reaches, from the multipliers of
-        all rows at v."""
+    def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray: ...
 
 
 class Lagrangian:
-    """Objective plus multipliers times rows near a point v.
-
-    Attributes
-    ----------
-    conditions : colloc.numerics.sqp.Stationarity
-        At v, where the checks are placed.
-    """
+    """Objective plus multipliers times rows near v; `conditions` are those at v."""
 
     def __init__(self, program: CheckedProgram, v: np.ndarray) -> None:
         program.move_checks(v)
@@ -93,11 +69,11 @@ class Lagrangian:
         ]
 
     def slope(self, at: np.ndarray) -> np.ndarray:
-        """Gradient ``(n,)`` with the checks at the instants that are the worst ones of v."""
+        """Gradient ``(n,)`` with the rows at the worst instants of v."""
         return self._program.gradient(at) + self.conditions.on_rows @ self._program.row_slopes(at)
 
     def of_moving_instants(self) -> np.ndarray:
-        """What is added to the Hessian at v, ``(n, n)``, as every check moves with the gait."""
+        """Part of the Hessian at v, ``(n, n)``, due to instants that move with the gait."""
         program, v, on_rows = self._program, self._v, self.conditions.on_rows
         around = []
         for later in (-_SHIFT, 0.0, _SHIFT):
@@ -108,7 +84,7 @@ class Lagrangian:
         return program.of_moving_peaks(v, on_rows) + curvature_of_moving(on_rows, values, slopes)
 
     def value(self, at: np.ndarray) -> float:
-        """Its value with every check at the worst instant that it has at this point."""
+        """Value with the rows at the worst instants of this point."""
         program = self._program
         program.move_checks(at)
         value, rows = program.objective(at), program.rows(at)
@@ -121,8 +97,7 @@ class Lagrangian:
 
 
 def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
-    """Smallest curvature of the Lagrangian at v, a point that satisfies the first-order conditions;
-    ``2 n_free + 2`` gradients.
+    """Smallest curvature of the Lagrangian at a stationary point v; ``2 n_free + 2`` gradients.
 
     Examples
     --------

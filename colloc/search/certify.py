@@ -1,79 +1,35 @@
-"""The certificate: every solve is judged by an independent replay and by its own first-order
-conditions."""
+"""The certificate: an independent replay of a gait, and its first- and second-order conditions."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import is_visible
 from colloc.mechanics.chain import BALANCED
 from colloc.results.answer import EVALUATED, Answer
-from colloc.results.checks import UNCERTIFIED, Certificate, Check
+from colloc.results.checks import Certificate, Check
 from colloc.results.measured import astray, measured
+from colloc.search.options import TOLERANCES
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.played import Path, Replay
 from colloc.verification.replay import replayer
 
-EXACT, VIOLATION, CLOSURE, WORK = 1e-6, 1e-8, 1e-9, 1e-7
-"""Largest values that pass of what holds but for rounding and the ends of iterations. EXACT:
-gradient of the Lagrangian, balance of forces, penetration of links [body lengths]."""
-GAP = 1e-4
-"""As much as collocation may be wrong by, relative. The distance of a body that turns depends on
-the point of it that is followed, to first order; so its rotation is limited by what that changes
-there."""
-ANGLE, SEVERAL = 1e-3, 1e-3
-"""An angle that counts [rad]: on a slope off the direction that was asked for, or turned in a
-period by a gait that goes nowhere. Part of the period at which the motion on a slope may be left
-open."""
-SADDLE = 1e-2
-"""Curvature of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a
-radian along it gains 5e-5, what the mesh may be wrong by."""
-NOWHERE = 1e-4
-"""Efficiency times the smallest friction coefficient (at most 1), or on a slope the value of the
-objective in units of the friction, up to which a gait goes nowhere."""
 _FINE_PHASES = 20000
-_BALANCED = "net force and torque at all replayed instants", "what a period changes of the momenta"
-
-
-class Certified(NamedTuple):
-    """An answer with its certificate, which is `UNCERTIFIED` where no replay was possible or of
-    use."""
-
-    answer: Answer
-    certificate: Certificate = UNCERTIFIED
-    failure: str = ""
-    """Why there was no replay."""
-
-    @property
-    def holds(self) -> bool:
-        """Whether the first-order conditions and every check hold."""
-        return self.answer.optimal and self.certificate.passed
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether a person sees the gait move."""
-        return is_visible(self.answer.gait)
 
 
 def is_trivial(answer: Answer) -> bool:
-    """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one:
-    no optimum."""
+    """Whether a gait goes nowhere and does not turn, as a retraced one."""
     problem = answer.problem
     if problem.regime.slides:
-        return control_problem(problem).in_units(answer.value) < NOWHERE
-    if not goes_nowhere(answer):
-        return False
-    return not abs(answer.motion.rotation) > ANGLE
+        return control_problem(problem).in_units(answer.value) < TOLERANCES.zero_value
+    return goes_nowhere(answer) and not abs(answer.motion.rotation) > TOLERANCES.angle
 
 
 def goes_nowhere(answer: Answer) -> bool:
-    """Whether what a gait on the level travels is nothing for its work; it may turn."""
-    return abs(answer.efficiency) * answer.problem.law.smallest < NOWHERE
+    """Whether the distance on the level is negligible for the work; the gait may turn."""
+    return abs(answer.efficiency) * answer.problem.law.smallest < TOLERANCES.zero_value
 
 
 def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
@@ -83,7 +39,7 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     Parameters
     ----------
     answer : Answer
-        As `Solution.answer` has it.
+        `Solution.answer`.
     tolerance : float
         Relative error of the replayed objective; a replay that does not reach it fails its check.
     instants : int, optional
@@ -110,11 +66,18 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
         usual = problem.body.usual
         each = 0.5 * usual.instants_a_point / problem.gait.fraction
         instants = max(usual.instants, 2 * int(np.ceil(each * answer.mesh.n_point)))
-    at = problem, gait, answer.delta_per_period, gait.corner_phases, instants, tolerance
-    if answer.program == EVALUATED:
-        return gait_certificate(*at, claimed=answer.value, after=tuple(_mesh(answer)))
-    before = (*_first_order(answer), _second_order(answer))
-    return gait_certificate(*at, claimed=answer.value, before=before, after=tuple(_mesh(answer)))
+    is_optimum = answer.program != EVALUATED
+    return gait_certificate(
+        problem,
+        gait,
+        answer.delta_per_period,
+        gait.corner_phases,
+        instants,
+        tolerance,
+        claimed=answer.value,
+        before=(*_first_order(answer), _second_order(answer)) if is_optimum else (),
+        after=_mesh_error(answer),
+    )
 
 
 def gait_certificate(
@@ -129,14 +92,14 @@ def gait_certificate(
     before: tuple[Check, ...] = (),
     after: tuple[Check, ...] = (),
 ) -> Certificate:
-    """The certificate of any gait, found in whatever way, by its replay at three deltas.
+    """The certificate of any gait, by its replay at three deltas.
 
     Parameters
     ----------
     problem : Problem
-        Whose body, friction and joint limit are meant.
+        Body, friction and limits.
     path : callable
-        The gait's angles and rates (`colloc.verification.replay`).
+        Angles and rates of the gait (`colloc.verification.replay`).
     delta : float
         Per period.
     breaks : (n,)
@@ -146,104 +109,93 @@ def gait_certificate(
     claimed : float, optional
         A value of the problem's objective that the replay has to confirm.
     before, after : tuple of Check
-        What else has to hold.
+        Further checks.
     """
-
-    settings = {
-        "tolerance": tolerance,
-        "instants": instants,
-        "breaks": breaks,
-        "rotation": problem.rotation,
-    }
-    run = replayer(problem.regime)
-    settings |= {"quantities": problem.integrals, "limits": problem.path_limits, "run": run}
-    known = measured(
+    result = measured(
         problem.body,
         problem.law,
         path,
         delta,
-        **settings,  # type: ignore[arg-type]
+        tolerance=tolerance,
+        instants=instants,
+        breaks=breaks,
+        rotation=problem.rotation,
+        quantities=problem.integrals,
+        limits=problem.path_limits,
+        run=replayer(problem.regime),
         objective=problem.objective,
     )
-    fine, at_zero, allowed = known.fine, known.value.limit.value, problem.body.usual.delta_influence
-    checks = (
-        *before,
-        *_motion(problem, path, fine, breaks, tolerance, claimed),
-        *_reached(problem, fine),
-        *_actuators(problem, fine),
-        *_direction(problem, fine),
-        _one_motion(problem, fine),
-        *after,
-        Check(
-            "delta influence",
-            at_zero / fine.value - 1,
-            allowed,
-            "same gait at delta -> 0, relative change",
-        ),
+    fine, efficiency, value = result.fine, result.efficiency, result.value
+    influence = Check(
+        "delta influence",
+        value.limit.value / fine.value - 1,
+        problem.body.usual.delta_influence,
+        "same gait at delta -> 0, relative change",
     )
     return Certificate(
         values=fine.values,
-        errors=known.errors,
+        errors=result.errors,
         others={},
-        checks=checks,
+        checks=(
+            *before,
+            *_motion(problem, path, fine, breaks, tolerance, claimed),
+            *_requirements(problem, fine),
+            _one_motion(problem, fine),
+            *after,
+            influence,
+        ),
         instants=fine.instants,
-        efficiency_error=known.efficiency.error,
-        efficiency_at_zero_delta=known.efficiency.limit.value,
-        error_at_zero_delta=known.efficiency.limit.error,
+        efficiency_error=efficiency.error,
+        efficiency_at_zero_delta=efficiency.limit.value,
+        error_at_zero_delta=efficiency.limit.error,
         value=fine.value,
-        value_error=known.value.error,
-        value_at_zero_delta=at_zero,
-        value_error_at_zero_delta=known.value.limit.error,
+        value_error=value.error,
+        value_at_zero_delta=value.limit.value,
+        value_error_at_zero_delta=value.limit.error,
     )
 
 
-def _first_order(answer: Answer) -> list[Check]:
+def _first_order(answer: Answer) -> tuple[Check, ...]:
     residual = np.abs(answer.motion.at_points.force).max() / answer.problem.law.largest
-    return [
+    return (
         Check(
             "KKT error",
             max(answer.kkt_error, answer.complementarity),
-            EXACT,
+            TOLERANCES.kkt,
             "gradient of the Lagrangian, complementarity",
         ),
         Check(
             "constraint violation",
             answer.violation,
-            VIOLATION,
+            TOLERANCES.violation,
             "largest violated equation or bound",
         ),
         Check(
             "balance at nodes",
             float(residual),
-            EXACT,
+            TOLERANCES.kkt,
             "net force and torque by the closed-form law",
         ),
-    ]
+    )
 
 
 def _second_order(answer: Answer) -> Check:
-    """Whether the gait is a local optimum and no other critical point, in the space of its
-    class."""
-    found = answer.second_order
-    if found.why_not:
-        return Check("second order", 0.0, SADDLE, found.why_not)
-    value = max(-found.smallest - found.error, 0.0)
-    if found.n_free == 0:
+    """Whether the gait is a local optimum, in the space of its class."""
+    second = answer.second_order
+    if second.why_not:
+        return Check("second order", 0.0, TOLERANCES.saddle, second.why_not)
+    value = max(-second.smallest - second.error, 0.0)
+    curvature = f"smallest curvature {second.smallest:.1e}"
+    directions = f"in {second.n_free} free directions"
+    if second.n_free == 0:
         verdict = "a vertex: what binds leaves no direction free"
-    elif found.smallest > found.error:
-        verdict = (
-            f"an optimum: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
-        )
-    elif value > SADDLE:
-        verdict = (
-            f"a saddle: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
-        )
+    elif second.smallest > second.error:
+        verdict = f"an optimum: {curvature} {directions}"
+    elif value > TOLERANCES.saddle:
+        verdict = f"a saddle: {curvature} {directions}"
     else:
-        verdict = (
-            f"flat: smallest curvature {found.smallest:.1e} +- {found.error:.0e} in "
-            f"{found.n_free} free directions"
-        )
-    return Check("second order", value, SADDLE, f"{verdict} [1/rad^2]")
+        verdict = f"flat: {curvature} +- {second.error:.0e} {directions}"
+    return Check("second order", value, TOLERANCES.saddle, f"{verdict} [1/rad^2]")
 
 
 def _motion(
@@ -257,37 +209,46 @@ def _motion(
     body, ends = problem.body, path(np.array([0.0, 1.0]))[0]
     angles, rates = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))
     stretched, limit = under_one_limit(angles, problem.joint_limit)
-    beyond = max(float(body.largest_angles(stretched).max()) - limit, 0.0)
+    excess = max(float(body.largest_angles(stretched).max()) - limit, 0.0)
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
+    balanced = "net force and torque at all replayed instants"
+    if problem.froude:
+        balanced = "what a period changes of the momenta"
     checks = [
-        Check("balance in replay", fine.residual, EXACT, _BALANCED[bool(problem.froude)]),
+        Check("balance in replay", fine.residual, TOLERANCES.kkt, balanced),
         Check(
             "closure",
             float(np.abs(ends[:, 1] - ends[:, 0]).max()),
-            CLOSURE,
+            TOLERANCES.closure,
             f"{body.quantity}s after one period [rad]",
         ),
         *_rotation(problem, fine),
-        Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
-        Check("self-contact", depth, EXACT, "penetration of links between nodes [body lengths]"),
+        Check(body.usual.limit_name, excess, body.usual.excess, "excess between nodes [rad]"),
+        Check(
+            "self-contact",
+            depth,
+            TOLERANCES.kkt,
+            "penetration of links between nodes [body lengths]",
+        ),
         *_speeds(problem, rates),
     ]
     if (lean := float(body.imbalance(angles).max())) > BALANCED:
-        beside = (
+        meaning = (
             "way from the centre of mass to where its weights press [body lengths]; "
-            "reported, "
-            "not judged"
+            "reported, not judged"
         )
-        checks.append(Check("statics", lean, 1.0, beside))  # the body is no longer than that
+        checks.append(Check("statics", lean, 1.0, meaning))  # the body is no longer than that
     if fine.multipliers:
         meaning = (
             "largest Floquet multiplier: what a period leaves of a small change of the momenta"
         )
         checks.append(Check("stability", float(np.abs(fine.multipliers).max()), 1.0, meaning))
     if claimed is not None:
-        gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
-        checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
-    spent = problem.regime.spent
+        gap = claimed / fine.value - 1
+        # the part that the motions that differ do not explain
+        unexplained = float(np.copysign(max(abs(gap) - fine.ambiguity, 0.0), gap))
+        meaning = "collocated over replayed efficiency, less 1"
+        checks.append(Check("replay gap", unexplained, TOLERANCES.replay_gap, meaning))
     return [
         *checks,
         Check(
@@ -299,126 +260,89 @@ def _motion(
         Check(
             "work = dissipation",
             fine.actuator_work / fine.work - 1,
-            WORK,
-            f"work of the joints over {spent}, less 1",
+            TOLERANCES.work_balance,
+            f"work of the joints over {problem.regime.spent}, less 1",
         ),
     ]
 
 
+def _rotation(problem: Problem, fine: Replay) -> list[Check]:
+    if problem.rotation is None:
+        return []
+    which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a period"
+    meaning = f"{which}, times the body's reach over the distance"
+    value = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
+    return [Check("net rotation", value, TOLERANCES.replay_gap, meaning)]
+
+
 def _speeds(problem: Problem, rates: np.ndarray) -> list[Check]:
-    """The fastest joint, against what its motor can do."""
     if not problem.largest_speeds:
         return []
     joints = problem.joint_map
     motors = rates if joints is None else joints.motor_rates(rates)
     share = np.abs(motors).max(axis=1) / np.array(problem.largest_speeds)
-    excess, fastest = (
-        max(float(share.max()) - 1.0, 0.0),
-        f"{'motor' if joints else problem.body.coordinate} {int(share.argmax()) + 1}",
-    )
+    name = f"{'motor' if joints else problem.body.coordinate} {int(share.argmax()) + 1}"
     return [
         Check(
             "joint speed",
-            excess,
-            GAP,
-            f"excess over a limit, relative; nearest to its own: {fastest}",
+            max(float(share.max()) - 1.0, 0.0),
+            TOLERANCES.replay_gap,
+            f"excess over a limit, relative; nearest to its own: {name}",
         )
     ]
 
 
-def _rotation(problem: Problem, fine: Replay) -> list[Check]:
-    """The net rotation, where it is prescribed."""
-    if problem.rotation is None:
-        return []
-    which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a period"
-    value = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
-    return [Check("net rotation", value, GAP, f"{which}, times the body's reach over the distance")]
-
-
-def _reached(problem: Problem, fine: Replay) -> list[Check]:
-    """Values that have to be reached."""
-    checks = []
-    for aim, least in problem.at_least:
-        lacks = max(least - aim(fine.values), 0.0) / (abs(least) or 1.0)
-        checks.append(
-            Check(f"least {aim.name}", lacks, GAP, f"relative, below {least:g}, in replay")
+def _requirements(problem: Problem, fine: Replay) -> list[Check]:
+    """Values that have to be reached, limits of the actuators, the direction on a slope."""
+    checks = [
+        Check(
+            f"least {aim.name}",
+            max(least - aim(fine.values), 0.0) / (abs(least) or 1.0),
+            TOLERANCES.replay_gap,
+            f"relative, below {least:g}, in replay",
         )
+        for aim, least in problem.at_least
+    ]
+    if names := problem.path_limits.names:
+        nearest = names[np.argmax(fine.shares)]
+        meaning = f"excess over a limit, relative, in replay; nearest to its own: {nearest}"
+        excess = max(float(fine.shares.max()) - 1.0, 0.0)
+        checks.append(Check("actuators", excess, TOLERANCES.replay_gap, meaning))
+    if problem.regime.keeps_ahead:
+        meaning = "of the way, off the one that was asked for [rad]"
+        checks.append(Check("direction", fine.across / fine.distance, TOLERANCES.angle, meaning))
     return checks
-
-
-def _actuators(problem: Problem, fine: Replay) -> list[Check]:
-    """What the joints have to do, against what they can."""
-    names = problem.path_limits.names
-    if not names:
-        return []
-    most, excess = names[np.argmax(fine.shares)], max(float(fine.shares.max()) - 1.0, 0.0)
-    return [
-        Check(
-            "actuators",
-            excess,
-            GAP,
-            f"excess over a limit, relative, in replay; nearest to its own: {most}",
-        )
-    ]
-
-
-def _direction(problem: Problem, fine: Replay) -> list[Check]:
-    """Where the way leads, if that is asked for."""
-    if not problem.regime.keeps_ahead:
-        return []
-    return [
-        Check(
-            "direction",
-            fine.across / fine.distance,
-            ANGLE,
-            "of the way, off the one that was asked for [rad]",
-        )
-    ]
-
-
-def _beyond(value: float, unknown: float) -> float:
-    """The part of a difference that something of unknown sign does not explain."""
-    return float(np.copysign(max(abs(value) - unknown, 0.0), value))
 
 
 def _one_motion(problem: Problem, fine: Replay) -> Check:
     """How far the objective depends on which of several balanced motions the body takes: where the
-    law leaves it open, no mesh decides it, and as much is allowed as the law's other limit, delta,
-    may change."""
+    law leaves it open no mesh decides it, and as much is allowed as delta may change."""
     if not problem.regime.others_measured:
         meaning = (
             "part of the period at which several motions are balanced; what they would "
             "change is not measured"
         )
-        return Check("one motion", fine.several, SEVERAL, meaning)
+        return Check("one motion", fine.several, TOLERANCES.nonunique_fraction, meaning)
     if problem.regime.others:
-        meaning = f"relative; between the motions {problem.regime.others}"
+        meaning = f"between the motions {problem.regime.others}"
     elif problem.law.associated:
-        meaning = "relative; the law leaves one balanced motion"
+        meaning = "the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:
-        meaning = "relative; other balanced motions of a smooth body are not looked for"
+        meaning = "other balanced motions of a smooth body are not looked for"
     elif fine.several == 0:
-        meaning = f"relative; no other balanced motion was found at {fine.instants} instants"
+        meaning = f"no other balanced motion was found at {fine.instants} instants"
     else:
-        meaning = f"relative; several motions are balanced at {fine.several:.2g} of the period"
-    return Check("one motion", fine.ambiguity, problem.body.usual.delta_influence, meaning)
+        meaning = f"several motions are balanced at {fine.several:.2g} of the period"
+    allowed = problem.body.usual.delta_influence
+    return Check("one motion", fine.ambiguity, allowed, f"relative; {meaning}")
 
 
-def _mesh(answer: Answer) -> list[Check]:
-    """The error estimate from the scheme's own defect; it has to pass only if the problem requests
-    an accuracy."""
-    problem = answer.problem
-    tolerance = problem.mesh_tolerance
+def _mesh_error(answer: Answer) -> tuple[Check, ...]:
+    problem, tolerance = answer.problem, answer.problem.mesh_tolerance
     if tolerance == 0:
-        return []
+        return ()
     error = mesh_error(
         control_problem(problem), answer.mesh, answer.gait, answer.delta_per_period, tolerance
     )
-    return [
-        Check(
-            "mesh error",
-            error.estimate,
-            tolerance,
-            f"of the {problem.objective.name}, relative, from defects between nodes",
-        )
-    ]
+    meaning = f"of the {problem.objective.name}, relative, from defects between nodes"
+    return (Check("mesh error", error.estimate, tolerance, meaning),)

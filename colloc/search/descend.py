@@ -1,12 +1,9 @@
-"""Friction gets drier: a gait is followed from the delta at which it was found down to the
-problem's, and off any saddle.
+"""Continuation in delta, from the one at which a gait was found down to the problem's, and descent
+from saddles.
 
-A gait may satisfy the first-order conditions only because its symmetry keeps the search from
-falling: a start with more symmetry than its class never leaves it, as the gradient has it too. Such
-a gait may be the best of the symmetric ones and still no optimum. The curvature
-(`colloc.reduced.second_order`) shows the way down. Where rows bind they bend away from that
-straight line, so it is the Lagrangian that has to fall along it; what counts is where the search
-then ends.
+A start with more symmetry than its class never leaves it, as the gradient has that symmetry too: it
+may satisfy the first-order conditions and be a saddle. The direction of negative curvature leads
+away. Where rows bind they bend away from that line, so it is the Lagrangian that has to fall.
 """
 
 from __future__ import annotations
@@ -16,87 +13,64 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import Lagrangian, curvature
-from colloc.search.converge import converged
-from colloc.search.effort import ROUGH, Effort
-from colloc.search.optimum import Optimum
-from colloc.search.run import this_run
-
-FACTOR = 0.2
-"""Of one delta to the one before."""
-_STEP = 0.1
-"""Along the direction of smallest curvature, over the length of the parameters' vector; its square
-where that leads up."""
-_LOST = 0.5
-"""A gait that loses this part of its value at the next delta owes it to delta."""
+from colloc.search.checkpoint import active_run
+from colloc.search.converge import optimise
+from colloc.search.iterate import Iterate
+from colloc.search.options import MEDIUM, OPTIONS, objective_accuracy
 
 
-def levels(problem: Problem, first: float) -> list[float]:
-    """The deltas from a first one down to the problem's."""
-    found = [first]
-    while found[-1] > problem.delta:
-        found.append(max(FACTOR * found[-1], problem.delta))
-    return found
+def delta_levels(problem: Problem, first: float) -> list[float]:
+    """Deltas from a first one down to the problem's."""
+    levels = [first]
+    while levels[-1] > problem.delta:
+        levels.append(max(OPTIONS.delta_ratio * levels[-1], problem.delta))
+    return levels
 
 
-def descend(optimum: Optimum, effort: Effort = ROUGH) -> Optimum:
-    """The gait at the problem's delta, on the same mesh.
-
-    Parameters
-    ----------
-    optimum : Optimum
-        At a larger delta, or at that one: then it is returned as it is.
-    effort : Effort
-
-    Returns
-    -------
-    Optimum
-
-    Raises
-    ------
-    NotConvergedError
-        If friction does not hold the body on its slope all the way.
+def descend(iterate: Iterate) -> Iterate:
+    """The gait at the problem's delta, on the same mesh; `NotConvergedError` if there is no
+    periodic motion on the way.
 
     Examples
     --------
     >>> import colloc
     >>> from colloc.search.descend import descend
-    >>> from colloc.search.explore import begin_at
+    >>> from colloc.search.explore import first_optimum
     >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    >>> descend(begin_at(problem, problem.guess)).delta
+    >>> descend(first_optimum(problem, problem.guess)).delta
     0.01
     """
-    run, below = this_run(), levels(optimum.problem, optimum.delta)[1:]
-    for done, delta in enumerate(below):
-        run.told("descend", done, len(below), optimum)
-        history = optimum.history
-        optimum = converged(optimum.space, optimum.v, delta, effort, optimum.curvature).after(
-            *history
-        )
-    return optimum
+    levels = delta_levels(iterate.problem, iterate.delta)[1:]
+    for done, delta in enumerate(levels):
+        active_run().report("descend", done, len(levels), iterate)
+        lower = optimise(iterate.space, iterate.v, delta, MEDIUM, iterate.hessian)
+        iterate = lower.after(iterate.history)
+    return iterate
 
 
-def below_saddle(optimum: Optimum) -> Optimum | None:
-    """A better gait that the search comes to from beside a gait of negative curvature; None if
-    there is none."""
-    program = optimum.program()
-    here = curvature(program, optimum.v)
+def leave_saddle(iterate: Iterate) -> Iterate | None:
+    """A better gait reached along the direction of negative curvature; None if there is none."""
+    program = iterate.program()
+    here = curvature(program, iterate.v)
     if here.smallest + here.error >= 0:
         return None
-    lagrangian, length = Lagrangian(program, optimum.v), np.linalg.norm(optimum.v)
-    value = lagrangian.value(optimum.v)
-    for step in (_STEP, _STEP**2):
+    lagrangian, size = Lagrangian(program, iterate.v), np.linalg.norm(iterate.v)
+    value = lagrangian.value(iterate.v)
+    for step in (OPTIONS.saddle_step, OPTIONS.saddle_step**2):
         for side in (1.0, -1.0):
-            beside = optimum.v + side * step * length * here.direction
-            if lagrangian.value(beside) >= value:
+            start = iterate.v + side * step * size * here.direction
+            if lagrangian.value(start) >= value:
                 continue
-            other = converged(optimum.space, beside, optimum.delta, ROUGH)
-            if other.objective < optimum.objective - ROUGH.accuracy * abs(optimum.objective):
-                return other.after(*optimum.history)
+            other = optimise(iterate.space, start, iterate.delta, MEDIUM)
+            gain = objective_accuracy(MEDIUM) * abs(iterate.objective)
+            if other.objective < iterate.objective - gain:
+                return other.after(iterate.history)
     return None
 
 
-def is_viscous(optimum: Optimum) -> bool:
-    """Whether the gait owes its value to delta: at the next one half is lost. Slow parts of a
-    retraced gait do that."""
-    dry = ReducedProgram(optimum.space, FACTOR * optimum.delta).objective(optimum.v)
-    return not dry <= optimum.objective + (1 - _LOST) * abs(optimum.objective)
+def regularisation_dominated(iterate: Iterate) -> bool:
+    """Whether the gait loses half of its value at the next delta, as slow parts of a retraced gait
+    do."""
+    drier = ReducedProgram(iterate.space, OPTIONS.delta_ratio * iterate.delta)
+    kept = (1 - OPTIONS.lost) * abs(iterate.objective)
+    return not drier.objective(iterate.v) <= iterate.objective + kept

@@ -1,5 +1,4 @@
-"""Why a solve failed, in mechanical words: which equation, which link, which time window, and what
-to try."""
+"""Why a solve failed: which equation, which link, which time window, and what to try."""
 
 from __future__ import annotations
 
@@ -8,15 +7,14 @@ from scipy import sparse
 
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.multiplier_estimate import quasi_definite_factors
-from colloc.search.certify import VIOLATION
 from colloc.search.ipopt import NlpResult, Solver
+from colloc.search.options import TOLERANCES
 from colloc.transcription.full_program import ACTUATORS, FullProgram
 
 SMALLEST_DELTA = 1e-9
-"""Below it the Lagrangian's gradient cannot be told from zero: a link at stick moves at the order
-of delta, the tail velocity that is solved for resolves 1e-16, so the gradient is known to about
-1e-16/delta. Measured on one harmonic of three links: a KKT error of 1.8e-8 at 1e-8, 1.3e-7 at 1e-9
-and 2e-6 at 1e-10, where 1e-6 is allowed."""
+"""Below it the Lagrangian's gradient cannot be told from zero: links at stick move at the order of
+delta, tail velocities resolve 1e-16, so the gradient is known to 1e-16/delta. Measured on one
+harmonic of three links: KKT errors of 1.8e-8 at 1e-8, 1.3e-7 at 1e-9, 2e-6 at 1e-10."""
 _EQUATIONS = {
     "tail": "the direction of the tail",
     "velocity x": "the joining of links",
@@ -26,7 +24,6 @@ _EQUATIONS = {
     "torque": "the balance of torques",
     "balance": "the balance of the body",
 }
-"""Rows of a motion by name; other names speak for themselves."""
 _OF_PERIOD = {
     "at least": "a value that has to be reached",
     "shape speed": "the lower bound on the shape speed",
@@ -34,18 +31,15 @@ _OF_PERIOD = {
     "across": "the way across the direction that was asked for",
 }
 _SMALLEST_EIGENVALUE = 1e-12
-"""Of the product of the equations, scaled to length 1, with their transpose: where it is less, they
-are redundant. What sums distance and work over n intervals has one of 1.2 / n^2; redundant rows
-have one of 1e-18."""
+"""Least eigenvalue of J J' for unit rows of J: n intervals that sum up distance have 1.2 / n^2,
+redundant rows 1e-18."""
 _UNITS = {"moment": " weight x body length", "power": " weight x body length per period"}
-"""Of limits on the joints, by what is limited."""
 _STEPS, _SHARE = 2, 0.1
-"""Steps of inverse iteration; share of the largest weight from which an equation counts as part of
-the combination."""
+"""Steps of inverse iteration; share of the largest weight that counts."""
 
 
 def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
-    """What a constraint row, by its index among all, states, and the phase at which it does."""
+    """What a constraint row states, and its phase."""
     name, rows = next((n, s) for n, s in program.groups.items() if s.start <= row < s.stop)
     index, mesh, count = row - rows.start, program.mesh, rows.stop - rows.start
     body, aims = program.control.dynamics.body, program.control.aims
@@ -80,8 +74,7 @@ def _phase(mesh: Mesh, index: int) -> float:
 
 
 def time_window(program: FullProgram, excess: np.ndarray, group: str) -> tuple[float, float]:
-    """First and last phase at which a group of rows is violated by at least a tenth of its
-    worst."""
+    """First and last phase where rows of a group are violated by a tenth of the worst."""
     rows = program.groups[group]
     bad = rows.start + np.flatnonzero(excess[rows] >= 0.1 * excess[rows].max())
     phases = [row_meaning(program, int(row))[1] for row in bad]
@@ -89,9 +82,9 @@ def time_window(program: FullProgram, excess: np.ndarray, group: str) -> tuple[f
 
 
 def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
-    """One or two sentences: what failed where, and what to try next."""
+    """What failed where, and what to try next."""
     worst = int(np.argmax(result.excess))
-    if result.excess[worst] > VIOLATION:
+    if result.excess[worst] > TOLERANCES.violation:
         what, when = row_meaning(program, worst)
         group = next(n for n, s in program.groups.items() if s.start <= worst < s.stop)
         first, last = time_window(program, result.excess, group)
@@ -155,8 +148,7 @@ def _advice(group: str) -> str:
 
 
 def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str]:
-    """Kinds of equations that are (nearly) linear combinations of others at x ``(n,)`` and delta
-    per period; an optimiser fails on those."""
+    """Names of equations that are (nearly) linear combinations of others at x ``(n,)``."""
     program = solver.program
     jacobian, equality = solver.equality_jacobian(x, delta)
     scale = np.sqrt(np.asarray(jacobian.multiply(jacobian).sum(axis=1)).ravel())

@@ -1,5 +1,5 @@
-"""A gait that is given, not sought: replayed, certified as far as that applies, and a solution like
-any other."""
+"""Evaluation of a given gait: replayed, certified except for optimality, and a solution like any
+other."""
 
 from __future__ import annotations
 
@@ -26,19 +26,18 @@ from colloc.reduced.one_gait import OneGait
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
-from colloc.search.certify import EXACT, GAP, certify, goes_nowhere
+from colloc.search.certify import certify, goes_nowhere
 from colloc.search.confirm import unconfirmed
-from colloc.search.converge import as_it_is
-from colloc.search.refine import MESHES
+from colloc.search.iterate import evaluate_at
+from colloc.search.options import OPTIONS, TOLERANCES
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.refinement import planned_mesh
 
 _PHASES = 256
-"""At which a record is looked at, before it is replayed."""
 _ROUGHLY = 1.25
-"""Times as much may be left out by smoothing as the mesh of the smoothed gait says."""
+"""Allowance for the mesh, which is made for the smoothed gait."""
 _DRAWN = 4
-"""Typical changes of a series that are tried, each both ways."""
+"""Random changes of a series that are tried, each both ways."""
 
 
 def evaluate(
@@ -49,16 +48,15 @@ def evaluate(
     harmonics: int | None = None,
     degrees: bool = False,
 ) -> Solution:
-    """What a gait of one's own achieves: joint angles measured or invented, on the body and the
-    ground of a problem.
+    """Evaluate joint angles, measured or invented, on the body and the ground of a problem.
 
     The angles are closed and smoothed (`colloc.gaits.fitted_gait.fitted_gait`), replayed and
-    certified; that the gait is an optimum is not asked. It may turn the body, if it does.
+    certified; optimality is not asked for. The gait may turn the body.
 
     Parameters
     ----------
     problem : Problem
-        Whose body, friction, limits and objective are meant; its class of gaits is left out.
+        Body, friction, limits and objective; its class of gaits is left out.
     gait : any gait, array, path of a CSV file, or callable
         Joint angles: a series, ``(n_joint, n_time)`` at equal steps of a period, an xarray
         DataArray with a dimension "joint" and one of times, a file with a column of times, or a
@@ -69,9 +67,9 @@ def evaluate(
     Returns
     -------
     Solution
-        Of a class of as many harmonics as the gait has; its message tells what was read and how far
-        the angles were smoothed. Its errors hold what the samples are off by, with two standard
-        deviations (`Certificate.of_samples`).
+        Of a class of as many harmonics as the gait has. Its message says what was read and how far
+        the angles were smoothed; its errors include two standard deviations of the samples
+        (`Certificate.of_samples`).
 
     Raises
     ------
@@ -110,11 +108,10 @@ def evaluate(
 
 
 def _check_centre(problem: Problem, fitted: FittedGait, given: Given) -> None:
-    """A `ProblemError` if all joints are bent about one right angle and links cross: so look servos
-    without negative angles."""
+    """Refuse servo angles about a right angle: all joints bent alike, and links that cross."""
     phases = np.arange(_PHASES) / _PHASES
     angles, _ = problem.joint_path(*fitted.gait(phases))
-    if float(problem.body.crossing_depth(angles).max()) > EXACT:
+    if float(problem.body.crossing_depth(angles).max()) > TOLERANCES.kkt:
         raise ProblemError(
             f"{given}: all joints move about {fitted.centre}°, where links cross: if servos stand "
             f"so when the body is "
@@ -140,7 +137,7 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
     stated = problem.with_(gait=gait_class, rotation=None, delta=delta, **usual)
     answer = _answer(stated, gait)
     turned = answer.motion.rotation
-    if abs(turned) < GAP * answer.distance:
+    if abs(turned) < TOLERANCES.replay_gap * answer.distance:
         if not problem.uses("rotation"):  # which then may be anything
             stated = stated.with_(rotation=0.0)
             answer = replace(answer, problem=stated)
@@ -176,15 +173,12 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
 
 
 def _answer(problem: Problem, gait: AnyGait) -> Answer:
-    """A gait as it is, with everything else following from its balance, on a mesh that meets the
-    problem's tolerance; its class is that of the problem, without symmetry, and it starts at the
-    phase that fixes the start of the class. Of a gait that goes nowhere, which no mesh would
-    resolve, on a first mesh."""
+    """The gait on a mesh that meets the problem's tolerance; on a first mesh if it goes nowhere."""
     begin, parameters = time.perf_counter(), problem.gait.parameters(gait)
     control = control_problem(problem)
     member, mesh, message = control.admissible.member(parameters), control.mesh(), ""
     first, answer = mesh, _measured(control, mesh, parameters)
-    meshes = MESHES if problem.mesh_tolerance > 0 and not goes_nowhere(answer) else 0
+    meshes = OPTIONS.meshes if problem.mesh_tolerance > 0 and not goes_nowhere(answer) else 0
     for _ in range(meshes):
         plan = planned_mesh(control, mesh, member, problem.delta, problem.mesh_tolerance)
         if plan is None:
@@ -199,20 +193,19 @@ def _answer(problem: Problem, gait: AnyGait) -> Answer:
 
 def _measured(control: ControlProblem, mesh: Mesh, parameters: np.ndarray) -> Answer:
     space = OneGait(control, mesh.edges, mesh.scheme.name, full=parameters)
-    found = as_it_is(space, np.empty(0), control.problem.delta)
-    return replace(unconfirmed(found), status=EVALUATED, program=EVALUATED)
+    iterate = evaluate_at(space, np.empty(0), control.problem.delta)
+    return replace(unconfirmed(iterate), status=EVALUATED, program=EVALUATED)
 
 
 def _errors_of_samples(
     answer: Answer, gait: Fourier, samples: Uncertainty
 ) -> tuple[tuple[float, ...], str]:
-    """By how much value, efficiency, distance and work may be wrong for what the samples of a gait
-    are off by, two standard deviations; and what of it is lack of fit, in words.
+    """Errors (two standard deviations) of value, efficiency, distance and work from samples, and
+    the part due to lack of fit, in words.
 
-    The covariance of the fit goes through the gradients of the collocated motion on the mesh of the
-    answer. Near an optimum they vanish, and what counts is of second order: typical changes of the
-    series are tried, both ways. What smoothing leaves out, if it is more than noise, is what a
-    series of more harmonics changes.
+    The covariance of the fit goes through the gradients of the collocated motion. Near an optimum
+    these vanish and second order counts: typical changes of the series are tried, both ways. Lack
+    of fit is what a series of more harmonics changes.
     """
     control, richer = control_problem(answer.problem), samples.richer
     highest = max(
@@ -261,10 +254,10 @@ def _errors_of_samples(
 
 
 class _Series(NamedTuple):
-    """Fourier series by their coefficients, joint by joint, on the points of a mesh."""
+    """Fourier series by their coefficients, on the points of a mesh; `functions` ``(2, 2 K + 1,
+    n_point)`` are the basis and its derivatives."""
 
     functions: np.ndarray
-    """``(2, 2 K + 1, n_point)``: with their derivatives."""
     joint_map: JointMap | None = None
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,5 +1,4 @@
-"""The one place that names IPOPT: solves a transcription's nonlinear program and measures what
-comes back."""
+"""IPOPT on a full program, and first-order conditions measured at what it returns."""
 
 from __future__ import annotations
 
@@ -15,7 +14,7 @@ from scipy import sparse
 from colloc.numerics.multiplier_estimate import estimated_multipliers
 from colloc.numerics.repeated import as_sparse
 from colloc.numerics.sqp import remembered
-from colloc.search.certify import EXACT
+from colloc.search.options import TOLERANCES
 from colloc.system.interruption import interrupted, interruptible
 from colloc.transcription.full_program import FullProgram
 
@@ -37,19 +36,18 @@ LIFTED_OPTIONS: dict[str, object] = {
     "constr_viol_tol": 1e-11,
     "max_iter": 300,
 }
-"""With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from
-which a step along negative curvature would otherwise carry them away for good. The price is up to
-120 short steps a level. The velocity map needs no such leash and is slowed by it. What a row of the
-lifted program is off by moves the balance of a point by up to 1 / delta as much, and a certificate
-allows that 1e-6."""
+"""theta_max_fact keeps the iterates near the balance manifold, from which a step along negative
+curvature would carry them away for good, at up to 120 short steps a level; the velocity map needs
+none. A violated row moves the balance of a point by up to 1 / delta as much, of which a certificate
+allows 1e-6."""
 CONFIRMING: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
-"""To confirm a gait. The barrier begins where it ends, as multipliers are known: one to four steps
-confirm most gaits, and more than these lead away."""
+"""The barrier begins where it ends, as multipliers are known: one to four steps confirm most gaits,
+and more than 30 lead away."""
 
 
 @dataclass(frozen=True, eq=False)
 class NlpResult:
-    """A point IPOPT returned, with its multipliers and what we measured there ourselves."""
+    """A point that IPOPT returned, with multipliers and measured first-order conditions."""
 
     x: np.ndarray  # (n,)
     lam_x: np.ndarray  # (n,)
@@ -58,20 +56,18 @@ class NlpResult:
     kkt_error: float
     """Largest component of the Lagrangian's gradient, unscaled."""
     violation: float
-    """Largest violation of a constraint or bound."""
     complementarity: float
-    """Largest product of a multiplier with its distance to the bound."""
     status: str
-    """IPOPT's own word; not a verdict."""
+    """IPOPT's word, no verdict."""
     iterations: int
     seconds: float
     evaluation_seconds: float
-    """The part spent evaluating functions and derivatives."""
+    """Seconds in functions and derivatives."""
     excess: np.ndarray
-    """How far each constraint is violated, ``(m,)``."""
+    """Violation of each constraint, ``(m,)``."""
 
     def accumulated(self, earlier: NlpResult) -> NlpResult:
-        """This result with the effort of an earlier solve of the same level added."""
+        """This result with the iterations and seconds of an earlier solve added."""
         return replace(
             self,
             iterations=self.iterations + earlier.iterations,
@@ -81,20 +77,17 @@ class NlpResult:
 
     @property
     def optimal(self) -> bool:
-        """First-order conditions hold as a certificate asks for, by our own measure."""
-        return max(self.kkt_error, self.violation, self.complementarity) < EXACT
+        return max(self.kkt_error, self.violation, self.complementarity) < TOLERANCES.kkt
 
 
 _REGIONS = 20
-"""Trust regions that may follow each other. Paths of three joints, whose basins end between deltas,
-go 2 rad and more."""
+"""Successive trust regions at most: gaits of three joints go 2 rad and more."""
 _INSIDE = 0.999
-"""A point nearer to the edge of its trust region than this is on it: the barrier keeps off an
-active bound by its tolerance over the multiplier, which is small where efficiency is flat."""
+"""Part of the radius from which a point counts as on the edge: the barrier keeps off it."""
 
 
 class Solver:
-    """A full program bound to IPOPT; built once, solved for many deltas and starts."""
+    """A full program bound to IPOPT, for many deltas and starts."""
 
     def __init__(self, program: FullProgram, options: dict[str, object] | None = None) -> None:
         self.program, self._nlp = program, program.nlp
@@ -121,18 +114,9 @@ class Solver:
         multipliers: tuple[np.ndarray, np.ndarray] | None,
         radius: float,
     ) -> NlpResult:
-        """Maximise the objective from x within a trust region, on whose edge the result may lie.
-
-        Parameters
-        ----------
-        x : (n,)
-        delta : float
-            Regularisation speed, per period.
-        multipliers : (lam_x, lam_g), optional
-            By default those of the equations that come closest to stationarity at x.
-        radius : float
-            How far each gait parameter may move [rad].
-        """
+        """Maximise from x ``(n,)`` within a trust region of so many radians for each gait
+        parameter, at delta per period; `multipliers` (lam_x, lam_g) are those closest to
+        stationarity by default."""
         t = self.program
         own = t.layout.parameters[:, 0]
         lower, upper = t.lower.copy(), t.upper.copy()
@@ -154,8 +138,7 @@ class Solver:
         return self._measured(x, lam_x, lam_g, delta, (lower, upper), stats, seconds)
 
     def _evaluated(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
-        """Objective, its gradient ``(n,)``, rows ``(m,)`` and their Jacobian ``(m, n)`` at
-        variables, then delta per period."""
+        """Objective, gradient ``(n,)``, rows ``(m,)`` and Jacobian ``(m, n)`` at ``(x, delta)``."""
         x, delta = at[:-1], at[-1] / self.program.delta_unit
         f, gradient = self._nlp.functions["grad_f"](x, delta)
         g, jacobian = self._nlp.functions["jac_g"](x, delta)
@@ -164,9 +147,8 @@ class Solver:
     def measured(
         self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
     ) -> NlpResult:
-        """The first-order conditions at x ``(n,)``, solving nothing, from multipliers of the bounds
-        and of the inequalities; those of the equations are the ones that come closest to the
-        conditions."""
+        """First-order conditions at x ``(n,)``, from multipliers of bounds and inequalities; those
+        of the equations are the ones closest to stationarity."""
         multipliers = self._completed(x, delta, lam_x, lam_g)
         bounds = self.program.lower, self.program.upper
         nothing = {"return_status": "measured", "iter_count": 0}
@@ -176,7 +158,7 @@ class Solver:
         self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's
-        gradient, given all others."""
+        gradient."""
         t = self.program
         free, equality = t.lower < t.upper, np.flatnonzero(t.row_lower == t.row_upper)
         _, gradient, _, jacobian = self._values_and_slopes(np.append(x, delta))
@@ -188,8 +170,7 @@ class Solver:
     def equality_jacobian(
         self, x: np.ndarray, delta: float
     ) -> tuple[sparse.csr_matrix, np.ndarray]:
-        """Jacobian of the equations in the free variables at x, and their row numbers among all
-        constraints."""
+        """Jacobian of the equations in the free variables at x, and their row numbers."""
         t = self.program
         equality = np.flatnonzero(t.row_lower == t.row_upper)
         jacobian = self._values_and_slopes(np.append(x, delta))[3]
@@ -240,8 +221,8 @@ def solve_in_regions(
     radius: float,
     options: dict[str, object] | None = None,
 ) -> tuple[FullProgram, NlpResult]:
-    """The optimum that trust regions lead to, each about the last one's end, with the limits of
-    the shape where that gait comes closest to them; and the program of the last region."""
+    """Optimum of successive trust regions, each about the last one's end, with shape limits at the
+    worst instants there; and the program of the last region."""
     result: NlpResult | None = None
     p = program.layout.parameters[:, 0]
     for _ in range(_REGIONS):
@@ -257,10 +238,8 @@ def solve_in_regions(
 def _complementarity(
     multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray
 ) -> float:
-    """Largest |multiplier| x distance to the bound it belongs to; equality rows do not count.
-
-    Where that bound is infinite the multiplier itself ought to vanish and counts as it is.
-    """
+    """Largest |multiplier| x distance to its bound, of inequalities; |multiplier| where that
+    is infinite."""
     inequality = lower < upper
     distance = np.where(multiplier > 0, upper - value, value - lower)
     with np.errstate(invalid="ignore"):
@@ -269,8 +248,7 @@ def _complementarity(
 
 
 class StopRequest(ca.Callback):
-    """What IPOPT asks between iterations, the ``iteration_callback`` of nlpsol: whether Ctrl-C
-    came. Stopped so, it ends at once and says nothing."""
+    """The ``iteration_callback`` of nlpsol: ends IPOPT once Ctrl-C came."""
 
     def __init__(self, nlp: Mapping[str, ca.MX]) -> None:
         ca.Callback.__init__(self)

@@ -1,20 +1,13 @@
-r"""What a wrong floor, or a robot built otherwise, costs: by how much the best value changes with
-every number of a problem.
+"""Sensitivity of the best value to every number of a problem.
 
 At an optimum the derivative of the best value is that of the Lagrangian ``L = f + sum_i lambda_i
-(g_i - b_i)`` with gait and multipliers held fixed (envelope theorem): the gait need not be sought
-again. So it is what the collocated motion of the *same* gait says, balanced anew, and what the rows
-that hold it back say times their multipliers. L is differentiated in the number by central
-differences of relative step 1e-5, which its Newton solves to 1e-11 allow.
+(g_i - b_i)`` with gait and multipliers held fixed (envelope theorem). L is differentiated by
+central differences of relative step 1e-5, which Newton solves to 1e-11 allow.
 
-The slope is off to first order in how far gait and multipliers are from the optimum without a mesh,
-some 1e-4 rad on the mesh of the answer, where the value is off to second order only. So the gait is
-optimised again on meshes much finer than that. How far slopes on different ones lie apart is the
+The slope is off to first order in the distance of the gait from the optimum without a mesh, some
+1e-4 rad. So the gait is optimised again on much finer meshes; the spread of their slopes is the
 error: halves of the answer's intervals, and quarters whose knots lie elsewhere, for meshes with
 knots on the same kinks err alike.
-
-Whoever wants more than first order has the gait sought again from where it is (`resolve`); what
-that gains over the gait as it stands is of second order.
 """
 
 from __future__ import annotations
@@ -35,45 +28,40 @@ from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
-from colloc.search.choose import solution_of
-from colloc.search.converge import converged
-from colloc.search.effort import FINE, ROUGH
-from colloc.search.solve import finished
+from colloc.search.converge import optimise
+from colloc.search.options import FINE, MEDIUM
+from colloc.search.solve import finish
 from colloc.search.spaces import remeshed, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
 from colloc.verification.played import Replay
 from colloc.verification.replay import replayer
 
 CHANGE = 0.1
-"""Of a number, that tables speak of: a tenth more and less."""
 _STEP = 1e-5
-"""Of differences, relative. With delta = 1e-4 the motion bends over relative changes of that order;
-measured on three problems, steps from 1e-4 to 1e-7 agree to 1e-7."""
+"""Relative step of differences; on three problems steps from 1e-4 to 1e-7 agree to 1e-7."""
 _NOTHING = 1e-9  # relative slope that counts as none
 _FINEST = 8  # parts of each interval of the answer's mesh
 _STATIONARY = 1e-4
 """Largest gradient of the Lagrangian, over the value, at which there are multipliers."""
 _EXCESS, _TURNS = 1e-5, 1e-4
-"""By how much a gait may exceed its limits [rad, or relative], and turn in a period [rad], and
-still be one of the problem."""
+"""Excess over limits [rad, or relative] and rotation [rad] that count as none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Again:
-    """What is best where a number differs, and what the gait on file does there.
+    """The best value where a number differs, and that of the gait on file there.
 
     Attributes
     ----------
     change : float
         Of the number.
     value, error : float
-        Of the best gait there, sought from the gait on file and certified; NaN if it is not
-        certified.
+        Of the re-optimised gait, certified; NaN if it is not.
     status : str
     kept, kept_error : float
         Of the gait on file, replayed there.
     breaks : str
-        What the gait on file does not keep there; empty if it is one of that problem's gaits.
+        Limits that the gait on file does not keep there.
     """
 
     change: float
@@ -86,12 +74,11 @@ class Again:
 
     @property
     def behind(self) -> float:
-        """By how much the gait on file falls behind the best one there; it may be ahead where it
-        breaks something."""
+        """Loss of the gait on file against the best one there; negative where it breaks a limit."""
         return self.value - self.kept
 
     def facts(self) -> dict[str, Any]:
-        """As plain numbers; None for what there is not."""
+        """Plain numbers; None for what there is not."""
         names = ("change", "value", "error", "kept", "kept_error", "behind")
         numbers = {name: float(getattr(self, name)) for name in names}
         finite = {name: x if np.isfinite(x) else None for name, x in numbers.items()}
@@ -100,7 +87,7 @@ class Again:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """What one number of a problem does to the best value.
+    """Effect of one number of a problem on the best value.
 
     Attributes
     ----------
@@ -108,18 +95,15 @@ class Effect:
     now : float
         The number.
     relative : bool
-        Whether changes are parts of the number (0.1: a tenth more), or parts of a link, for places
-        of feet.
+        Whether changes are parts of the number, or of a link for places of feet.
     slope : float
-        Derivative of the best value along that change. Where the number can only become smaller,
-        that to this side.
+        Derivative of the best value along that change; one-sided where the number can only become
+        smaller.
     error : float
-        What other meshes, and doubling the step of the differences, change of it. See
-        `Sensitivity.note`.
+        Change of the slope on other meshes and with twice the step.
     sides : tuple of int
         Whether the number can be smaller (-1) and larger (1).
     again : tuple of Again
-        Empty unless asked for.
     """
 
     name: str
@@ -133,19 +117,16 @@ class Effect:
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """By how much the best value of a problem changes with its numbers.
+    """Effects of the numbers of a problem on its best value.
 
     Attributes
     ----------
-    name : str
-        Of the problem.
-    objective : str
-        In short.
+    name, objective : str
     value, error : float
         As certified.
     effects : tuple of Effect
     note : str
-        What the errors of slopes leave out; empty if it is nothing.
+        What the errors of slopes leave out.
     """
 
     name: str
@@ -168,7 +149,7 @@ class Sensitivity:
         return "\n".join(self.lines())
 
     def facts(self) -> dict[str, Any]:
-        """All of it as plain numbers (JSON)."""
+        """Plain numbers (JSON)."""
         effects = [
             vars(effect) | {"again": [each.facts() for each in effect.again]}
             for effect in self.effects
@@ -178,18 +159,18 @@ class Sensitivity:
 
     @property
     def seen(self) -> list[Effect]:
-        """Those that change the value to first order."""
+        """Effects of first order."""
         least = _NOTHING * abs(self.value)
         return [effect for effect in self.effects if not abs(effect.slope) <= least]
 
     def beside(self, effect: Effect) -> list[str]:
-        """The best value where a number is a tenth smaller, and where it is a tenth larger; "-"
-        where it cannot be."""
+        """First-order values where a number is a tenth smaller and larger; "-" where it cannot
+        be."""
         values = {side: f"{self.value + side * CHANGE * effect.slope:.4f}" for side in effect.sides}
         return [values.get(side, "-") for side in (-1, 1)]
 
     def lines(self) -> list[str]:
-        """For a terminal."""
+        """Lines of a table for a terminal."""
         seen = self.seen
         width = max((len(effect.name) for effect in seen), default=0)
         lines = [
@@ -226,17 +207,15 @@ class Sensitivity:
 
 
 def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANGE) -> Sensitivity:
-    """By how much the best value changes with every number of the problem
-    (`colloc.gaits.parameters`).
+    """Derivatives of the best value with respect to every number of the problem.
 
     Parameters
     ----------
     solution : Solution
         Solved.
     resolve : bool
-        Whether to seek the gait again, from where it is, with each number that matters a little
-        smaller and larger, and to replay the gait on file there. Takes about a second or two for
-        each.
+        Whether to re-optimise the gait with each number that matters a little smaller and larger,
+        and to replay the gait on file there; a second or two for each.
     change : float
         How much smaller and larger, then.
 
@@ -290,7 +269,7 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
 
 @dataclass(frozen=True, eq=False)
 class _Lagrangian:
-    """The Lagrangian of the reduced program on one mesh at its optimum, as a function of the
+    """Lagrangian of the reduced program on one mesh at its optimum, as a function of the
     problem."""
 
     space: SearchSpace  # the class of gaits on its mesh, for the problem as it was solved
@@ -311,9 +290,11 @@ class _Lagrangian:
         return cls(space, v, on_rows, found.on_bounds)
 
     def __call__(self, problem: Problem) -> float:
-        """Its value, in the units of the stated objective, with the rows at the worst instants of
-        the gait."""
-        program = ReducedProgram(space_of(problem, None, *self.space.given), problem.delta)
+        """Value with the rows at the worst instants of the gait, in units of the objective."""
+        program = ReducedProgram(
+            space_of(problem, None, self.space.edges, self.space.scheme, self.space.far),
+            problem.delta,
+        )
         program.place_rows(self.v)
         at = {name: k for k, name in enumerate(program.row_names)}
         if missing := self.on_rows.keys() - at.keys():
@@ -331,13 +312,13 @@ class _Lagrangian:
 def _beyond(
     values: np.ndarray, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray
 ) -> float:
-    """Multipliers times how far values are beyond the bounds that they belong to."""
+    """Multipliers times (value - bound)."""
     bounds = np.select([multipliers > 0, multipliers < 0], [high, low], values)
     return float(multipliers @ (values - bounds))
 
 
 def _on_meshes(answer: Answer) -> list[_Lagrangian]:
-    """At the optima of several meshes, the finest first: multipliers go with their mesh."""
+    """Lagrangians at the optima of several meshes, the finest first."""
     edges = answer.edges
     space, v = space_near(answer.problem, answer.gait, edges, answer.scheme)
     far = answer.problem.body.far_pairs
@@ -347,7 +328,7 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
         inner = edges[:-1, None] + (np.arange(parts) + later) / parts * np.diff(edges)[:, None]
         finer = np.unique([edges[0], *inner.flat, edges[-1]])
         space = remeshed(solved.space, answer.gait, finer, answer.scheme)
-        found = converged(space, space.parameters(answer.gait), answer.delta, FINE)
+        found = optimise(space, space.parameters(answer.gait), answer.delta, FINE)
         return _Lagrangian.at_optimum(found.space, found.v, answer.delta)
 
     fixed = answer.problem.gait.relative_delta or not answer.problem.gait.free
@@ -355,7 +336,7 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
 
 
 def _neighbours(parameter: Parameter, step: float) -> dict[int, Problem]:
-    """The problems with a number a little smaller (-1) and larger (1), as far as there are such."""
+    """Problems with a number a little smaller (-1) and larger (1), where that is possible."""
     found = {}
     for side in (-1, 1):
         with suppress(ProblemError):
@@ -369,7 +350,7 @@ def _slope(
     sides: tuple[int, ...],
     step: float = _STEP,
 ) -> float:
-    """Derivative along a change of a number; where it can change to one side only, to that side."""
+    """Central difference, or a one-sided one where the number can change to one side only."""
     if len(sides) == 2:
         return (value(parameter.changed(step)) - value(parameter.changed(-step))) / (2 * step)
     (side,) = sides
@@ -380,7 +361,7 @@ def _slope(
 def _again(solution: Solution, problem: Problem, change: float) -> Again:
     gait, delta = solution.answer.gait, problem.delta
     space, v = space_near(problem, gait)
-    found = solution_of(problem, finished(converged(space, v, delta, ROUGH)))
+    found = finish(problem, optimise(space, v, delta, MEDIUM))
     best = found.certificate if found.success else UNCERTIFIED
     kept = replayer(problem.regime)(
         problem.body, problem.law, gait, delta_per_period(problem.gait, gait, delta),

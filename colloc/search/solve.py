@@ -1,10 +1,7 @@
-"""From a problem to a certified solution: the stages of a search, in order.
+"""From a problem to a certified solution: explore, descend, refine, confirm, certify, choose.
 
-    explore -> descend -> refine -> confirm -> certify -> choose
-
-Each is a function of one value that returns the next one, in a module of its name, and can be
-called by itself. Only here is decided what comes after what, how often something is tried again,
-how long all of it may take, and what an interrupt leaves.
+Each stage is a function of one value that returns the next one, in a module of its name. Here is
+decided what is tried again, how long all of it may take, and what an interrupt leaves.
 """
 
 from __future__ import annotations
@@ -14,34 +11,35 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer
+from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
-from colloc.search.certify import GAP, SADDLE, Certified, certify, is_trivial
-from colloc.search.choose import choose, promised, solution_of
+from colloc.search.certify import certify, is_trivial
+from colloc.search.checkpoint import Progress, Run, active_run, checkpointed
+from colloc.search.choose import choose, is_visible_solution, passes, solution_of
 from colloc.search.confirm import confirm, unconfirmed
-from colloc.search.converge import as_it_is
-from colloc.search.descend import FACTOR, below_saddle, descend
-from colloc.search.explore import CLOSE, Exploration, begin_at, explore, followed_further, is_finite
-from colloc.search.literal import literal_answer
-from colloc.search.optimum import Optimum
+from colloc.search.descend import descend, leave_saddle
+from colloc.search.direct_nlp import solve_directly
+from colloc.search.explore import (
+    Exploration,
+    explore,
+    first_optimum,
+    follow_rest,
+    is_finite,
+)
+from colloc.search.iterate import Iterate, evaluate_at
+from colloc.search.options import OPTIONS, TOLERANCES
 from colloc.search.refine import refine
-from colloc.search.run import Progress, Run, this_run
-from colloc.search.spaces import space_near
+from colloc.search.spaces import space_near, space_of
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.interruption import clear_interrupt
 
 REDUCED, FULL = "reduced", "full"
 SEARCHES = (REDUCED, FULL)
-_TRIES = 3
-"""Gaits of a kind that are solved for at most, until a certificate holds; saddles left one after
-another; and deltas tried where nothing but the influence of delta fails."""
-_EXPLORING = 0.6
-"""The share of the time allowed that is spent on starts; the rest is for the answer."""
 
 
 def solve(
@@ -51,8 +49,8 @@ def solve(
     seconds: float = np.inf,
     search: str = REDUCED,
     keep: Path | None = None,
-    progress: Callable[[Progress], object] = lambda news: None,
-    worth: Callable[[Optimum], bool] = lambda first: True,
+    progress: Callable[[Progress], object] = lambda progress: None,
+    accept: Callable[[Iterate], bool] = lambda first: True,
 ) -> Solution:
     """The best gait of a problem's class that so many starts lead to, certified.
 
@@ -60,21 +58,20 @@ def solve(
     ----------
     problem : Problem
     starts : int, optional
-        The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops: at
-        least so many. With 1 the guess alone. By default 32, with inertia 96; fewer once four new
-        ones, and one in eight, met the best.
+        Starts at least: the guess, known gaits, seeded samples (`colloc.search.explore`), and small
+        loops beside them. With 1 the guess alone. By default 32, with inertia 96; fewer once four
+        new ones, and one in eight, met the best.
     seconds : float
         Wall time allowed. Then the best gait so far is returned, with status "interrupted" unless
-        its certificate holds.
+        its certificate passes.
     search : {"reduced", "full"}
         Where gaits are searched: in the space of their parameters, or by IPOPT on the full program,
         from the guess alone.
     keep : path, optional
-        File in which everything found is kept until the end; a solve of the same problem goes on
-        from what is there.
+        Checkpoint file: a solve of the same problem goes on from what is there.
     progress : callable, optional
-        Called with every `colloc.search.run.Progress`.
-    worth : callable, optional
+        Called with every `colloc.search.checkpoint.Progress`.
+    accept : callable, optional
         Whether the best gait, at the final delta and before its mesh is refined, is worth an
         answer. By default it is.
 
@@ -95,42 +92,39 @@ def solve(
     if search not in SEARCHES:
         raise ProblemError(f"search must be one of {', '.join(SEARCHES)}, not {search!r}.")
     begin, run = time.monotonic(), Run(keep, problem, progress)
+
+    def has_time() -> bool:
+        return time.monotonic() < begin + OPTIONS.exploring * seconds
+
     try:
-        with run.under_way(seconds):
-            solution = _solved(problem, starts, search, begin + _EXPLORING * seconds, worth)
+        with run.active(seconds):
+            if search == FULL and problem.gait.free:
+                solution = certify_answer(problem, solve_directly(problem))
+            else:
+                solution = _solve(problem, starts, has_time, accept)
     except KeyboardInterrupt:
         clear_interrupt()
         over = time.monotonic() - begin >= seconds
-        solution = _interrupted(
-            problem, run, f"the {seconds:g} s allowed are over" if over else "interrupted"
-        )
+        why = f"the {seconds:g} s allowed are over" if over else "interrupted"
+        solution = _best_so_far(problem, run, why)
     solution.seconds = time.monotonic() - begin
     return solution
 
 
-def _solved(
+def _solve(
     problem: Problem,
     starts: int | None,
-    search: str,
-    until: float,
-    worth: Callable[[Optimum], bool],
+    has_time: Callable[[], bool],
+    accept: Callable[[Iterate], bool],
 ) -> Solution:
-    """The stages, in order. After the time `until` nothing else is explored."""
-
-    def goes_on() -> bool:
-        return time.monotonic() < until
-
-    if search == FULL and problem.gait.free:
-        return solution_of(problem, certified(literal_answer(problem)))
-    explored = _explored(problem, starts, goes_on)
+    explored = _explore(problem, starts, has_time)
     first = descend(explored.optima[0])
-    if not worth(first):
+    if not accept(first):
         return Solution(problem, unconfirmed(first))
-    explored = replace(explored, optima=(first, *explored.optima[1:]))
-    found = _certified_best(problem, explored.optima)
-    if not any(each.holds for each in found) and explored.left:
-        found += _certified_best(problem, followed_further(problem, explored, goes_on))
-    solution = choose(problem, found)
+    solutions = _finish_best(problem, (first, *explored.optima[1:]))
+    if not any(map(passes, solutions)) and explored.left:
+        solutions += _finish_best(problem, follow_rest(problem, explored, has_time))
+    solution = choose(problem, solutions)
     solution.starts, solution.others = explored.starts, explored.others
     if explored.failure and not solution.success:
         why = explored.failure[:1].upper() + explored.failure[1:]
@@ -138,69 +132,76 @@ def _solved(
     return solution
 
 
-def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool]) -> Exploration:
+def _explore(problem: Problem, starts: int | None, has_time: Callable[[], bool]) -> Exploration:
     failure = ""
     if starts != 1 and problem.gait.free:
         try:
-            return explore(problem, starts, goes_on)
+            return explore(problem, starts, has_time)
         except NotConvergedError as error:
             failure = str(error)  # what fails with the guess alone is said in detail
-    return Exploration((begin_at(problem, problem.guess),), 1, failure=failure)
+    return Exploration((first_optimum(problem, problem.guess),), 1, failure=failure)
 
 
-def _certified_best(problem: Problem, optima: Sequence[Optimum]) -> list[Certified]:
-    """The best gaits, certified: of finite size first, then what shrank and is better; in one row
-    where either will do."""
+def _finish_best(problem: Problem, optima: Sequence[Iterate]) -> list[Solution]:
+    """Solutions of the best optima: of finite size first, then better ones that shrank; all in one
+    order where the problem asks for any size."""
     if problem.shrinking:
-        return _tried(optima, lambda found: found.holds)
-    finite = [optimum for optimum in optima if is_finite(optimum)]
-    shrunk = [optimum for optimum in optima if not is_finite(optimum)]
-    found = _tried(finite, lambda found: found.holds and found.is_finite)
-    best = max(map(promised, found), default=-np.inf)
-    return [
-        *found,
-        *_tried([optimum for optimum in shrunk if optimum.value > best], lambda found: found.holds),
-    ]
+        return _finish_until(problem, optima, passes)
+    solutions = _finish_until(
+        problem,
+        [optimum for optimum in optima if is_finite(optimum)],
+        lambda solution: passes(solution) and is_visible_solution(solution),
+    )
+    best = max((each.answer.value for each in solutions if passes(each)), default=-np.inf)
+    better = [each for each in optima if not is_finite(each) and each.value > best]
+    return solutions + _finish_until(problem, better, passes)
 
 
-def _tried(optima: Sequence[Optimum], counts: Callable[[Certified], bool]) -> list[Certified]:
-    """Certified answers, best first: the next one where one does not count, or lost more on its
-    refined mesh than the next one is behind."""
-    tried: list[Certified] = []
-    for optimum in optima[:_TRIES]:
-        best = max((each.answer.value for each in tried if counts(each)), default=-np.inf)
-        if optimum.value - CLOSE * abs(optimum.value) < best:
+def _finish_until(
+    problem: Problem, optima: Sequence[Iterate], counts: Callable[[Solution], bool]
+) -> list[Solution]:
+    """Solutions, best first, as long as none counts, or it lost more on its refined mesh than the
+    next one is behind."""
+    solutions: list[Solution] = []
+    for optimum in optima[: OPTIONS.attempts]:
+        best = max((each.answer.value for each in solutions if counts(each)), default=-np.inf)
+        if optimum.value - OPTIONS.close * abs(optimum.value) < best:
             break
-        tried.append(finished(optimum))
-        this_run().answers.append((tried[-1].answer, tried[-1].certificate))
-    return tried
+        solutions.append(finish(problem, optimum))
+        active_run().solutions.append(solutions[-1])
+    return solutions
 
 
-def finished(optimum: Optimum) -> Certified:
-    """An optimum through the last stages: refined, confirmed, and certified.
-
-    Where it turns out to be a saddle, the search goes on below it; where friction is viscous at its
-    speeds, at a smaller delta: what is slow enough for a large gait is not for a small one, or
-    where feet hold.
-    """
-    found = certified(confirmed(optimum))
-    for _ in range(_TRIES - 1):
-        if not _is_viscous(found):
+def finish(problem: Problem, optimum: Iterate) -> Solution:
+    """An optimum refined, confirmed and certified, at a smaller delta where friction is viscous at
+    its speeds: small gaits and sticking feet need one."""
+    solution = certify_answer(problem, confirm_optimum(optimum))
+    for _ in range(OPTIONS.attempts - 1):
+        failures = [check.name for check in solution.certificate.failures]
+        # a prescribed motion is measured at the delta that is asked for
+        if failures != ["delta influence"] or not problem.gait.free:
             break
-        optimum = _at_smaller_delta(optimum)
+        drier = optimum.problem.with_(delta=OPTIONS.delta_ratio * optimum.problem.delta)
+        optimum = _of_problem(optimum, drier)
         with suppress(NotConvergedError):  # there the body may have no such motion
-            found = certified(confirmed(optimum))
-    return found
+            solution = certify_answer(problem, confirm_optimum(optimum))
+    return solution
 
 
-def confirmed(optimum: Optimum) -> Answer:
-    """An optimum through the stages to the answer, which has no certificate yet."""
+def _of_problem(optimum: Iterate, problem: Problem) -> Iterate:
+    old = optimum.space
+    return replace(optimum, space=space_of(problem, None, old.edges, old.scheme, old.far))
+
+
+def confirm_optimum(optimum: Iterate) -> Answer:
+    """An optimum through refine and confirm; where it turns out to be a saddle, the one below."""
     optimum = refine(descend(optimum))
     answer = confirm(optimum)
-    for _ in range(_TRIES):
-        if not answer.second_order.smallest + answer.second_order.error < -SADDLE:
+    for _ in range(OPTIONS.attempts):
+        second = answer.second_order
+        if not second.smallest + second.error < -TOLERANCES.saddle:
             break
-        below = below_saddle(optimum)
+        below = leave_saddle(optimum)
         if below is None:
             break
         optimum = refine(below)
@@ -208,43 +209,35 @@ def confirmed(optimum: Optimum) -> Answer:
     return answer
 
 
-def certified(answer: Answer) -> Certified:
-    """An answer with its certificate; without one where it goes nowhere, or cannot be replayed."""
-    problem, run = answer.problem, this_run()
-    if problem.gait.free and is_trivial(answer):
-        return Certified(answer)
-    run.told("certify", 0, 1)
-    # exactly may take minutes, for what is no optimum
-    roughly: dict[str, Any] = (
-        {} if answer.optimal else {"tolerance": GAP, "instants": problem.body.usual.instants}
-    )
+def certify_answer(problem: Problem, answer: Answer) -> Solution:
+    """A solution with its certificate; without one where the gait goes nowhere, or cannot be
+    replayed."""
+    if answer.problem.gait.free and is_trivial(answer):
+        return solution_of(problem, answer)
+    active_run().report("certify", 0, 1)
     try:
-        return Certified(answer, run.kept("certify", (answer,), lambda: certify(answer, **roughly)))
+        return solution_of(problem, answer, _certificate(answer))
     except NotConvergedError as error:
-        return Certified(answer, failure=str(error))
+        return solution_of(problem, answer, failure=str(error))
 
 
-def _is_viscous(found: Certified) -> bool:
-    """Whether nothing fails but the influence of delta: the gait is so slow, or small, that
-    friction is viscous at it. A motion that is prescribed is measured at the delta that is asked
-    for."""
-    viscous = [check.name for check in found.certificate.failures] == ["delta influence"]
-    return viscous and found.answer.problem.gait.free
+@checkpointed
+def _certificate(answer: Answer) -> Certificate:
+    if answer.optimal:
+        return certify(answer)
+    # an exact replay may take minutes, for what is no optimum
+    instants = answer.problem.body.usual.instants
+    return certify(answer, tolerance=TOLERANCES.replay_gap, instants=instants)
 
 
-def _at_smaller_delta(optimum: Optimum) -> Optimum:
-    return replace(optimum, problem=optimum.problem.with_(delta=FACTOR * optimum.problem.delta))
-
-
-def _interrupted(problem: Problem, run: Run, why: str) -> Solution:
-    """The best that was found before an interrupt."""
-    found = [Certified(*each) for each in run.answers]
-    if any(each.holds for each in found):
-        solution = choose(problem, found)
-    elif found:
-        solution = Solution(problem, found[0].answer)
+def _best_so_far(problem: Problem, run: Run, why: str) -> Solution:
+    if any(map(passes, run.solutions)):
+        solution = choose(problem, run.solutions)
+    elif run.solutions:
+        solution = Solution(problem, run.solutions[0].answer)
     else:
-        best = run.best or as_it_is(*space_near(problem, problem.guess), problem.delta_start)
+        guess = space_near(problem, problem.guess)
+        best = run.best or evaluate_at(*guess, problem.delta_start)
         solution = Solution(problem, unconfirmed(best))
     solution.interrupted = True
     solution.message = f"{why}; this is the best gait so far. {solution.message}".strip()

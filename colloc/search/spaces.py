@@ -1,4 +1,4 @@
-"""From a problem to its programs: the full one, and the space of gaits that a search sees."""
+"""Programs of a problem: the full one, and the space of gaits on a mesh that a search sees."""
 
 from __future__ import annotations
 
@@ -19,45 +19,7 @@ from colloc.reduced.program import SearchSpace
 from colloc.system.errors import ProblemError
 from colloc.transcription.full_program import FullProgram, full_program
 
-
-def _space_class(problem: Problem) -> type[LinearSpace] | type[OneGait]:
-    if isinstance(problem.gait, Serpenoid):
-        return SerpenoidSpace
-    if isinstance(problem.gait, Prescribed):
-        return OneGait
-    if isinstance(problem.gait, LinearClass):
-        return LinearSpace
-    raise ProblemError(
-        f"no search is known for the class {type(problem.gait).__name__}: derive it from "
-        f"LinearClass (docs/howto/own_gait_class.md)."
-    )
-
-
-def program_of(problem: Problem, gait: AnyGait | None = None) -> FullProgram:
-    """The full program of a problem on its first mesh, in units of friction, with the limits of
-    the shape at the worst instants of the member nearest to a gait, by default its guess."""
-    space, v = space_near(problem, problem.guess if gait is None else gait)
-    return full_program(space.control, space.full_parameters(v))
-
-
-def heading(program: FullProgram, x: np.ndarray) -> FullProgram:
-    """The program with the net rotation closed as variables x close it."""
-    if program.control.admissible.gait.closing_symmetry != ANTIPODAL:
-        return program
-    if "rotation" not in program.groups:
-        return program
-    theta = x[program.layout.theta[0]]
-    turns = np.array([whole_turns(theta[0], theta[-1])])
-    return program.with_bounds("rotation", turns, turns)
-
-
-def space_near(
-    problem: Problem, gait: AnyGait, edges: np.ndarray | None = None, scheme: str = ""
-) -> tuple[SearchSpace, np.ndarray]:
-    """The class of a problem on its first mesh, or one in phases of a gait, and the parameters of
-    its member nearest to that gait."""
-    space = space_of(problem, gait, edges, scheme)
-    return space, space.parameters(gait)
+SPACES = LinearSpace, SerpenoidSpace, OneGait
 
 
 def space_of(
@@ -67,18 +29,55 @@ def space_of(
     scheme: str = "",
     far: Pairs = (),
 ) -> SearchSpace:
-    """The class of a problem, with the pairs `far` kept apart, on its first mesh or a given one, in
-    phases of a gait or, without one, in the program's own time."""
+    """The class of a problem on its first mesh, or on edges in phases of a gait (in the program's
+    own time without one), with pairs of links `far` kept from crossing."""
     if gait is not None and edges is not None:
         edges = problem.gait.times(gait, edges)
-    return _space_class(problem)(control_problem(problem), edges, scheme, far)
+    if isinstance(problem.gait, Serpenoid):
+        space: type = SerpenoidSpace
+    elif isinstance(problem.gait, Prescribed):
+        space = OneGait
+    elif isinstance(problem.gait, LinearClass):
+        space = LinearSpace
+    else:
+        raise ProblemError(
+            f"no search is known for the class {type(problem.gait).__name__}: derive it from "
+            f"LinearClass (docs/howto/own_gait_class.md)."
+        )
+    return space(control_problem(problem), edges, scheme, far)
+
+
+def space_near(
+    problem: Problem, gait: AnyGait, edges: np.ndarray | None = None, scheme: str = ""
+) -> tuple[SearchSpace, np.ndarray]:
+    """The space of `space_of`, and the parameters of its member nearest to a gait."""
+    space = space_of(problem, gait, edges, scheme)
+    return space, space.parameters(gait)
 
 
 def with_far(space: SearchSpace, far: Pairs) -> SearchSpace:
     """The same class on the same mesh with other pairs of links kept apart."""
-    return space_of(space.control.problem, None, *space.given._replace(far=far))
+    return space_of(space.control.problem, None, space.edges, space.scheme, far)
 
 
 def remeshed(space: SearchSpace, gait: AnyGait, edges: np.ndarray, scheme: str) -> SearchSpace:
     """The same class on another mesh, in phases of a member."""
-    return space_of(space.control.problem, gait, edges, scheme, space.given.far)
+    return space_of(space.control.problem, gait, edges, scheme, space.far)
+
+
+def program_of(problem: Problem, gait: AnyGait | None = None) -> FullProgram:
+    """The full program of a problem on its first mesh, in units of friction, with shape limits at
+    the worst instants of the member nearest to a gait (by default the guess)."""
+    space, v = space_near(problem, problem.guess if gait is None else gait)
+    return full_program(space.control, space.full_parameters(v))
+
+
+def with_whole_turns(program: FullProgram, x: np.ndarray) -> FullProgram:
+    """The program with the net rotation of an antipodal gait closed as variables x close it."""
+    if program.control.admissible.gait.closing_symmetry != ANTIPODAL:
+        return program
+    if "rotation" not in program.groups:
+        return program
+    theta = x[program.layout.theta[0]]
+    turns = np.array([whole_turns(theta[0], theta[-1])])
+    return program.with_bounds("rotation", turns, turns)

@@ -18,7 +18,7 @@ from colloc.results.archive import Archive, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import Outcome, counts
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.run import Progress
+from colloc.search.checkpoint import Progress
 from colloc.search.solve import REDUCED
 from colloc.search.solve import solve as search_solve
 from colloc.studies.multistart import run_archive
@@ -62,7 +62,7 @@ def solve(
     verbose : bool
         Print a line for every step.
     progress : callable, optional
-        Called with every `colloc.search.run.Progress`.
+        Called with every `colloc.search.checkpoint.Progress`.
 
     Returns
     -------

@@ -12,8 +12,8 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
 from colloc.results.distinct_optima import SAME_GAIT, distance, fourier_series, phase_distance
 from colloc.results.outcome import ERROR, Outcome
-from colloc.search.closure import closed_gait
-from colloc.search.optimum import Optimum
+from colloc.search.closure import project_to_zero_rotation
+from colloc.search.iterate import Iterate
 from colloc.search.spaces import space_near
 from colloc.studies.journal import Attempt, Visit, best_attempt, start_key
 from colloc.studies.multistart import run_guess
@@ -60,7 +60,7 @@ def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
         return None
     try:
         similar = laid_into(gaits, gait, body, problem.joint_limit, problem.smallest_shape_speed)
-        space, v = space_near(problem, closed_gait(problem, similar))
+        space, v = space_near(problem, project_to_zero_rotation(problem, similar))
         projection = space.member(v)
         problem.with_(guess=projection)
     except CollocError:
@@ -108,7 +108,7 @@ def visit(work: Work) -> Visit:
         best = best_attempt(attempts)
         return (1 + BETTER) * max(work.incumbent, best.outcome.value if best else 0.0)
 
-    def worth(end: Optimum) -> bool:
+    def worth(end: Iterate) -> bool:
         best = best_attempt(attempts)
         if not end.value > enough():
             return best is None and not work.incumbent

@@ -16,8 +16,8 @@ from colloc.results.archive import Archive, StartName
 from colloc.results.outcome import CRASHED, ERROR, PASSED_OVER, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
 from colloc.search.certify import is_trivial
-from colloc.search.optimum import Optimum
-from colloc.search.run import Progress
+from colloc.search.checkpoint import Progress
+from colloc.search.iterate import Iterate
 from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, process_pool, run_tasks
@@ -40,7 +40,7 @@ def run_guess(
     start: int,
     time_limit: float,
     *,
-    worth: Callable[[Optimum], bool] = lambda end: True,
+    worth: Callable[[Iterate], bool] = lambda end: True,
 ) -> Outcome:
     """Solve and certify a problem from the gait that `start_from` makes, within a time limit [s].
 
@@ -48,9 +48,9 @@ def run_guess(
     over.
     """
     begin, cpu = time.perf_counter(), time.process_time()
-    passed, news = list[Optimum](), list[Progress]()
+    passed, news = list[Iterate](), list[Progress]()
 
-    def accept(end: Optimum) -> bool:
+    def accept(end: Iterate) -> bool:
         if not worth(end):
             passed.append(end)
         return not passed
@@ -59,7 +59,7 @@ def run_guess(
     try:
         guess = start_from()
         solution = solve(
-            problem.with_(guess=guess), 1, seconds=time_limit, progress=news.append, worth=accept
+            problem.with_(guess=guess), 1, seconds=time_limit, progress=news.append, accept=accept
         )
         if not solution.interrupted:
             outcome = _outcome(start, guess, solution)

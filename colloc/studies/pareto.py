@@ -18,7 +18,7 @@ from colloc.gaits.objective import EFFICIENCY, SPEED, Objective, objective_from
 from colloc.gaits.period import Period
 from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
-from colloc.search.explore import STARTS
+from colloc.search.options import OPTIONS
 from colloc.studies.saved import solve_member
 from colloc.system.arguments import check_count
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -89,7 +89,7 @@ def pareto_front(
     second: Objective | str = EFFICIENCY,
     points: int = POINTS,
     *,
-    starts: int = STARTS,
+    starts: int = OPTIONS.starts,
     progress: Callable[[int, Solution], object] | None = None,
 ) -> ParetoFront:
     """Find the Pareto front of two objectives of a problem.

@@ -18,7 +18,7 @@ from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.results.solution import Solution
-from colloc.search.explore import STARTS
+from colloc.search.options import OPTIONS
 from colloc.studies.saved import solve_member
 from colloc.system.arguments import check_count, is_number
 from colloc.system.errors import ProblemError
@@ -118,7 +118,7 @@ def steer(
     turns: Sequence[float],
     *,
     spot: Sequence[float] = (),
-    starts: int = STARTS,
+    starts: int = OPTIONS.starts,
     progress: Callable[[float, Solution], object] | None = None,
 ) -> Steering:
     """Find the best gaits of a problem for given turns per period.

@@ -4,7 +4,7 @@ same command does not solve again."""
 import pytest
 
 from colloc.commands.main import main
-from colloc.search.run import Run
+from colloc.search.checkpoint import Run
 
 FILE = """
 from colloc import *
@@ -19,7 +19,7 @@ def test_an_interrupted_command_goes_on_from_its_last_problem(name, tmp_path, mo
     (tmp_path / "p.py").write_text(FILE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     command = [name, "p.py", *COMMANDS[name], "--starts", "1", "--no-figure", "--quiet"]
-    kept, computed, interruptions = Run.kept, [], []
+    kept, computed, interruptions = Run.result, [], []
 
     def interrupted_at_the_second(run, stage, given, compute):
         def counted():
@@ -31,7 +31,7 @@ def test_an_interrupted_command_goes_on_from_its_last_problem(name, tmp_path, mo
 
         return kept(run, stage, given, counted)
 
-    monkeypatch.setattr(Run, "kept", interrupted_at_the_second)
+    monkeypatch.setattr(Run, "result", interrupted_at_the_second)
     assert main(command) == 130
     assert "the same command goes on" in capsys.readouterr().err
     second = computed[-1]

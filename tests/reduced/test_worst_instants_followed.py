@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,8 +12,8 @@ from colloc.gaits.starts import latin_hypercube_gait
 from colloc.reduced.constraints import Constraints
 from colloc.reduced.program import ReducedProgram
 from colloc.search import converge
-from colloc.search.converge import at_rest
-from colloc.search.effort import FINE
+from colloc.search.converge import solve_subproblems
+from colloc.search.options import FINE, OPTIONS
 from colloc.search.spaces import space_near
 
 BODIES = {
@@ -74,11 +76,11 @@ def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, 
     before."""
     if not follows:
         monkeypatch.setattr(Constraints, "following", lambda held: held)
-    monkeypatch.setattr(converge, "BOX", 0.5)
+    monkeypatch.setattr(converge, "OPTIONS", replace(OPTIONS, radius=0.5))
     body, friction = Chain((0.25, 0.25, 0.25, 0.25)), Friction(mu_t=0.4, mu_f=1, mu_b=1)
     problem = Problem(
         "touch", body=body, friction=friction, gait=Harmonic(4), joint_limit=2.5, intervals=20
     )
     space, v = space_near(problem, latin_hypercube_gait(problem, 0, 0))
-    conditions = at_rest(ReducedProgram(space, 0.02), v, FINE).conditions
+    conditions = solve_subproblems(ReducedProgram(space, 0.02), v, FINE).conditions
     assert (max(conditions.kkt_error, conditions.violation) < 1e-6) == follows

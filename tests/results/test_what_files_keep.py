@@ -7,8 +7,8 @@ import pytest
 from colloc import Friction, Harmonic, Problem, load, save, solve
 from colloc.gaits.starts import latin_hypercube_gait, on_speed_floor
 from colloc.results.kept import save_result
-from colloc.search import run as run_module
-from colloc.search.run import ROWS, Run
+from colloc.search import checkpoint as run_module
+from colloc.search.checkpoint import ROWS, Run
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.row_file import read_rows
 
@@ -80,7 +80,7 @@ def test_a_delta_that_was_lowered_for_a_small_gait_is_that_of_the_result_as_read
 def test_rows_that_the_disk_refused_are_written_when_it_takes_them_again(tmp_path, monkeypatch):
     path = tmp_path / "x.run.sqlite"
     run = Run(path, QUICK)
-    run.kept("stage", (1.0,), lambda: 10.0)
+    run.result("stage", (1.0,), lambda: 10.0)
     with monkeypatch.context() as patch:
         patch.setattr(
             run_module,
@@ -89,20 +89,20 @@ def test_rows_that_the_disk_refused_are_written_when_it_takes_them_again(tmp_pat
         )
         with pytest.warns(ReadOnlyRunWarning, match="the disk is full"):
             run.write()
-        run.kept("stage", (2.0,), lambda: 20.0)
+        run.result("stage", (2.0,), lambda: 20.0)
     run.write()
     assert sorted(value for key, value in read_rows(path, ROWS).items() if key != "problem") == [
         10.0,
         20.0,
     ]
     again = Run(path, QUICK)
-    assert [again.kept("stage", (x,), lambda: None) for x in (1.0, 2.0)] == [10.0, 20.0]
+    assert [again.result("stage", (x,), lambda: None) for x in (1.0, 2.0)] == [10.0, 20.0]
 
 
 def test_what_another_process_computed_is_in_the_file_of_the_run(tmp_path):
-    other = Run(problem=QUICK, remembers=True)
-    other.kept("stage", (1.0,), lambda: 10.0)
+    other = Run(problem=QUICK, stores=True)
+    other.result("stage", (1.0,), lambda: 10.0)
     run = Run(tmp_path / "x.run.sqlite", QUICK)
-    run.learn(other.rows)
+    run.update(other.rows)
     run.write()
-    assert Run(tmp_path / "x.run.sqlite", QUICK).kept("stage", (1.0,), lambda: None) == 10.0
+    assert Run(tmp_path / "x.run.sqlite", QUICK).result("stage", (1.0,), lambda: None) == 10.0

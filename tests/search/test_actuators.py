@@ -22,7 +22,7 @@ from colloc import (
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import instant
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
-from colloc.search.explore import ENOUGH
+from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
 
 ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
@@ -201,7 +201,7 @@ HOPELESS = {
 def test_where_no_start_keeps_the_limits_the_search_ends_soon_and_says_what_is_missed(case):
     (changes, words), tried = HOPELESS[case], []
     found = solve(USUAL.with_(guess=None, **changes), progress=lambda news: tried.append(news.done))
-    assert max(tried) == ENOUGH
+    assert max(tried) == OPTIONS.patience
     assert found.status == "not converged"
     assert re.search(f"the limit on the {words}.* allow the joints more", found.message)
     assert "None of 8 starts led to a gait of the class that keeps the limits" in found.message

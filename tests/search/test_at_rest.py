@@ -5,7 +5,8 @@ import pytest
 
 from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
-from colloc.search.confirm import RADIUS, confirm
+from colloc.search.confirm import confirm
+from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
 from tests.shared.stages import optimum_near
 
@@ -37,7 +38,7 @@ def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(
     assert answer.optimal
     assert ("beyond its limits" in answer.message) == kept
     assert (answer.status == "stationary") == kept
-    assert abs(answer.value + found.objective) < RADIUS
+    assert abs(answer.value + found.objective) < OPTIONS.confirm_radius
 
 
 @pytest.mark.parametrize("changed", [{}, {"mu_b": 2.0}], ids=["symmetric", "unequal"])

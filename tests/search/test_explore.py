@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,16 +11,16 @@ import pytest
 
 from colloc import Chain, Foot, Friction, Harmonic, Problem, Wheel, ellipse
 from colloc.gaits.starts import on_speed_floor
+from colloc.results.checks import UNCERTIFIED
 from colloc.results.store import load, save
 from colloc.search import explore
 from colloc.search import solve as stages
-from colloc.search.explore import candidates
-from colloc.search.helpers import Helpers
-from colloc.search.optimum import replace_keeping_space
+from colloc.search.ahead import Ahead
+from colloc.search.explore import multistart
 from colloc.search.solve import solve
 from colloc.system.errors import NotConvergedError
 
-ALONE = Helpers(Problem("alone"))
+ALONE = Ahead(Problem("alone"))
 UNEQUAL = Problem(
     "unequal",
     body=Chain((0.3, 0.2, 0.15, 0.35)),
@@ -134,10 +135,8 @@ def test_the_answer_does_not_depend_on_what_the_search_is_given(changed, starts)
 def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkeypatch):
     """However good it is: links that pass through each other as delta falls went on to be refined
     on ten thousand intervals."""
-    followed = explore._followed
-    monkeypatch.setattr(
-        explore, "_followed", lambda *given: replace_keeping_space(followed(*given), violation=0.5)
-    )
+    follow = explore.follow
+    monkeypatch.setattr(explore, "follow", lambda *at: replace(follow(*at), violation=0.5))
     with pytest.raises(NotConvergedError, match="no gait could be followed"):
         explore.explore(Problem("broken", gait=Harmonic(1, "bilateral")), 2, lambda: True)
 
@@ -170,27 +169,28 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(
 ):
     numbers = itertools.count()
 
-    def follow(problem, gait, deltas, known, *, hop=False):
+    def follow(problem, gait, deltas, known, *, is_new):
         if not known[-1]:
             found = SimpleNamespace(
                 objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem
             )
             known[-1].append(explore.Candidate(found))
         if next(numbers) in meeting:
-            known[-1][0].joined(hop=hop)
+            known[-1][0].count_start(is_new=is_new)
 
-    monkeypatch.setattr(explore, "_follow", follow)
+    monkeypatch.setattr(explore, "_descend_levels", follow)
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     problem = Problem("same", gait=Harmonic(1, "antipodal"), froude=froude)
-    assert candidates(problem, asked, lambda: True, ALONE)[1] == tried
+    assert multistart(problem, asked, lambda: True, ALONE)[1] == tried
 
 
 def certified(value, holds=True, finite=True):
     """An answer with its certificate, as the choice among them sees it."""
     gait = ellipse(0.0, 2.0, 1.0) if finite else ellipse(0.0, 0.1, 0.1)
     answer = SimpleNamespace(value=value, problem=UNEQUAL, gait=gait)
-    return SimpleNamespace(answer=answer, certificate=None, holds=holds, is_finite=finite)
+    answer.optimal = True
+    return SimpleNamespace(answer=answer, certificate=SimpleNamespace(passed=holds))
 
 
 @pytest.mark.parametrize(
@@ -216,13 +216,13 @@ def test_gaits_are_solved_for_until_a_certificate_holds_and_no_other_promises_mo
     """Gaits promise 1, 0.9, 0.8, 0.7 before their meshes are refined."""
     asked = []
 
-    def finished(optimum):
+    def finish(problem, optimum):
         asked.append(optimum)
         return certified(*ends[len(asked) - 1])
 
-    monkeypatch.setattr(stages, "finished", finished)
+    monkeypatch.setattr(stages, "finish", finish)
     optima = [SimpleNamespace(value=1.0 - 0.1 * k) for k in range(len(ends))]
-    found = stages._tried(optima, lambda each: each.holds)
+    found = stages._finish_until(UNEQUAL, optima, stages.passes)
     assert (len(found), len(asked)) == (solved_for, solved_for)
 
 
@@ -231,26 +231,18 @@ def test_where_no_certificate_holds_gaits_that_were_left_are_followed_and_the_be
 ):
     """The first three of all followed fail; what comes of others is another gait, at the final
     delta."""
-    problem, asked, finished = (
-        Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2),
-        [],
-        stages.finished,
-    )
+    problem, asked = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2), []
+    finish = stages.finish
     explored = explore.explore(problem, 6)
 
-    def failing(optimum):
-        found = finished(optimum)
+    def failing(problem, optimum):
+        found = finish(problem, optimum)
         asked.append(optimum)
-        return (
-            found if len(asked) > len(explored.optima) else found._replace(failure="it was told to")
-        )
+        if len(asked) <= len(explored.optima):
+            found.certificate = UNCERTIFIED
+        return found
 
-    monkeypatch.setattr(stages, "finished", failing)
-    monkeypatch.setattr(
-        stages.Certified,
-        "holds",
-        property(lambda found: found.answer.optimal and not found.failure),
-    )
+    monkeypatch.setattr(stages, "finish", failing)
     solution = solve(problem, 6)
     assert len(asked) > len(explored.optima) > 0
     assert solution.value == pytest.approx(
@@ -259,7 +251,7 @@ def test_where_no_certificate_holds_gaits_that_were_left_are_followed_and_the_be
     assert not any(
         explore.same_gait(problem, one, other) for one, other in itertools.combinations(asked, 2)
     )
-    assert explore.followed_further(problem, explored, lambda: False) == ()
+    assert explore.follow_rest(problem, explored, lambda: False) == ()
 
 
 @pytest.mark.slow

@@ -9,8 +9,8 @@ import pytest
 import colloc
 from colloc.commands.summary import summary_lines
 from colloc.reduced.program import ReducedProgram
-from colloc.search.converge import converged
-from colloc.search.effort import FINE
+from colloc.search.converge import optimise
+from colloc.search.options import FINE
 from colloc.search.spaces import space_near
 
 ROUND, STANDING_POWER = colloc.ellipse(A0=0, A1=2.2, B1=1.3), "distance / (work + 0.1 * period)"
@@ -36,7 +36,7 @@ def played(found):
 
 def best(stated):
     """On the first mesh."""
-    return converged(*space_near(stated, stated.guess), stated.delta, FINE)
+    return optimise(*space_near(stated, stated.guess), stated.delta, FINE)
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.1])

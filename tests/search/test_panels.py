@@ -9,7 +9,7 @@ from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
-from colloc.search.converge import as_it_is
+from colloc.search.iterate import evaluate_at
 from colloc.search.refine import on_more_panels
 from colloc.search.spaces import space_near
 from colloc.smooth.modal_body import ModalBody
@@ -29,7 +29,7 @@ def found(panels, friction=Friction(), delta=1e-2, **changes):
         intervals=8,
         **changes,
     )
-    return as_it_is(*space_near(stated, GAIT), delta)
+    return evaluate_at(*space_near(stated, GAIT), delta)
 
 
 def test_panels_are_added_where_a_point_at_rest_moves_over_them():
@@ -55,7 +55,7 @@ def test_panels_stay_where_they_do_not_matter():
 
 def test_a_chain_has_none_to_add():
     stated = Problem("chain", gait=Harmonic(1, "antipodal"))
-    assert on_more_panels(as_it_is(*space_near(stated, stated.guess), 0.1)) is None
+    assert on_more_panels(evaluate_at(*space_near(stated, stated.guess), 0.1)) is None
 
 
 @pytest.mark.slow

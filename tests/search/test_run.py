@@ -19,12 +19,13 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load
 from colloc.search.certify import certify
-from colloc.search.choose import Certified, choose
+from colloc.search.checkpoint import ROWS, STAGES, Run
+from colloc.search.choose import choose, is_visible_solution, solution_of
 from colloc.search.confirm import confirm
 from colloc.search.descend import descend
-from colloc.search.explore import begin_at, explore
+from colloc.search.explore import explore, first_optimum
+from colloc.search.options import SearchOptions
 from colloc.search.refine import refine
-from colloc.search.run import ROWS, STAGES, Run
 from colloc.search.solve import solve
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.files import run_file
@@ -54,16 +55,16 @@ class Stop:
 
     def __init__(self, number, monkeypatch):
         self.left = number
-        kept = Run.kept
+        result = Run.result
 
         def stopping(run, stage, given, compute):
-            value = kept(run, stage, given, compute)
+            value = result(run, stage, given, compute)
             self.left -= 1
             if self.left == 0:
                 raise KeyboardInterrupt
             return value
 
-        monkeypatch.setattr(Run, "kept", stopping)
+        monkeypatch.setattr(Run, "result", stopping)
 
 
 @pytest.mark.parametrize(
@@ -118,23 +119,23 @@ def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
 
 
 def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path, monkeypatch):
-    path, kept, computed = tmp_path / "x.run.sqlite", Run.kept, []
+    path, result, computed = tmp_path / "x.run.sqlite", Run.result, []
 
     def counted(run, stage, given, compute):
-        value = kept(run, stage, given, lambda: (computed.append(stage), compute())[1])
+        value = result(run, stage, given, lambda: (computed.append(stage), compute())[1])
         if len(computed) - stops[-1] == 5:
             stops.append(len(computed))
             raise KeyboardInterrupt
         return value
 
     wanted, stops = solve(QUICK, 2), [0]
-    monkeypatch.setattr(Run, "kept", counted)
+    monkeypatch.setattr(Run, "result", counted)
     while (found := solve(QUICK, 2, keep=path)).status == "interrupted":
         pass
     assert len(stops) > 3
     np.testing.assert_array_equal(found.answer.x, wanted.answer.x)
     rows = [key.split(" ")[0] for key in read_rows(path, ROWS)]
-    for stage in ("converged", "confirm", "certify"):
+    for stage in ("optimise", "_confirm", "_certificate"):
         assert computed.count(stage) == rows.count(stage) > 0
 
 
@@ -157,7 +158,7 @@ def test_every_stage_makes_the_value_of_the_next_one_and_together_they_are_a_sol
     answer = confirm(optimum)
     assert answer.optimal
     certificate = certify(answer)
-    chosen = choose(QUICK, [Certified(answer, certificate)])
+    chosen = choose(QUICK, [solution_of(QUICK, answer, certificate)])
     np.testing.assert_array_equal(chosen.answer.x, solution.answer.x)
     assert (chosen.value, chosen.status) == (solution.value, solution.status)
     assert [step.delta for step in answer.history] == [step.delta for step in solution.history]
@@ -167,13 +168,12 @@ def test_every_stage_makes_the_value_of_the_next_one_and_together_they_are_a_sol
 def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_be(shrinking):
     found = solve(QUICK.with_(delta=1e-3, mesh_tolerance=1e-5), 1)
     assert found.success
-    big = Certified(found.answer, found.certificate)
+    big = solution_of(found.problem, found.answer, found.certificate)
     tiny = found.gait.scaled(0.01)
-    small = Certified(
-        replace(found.answer, gait=tiny, value=1.1 * found.answer.value), found.certificate
-    )
-    assert big.is_finite
-    assert not small.is_finite
+    answer = replace(found.answer, gait=tiny, value=1.1 * found.answer.value)
+    small = solution_of(found.problem, answer, found.certificate)
+    assert is_visible_solution(big)
+    assert not is_visible_solution(small)
     chosen = choose(found.problem.with_(shrinking=shrinking), [small, big])
     if shrinking:
         assert chosen.answer is small.answer
@@ -188,14 +188,14 @@ def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_b
 def test_a_kept_value_that_was_damaged_is_found_anew(tmp_path):
     path = tmp_path / "x.run.sqlite"
     first = Run(path, QUICK)
-    first.kept("stage", (1,), lambda: (np.arange(3.0), QUICK))
+    first.result("stage", (1,), lambda: (np.arange(3.0), QUICK))
     first.write()
     (key,) = (key for key in read_rows(path, ROWS) if key != "problem")
     for wrong in ({"kind": "Stranger", "of": {}}, {"array": "AAAA", "type": "<f8", "shape": [3]}):
         put_rows(path, ROWS, {key: wrong})
         again = Run(path, QUICK)
-        assert again.kept("stage", (1,), lambda: "anew") == "anew"
-        assert again.found_again == 0
+        assert again.result("stage", (1,), lambda: "anew") == "anew"
+        assert again.n_reused == 0
 
 
 def problems():
@@ -224,19 +224,19 @@ def series():
 @pytest.fixture
 def at_once(monkeypatch):
     """What is found is written as it appears."""
-    monkeypatch.setattr("colloc.search.run.EVERY", 0.0)
+    monkeypatch.setattr("colloc.search.checkpoint.OPTIONS", SearchOptions(checkpoint_interval=0.0))
 
 
 @pytest.mark.parametrize("problem", list(problems()), ids=lambda problem: problem.name)
 def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tmp_path, at_once):
     path = tmp_path / "x.run.sqlite"
     first = Run(path, problem)
-    with first.under_way(np.inf):
-        found = descend(begin_at(problem, problem.guess))
+    with first.active(np.inf):
+        found = descend(first_optimum(problem, problem.guess))
     second = Run(path, problem)
-    with second.under_way(np.inf):
-        again = descend(begin_at(problem, problem.guess))
-    assert second.found_again == len(read_rows(path, ROWS)) - 1 > 0
+    with second.active(np.inf):
+        again = descend(first_optimum(problem, problem.guess))
+    assert second.n_reused == len(read_rows(path, ROWS)) - 1 > 0
     np.testing.assert_array_equal(again.v, found.v)
     assert (again.objective, again.kkt_error, again.history) == (
         found.objective,
@@ -300,7 +300,7 @@ def test_a_run_that_cannot_be_written_is_told_once_and_is_written_at_the_end_if_
             raise StoreError("cannot write: no space left on device.")
         put_rows(*given)
 
-    monkeypatch.setattr("colloc.search.run.put_rows", full)
+    monkeypatch.setattr("colloc.search.checkpoint.put_rows", full)
     with pytest.warns(ReadOnlyRunWarning, match="no space left") as told:
         solution = solve(QUICK, 2, keep=path)
     assert solution.certificate.replayed

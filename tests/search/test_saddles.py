@@ -7,9 +7,9 @@ from colloc import Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.search.confirm import confirm
-from colloc.search.converge import as_it_is
-from colloc.search.descend import below_saddle
-from colloc.search.solve import finished
+from colloc.search.descend import leave_saddle
+from colloc.search.iterate import evaluate_at
+from colloc.search.solve import finish
 from colloc.search.spaces import space_near
 from tests.shared.stages import optimum_near
 
@@ -29,7 +29,7 @@ def saddle():
     give it one."""
     space, v = space_near(PROBLEM, SADDLE)
     v = root(ReducedProgram(space, PROBLEM.delta).gradient, v, tol=1e-9).x
-    return as_it_is(space, v, PROBLEM.delta)
+    return evaluate_at(space, v, PROBLEM.delta)
 
 
 def smallest(found):
@@ -40,19 +40,19 @@ def test_below_a_saddle_lies_an_optimum(saddle):
     assert saddle.optimal
     assert saddle.objective == pytest.approx(-0.04614, abs=2e-5)
     assert smallest(saddle) == pytest.approx(-0.81, abs=0.02)
-    below = below_saddle(saddle)
+    below = leave_saddle(saddle)
     assert smallest(below) > 0
     assert below.objective < 2 * saddle.objective
 
 
 def test_a_search_that_comes_to_a_saddle_goes_on_from_there(saddle):
     assert confirm(saddle).second_order.smallest < 0
-    found = finished(saddle)
-    assert found.holds
+    found = finish(PROBLEM, saddle)
+    assert found.success
     assert found.answer.second_order.smallest > 0
     assert found.answer.value > -4 * saddle.objective
     assert found.answer.history[0].value == pytest.approx(0.04614, abs=2e-5)
 
 
 def test_nothing_lies_below_an_optimum():
-    assert below_saddle(optimum_near(PROBLEM)) is None
+    assert leave_saddle(optimum_near(PROBLEM)) is None

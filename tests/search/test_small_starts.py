@@ -8,8 +8,8 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, Polygon, Problem, Viscous
 from colloc.results.distinct_optima import distance
-from colloc.search.explore import candidates
-from colloc.search.helpers import Helpers
+from colloc.search.ahead import Ahead
+from colloc.search.explore import multistart
 from colloc.search.small_starts import small_loops
 
 PROBLEMS = {
@@ -24,7 +24,7 @@ PROBLEMS = {
     "polygon": Problem("polygon", friction=Friction(mu_t=0.4, mu_f=1, mu_b=2), gait=Polygon(8)),
 }
 
-ALONE = Helpers(Problem("alone"))
+ALONE = Ahead(Problem("alone"))
 
 
 @pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
@@ -61,8 +61,8 @@ def test_viscous_drag_has_none():
 def test_a_small_gait_at_the_fold_is_found_where_it_is_the_best():
     """Two harmonics, joints up to pi: 0.37 at the fold, 0.35 for gaits of any size."""
     problem = Problem("fold", gait=Harmonic(2))
-    known, _ = candidates(problem, 8, lambda: True, ALONE)
-    best = known[0].optimum.gait
-    assert -known[0].dry > 0.36
+    known, _ = multistart(problem, 8, lambda: True, ALONE)
+    best = known[0].iterate.gait
+    assert -known[0].dry_objective > 0.36
     assert best.shape_speed < 2 * problem.smallest_shape_speed
     assert np.sort(np.abs(best.mean)) == pytest.approx([0, np.pi], abs=0.2)

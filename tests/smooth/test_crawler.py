@@ -15,8 +15,9 @@ from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.confirm import unconfirmed
-from colloc.search.converge import as_it_is, converged
-from colloc.search.effort import SKETCH
+from colloc.search.converge import optimise
+from colloc.search.iterate import evaluate_at
+from colloc.search.options import COARSE
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 from colloc.smooth.concertina import Concertina
@@ -105,7 +106,7 @@ def test_optimising_beats_the_paper_s_crawler():
         Problem("crawler", guess, body, gait=Polygon(8, "antipodal"), intervals=8), guess
     )
     paper = -ReducedProgram(space, 1e-3).objective(v)
-    found = converged(space, v, 1e-3, SKETCH)
+    found = optimise(space, v, 1e-3, COARSE)
     assert 0.5 < paper + 0.005 < -found.objective < 1.0
 
 
@@ -140,7 +141,9 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
         delta=1e-3,
         delta_start=1e-3,
     )
-    solution = Solution(problem, unconfirmed(as_it_is(*space_near(problem, guess), problem.delta)))
+    solution = Solution(
+        problem, unconfirmed(evaluate_at(*space_near(problem, guess), problem.delta))
+    )
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
         ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps",

@@ -17,7 +17,7 @@ from colloc.pictures.report_page import report_page
 from colloc.pictures.solution_figure import solution_figure
 from colloc.results.solution import SOLVED
 from colloc.results.store import load, save
-from colloc.search.explore import begin_at
+from colloc.search.explore import first_optimum
 from colloc.search.solve import solve
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_body import ModalBody
@@ -96,7 +96,7 @@ def test_the_work_on_the_mesh_is_that_of_the_general_solver(body):
     )
     reference = period(body.prescribed(), problem.friction, 1e-2, intervals=4, nodes=2)
     # the same quadrature in time
-    optimum = begin_at(problem, problem.guess)
+    optimum = first_optimum(problem, problem.guess)
     assert optimum.step.work == pytest.approx(reference.W, rel=1e-6)
 
 

@@ -36,6 +36,7 @@ from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.search import certify
 from colloc.search.certify import is_trivial
+from colloc.search.options import Tolerances
 from colloc.search.solve import solve
 from colloc.studies import calls
 from colloc.studies import multistart as campaign
@@ -148,7 +149,7 @@ def test_a_start_that_turns_the_body_does_not_collapse_onto_a_retraced_gait():
 
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     # with a threshold above every efficiency each level counts as going nowhere
-    monkeypatch.setattr(certify, "NOWHERE", 2.0)
+    monkeypatch.setattr(certify, "TOLERANCES", Tolerances(zero_value=2.0))
     solution = solve(problem(), 1)
     assert is_trivial(solution.answer)
     assert solution.status != SOLVED

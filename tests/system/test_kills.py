@@ -28,7 +28,7 @@ from colloc.commands.solve import solve
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results import store
 from colloc.results.archive import Archive, open_archive
-from colloc.search.run import ROWS
+from colloc.search.checkpoint import ROWS
 from colloc.studies import multistart as campaign
 from colloc.studies import run as study_run
 from colloc.studies import saved
