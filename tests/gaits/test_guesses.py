@@ -1,5 +1,4 @@
-"""How far shapes may be enlarged: up to the joint limit, or to where links touch, and no
-further."""
+"""First guesses; how far shapes may be enlarged: to the joint limit, or to where links touch."""
 
 import numpy as np
 import pytest
@@ -11,24 +10,18 @@ from colloc.gaits.starts import latin_hypercube_gait
 from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 
-STRAIGHT = np.zeros((2, 1))
 
-
-@pytest.mark.parametrize(("share", "moves"), [(1.01, True), (0.995, True), (0.98, False)])
-def test_a_guess_on_the_bound_of_the_shape_speed_counts_as_moving(share, moves):
+def test_a_guess_on_the_bound_of_the_shape_speed_counts_as_moving():
     """Sampling cuts the corners of an optimum that lies there, and makes it a little slower."""
     guess = ellipse(0.0, 0.3, 0.2)
-    slowest = guess.shape_speed / share
-    if moves:
-        assert (
-            Problem(
-                "small", guess, gait=Harmonic(1, "bilateral"), smallest_shape_speed=slowest
-            ).guess
-            is guess
-        )
-    else:
-        with pytest.raises(ProblemError, match="guess hardly moves"):
-            Problem("small", guess, gait=Harmonic(1, "bilateral"), smallest_shape_speed=slowest)
+    for share in (1.01, 0.995, 0.98):
+        stated = {"gait": Harmonic(1, "bilateral"), "smallest_shape_speed": guess.shape_speed}
+        stated["smallest_shape_speed"] /= share
+        if share > 0.99:
+            assert Problem("small", guess, **stated).guess is guess
+        else:
+            with pytest.raises(ProblemError, match="guess hardly moves"):
+                Problem("small", guess, **stated)
 
 
 @pytest.mark.parametrize(
@@ -36,16 +29,12 @@ def test_a_guess_on_the_bound_of_the_shape_speed_counts_as_moving(share, moves):
 )
 def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
     """In the phases of its class, in which the first joint is bent most at 0."""
-    body, wave = (
-        Chain(width=width),
-        Fourier(np.full(2, 1.9), np.array([[0.2], [0.2]]), np.array([[0.0], [0.8]])),
-    )
+    body, wave = Chain(width=width), Fourier([1.9, 1.9], [[0.2], [0.2]], [[0.0], [0.8]])
     with pytest.raises(ProblemError, match=f"{words} at phase") as refused:
         Problem("crossed", wave, body, gait=Harmonic(1))
     phase = float(str(refused.value).rstrip(".").split()[-1])
-    depth = body.crossing_depth(
-        checked_member(Harmonic(1), wave)[0].angles(np.append(phase, np.arange(400) / 400))
-    )
+    phases = np.append(phase, np.arange(400) / 400)
+    depth = body.crossing_depth(checked_member(Harmonic(1), wave)[0].angles(phases))
     assert 0.05 < phase < 0.4
     assert depth[0] == pytest.approx(depth.max(), rel=1e-3)
 
@@ -70,16 +59,14 @@ def test_where_no_wave_moves_enough_the_limit_that_is_in_the_way_is_named():
         Problem("stiff", gait=Harmonic(1), joint_limit=0.05)
 
 
-def test_a_straight_body_may_be_enlarged_without_end():
-    assert largest_factor(Chain(), np.pi, STRAIGHT) == np.inf
-
-
-def test_shapes_whose_links_do_not_meet_end_at_the_joint_limit():
-    assert largest_factor(Chain(), 2.0, np.array([[0.5], [-0.25]])) == pytest.approx(SAFE * 4.0)
-
-
-def test_others_end_where_their_links_touch():
-    """Equal links bent the same way: the ends meet as a triangle, at 2 pi/3."""
-    assert largest_factor(Chain(), np.pi, np.array([[0.5], [0.5]])) == pytest.approx(
-        SAFE * 4 * np.pi / 3, rel=1e-6
-    )
+@pytest.mark.parametrize(
+    ("shape", "limit", "factor"),
+    [
+        ([0.0, 0.0], np.pi, np.inf),
+        ([0.5, -0.25], 2.0, SAFE * 4.0),
+        ([0.5, 0.5], np.pi, SAFE * 4 * np.pi / 3),  # the ends meet as a triangle, at 2 pi/3
+    ],
+)
+def test_shapes_grow_to_the_joint_limit_or_to_where_links_touch(shape, limit, factor):
+    grown = largest_factor(Chain(), limit, np.array(shape)[:, None])
+    assert grown == pytest.approx(factor, rel=1e-6)

@@ -11,17 +11,10 @@ from colloc.system.errors import ProblemError
 
 THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
 PHASES = np.linspace(0.0, 1.0, 101)
-FIVE_HARMONICS = Fourier(
-    [0.00357, -0.00357],
-    [
-        [2.50125, -0.00401, -0.12198, 0.00064, -0.03095],
-        [-2.50125, 0.00401, 0.12198, -0.00064, 0.03095],
-    ],
-    [[0.84175, -0.00217, -0.2703, 0.00101, -0.0018]] * 2,
-)
+COSINES = np.array([2.50125, -0.00401, -0.12198, 0.00064, -0.03095])
+SINES = [0.84175, -0.00217, -0.2703, 0.00101, -0.0018]
+FIVE_HARMONICS = Fourier([0.00357, -0.00357], [COSINES, -COSINES], [SINES, SINES])
 """The optimum of five harmonics, efficiency 0.40044."""
-
-
 GAITS = {
     "Fourier": ellipse(0.2, 1.5, 1.0),
     "Corners": Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]])),

@@ -11,24 +11,11 @@ from colloc import Harmonic, Objective, Problem, ProblemError
 from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.objective import DRIVEN, EFFICIENCY, NAMED, QUANTITIES, SPEED, TURNING
 
-PERIOD = {
-    "distance": 0.31,
-    "work": 1.3,
-    "rotation": 0.7,
-    "length": 8.0,
-    "driven_work": 1.5,
-    "period": 3.0,
-}
-EXPRESSIONS = [
-    *NAMED,
-    "distance / (work + 0.1 * length)",
-    "2 * distance - 0.01 * work**2",
-    "sqrt(distance) * abs(rotation - 1) / -length**-1 + 3",
-    "-1 / (+distance - 2)",
-]
+PERIOD = dict(zip(QUANTITIES, (0.31, 1.3, 0.7, 8.0, 1.5, 3.0), strict=True))
+EXPRESSIONS = [*NAMED, "distance / (work + 0.1 * length)", "2 * distance - 0.01 * work**2"]
 
 
-@pytest.mark.parametrize("text", EXPRESSIONS[:-2])
+@pytest.mark.parametrize("text", EXPRESSIONS)
 def test_values_gradients_and_symbols_agree(text):
     objective = Objective(text)
     symbols = {name: ca.SX.sym(name) for name in QUANTITIES}
@@ -43,10 +30,8 @@ def test_values_gradients_and_symbols_agree(text):
 
 
 def test_gradients_of_every_operation_are_those_of_differences():
-    objective, h = (
-        Objective("sqrt(distance) * abs(rotation - 1) / length**-1 + 3 - (2 - work) / +work"),
-        1e-6,
-    )
+    text, h = "sqrt(distance) * abs(rotation - 1) / length**-1 + 3 - (2 - work) / +work", 1e-6
+    objective = Objective(text)
     for name, slope in objective.partials(PERIOD).items():
         up, down = (objective(PERIOD | {name: PERIOD[name] + side * h}) for side in (1, -1))
         assert slope == pytest.approx((up - down) / (2 * h), rel=1e-8)
@@ -82,43 +67,30 @@ def test_the_power_of_friction_that_an_objective_is_proportional_to():
 
 def test_what_is_usual_is_not_stated_so_a_problem_has_one_hash():
     problem = Problem("h1", gait=Harmonic(1, "bilateral"))
-    assert (
-        problem.with_(objective="distance / work", rotation=0.0, at_least={}).hash == problem.hash
-    )
+    same = problem.with_(objective="distance / work", rotation=0.0, at_least={})
+    assert same.hash == problem.hash
     assert "objective" not in problem.to_dict()
 
 
 def test_a_problem_with_an_objective_comes_back_from_its_statement():
-    problem = Problem(
-        "turning",
-        gait=Harmonic(2),
-        objective=Objective("rotation / work", "turn"),
-        rotation=None,
-        at_least={"speed": 0.01},
-    )
+    asked = {"objective": Objective("rotation / work", "turn"), "at_least": {"speed": 0.01}}
+    problem = Problem("turning", gait=Harmonic(2), rotation=None, **asked)
     again = Problem.from_dict(problem.to_dict())
     assert again.objective == problem.objective
     assert again.rotation is None
     assert again.at_least == ((SPEED, 0.01),)
     assert pickle.loads(pickle.dumps(problem)).hash == problem.hash  # as it goes to other processes
-    assert (
-        again.hash
-        == problem.hash
-        == statement_hash(problem.to_dict())
-        != problem.with_(at_least={}).hash
-    )
+    assert again.hash == problem.hash == statement_hash(problem.to_dict())
+    assert again.hash != problem.with_(at_least={}).hash
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"objective": "turning"}, "rotation"),
-        ({"rotation": 0.2, "gait": Harmonic(1, "bilateral")}, "bilateral gait turns"),
-        ({"rotation": np.inf}, "rotation must be"),
-        ({"at_least": {"distance": "far"}}, "finite number"),
-        ({"at_least": {"size": 1.0}}, "speaks of size"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"objective": "turning"}, "rotation"),
+    ({"rotation": 0.2, "gait": Harmonic(1, "bilateral")}, "bilateral gait turns"),
+    ({"rotation": np.inf}, "rotation must be"),
+    ({"at_least": {"distance": "far"}}, "finite number"),
+    ({"at_least": {"size": 1.0}}, "speaks of size"),
+])  # fmt: skip
 def test_what_cannot_be_asked_for_is_refused(changes, words):
     with pytest.raises(ProblemError, match=words):
         Problem("x", **changes)

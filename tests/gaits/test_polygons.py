@@ -20,7 +20,6 @@ from colloc.gaits.harmonic import shifted
 from colloc.gaits.starts import prolonged
 from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
-from colloc.search.spaces import space_near
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 
@@ -28,12 +27,7 @@ TRIANGLE = Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
 
 
 @pytest.mark.parametrize(
-    "gait",
-    [
-        TRIANGLE,
-        ellipse(0.1, 2.0, 1.2),
-        BSpline(6).member(np.linspace(-1, 1, 12), 2),
-    ],
+    "gait", [TRIANGLE, ellipse(0.1, 2.0, 1.2), BSpline(6).member(np.linspace(-1, 1, 12), 2)]
 )
 def test_the_mirror_image_of_a_gait_is_one_of_its_class(gait):
     t = np.linspace(0, 1, 97)
@@ -44,19 +38,14 @@ def test_the_mirror_image_of_a_gait_is_one_of_its_class(gait):
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 def test_harmonics_survive_the_way_through_points(symmetry):
-    rng = np.random.default_rng(2)
-    drawn = Fourier(
-        0.3 * rng.normal(size=2), 0.3 * rng.normal(size=(2, 3)), 0.3 * rng.normal(size=(2, 3))
-    )
     target = Harmonic(3, symmetry)
-    gait = target.member(target.parameters(drawn), 2)
+    gait = target.member(0.3 * np.random.default_rng(2).normal(size=target.size(2)), 2)
 
     class Opaque(GaitFunction):
         n_joint = 2
         angles, rates = staticmethod(gait.angles), staticmethod(gait.rates)
 
-    back = target.through(Opaque())
-    t = np.linspace(0, 1, 50)
+    back, t = target.through(Opaque()), np.linspace(0, 1, 50)
     np.testing.assert_allclose(back.angles(t), gait.angles(t), rtol=0, atol=1e-10)
 
 
@@ -76,9 +65,8 @@ def test_a_polygon_is_found_again_through_its_points_and_exactly_from_its_corner
         assert found.length == pytest.approx(gait.length, rel=0.02)
         again = kind.member(kind.parameters(found), 2)
         np.testing.assert_allclose(again.corners, found.corners, atol=1e-13)
-    np.testing.assert_allclose(
-        Polygon(4).member(Polygon(4).parameters(square), 2).corners, square.corners, atol=1e-13
-    )
+    same = Polygon(4).member(Polygon(4).parameters(square), 2)
+    np.testing.assert_allclose(same.corners, square.corners, atol=1e-13)
 
 
 def test_a_polygon_is_a_spline_of_degree_1_whose_pace_does_not_matter():
@@ -92,9 +80,8 @@ def test_a_polygon_is_a_spline_of_degree_1_whose_pace_does_not_matter():
         assert not BSpline(6, 2).relative_delta
         # angles linear in the parameters at a program's times are those of the gait at its phases
         part = t * kind.fraction
-        np.testing.assert_allclose(
-            gait.angles(kind.phases(gait, part)), timed.angles(part), atol=1e-12
-        )
+        angles = gait.angles(kind.phases(gait, part))
+        np.testing.assert_allclose(angles, timed.angles(part), atol=1e-12)
         edges = kind.edges(24)
         np.testing.assert_allclose(kind.times(gait, kind.phases(gait, edges)), edges, atol=1e-12)
         assert np.ptp(np.linalg.norm(gait.rates(t), axis=0)) < 1e-9
@@ -105,17 +92,11 @@ def test_a_polygon_is_a_spline_of_degree_1_whose_pace_does_not_matter():
     ("corners", "axis"), [(3, "corner"), (4, "corner"), (4, "side"), (5, "corner"), (6, "side")]
 )
 def test_polygons_have_the_corners_and_the_symmetry_they_promise(corners, axis):
-    problem = Problem(
-        "p", ellipse(0, 2.0, 1.2), gait=Polygon(corners, "bilateral", axis), intervals=40
-    )
-    space, v = space_near(problem, problem.guess)
-    gait = space.member(v)
-    t = np.linspace(0, 1, 20001)[:-1] + 1e-6
-    heading = np.unwrap(np.arctan2(*gait.rates(t)[::-1]))
-    turns = np.abs(
-        np.diff(np.append(heading, heading[0] + 2 * np.pi * np.sign(heading[-1] - heading[0])))
-    )
-    assert np.sum(turns > 1e-6) == corners
+    kind, t = Polygon(corners, "bilateral", axis), np.linspace(0, 1, 20001)[:-1] + 1e-6
+    gait = kind.member(kind.parameters(ellipse(0, 2.0, 1.2)), 2)
+    heading = np.arctan2(*gait.rates(t)[::-1])
+    turns = (heading - np.roll(heading, 1) + 1) % (2 * np.pi) - 1
+    assert np.sum(np.abs(turns) > 1e-6) == corners
     np.testing.assert_allclose(gait.angles(-t), -gait.angles(t)[::-1], atol=1e-8)
 
 
@@ -125,13 +106,8 @@ def test_replay_of_the_small_triangle_reaches_two_fifths():
     for c, e in ((2.2, 1e-3), (2.5, 1e-3)):
         gait = Corners(np.array([[c + e, c, c], [-c, -c, -c - e]]))
         assert gait.length == pytest.approx((2 + np.sqrt(2)) * e)
-        result = replay(
-            Chain(),
-            Friction(),
-            lambda t, g=gait: (g.angles(t), g.rates(t)),
-            1e-9 * gait.length,
-            breaks=gait.corner_phases,
-        )
+        delta = 1e-9 * gait.length
+        result = replay(Chain(), Friction(), gait, delta, breaks=gait.corner_phases)
         assert result.efficiency == pytest.approx(0.4, rel=2e-3)
         assert result.distance == pytest.approx(e / 12, rel=2e-3)
         assert result.work == pytest.approx(5 * e / 24, rel=2e-3)
@@ -142,22 +118,13 @@ def test_replay_does_not_depend_on_the_pace_of_a_polygon():
 
     def slow_at_corners(t):
         # phase s(t) with s' = 0 at the corners
-        breaks = gait.phases
-        k = np.clip(np.searchsorted(breaks, t, side="right") - 1, 0, 2)
-        h = np.diff(breaks)[k]
-        x = (t - breaks[k]) / h
-        inside = np.clip(
-            breaks[k] + h * (x - np.sin(2 * np.pi * x) / (2 * np.pi)), 1e-12, 1 - 1e-12
-        )
-        return gait.angles(inside), gait.rates(inside) * (1 - np.cos(2 * np.pi * x))
+        k = np.clip(np.searchsorted(gait.phases, t, side="right") - 1, 0, 2)
+        begin, h = gait.phases[k], np.diff(gait.phases)[k]
+        turn = 2 * np.pi * (t - begin) / h
+        inside = np.clip(begin + h * (turn - np.sin(turn)) / (2 * np.pi), 1e-12, 1 - 1e-12)
+        return gait.angles(inside), gait.rates(inside) * (1 - np.cos(turn))
 
-    sharp = replay(
-        Chain(),
-        Friction(),
-        lambda t: (gait.angles(t), gait.rates(t)),
-        1e-8,
-        breaks=gait.corner_phases,
-    )
+    sharp = replay(Chain(), Friction(), gait, 1e-8, breaks=gait.corner_phases)
     smooth = replay(Chain(), Friction(), slow_at_corners, 1e-8, instants=3200)
     assert sharp.distance == pytest.approx(smooth.distance, rel=1e-5)
     assert sharp.work == pytest.approx(smooth.work, rel=1e-5)
@@ -172,38 +139,27 @@ def test_delta_keeps_its_meaning_from_class_to_class():
     assert back.delta == pytest.approx(1e-3)
 
 
-@pytest.mark.parametrize(
-    ("gait", "changes", "words"),
-    [
-        (Polygon(4), {"scheme": "trapezoid"}, "gauss-N or radau-N"),
-        (Polygon(6), {"intervals": 8}, "mesh is too small"),
-        (
-            Polygon(4),
-            {"body": Chain((0.5, 0.5)), "guess": Fourier([0.0], [[1.0]], [[0.0]])},
-            "three links",
-        ),
-        (Polygon(4), {"guess": Corners(np.array([[0.1, -0.1], [0.0, 0.0]]))}, "hardly moves"),
-        (Polygon(4, "bilateral"), {"body": Chain((0.2, 0.3, 0.5))}, "both ends"),
-    ],
-)
-def test_unusable_problems_are_refused_in_words(gait, changes, words):
-    with pytest.raises(ProblemError, match=words):
-        Problem("p", **({"guess": ellipse(0, 1.5, 1.0), "gait": gait} | changes))
+def problem(gait, **changes):
+    return Problem("p", **({"guess": ellipse(0, 1.5, 1.0), "gait": gait} | changes))
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: Polygon(1), "corners"),
-        (lambda: Polygon(5, "antipodal"), "even"),
-        (lambda: Polygon(4, "bilateral", "edge"), "axis"),
-        (lambda: Corners(np.array([[1.0, 1.0], [0.0, 0.0]])), "equal neighbours"),
-        (lambda: Corners("triangle"), "numbers"),
-        (lambda: BSpline(6, 0), "degree"),
-        (lambda: BSpline(1, 1), "knots"),
-    ],
-)
-def test_unusable_classes_and_gaits_are_refused_in_words(make, words):
+ONE_JOINT = {"body": Chain((0.5, 0.5)), "guess": Fourier([0.0], [[1.0]], [[0.0]])}
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: problem(Polygon(4), scheme="trapezoid"), "gauss-N or radau-N"),
+    (lambda: problem(Polygon(6), intervals=8), "mesh is too small"),
+    (lambda: problem(Polygon(4), **ONE_JOINT), "three links"),
+    (lambda: problem(Polygon(4), guess=Corners(np.array([[0.1, -0.1], [0.0, 0.0]]))), "hardly moves"),
+    (lambda: problem(Polygon(4, "bilateral"), body=Chain((0.2, 0.3, 0.5))), "both ends"),
+    (lambda: Polygon(1), "corners"),
+    (lambda: Polygon(5, "antipodal"), "even"),
+    (lambda: Polygon(4, "bilateral", "edge"), "axis"),
+    (lambda: Corners(np.array([[1.0, 1.0], [0.0, 0.0]])), "equal neighbours"),
+    (lambda: Corners("triangle"), "numbers"),
+    (lambda: BSpline(1, 1), "knots"),
+])  # fmt: skip
+def test_unusable_problems_classes_and_gaits_are_refused_in_words(make, words):
     with pytest.raises(ProblemError, match=words):
         make()
 
@@ -213,28 +169,22 @@ def test_problems_of_every_class_survive_their_description():
         (BSpline(6, 1, "bilateral"), TRIANGLE),
         (Polygon(4, "bilateral", "side"), ellipse(0, 2.0, 1.2)),
     ):
-        problem = Problem("p", guess, gait=gait, intervals=40)
-        again = Problem.from_dict(problem.to_dict())
-        assert again.hash == problem.hash
-        assert again.gait == gait
-        assert again.delta_start == 0.01
+        stated = problem(gait, guess=guess, intervals=40)
+        again = Problem.from_dict(stated.to_dict())
+        assert (again.hash, again.gait, again.delta_start) == (stated.hash, gait, 0.01)
 
 
 def test_a_pair_of_closed_joints_that_travels_along_a_folded_chain_wastes_nothing_in_the_limit():
     """All joints are open by e but two neighbours, which are folded: W = e/5, d = W (1 - e^2/24).
     No gait exceeds 1."""
     links = 5
-    body, sign = (
-        Chain((1 / links,) * links),
-        np.array([[(-1.0) ** (j + 1)] for j in range(links - 1)]),
-    )
+    body, sign = Chain((1 / links,) * links), -((-1.0) ** np.arange(links - 1)[:, None])
     closed = [(), *((j, j + 1) for j in range(links - 2))]
     open_by = np.array([[0.0 if j in pair else 1.0 for pair in closed] for j in range(links - 1)])
     for e in (0.2, 0.1):
         gait = Corners(sign * (np.pi - e * open_by))
-        fine = replay(body, Friction(), lambda t, g=gait: (g.angles(t), g.rates(t)),
-        1e-7 * gait.length, instants=800,
-                      tolerance=1e-4, breaks=gait.phases[1:-1])  # fmt: skip
+        how = {"instants": 800, "tolerance": 1e-4, "breaks": gait.corner_phases}
+        fine = replay(body, Friction(), gait, 1e-7 * gait.length, **how)
         assert fine.rotation == pytest.approx(0, abs=1e-12)
         assert fine.work == pytest.approx(e / links, rel=1e-8)
         assert 1 - fine.efficiency == pytest.approx(e**2 / 24, rel=0.02)

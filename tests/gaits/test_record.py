@@ -38,144 +38,51 @@ def read(tmp_path, content, **settings):
 
 ROS = "%time,field.header.seq,field.header.frame_id,field.name0,field.position0,field.position1,field.position2,field.velocity0\n"
 TOPIC = "/joint_states/joint_"
+# fmt: off
 READ = {
-    "tail last": (
-        "time_s,joint_3_rad,joint_2_rad,joint_1_rad\n" + table(SECONDS, C, B, A),
-        "by name from joint_1_rad",
-    ),
+    "tail last": ("time_s,joint_3_rad,joint_2_rad,joint_1_rad\n" + table(SECONDS, C, B, A), "by name from joint_1_rad"),
     "from zero": ("t,q2,q0,q1\n" + table(SECONDS, C, A, B), "from q0 ... q2, radians; time from t"),
     "numbers of one digit and two": ("t,q11,q9,q10\n" + table(SECONDS, C, A, B), "from q9 ... q11"),
-    "letters": (
-        "ElapsedTime, Axis_B, Axis_A, Axis_C\n" + table(SECONDS, B, A, C),
-        "from Axis_A ... Axis_C",
-    ),
-    "units in brackets": (
-        "Time [ms],Joint 3 [deg],Joint 1 [deg],Joint 2 [deg]\n" + table(1000 * SECONDS, F, D, E),
-        "degrees; time in ms",
-    ),
-    "one column of degrees": (
-        "t,joint_1_rad,joint_2_deg,joint_3_rad\n" + table(SECONDS, A, E, C),
-        r"radians \(but joint_2_deg degrees\)",
-    ),
-    "the joint at the tail in degrees": (
-        "t,joint_1_deg,joint_2_rad,joint_3_rad\n" + table(SECONDS, D, B, C),
-        r"radians \(but joint_1_deg degrees\)",
-    ),
-    "units in a row": (
-        "time,joint_1,joint_2,joint_3,current_1\ns,deg,deg,deg,mA\n" + table(SECONDS, D, E, F, T),
-        "degrees; time in s; left out: current_1 mA",
-    ),
-    "rostopic echo": (
-        ROS + table(NANOSECONDS, range(60), ["base"] * 60, ["j"] * 60, A, B, C, A),
-        "from field.position0",
-    ),
-    "PlotJuggler": (
-        "__time,"
-        + ",".join(f"{TOPIC}{j}/{what}" for j in (1, 2, 3) for what in ("position", "velocity"))
-        + "\n"
-        + table(1.7e9 + SECONDS, A, A, B, B, C, C, digits=16),
-        "left out: /joint_states/joint_1/velocity",
-    ),
-    "driver of an arm": (
-        "time_ms,read_attempt,joint_0_pos,joint_1_pos,joint_2_pos,joint_0_vel,joint_1_vel,joint_2_vel\n"
-        + table(1000 * SECONDS, range(60), A, B, C, A, B, C),
-        "from joint_0_pos ... joint_2_pos",
-    ),
-    "commanded and measured": (
-        "t,cmd_1,cmd_2,cmd_3,meas_1,meas_2,meas_3\n" + table(SECONDS, B, C, A, A, B, C),
-        "from meas_1 ... meas_3",
-    ),
-    "seconds and nanoseconds": (
-        "stamp.sec,stamp.nanosec,q1,q2,q3\n"
-        + table(
-            [f"{int(s) + 1000}" for s in SECONDS],
-            [f"{round(s % 1 * 1e9)}" for s in SECONDS],
-            A,
-            B,
-            C,
-        ),
-        "time in s",
-    ),
-    "date and time": (
-        "timestamp,joint_1,joint_2,joint_3\n" + table(STAMPS, A, B, C),
-        "time of day, in s",
-    ),
-    "no times": (
-        "Servo1 Position,Servo2 Position,Servo3 Position\n" + table(A, B, C),
-        "time in equal steps",
-    ),
-    "counted samples, two dropped": (
-        "seq,q1,q2,q3\n" + table(*(np.delete(each, [7, 30]) for each in (np.arange(60), A, B, C))),
-        r"time in samples \(seq\)",
-    ),
+    "letters": ("ElapsedTime, Axis_B, Axis_A, Axis_C\n" + table(SECONDS, B, A, C), "from Axis_A ... Axis_C"),
+    "units in brackets": ("Time [ms],Joint 3 [deg],Joint 1 [deg],Joint 2 [deg]\n" + table(1000 * SECONDS, F, D, E), "degrees; time in ms"),
+    "one column of degrees": ("t,joint_1_rad,joint_2_deg,joint_3_rad\n" + table(SECONDS, A, E, C), r"radians \(but joint_2_deg degrees\)"),
+    "the joint at the tail in degrees": ("t,joint_1_deg,joint_2_rad,joint_3_rad\n" + table(SECONDS, D, B, C), r"radians \(but joint_1_deg degrees\)"),
+    "units in a row": ("time,joint_1,joint_2,joint_3,current_1\ns,deg,deg,deg,mA\n" + table(SECONDS, D, E, F, T),
+        "degrees; time in s; left out: current_1 mA"),
+    "rostopic echo": (ROS + table(NANOSECONDS, range(60), ["base"] * 60, ["j"] * 60, A, B, C, A), "from field.position0"),
+    "PlotJuggler": ("__time," + ",".join(f"{TOPIC}{j}/{what}" for j in (1, 2, 3) for what in ("position", "velocity")) + "\n" + table(1.7e9 + SECONDS, A, A, B, B, C, C, digits=16),
+        "left out: /joint_states/joint_1/velocity"),
+    "driver of an arm": ("time_ms,read_attempt,joint_0_pos,joint_1_pos,joint_2_pos,joint_0_vel,joint_1_vel,joint_2_vel\n" + table(1000 * SECONDS, range(60), A, B, C, A, B, C),
+        "from joint_0_pos ... joint_2_pos"),
+    "commanded and measured": ("t,cmd_1,cmd_2,cmd_3,meas_1,meas_2,meas_3\n" + table(SECONDS, B, C, A, A, B, C), "from meas_1 ... meas_3"),
+    "seconds and nanoseconds": ("stamp.sec,stamp.nanosec,q1,q2,q3\n" + table([f"{int(s) + 1000}" for s in SECONDS], [f"{round(s % 1 * 1e9)}" for s in SECONDS], A, B, C),
+        "time in s"),
+    "date and time": ("timestamp,joint_1,joint_2,joint_3\n" + table(STAMPS, A, B, C), "time of day, in s"),
+    "no times": ("Servo1 Position,Servo2 Position,Servo3 Position\n" + table(A, B, C), "time in equal steps"),
+    "counted samples, two dropped": ("seq,q1,q2,q3\n" + table(*(np.delete(each, [7, 30]) for each in (np.arange(60), A, B, C))),
+        r"time in samples \(seq\)"),
     "no names": (table(1.7e9 + SECONDS, A, B, C, digits=16), "as it has no names"),
-    "names in a comment": (
-        "# t q1 q2 q3\n" + table(SECONDS, A, B, C, between=" "),
-        "spaces between",
-    ),
+    "names in a comment": ("# t q1 q2 q3\n" + table(SECONDS, A, B, C, between=" "), "spaces between"),
     "an index of pandas": (",t,q1,q2,q3\n" + table(range(60), SECONDS, A, B, C), "time from t"),
-    "OpenSim": (
-        "Coordinates\nversion=1\nnRows=60\ninDegrees=yes\nendheader\n"
-        + "time\tjoint_1\tjoint_2\tjoint_3\n"
-        + table(SECONDS, D, E, F, between="\t"),
-        "degrees; time from time; tabs between",
-    ),
-    "a spreadsheet, decimal commas": (
-        "\ufeffZeit (s);Winkel 1 (°);Winkel 2 (°);Winkel 3 (°);\r\n"
-        + table(SECONDS, D, E, F, between=";", comma=True, end=";\r\n"),
-        "degrees; time in s; semicolons between; decimal commas",
-    ),
-    "decimal commas and tabs": (
-        table(SECONDS, A, B, C, between="\t", comma=True),
-        "tabs between; decimal commas",
-    ),
-    "UTF-16": (
-        ("t\tq1\tq2\tq3\r\n" + table(SECONDS, A, B, C, between="\t")).encode("utf-16"),
-        "tabs between",
-    ),
-    "Latin-1": (
-        ("t;q1 [°];q2 [°];q3 [°]\n" + table(SECONDS, D, E, F, between=";")).encode("cp1252"),
-        "degrees",
-    ),
-    "quoted": (
-        '"t","q1","q2","q3"\n'
-        + table(*([f'"{x:.6f}"' for x in each] for each in (SECONDS, A, B, C))),
-        "from q1",
-    ),
-    "thousands": (
-        "t_ms;q1;q2;q3\n" + table([f"{1e4 * s:,.1f}" for s in SECONDS], A, B, C, between=";"),
-        "commas in numbers",
-    ),
-    "equal rows": (
-        "t,q1,q2,q3\n"
-        + "".join(line + "\n" + line + "\n" for line in table(SECONDS, A, B, C).splitlines()),
-        "60 rows like the one before left out",
-    ),
-    "blank cells": (
-        "t,q1,q2,q3\n0,,,\n" + table(SECONDS[1:], A[1:], B[1:], C[1:]) + "4,nan,0.2,-\n",
-        "2 rows with blank cells left out",
-    ),
-    "a last line cut short": (
-        "t,q1,q2,q3\n" + table(SECONDS, A, B, C) + "4.0,0.8",
-        "line 62, the last one, cut short",
-    ),
-    "rounded stamps": (
-        "t,q1,q2,q3\n" + table(np.round(SECONDS, 1), A, B, C),
-        "rounded to 0.1 taken as equal steps",
-    ),
-    "equal stamps": (
-        "t,q1,q2,q3\n" + table(np.floor(SECONDS), A, B, C),
-        "rounded to 1 taken as equal steps",
-    ),
-    "angles without a sign": (
-        "t,q1_deg,q2_deg,q3_deg\n" + table(SECONDS, D % 360, E % 360, F % 360),
-        "whole turns taken out",
-    ),
-    "times called otherwise": (
-        "Uhr,Gelenk1,Gelenk2,Gelenk3\n" + table(SECONDS, A, B, C),
-        "time from Uhr",
-    ),
+    "OpenSim": ("Coordinates\nversion=1\nnRows=60\ninDegrees=yes\nendheader\n" + "time\tjoint_1\tjoint_2\tjoint_3\n" + table(SECONDS, D, E, F, between="\t"),
+        "degrees; time from time; tabs between"),
+    "a spreadsheet, decimal commas": ("\ufeffZeit (s);Winkel 1 (°);Winkel 2 (°);Winkel 3 (°);\r\n" + table(SECONDS, D, E, F, between=";", comma=True, end=";\r\n"),
+        "degrees; time in s; semicolons between; decimal commas"),
+    "decimal commas and tabs": (table(SECONDS, A, B, C, between="\t", comma=True), "tabs between; decimal commas"),
+    "UTF-16": (("t\tq1\tq2\tq3\r\n" + table(SECONDS, A, B, C, between="\t")).encode("utf-16"), "tabs between"),
+    "Latin-1": (("t;q1 [°];q2 [°];q3 [°]\n" + table(SECONDS, D, E, F, between=";")).encode("cp1252"), "degrees"),
+    "quoted": ('"t","q1","q2","q3"\n' + table(*([f'"{x:.6f}"' for x in each] for each in (SECONDS, A, B, C))), "from q1"),
+    "thousands": ("t_ms;q1;q2;q3\n" + table([f"{1e4 * s:,.1f}" for s in SECONDS], A, B, C, between=";"), "commas in numbers"),
+    "equal rows": ("t,q1,q2,q3\n" + "".join(line + "\n" + line + "\n" for line in table(SECONDS, A, B, C).splitlines()),
+        "60 rows like the one before left out"),
+    "blank cells": ("t,q1,q2,q3\n0,,,\n" + table(SECONDS[1:], A[1:], B[1:], C[1:]) + "4,nan,0.2,-\n", "2 rows with blank cells left out"),
+    "a last line cut short": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C) + "4.0,0.8", "line 62, the last one, cut short"),
+    "rounded stamps": ("t,q1,q2,q3\n" + table(np.round(SECONDS, 1), A, B, C), "rounded to 0.1 taken as equal steps"),
+    "equal stamps": ("t,q1,q2,q3\n" + table(np.floor(SECONDS), A, B, C), "rounded to 1 taken as equal steps"),
+    "angles without a sign": ("t,q1_deg,q2_deg,q3_deg\n" + table(SECONDS, D % 360, E % 360, F % 360), "whole turns taken out"),
+    "times called otherwise": ("Uhr,Gelenk1,Gelenk2,Gelenk3\n" + table(SECONDS, A, B, C), "time from Uhr"),
 }
+# fmt: on
 
 
 @pytest.mark.parametrize("kind", READ)
@@ -189,82 +96,34 @@ def test_a_record_is_read_right_and_what_was_taken_is_said(kind, tmp_path):
         raise AssertionError(found.describe())
 
 
+# fmt: off
 REFUSED = {
-    "ticks": (
-        "t,m1,m2,m3\n" + table(SECONDS, *np.round(512 + DEGREES * 1023 / 300)),
-        "m1 goes up to .* like ticks .* of a servo",
-    ),
-    "pulses": (
-        "millis,s1,s2,s3\n" + table(1000 * SECONDS, *np.round(1500 + DEGREES / 0.09)),
-        r"\(microseconds - 1500\)",
-    ),
-    "turns": (
-        "t,q1_rev,q2_rev,q3_rev\n" + table(SECONDS, *DEGREES / 360),
-        "q1_rev holds rev: write degrees or radians",
-    ),
-    "few ticks": (
-        "t,q1_ticks,q2_ticks,q3_ticks\n" + table(SECONDS, *DEGREES * 1023 / 300),
-        "q1_ticks holds ticks",
-    ),
-    "directions of links": (
-        "t,theta1,theta2,theta3,theta4\n" + table(SECONDS, T, A, B, C),
-        "if they are directions of links",
-    ),
-    "positions": (
-        "t,x0,y0,x1,y1,x2,y2\n" + table(SECONDS, A, B, C, A, B, C),
-        "look like positions of points",
-    ),
-    "leader and follower": (
-        "t,j1,j2,j3,l_j1,l_j2,l_j3\n" + table(SECONDS, A, B, C, A, B, C),
-        "j1 ... j3, and l_j1 ... l_j3",
-    ),
+    "ticks": ("t,m1,m2,m3\n" + table(SECONDS, *np.round(512 + DEGREES * 1023 / 300)), "m1 goes up to .* like ticks .* of a servo"),
+    "pulses": ("millis,s1,s2,s3\n" + table(1000 * SECONDS, *np.round(1500 + DEGREES / 0.09)), r"\(microseconds - 1500\)"),
+    "turns": ("t,q1_rev,q2_rev,q3_rev\n" + table(SECONDS, *DEGREES / 360), "q1_rev holds rev: write degrees or radians"),
+    "few ticks": ("t,q1_ticks,q2_ticks,q3_ticks\n" + table(SECONDS, *DEGREES * 1023 / 300), "q1_ticks holds ticks"),
+    "directions of links": ("t,theta1,theta2,theta3,theta4\n" + table(SECONDS, T, A, B, C), "if they are directions of links"),
+    "positions": ("t,x0,y0,x1,y1,x2,y2\n" + table(SECONDS, A, B, C, A, B, C), "look like positions of points"),
+    "leader and follower": ("t,j1,j2,j3,l_j1,l_j2,l_j3\n" + table(SECONDS, A, B, C, A, B, C), "j1 ... j3, and l_j1 ... l_j3"),
     "one name twice": ("t,q1,q1,q2\n" + table(SECONDS, A, B, C), "two columns are called q1"),
-    "head first, or not": (
-        "t,head,middle,tail\n" + table(SECONDS, A, B, C),
-        "head, middle, tail is not clear",
-    ),
-    "a unit of some": (
-        "t,q1_deg,q2,q3_deg\n" + table(SECONDS, D, E, F),
-        "q2 does not: call it q2_deg or q2_rad",
-    ),
-    "no number": (
-        "t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n2,", "\n2,E!", 1),
-        r"line 32, column q1: .* is no number: mend it",
-    ),
-    "a longer line": (
-        "t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n", ",1\n", 1) + "4,0,0,0\n",
-        "line 2, has 5 cells, and the lines below have 4",
-    ),
+    "head first, or not": ("t,head,middle,tail\n" + table(SECONDS, A, B, C), "head, middle, tail is not clear"),
+    "a unit of some": ("t,q1_deg,q2,q3_deg\n" + table(SECONDS, D, E, F), "q2 does not: call it q2_deg or q2_rad"),
+    "no number": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n2,", "\n2,E!", 1), r"line 32, column q1: .* is no number: mend it"),
+    "a longer line": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n", ",1\n", 1) + "4,0,0,0\n",
+        "line 2, has 5 cells, and the lines below have 4"),
     "two records": ("t,q1,q2,q3\n" + 2 * table(SECONDS, A, B, C), "the times fall after line 61"),
-    "names twice": (
-        2 * ("t,q1,q2,q3\n" + table(SECONDS, A, B, C)),
-        "line 62, names the columns again",
-    ),
-    "commas for both": (
-        "t,q1,q2,q3\n"
-        + table(*(np.round(each + 0.1234, 6) for each in (SECONDS, A, B, C)), comma=True),
-        "line 1, has 4 cells, and the lines below have .* decimal commas",
-    ),
-    "joints by turns": (
-        "t,q1,q2,q3\n"
-        + "".join(
-            f"{s},{x:.4f},,\n{s},,{x:.4f},\n{s},,,{x:.4f}\n"
-            for s, x in zip(SECONDS, A, strict=True)
-        ),
-        "only 0 of 180 lines .* write all joints in every line",
-    ),
-    "lists in cells": (
-        "t,positions\n" + "".join(f'{s},"[{a}, {a}]"\n' for s, a in zip(SECONDS, A, strict=True)),
-        "0 columns of angles",
-    ),
-    "another time": (
-        "t,q1,q2,q3\n" + table([f"31.01. {k}h" for k in range(60)], A, B, C),
-        "line 2: the time .* write seconds",
-    ),
+    "names twice": (2 * ("t,q1,q2,q3\n" + table(SECONDS, A, B, C)), "line 62, names the columns again"),
+    "commas for both": ("t,q1,q2,q3\n" + table(*(np.round(each + 0.1234, 6) for each in (SECONDS, A, B, C)), comma=True),
+        "line 1, has 4 cells, and the lines below have .* decimal commas"),
+    "joints by turns": ("t,q1,q2,q3\n" + "".join(f"{s},{x:.4f},,\n{s},,{x:.4f},\n{s},,,{x:.4f}\n" for s, x in zip(SECONDS, A, strict=True)),
+        "only 0 of 180 lines .* write all joints in every line"),
+    "lists in cells": ("t,positions\n" + "".join(f'{s},"[{a}, {a}]"\n' for s, a in zip(SECONDS, A, strict=True)), "0 columns of angles"),
+    "another time": ("t,q1,q2,q3\n" + table([f"31.01. {k}h" for k in range(60)], A, B, C), "line 2: the time .* write seconds"),
     "one instant": (table(np.ones(60), A, B, C), "all times are 1"),
     "JSON": (b'{"time_s": [0, 1]}', "is no text of numbers"),
     "a workbook": (b"PK\x03\x04\x14\x00\x06", "save as CSV"),
 }
+# fmt: on
 
 
 @pytest.mark.parametrize("kind", REFUSED)
