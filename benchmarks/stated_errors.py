@@ -26,7 +26,7 @@ from colloc.gaits.sloped import Slope
 from colloc.results.measured import measured
 from colloc.verification.inertial_motion import GaitWithInertia
 from colloc.verification.replay import replayer
-from colloc.verification.slope import gait_on_slope
+from colloc.verification.slope import GaitOnSlope
 
 FINER, LEAST = 1e-2, 1e-11
 """Error of the references' steps over the least of the errors that are stated, and the least:
@@ -115,7 +115,7 @@ def motion(case: Case) -> Row:
 
 def slope(case: Case) -> Row:
     """On a slope."""
-    on = gait_on_slope(*case[:4], case.grade, ())
+    on = GaitOnSlope(*case[:4], case.grade, ())
     ran = replayer(Slope(case.grade))(*case[:4], tolerance=case.tolerance)
     states = on.integrate(np.array([case.gait.theta]), _finer(ran.errors), 1e-3).states
     theta, climb, _, spent, *_ = states[:, -1] - states[:, 0]

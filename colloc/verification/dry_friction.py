@@ -1,10 +1,8 @@
-"""A period of a gait at delta = 0: distance, work and efficiency between bounds, by
-`colloc.verification.dry_balance`.
+"""A period of a gait at delta = 0: distance, work and efficiency between bounds.
 
-A replay at a small delta is corrected for how far dry friction is from it, instant by instant. At
-every instant of the replay the motion under dry friction is bounded, whatever it is. Between two
-instants it counts as at the worse of them, and the error of the replay's quadrature, as it
-estimates it, is added: these two are estimates, all else is bounds.
+A replay at a small delta is corrected, instant by instant, for how far dry friction is from it
+(`colloc.verification.dry_balance`). Between two instants the worse of them counts, and the error of
+the replay's quadrature is added: these two are estimates, all else is bounds.
 """
 
 from __future__ import annotations
@@ -22,21 +20,17 @@ from colloc.verification.dry_balance import dry_balance
 from colloc.verification.played import Path
 from colloc.verification.replay import replay
 
-DRY = 1e-6
-"""Of the largest mean rate: the delta of the replay, which is corrected for."""
-OPEN = 1e-2
-"""Of the largest rate: velocities that are known less well than this count as open."""
+DRY = 1e-6  # delta of the replay that is corrected, over the largest mean rate
+OPEN = 1e-2  # velocities known less well than this, over the largest rate, count as open
 
 
 class Between(NamedTuple):
-    """An interval."""
-
     least: float
     most: float
 
 
 class DryFriction(NamedTuple):
-    """What a gait does in a period under dry friction."""
+    """A period under dry friction."""
 
     distance: Between
     work: Between
@@ -71,23 +65,10 @@ def dry_friction(
     tolerance: float = 1e-6,
     turn: float = 0.0,
 ) -> DryFriction:
-    """Distance of the centre of mass and work of a path over a period at delta = 0, between bounds.
+    """Distance of the centre of mass and work of a path over a period at delta = 0, with the
+    arguments of `colloc.verification.replay.replay`.
 
-    Arguments as those of `colloc.verification.replay.replay`.
-
-    Raises
-    ------
-    ProblemError
-        For bodies that are no chains, and laws that have no bounds
-        (`colloc.verification.dry_balance.dry_balance`).
-
-    Examples
-    --------
-    >>> import colloc
-    >>> from colloc.verification.dry_friction import dry_friction
-    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-    >>> print(str(dry_friction(colloc.Chain(), colloc.Friction(), gait))[:20])
-    d/W between 0.260027
+    `ProblemError` for bodies that are no chains, and laws that have no bounds.
     """
     if not isinstance(body, Chain):
         raise ProblemError(
@@ -101,37 +82,30 @@ def dry_friction(
     replayed = replay(body, friction, path, delta, breaks=breaks, tolerance=tolerance, turn=turn)
     t, z = replayed.tail
     angles, rates = path(t)
-    found = dry_balance(body, friction, angles, rates)
+    dry, posture = dry_balance(body, friction, angles, rates), body.posture(angles)
+
+    def centre_velocity(z: np.ndarray) -> np.ndarray:
+        x, y = body.centre_velocity(posture, body.velocity(posture, rates, z))
+        return (x + 1j * y)[0]
+
     smooth = instant(body, law, angles, rates, z, delta)
-    power = total_power(smooth.velocity, smooth.force)[0]
-    moved, turned = _centre(body, angles, rates, z), z[2]
-    off = np.abs(_centre(body, angles, rates, found.z) - moved) + np.hypot(*found.apart[:2])
-    spin = np.abs(found.z[2] - turned) + found.apart[2]
+    power, moved = total_power(smooth.velocity, smooth.force)[0], centre_velocity(z)
+    off = np.abs(centre_velocity(dry.z) - moved) + np.hypot(*dry.apart[:2])
+    spin = np.abs(dry.z[2] - z[2]) + dry.apart[2]
     step = np.diff(np.append(t, 1.0))
 
     def integral(values: np.ndarray) -> float:
-        """The most that it can be, by the worse of neighbours."""
+        """Upper bound, by the worse of neighbours."""
         return float(step @ np.maximum(values, np.roll(values, -1)))
 
-    reach = integral(np.abs(moved))
-    off_distance = replayed.errors["distance"] + integral(off) + reach * integral(spin)
+    turned = integral(np.abs(moved)) * integral(spin)
+    way, off_way = replayed.distance, replayed.errors["distance"] + integral(off) + turned
     work, error = replayed.work, replayed.errors["work"]
+    low, high = integral(power - dry.least), integral(dry.most - power)
     largest = np.abs(rates).max(axis=0)
     return DryFriction(
-        distance=Between(
-            max(replayed.distance - off_distance, 0.0), replayed.distance + off_distance
-        ),
-        work=Between(
-            work - error - integral(power - found.least),
-            work + error + integral(found.most - power),
-        ),
-        open=float(step @ (found.apart.max(axis=0) > OPEN * largest)),
+        distance=Between(max(way - off_way, 0.0), way + off_way),
+        work=Between(work - error - low, work + error + high),
+        open=float(step @ (dry.apart.max(axis=0) > OPEN * largest)),
         instants=t.size,
     )
-
-
-def _centre(body: Chain, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Velocity of the centre of mass in the body's axes, complex."""
-    posture = body.posture(angles)
-    x, y = body.centre_velocity(posture, body.velocity(posture, rates, z))
-    return (x + 1j * y)[0]

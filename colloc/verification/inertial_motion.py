@@ -1,14 +1,8 @@
-"""A gait with inertia, over a period of the motion in which all periods are alike: by Adams' and
-Gear's methods, steps of their own, and shooting.
+r"""Gaits with inertia by shooting: periods that leave the momenta as they are, by Adams' and Gear's
+methods and Newton's on the map of a period.
 
-The pace of a gait matters once the body's mass does. The Froude number Fr = L/(g T^2), length over
-gravity and the period squared, says how much: it is the mass times acceleration of a body that
-covers its length in a period, over its weight. It counts against the coefficient of friction. At
-Fr = 0 this is `colloc.verification.replay.replay`.
-
-Nothing is shared with collocation but the forces. The momenta after a period are those before it;
-they are found by Newton's method on the map from one to the other, whose derivatives also say
-whether the motion is stable.
+At the Froude number Fr = L/(g T^2) mass times acceleration counts against friction as Fr to mu; at
+0 this is `colloc.verification.replay.replay`. Nothing is shared with collocation but the forces.
 """
 
 from __future__ import annotations
@@ -38,9 +32,9 @@ from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.played import Numbers, Path, Replay, lever, to_tolerance
 
 _ROUGH = 1e-4
-"""Error of the runs that say how the momenta at the end depend on those at the start, over the size
-of the momenta; less where friction is so dry that a step would err by more than a tenth of delta:
-then bodies that should rest are shaken to and fro."""
+"""Error of the runs that give the derivatives of the period map, over the size of the momenta; less
+where friction is so dry that a step would err by more than a tenth of delta: then bodies that
+should rest are shaken to and fro."""
 _APART = 1e-3  # distance between the starts of those runs
 _LEFT_OPEN = 10.0
 """Gap between the momenta at start and end that is left open at most, over the error of a run:
@@ -55,7 +49,7 @@ _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
 @dataclass(frozen=True, eq=False)
 class InertialMotion(Period):
-    """A gait with inertia, over one period of the motion in which all periods are alike.
+    """A period of a gait with inertia that leaves the momenta as they are.
 
     The work is that against friction [weight x length]; errors are those of
     `GaitWithInertia.errors`.
@@ -113,24 +107,9 @@ class PeriodicRun(NamedTuple):
 
 
 class GaitWithInertia:
-    """A gait of a chain at a Froude number.
-
-    Parameters
-    ----------
-    body, friction, gait, delta
-    froude : float
-    breaks : tuple of float
-        Phases in (0, 1) at which the rates jump.
-    turn : float
-        That a period is asked for [rad].
-    regime : Regime
-        Whose weight pulls, as on a slope; then orientations are from straight uphill.
-
-    Raises
-    ------
-    ProblemError
-        If the body cannot move with inertia.
-    """
+    """A gait of a chain at a Froude number, asked for a turn [rad], with corners at `breaks`; in a
+    regime whose weight pulls orientations are from straight uphill. `ProblemError` if the body
+    cannot move with inertia."""
 
     def __init__(
         self,
@@ -152,8 +131,8 @@ class GaitWithInertia:
         self._momenta_of = lru_cache(partial(MomentaAt, self.body, friction, delta, self.froude))
 
     def momenta(self, z: np.ndarray | None = None) -> np.ndarray:
-        """Those at the start of the period, ``(3,)``, where the tail link has a velocity ``(3,
-        1)``; by default as if the gait were played slowly on the level."""
+        """Momenta at phase 0, ``(3,)``, for a velocity of the tail link ``(3, 1)``; by default that
+        of quasi-static motion on the level."""
         angles, rates = self.path(np.full(1, ONE_SIDED))
         if z is None:
             z = solve_balance(self.body, self.friction, angles, rates, self.delta).require().z
@@ -166,7 +145,7 @@ class GaitWithInertia:
         return self._run(np.append(start, [self.theta, 0.0, 0.0, 0.0][start.size - 3 :])[None], aim)
 
     def _run(self, begin: np.ndarray, aim: float) -> Course:
-        """Several such motions with the same steps, from states ``(n, 7)``."""
+        """Several motions with the same steps, from states ``(n, 7)``."""
 
         def rates(t: float, states: np.ndarray, _: None) -> tuple[np.ndarray, None]:
             return self._rates(t, states.reshape(begin.shape)).ravel(), None
@@ -174,8 +153,8 @@ class GaitWithInertia:
         return followed(rates, begin.ravel(), aim, self.breaks)
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
-        """What `colloc.motion.compiled_momenta` says of a phase and n momenta, with the weight's
-        pull, ``(n, 9)``."""
+        """Outputs of `colloc.motion.compiled_momenta` for a phase and states ``(n, 7)``, with the
+        weight's pull, ``(n, 9)``."""
         angles, rates = self.path(np.array([t]))
         now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
         if self.regime.slides:
@@ -225,8 +204,8 @@ class GaitWithInertia:
         )
 
     def find_period(self, near: np.ndarray | None = None) -> RoughPeriod:
-        """`rough_period` near some momenta; where they are not given or lead nowhere, near the slow
-        ones, or near none: a body that friction hardly brakes keeps what it begins with at rest."""
+        """`rough_period` near some momenta; where these are not known or lead nowhere, near the
+        quasi-static ones, or none: a body that friction hardly brakes keeps what it begins with."""
         if near is not None:
             with suppress(NotConvergedError):
                 return self.rough_period(near)
@@ -235,8 +214,8 @@ class GaitWithInertia:
         return self.rough_period(np.zeros(3))
 
     def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
-        """A period that leaves the momenta as they are, to an error, sought near those of a
-        `RoughPeriod`, with its derivatives."""
+        """A period that leaves the momenta as they are, to an error, from the momenta and
+        derivatives of a `RoughPeriod`."""
         start, before = near, np.inf
         for _ in range(_MOST_STEPS):
             course = self.run(start, aim)
@@ -259,10 +238,9 @@ class GaitWithInertia:
 
             s* - s = (I - M)^-1 (gap - e),
 
-        M being the derivatives of the momenta, and gap what is left open. Errors of momenta are
-        multiplied many times where friction brakes little, and so carried with the body through all
-        the period. Of e a bound is the difference of the ends of both runs, had they had one start;
-        but it is the aim at least, as differences vanish now and then.
+        M being the derivatives of the momenta, and gap what is left open. A bound of e is the
+        difference of the ends of both runs, had they had one start, but the aim at least, as
+        differences vanish now and then.
         """
         (first, last), (other, end) = (each.ends.T for each in (ran, before))
         steps = np.maximum(np.abs(end - last - slopes @ (other - first)[_MOMENTA]), ran.aim)
@@ -274,8 +252,7 @@ class GaitWithInertia:
         """Changes of `totals` between states ``(7, 2)``, where those at the end err by `steps`
         ``(7,)``, and momenta do not close by a gap ``(3,)``."""
         off = np.column_stack([np.diag(steps), amplification(slopes) * (steps[_MOMENTA] + gap)])
-        start, end = ends.T
-        totals = self.totals(ends)
+        (start, end), totals = ends.T, self.totals(ends)
         changed = [self.totals(np.column_stack([start, end + each])) for each in off.T]
         return {x: sum(abs(other[x] - value) for other in changed) for x, value in totals.items()}
 
@@ -287,7 +264,6 @@ def amplification(slopes: np.ndarray) -> np.ndarray:
 
 
 def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """To where a period changes nothing."""
     return np.linalg.solve(np.eye(3) - slopes[_MOMENTA], gap)
 
 
@@ -333,7 +309,7 @@ def inertial_motion(
         Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that
         turns by as much.
     quantities : iterable of Quantity or str
-        What shapes and their rates sum up to and is asked for besides.
+        Further quantities that shapes and their rates sum up to.
     regime : Regime
         On a slope `problem.regime`, or `colloc.gaits.sloped.Slope`: the gait says where it points,
         distance and work are as of `colloc.slope_motion`.
@@ -396,13 +372,12 @@ def inertial_replay(
     near: Replay | None = None,
     **_: object,
 ) -> Replay:
-    """A period of a gait with inertia as a certificate asks for it: arguments are as of
-    `colloc.verification.replay.replay`; the regime says its pace.
+    """`inertial_motion` with the arguments of `colloc.verification.replay.replay`, at the pace of
+    the regime.
 
-    What a body comes to that sets out from rest is looked at, too: if it is another motion, the
-    gait has several. Of a gait replayed `near` another, as at another delta, one motion is looked
-    for where that had one. Of the result the residual is the change of the momenta in a period; the
-    work of the joints is that against friction and what the body gains in kinetic energy.
+    A body from rest may come to another motion: then the gait has several. Near a replay that had
+    one, as at another delta, no other is looked for. The joints' work is that against friction and
+    what the body gains in kinetic energy.
     """
     regime = regime.at(gait)
     how: Any = {"froude": regime.froude, "breaks": breaks, "turn": turn, "regime": regime}
@@ -460,7 +435,7 @@ def motion_from_rest(
     grade: float = 0.0,
     theta: float = 0.0,
 ) -> FromRest:
-    """Move a body from rest: how a body with inertia comes to the motion in which all periods are
+    """Move a body with inertia from rest: how it comes to the motion in which all periods are
     alike, or glides downhill.
 
     Its momenta are zero at first, while its joints already turn at the gait's rates.
@@ -470,7 +445,6 @@ def motion_from_rest(
     body, friction, gait, delta, froude, breaks
         As of `inertial_motion`.
     periods : int
-        How many.
     tolerance : float
         About the error of the states after a period.
     grade : float
@@ -499,9 +473,9 @@ def motion_from_rest(
     check_finite(positive=True, froude=froude, delta=delta, tolerance=tolerance)
     check_count(MOST_PERIODS, periods=periods)
     check_finite(grade=grade, theta=theta)
-    regime = Slope(float(grade)) if grade else LEVEL
+    how: Any = {"froude": froude, "breaks": breaks}
     moving = GaitWithInertia(
-        body, friction, gait, delta, froude=froude, breaks=breaks, regime=regime
+        body, friction, gait, delta, regime=Slope(float(grade)) if grade else LEVEL, **how
     )
     start, courses = np.array([0.0, 0.0, 0.0, theta, 0.0, 0.0, 0.0]), []
     for _ in range(periods):

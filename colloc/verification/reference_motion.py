@@ -28,7 +28,7 @@ from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import totals_along
 from colloc.verification.inertial_motion import GaitWithInertia, amplification
 from colloc.verification.played import LEAST
-from colloc.verification.slope import gait_on_slope
+from colloc.verification.slope import GaitOnSlope
 
 
 class ReferenceMotion(NamedTuple):
@@ -63,7 +63,7 @@ def reference_motion(
     if isinstance(regime, Slope):
         asked = [each for each in control.aims.integrals if each.needs_forces]
         body, law, *_ = control.dynamics
-        on = gait_on_slope(body, law, gait, delta, regime.grade, gait.corner_phases)
+        on = GaitOnSlope(body, law, gait, delta, regime.grade, gait.corner_phases)
         ran = on.integrate(np.array([gait.theta]), error)
         return ReferenceMotion(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
     raise NotImplementedError(

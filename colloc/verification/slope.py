@@ -1,34 +1,26 @@
-r"""A gait on a slope: the heading becomes an unknown of its own, because the weight pulls down the
-slope while the body turns.
+r"""Gaits on a slope, where the heading is a state: the weight pulls downhill while the body turns.
 
-On a plane whose inclination has the tangent g, the *grade*, a body presses on the ground with a
-force of 1 and its weight pulls it down along the fall line with g. With theta the angle of the tail
-link from straight uphill, the pull in the body's axes is ``-g e^(-i theta)``, and the balance at an
-instant gives velocities that depend on theta:
+On a plane of grade g, the tangent of its inclination, the body presses on the ground with a force
+of 1. With theta the angle of the tail link from straight uphill, the weight pulls with ``-g e^(-i
+theta)`` in the body's axes, the balance gives velocities that depend on theta, and
 
     d theta/dt = omega(q, q', theta),      d x/dt = e^(i theta) c(q, q', theta),
 
-c being the velocity of the centre of mass in the body's axes, and x its place in the plane, its
-real part uphill. On the level theta is a sum; here this is an ordinary differential equation, and
-is solved as one. The joints work against friction and lift the body,
-
-    work of the joints = work against friction + g climb,
-
-which is measured on both sides: the left one from the moments in the joints.
+c being the velocity of the centre of mass in the body's axes and x its place, real part uphill. The
+work of the joints, by their moments, is the work against friction + g climb.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import (
     LENGTH,
     Instants,
@@ -49,8 +41,8 @@ from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion, whole_t
 from colloc.verification.played import Path, Replay, lever, to_tolerance
 
 _UNITS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
-"""Of the errors of theta, place, works, and of the logarithm of the steering, which is needed less
-exactly."""
+"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed
+less exactly."""
 _OMEGA = 2
 _LOOSER = 30.0  # error of the run that states the error, over that of the run it is of
 _PANELS = 40
@@ -70,8 +62,8 @@ class SlopeMotion:
     course : float
         Direction in which the gait goes on the level, from that of the tail link at phase 0 [rad].
     headings : (n_period + 1,)
-        At the start of every period and the end of the last: the direction in which the gait would
-        go from there on the level, from straight uphill, positive to the left [rad].
+        Directions, at the start of every period and the end of the last, in which the gait would go
+        from there on the level, from straight uphill, positive to the left [rad].
     climb, aside : (n_period,)
         Way of the centre of mass up the fall line, and to the left of it [body lengths along the
         slope].
@@ -81,8 +73,8 @@ class SlopeMotion:
         Derivative of the heading at the end of a period with respect to that at its start; always
         positive.
     error : float
-        Of headings, ways and works at the end: how much they change where steps are allowed 30
-        times the error.
+        Error of headings, ways and works at the end: their change where steps are allowed 30 times
+        the error.
     several : float
         Part of the time at which several motions are balanced, by the solver's steps; 0 for laws
         that leave one. One of them is followed, and no error says what the others would change.
@@ -117,7 +109,7 @@ class SlopeMotion:
 
     @property
     def turn(self) -> float:
-        """Of the heading, over all periods [rad]."""
+        """Turn of the heading over all periods [rad]."""
         return float(self.headings[-1] - self.headings[0])
 
     @property
@@ -126,72 +118,31 @@ class SlopeMotion:
         return bool(np.prod(self.steering) < 1.0)
 
 
-class GaitOnSlope(NamedTuple):
-    """A gait of a body, and the slope it is on."""
+class GaitOnSlope:
+    """A gait of a chain on a slope; `ProblemError` if the body cannot be there."""
 
-    body: Chain
-    friction: Law
-    path: Path
-    delta: float
-    breaks: tuple[float, ...]
-    slope: Slope
-
-    def course(self, tolerance: float) -> float:
-        """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
-        edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), self.breaks)
-        way = fine_motion(*self[:4], edges, tolerance, lambda period: _WAY_ALONE).path[-1]
-        return float(np.angle(way)) if abs(way) > tolerance else 0.0
+    def __init__(
+        self,
+        body: Body,
+        friction: Law,
+        path: Path,
+        delta: float,
+        grade: float,
+        breaks: np.ndarray | tuple[float, ...] = (),
+    ) -> None:
+        self.body, self.slope = checked_chain(body, friction, grade), Slope(float(grade))
+        self.friction, self.path, self.delta = friction, path, delta
+        self.breaks = tuple(sorted(map(float, breaks)))
 
     def integrate(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
-        """The unknowns ``(6,)`` through a period, from those at its begin, of which theta is the
-        first; no step is longer than `longest`."""
+        """The unknowns of `SlopeMotion` through a period, from the first of them at its begin."""
         start = np.append(begin, np.zeros(6 - begin.size))
         return followed(self._rates, start, tolerance * _UNITS, self.breaks, longest)
-
-    def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
-        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the steps of
-        the solver."""
-        if not quantities:
-            return np.empty((0, ends.size))
-        edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
-        h = np.diff(edges)
-        t = (edges[:-1, None] + h[:, None] * PANEL_RULE.c).ravel()
-        now, _ = self.instants(t, ran.at(t)[0])
-        parts = [h * (each.at(now)[0].reshape(h.size, -1) @ PANEL_RULE.b) for each in quantities]
-        sums = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
-        return sums[:, np.searchsorted(edges, ends)]
-
-    def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
-        """Part of the time at which several motions are balanced, from phases and orientations
-        there, ``(n,)``."""
-        if self.friction.associated:
-            return 0.0
-        at = (self.body, self.friction, *self.path(phases % 1.0), self.delta)
-        several = all_balanced_velocities(*at, self.slope.pull(theta[None])).number > 1
-        return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
-
-    def run(
-        self, course: float, heading: float, periods: int, tolerance: float, longest: float = np.inf
-    ) -> SlopeMotion:
-        """The motion through periods from a heading, without its error; no step is longer than
-        `longest`."""
-        start, courses = np.append(heading - course, np.zeros(5)), []
-        for _ in range(periods):
-            courses.append(self.integrate(start, tolerance, longest))
-            start = courses[-1].states[:, -1]
-        states = np.concatenate([ran.states for ran in courses], axis=1)
-        ends = np.stack([states[:, 0], *(ran.states[:, -1] for ran in courses)], axis=1)
-        climb, aside, friction_work, joint_work, steering = np.diff(ends[1:])
-        ways = climb, aside, friction_work, joint_work
-        phases = np.concatenate([k + ran.phases for k, ran in enumerate(courses)])
-        at = self.slope.grade, course, ends[0] + course
-        return SlopeMotion(*at, *ways, np.exp(steering), np.nan, np.nan, phases, states)
 
     def _rates(
         self, t: float, state: np.ndarray, near: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next
-        balance may start."""
+        """Derivatives of the unknowns, and the tail velocity to start the next balance from."""
         shapes, theta = (*self.path(np.array([t])), self.delta), state[0]
         solved, now, _, by_theta = balance_on_slope(
             self.body, self.friction, self.slope, shapes, np.array([theta]), start=near
@@ -207,26 +158,55 @@ class GaitOnSlope(NamedTuple):
         omega, steering = now.z[_OMEGA, 0], by_theta[_OMEGA, 0]
         return np.array([omega, moved.real, moved.imag, *works, steering]), solved.z
 
+    def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
+        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the steps of
+        the solver."""
+        if not quantities:
+            return np.empty((0, ends.size))
+        edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
+        h = np.diff(edges)
+        t = (edges[:-1, None] + h[:, None] * PANEL_RULE.c).ravel()
+        now, _ = self.instants(t, ran.at(t)[0])
+        parts = [h * (each.at(now)[0].reshape(h.size, -1) @ PANEL_RULE.b) for each in quantities]
+        sums = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
+        return sums[:, np.searchsorted(edges, ends)]
+
     def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
-        """What formulas see at phases, from the orientations there ``(n,)``, and what balance
-        leaves over, ``(n,)``."""
+        """What formulas see at phases and orientations ``(n,)``, and the residual of the balance
+        ``(n,)``."""
         at = (self.body, self.friction, *self.path(phases), self.delta)
         load = self.slope.pull(theta[None])
         solved = solve_balance(*at, load=load)
         return Instants(*at, z=solved.z, load=load), solved.residual
 
+    def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
+        """Part of the time at which several motions are balanced."""
+        if self.friction.associated:
+            return 0.0
+        at = (self.body, self.friction, *self.path(phases % 1.0), self.delta)
+        several = all_balanced_velocities(*at, self.slope.pull(theta[None])).number > 1
+        return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
 
-def gait_on_slope(
-    body: Body,
-    friction: Law,
-    gait: Path,
-    delta: float,
-    grade: float,
-    breaks: np.ndarray | tuple[float, ...],
-) -> GaitOnSlope:
-    """A gait of a body on a slope, or a `ProblemError` that says why it cannot be there."""
-    at = checked_chain(body, friction, grade), friction, gait, delta
-    return GaitOnSlope(*at, tuple(sorted(map(float, breaks))), Slope(float(grade)))
+    def course(self, tolerance: float) -> float:
+        """`SlopeMotion.course`; 0 where the gait stays."""
+        edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), self.breaks)
+        at = self.body, self.friction, self.path, self.delta
+        way = fine_motion(*at, edges, tolerance, lambda period: _WAY_ALONE).path[-1]
+        return float(np.angle(way)) if abs(way) > tolerance else 0.0
+
+    def run(self, course: float, heading: float, periods: int, tolerance: float) -> SlopeMotion:
+        """The motion through periods from a heading, without its error."""
+        start, courses = np.append(heading - course, np.zeros(5)), []
+        for _ in range(periods):
+            courses.append(self.integrate(start, tolerance))
+            start = courses[-1].states[:, -1]
+        states = np.concatenate([ran.states for ran in courses], axis=1)
+        ends = np.stack([states[:, 0], *(ran.states[:, -1] for ran in courses)], axis=1)
+        climb, aside, friction_work, joint_work, steering = np.diff(ends[1:])
+        ways = climb, aside, friction_work, joint_work
+        phases = np.concatenate([k + ran.phases for k, ran in enumerate(courses)])
+        at = self.slope.grade, course, ends[0] + course
+        return SlopeMotion(*at, *ways, np.exp(steering), np.nan, np.nan, phases, states)
 
 
 def slope_motion(
@@ -292,7 +272,7 @@ def slope_motion(
     [0.181] [1.041]
     [0.091] [1.048]
     """
-    on = gait_on_slope(body, friction, gait, delta, grade, breaks)
+    on = GaitOnSlope(body, friction, gait, delta, grade, breaks)
     if heading is None and theta is None:
         theta = getattr(gait, "theta", None)
     check_finite(heading=0.0 if heading is None else heading, theta=0.0 if theta is None else theta)
@@ -302,11 +282,8 @@ def slope_motion(
     heading = (heading or 0.0) if theta is None else theta + course
     loose = on.run(course, heading, periods, _LOOSER * tolerance).states[:5, -1]
     ran = on.run(course, heading, periods, tolerance)
-    return replace(
-        ran,
-        error=float(np.abs(ran.states[:5, -1] - loose).max()),
-        several=on.several(ran.phases, ran.states[0]),
-    )
+    error = float(np.abs(ran.states[:5, -1] - loose).max())
+    return replace(ran, error=error, several=on.several(ran.phases, ran.states[0]))
 
 
 def slope_replay(
@@ -324,27 +301,26 @@ def slope_replay(
     limits: Iterable[PathLimit] | PathLimits = (),
     **_: object,
 ) -> Replay:
-    """A period of a gait that says where it points, on a slope: arguments as of
+    """A period of a gait that says where it points, with the arguments of
     `colloc.verification.replay.replay`.
 
-    The equation is solved with ever smaller errors a step until the last tenth of them changes the
-    objective by less than is allowed. Of the result the distance is the way in the direction that
-    counts, the work that of the joints; what other balanced motions would change is not known, only
-    for which part of the time there are any. `NotConvergedError` if no balance is found at some
-    instant, or rounding hides the accuracy that is asked for.
+    The distance is the way in the direction that counts, the work that of the joints; what other
+    balanced motions would change is not known. `NotConvergedError` if no balance is found at some
+    instant, or rounding hides the accuracy.
     """
     asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
     with_forces = [each for each in asked if each.needs_forces]
     totals = whole_totals([each for each in asked if not each.needs_forces], gait)
-    on = gait_on_slope(body, friction, gait, delta, slope.grade, breaks)
+    on = GaitOnSlope(body, friction, gait, delta, slope.grade, breaks)
 
     def run(aim: float) -> tuple[tuple[Course, float], dict[str, float]]:
         ran = on.integrate(np.array([gait.theta]), aim, _LONGEST / instants)
         theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
         way, work = slope.counted(complex(climb, aside)), float(spent + slope.grade * climb)
-        found = {"distance": way.real, "work": work, "rotation": float(theta)}
+        numbers = {"distance": way.real, "work": work, "rotation": float(theta)}
         sums = on.totals(ran, with_forces, np.ones(1))[:, 0].tolist()
-        return (ran, way.imag), found | dict(zip((x.name for x in with_forces), sums, strict=True))
+        names = (each.name for each in with_forces)
+        return (ran, way.imag), numbers | dict(zip(names, sums, strict=True))
 
     first = _FIRST * tolerance
     (ran, across), values, errors = to_tolerance(run, first, objective, tolerance, totals)

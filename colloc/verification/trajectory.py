@@ -1,19 +1,12 @@
-"""A gait as joint angles over time for a machine: a period in seconds, and joint speeds it can
-follow.
+"""A gait as joint angles over time for a machine: a period in seconds, within joint speed limits.
 
-Dry friction does not know how fast a path is run through, so distance and work per period do not
-depend on pacing (up to the influence of delta). With phase t in [0, 1] and time tau in seconds,
-pacing is ``d tau/dt = p(t)``; joint j then moves at ``|dq_j/dt| / p``. Speed limits v_j ask for ``p
->= s(t) = max_j |dq_j/dt| / v_j``, and the least change of an even pace that takes T seconds is
+Distance and work under dry friction do not depend on pacing. With phase t and time tau in seconds,
+pacing is ``d tau/dt = p(t)``, and joint j moves at ``|dq_j/dt| / p``. Speed limits v_j ask for ``p
+>= s(t) = max_j |dq_j/dt| / v_j``; the least change of an even pace that takes T seconds is
 
-    p(t) = max(level, s(t)),   level such that  int p dt = T;
+    p(t) = max(level, s(t)),   level such that  int p dt = T,
 
-T = int s dt, with level = 0, is the fastest: some joint is at its limit all the time.
-
-A machine comes to it from rest (`approach`): over a period the gait grows out of the straight body,
-``a(t) q(t)``, where a rises from 0 to 1 and is flat at both ends, so that joints begin at rest and
-enter the period with its angles and speeds. No joint bends farther than the gait bends it. Where a
-joint would be too fast, the clock slows down.
+and T = int s dt, with level = 0, is the fastest.
 """
 
 from __future__ import annotations
@@ -90,11 +83,21 @@ def plan_trajectory(
     clock = np.concatenate([[0.0], np.cumsum(pace) / pace.size])
     clock *= period / clock[-1]
     time = np.arange(count) / rate
-    phase = np.interp(time, clock, _PHASES)
-    angles = np.stack([np.interp(time, clock, joint) for joint in vertices])
-    index = np.clip(np.searchsorted(clock, time, side="right") - 1, 0, pace.size - 1)
-    speeds = np.clip(path(phase)[1] / pace[index], -most[:, None], most[:, None])
+    phase, angles = _by_clock(time, clock, _PHASES[None])[0], _by_clock(time, clock, vertices)
+    speeds = _within(path(phase)[1], pace, clock, time, most)
     return Trajectory(time, phase, angles, speeds, period)
+
+
+def _by_clock(time: np.ndarray, clock: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    return np.array([np.interp(time, clock, row) for row in rows])
+
+
+def _within(
+    speeds: np.ndarray, pace: np.ndarray, clock: np.ndarray, time: np.ndarray, most: np.ndarray
+) -> np.ndarray:
+    """Speeds ``(n_joint, n)`` at the pace of the clock, within limits but for rounding."""
+    index = np.clip(np.searchsorted(clock, time, side="right") - 1, 0, pace.size - 1)
+    return np.clip(speeds / pace[index], -most[:, None], most[:, None])
 
 
 class Approach(NamedTuple):
@@ -106,16 +109,12 @@ class Approach(NamedTuple):
 
 
 def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approach:
-    """The way of joints from 0, at rest, into a trajectory, no faster than limits ``(n_joint,)``
-    [rad/s] that this keeps.
+    """Joints from 0, at rest, into a trajectory, no faster than limits ``(n_joint,)`` [rad/s] that
+    this keeps.
 
-    Examples
-    --------
-    >>> import colloc
-    >>> made = plan_trajectory(colloc.ellipse(A0=0, A1=0.5, B1=0.3), 50.0, period=2.0)
-    >>> way = approach(made, 50.0, limits=np.array([2.0, 2.0]))
-    >>> float(way.time[0]), float(way.time[-1]), bool(np.abs(way.angles[:, 0]).max() < 1e-4)
-    (-2.0, -0.02, True)
+    Over a period the gait grows out of the straight body, ``a(t) q(t)``, where a rises from 0 to 1
+    and is flat at both ends: no joint bends farther than the gait bends it. Where a joint would be
+    too fast, the clock slows down.
     """
     from scipy.interpolate import CubicHermiteSpline
 
@@ -132,23 +131,13 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
     clock = np.append(0.0, np.cumsum(pace)) * step
     time = np.arange(-int(np.ceil(clock[-1] * rate - 1e-9)), 0) / rate
     at = time + clock[-1]
-    bent, turning = (
-        np.array([np.interp(at, clock, row) for row in rows]) for rows in (angles, speeds)
-    )
-    side = np.clip(np.searchsorted(clock, at, side="right") - 1, 0, pace.size - 1)
-    return Approach(time, bent, np.clip(turning / pace[side], -limits[:, None], limits[:, None]))
+    sampled = _by_clock(at, clock, speeds)
+    return Approach(time, _by_clock(at, clock, angles), _within(sampled, pace, clock, at, limits))
 
 
 def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) -> float:
-    """Seconds that a path takes at least with joint speeds ``(n_joint,)`` [rad/s], at its own pace
-    or at any.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> round(shortest_period(colloc.ellipse(A0=0, A1=0.5, B1=0), np.array([2.0, 2.0])), 3)
-    1.0
-    """
+    """Least seconds of a path with joint speeds ``(n_joint,)`` [rad/s], at its own pace or at
+    any."""
     return float(_slowest(path(_PHASES)[0], limits, keep_pace).mean())
 
 
@@ -160,8 +149,7 @@ def _slowest(vertices: np.ndarray, limits: np.ndarray, keep_pace: bool) -> np.nd
 
 
 def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: str) -> np.ndarray:
-    """Limits that are positive numbers, ``(n_joint,)``, from one for all or one each; `what` one of
-    them is."""
+    """Positive limits ``(n_joint,)`` from one for all or one each; `what` one of them is called."""
     try:
         given = np.asarray(limits, dtype=float).ravel()
     except (TypeError, ValueError):
@@ -176,9 +164,7 @@ def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: s
 
 
 def _level(slowest: np.ndarray, period: float) -> float:
-    """The even pace that lower bounds are raised to so that the mean of the larger of both is
-    `period`."""
-
+    """The even pace that lower bounds are raised to so that the mean of the larger is `period`."""
     from scipy.optimize import brentq
 
     def excess(level: float) -> float:
