@@ -1,15 +1,9 @@
-"""What is solved: how a body moves, which of its gaits are allowed, what they are to be best at;
-and friction's own unit.
+"""The optimal control problem of a `Problem`, in units of friction: dynamics, gaits, objectives,
+limits.
 
-A `Problem` is what somebody states. It is taken apart here, once, into an optimal control problem:
-`Dynamics`, `Admissible`, `Aims` and limits on actuators. Programs, motions and errors of meshes are
-made from these, and none of them asks a `Problem`.
-
-Friction comes in units of its own size, so that what a solver sees is never larger or smaller than
-it was made for. Balance and velocities depend on the ratios of the coefficients only; forces and
-work are proportional to them, efficiency inversely. So a problem with coefficients of 1e-6 is one
-with coefficients of 1, and tolerances are relative to friction. An objective that is proportional
-to no power of the coefficients is left as it is.
+Balance and velocities depend on ratios of friction coefficients only; forces and work are
+proportional to them, efficiency inversely. So tolerances are relative to friction. An objective of
+no degree in the coefficients is left as it is.
 """
 
 from __future__ import annotations
@@ -33,32 +27,29 @@ from colloc.numerics.schemes import scheme
 
 
 class Dynamics(NamedTuple):
-    """What moves how: a body under a law of friction, in a regime such as slow on the level."""
+    """A body under a law of friction, in a regime."""
 
     body: Body
     law: Law
     regime: Regime
     symmetry: str
-    """Of the motion: which part of a period follows from the other (`colloc.gaits.symmetry`)."""
+    """Symmetry of the motion (`colloc.gaits.symmetry`)."""
     turn: float = 0.0
-    """By which a period is asked to turn the body [rad]: the way is seen from axes that turn evenly
-    (`colloc.gaits.period`)."""
+    """Prescribed rotation over a period [rad]."""
     joint_map: JointMap | None = None
 
     def in_speeds_of(self, unit: float) -> Dynamics:
-        """The same for speeds that are divided by a unit."""
         return self._replace(law=self.law.in_speeds_of(unit))
 
 
 class Admissible(NamedTuple):
-    """Gaits that are allowed: a class of gaits of a body, and its limits."""
+    """A class of gaits of a body, and its limits."""
 
     gait: AnyClass
-    """The class."""
     body: Body
     joint_limit: Limit
     largest_speeds: tuple[float, ...]
-    """Of each shape coordinate [rad per period]; none if there is no limit."""
+    """[rad per period]; empty without a limit."""
     smallest_shape_speed: float
 
     @property
@@ -66,53 +57,32 @@ class Admissible(NamedTuple):
         return self.body.n_joint
 
     def member(self, parameters: np.ndarray) -> AnyGait:
-        """The gait of a parameter vector of the full program."""
         return self.gait.member(parameters, self.n_joint)
 
 
 class Aims(NamedTuple):
-    """What a gait is to be best at, what it must keep to, and what it must reach."""
+    """Objective, required values, prescribed rotation."""
 
     objective: Objective
     at_least: tuple[tuple[Objective, float], ...]
     rotation: float | None
-    """Over a period [rad]; None: free."""
     no_way_across: bool
-    """Whether what counts on a slope is the way in a direction, with none across it."""
 
     def uses(self, quantity: str) -> bool:
-        """Whether any of it speaks of a quantity of a period, by its name."""
+        """Whether an objective or requirement uses a quantity of a period."""
         return any(
             quantity in aim.uses for aim in (self.objective, *(aim for aim, _ in self.at_least))
         )
 
     @property
     def integrals(self) -> tuple[Quantity, ...]:
-        """The quantities of which it speaks that are integrals of functions of an instant."""
+        """Quantities that are integrals over a period."""
         return integrals_of((self.objective, *(aim for aim, _ in self.at_least)))
 
 
 @dataclass(frozen=True, eq=False)
 class ControlProblem:
-    """An optimal control problem in units of friction.
-
-    Attributes
-    ----------
-    problem : Problem
-        What it stands for. Stages hand it on; nobody below them looks into it.
-    dynamics : Dynamics
-    admissible : Admissible
-    aims : Aims
-    actuators : PathLimits
-    formulation : str
-        Of the full program.
-    scheme : str
-    intervals : int
-        Scheme of collocation, and intervals of the first mesh.
-    delta_start : float
-        In the units of the class.
-    unit : float
-        The friction that is 1 here.
+    """An optimal control problem in units of friction; `unit` is the friction that is 1 here.
 
     Examples
     --------
@@ -136,27 +106,23 @@ class ControlProblem:
     unit: float
 
     def mesh(self, edges: np.ndarray | None = None, of_scheme: str = "") -> Mesh:
-        """The first mesh on the part of the period that is solved, that of the class and of the
-        usual scheme; or as given."""
+        """The first mesh on the solved part of the period, or one of given edges and scheme."""
         if edges is None:
             edges = self.admissible.gait.edges(self.intervals)
         return Mesh(scheme(of_scheme or self.scheme), edges)
 
     def in_phases(self, mesh: Mesh, gait: AnyGait) -> Mesh:
-        """A program's mesh in phases of a member."""
         return Mesh(mesh.scheme, self.admissible.gait.phases(gait, mesh.edges))
 
     def stated(self, value: float) -> float:
-        """A value of the objective as the problem states it."""
+        """Value of the objective in the problem's units."""
         return value * _size(self.aims.objective, self.unit)
 
     def in_units(self, value: float) -> float:
-        """The other way round."""
         return value / _size(self.aims.objective, self.unit)
 
 
 def control_problem(problem: Problem) -> ControlProblem:
-    """What solves a problem: its parts, in units of friction."""
     body, gait, law, aims = (
         problem.body,
         problem.gait,
@@ -197,11 +163,10 @@ def control_problem(problem: Problem) -> ControlProblem:
 
 
 def friction_unit(law: Law) -> float:
-    """The power of ten nearest to the smallest coefficient, which bounds the efficiency: 1 for
-    friction of usual size."""
+    """Power of ten nearest to the smallest coefficient."""
     return float(10.0 ** np.rint(np.log10(law.smallest)))
 
 
 def _size(aim: Objective, unit: float) -> float:
-    """What an objective comes to for coefficients `unit` times as large, over what it is."""
+    """Factor of an objective for coefficients `unit` times as large."""
     return unit ** (aim.degree or 0.0)

@@ -1,4 +1,4 @@
-"""What can be asked of a problem whose gaits are played so fast that the body's inertia counts."""
+"""Problems with inertia, at one Froude number or at the best one of a range."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
 _PACED = {"distance", "work", "rotation", "period"}
-"""What inertia makes depend on how fast a gait is played."""
 
 
 class Free(NamedTuple):
@@ -45,8 +44,7 @@ symmetry none, delta 1e-04>
 
 
 class AtFreePace(Telling):
-    """What a free pace changes in a class of gaits: members say how long a period takes, at first
-    the middle of the range."""
+    """Members state log(period), at first the middle of the range."""
 
     tells = "log_period"
     pace: Free
@@ -63,8 +61,7 @@ class AtFreePace(Telling):
 
 @dataclass(frozen=True)
 class Paced(Regime):
-    """At a Froude number L/(g T^2), at which inertia counts, or at one in a range, whose middle it
-    is."""
+    """At a Froude number L/(g T^2), or the middle of a range of them."""
 
     froude: float  # type: ignore[misc]
     free: Free | None = None
@@ -166,8 +163,6 @@ class Paced(Regime):
 
 @dataclass(frozen=True)
 class PacedOnSlope(Paced, Slope):
-    """The same on a slope."""
-
     grade: float = 0.0  # type: ignore[misc]
     froude: float = 0.0  # type: ignore[misc]
 
@@ -187,8 +182,7 @@ class PacedOnSlope(Paced, Slope):
 
 
 def paced_from(froude: Any, slope: Slope | None, *, timed: bool) -> Paced:
-    """How a problem states its pace: a number, or a range; `timed`: something asked for speaks of
-    the period, which is then a parameter of the gait. `ProblemError` if it is none."""
+    """Regime for a stated Froude number or range; `timed` where objectives depend on the period."""
     free = None
     if isinstance(froude, (tuple, list)):
         if len(froude) != 2 or not all(map(is_number, froude)) or not 0 < froude[0] <= froude[1]:

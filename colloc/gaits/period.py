@@ -23,7 +23,7 @@ from colloc.gaits.objective import Objective
 
 
 def chord_per_way(turn: float) -> float:
-    """The chord of an arc that turns by an angle [rad], over the way in axes that turn evenly."""
+    """Chord of an arc that turns by an angle [rad], over the way in axes that turn evenly."""
     return float(abs(np.sinc(turn / (2 * np.pi))))
 
 
@@ -56,8 +56,7 @@ class Period:
 
     @property
     def distance(self) -> float:
-        """Displacement of the centre of mass, or the chord of the arc where a turn is asked for
-        [body lengths]."""
+        """Displacement of the centre of mass, or the chord of the arc [body lengths]."""
         return self.values["distance"]
 
     @property
@@ -72,12 +71,11 @@ class Period:
 
     @property
     def length(self) -> float:
-        """Of the path in shape space [rad]."""
+        """Length of the path in shape space [rad]."""
         return self.values["length"]
 
     @property
     def efficiency(self) -> float:
-        """Distance over work."""
         return self.distance / self.work
 
     def error_of(self, objective: Objective) -> float:
@@ -85,5 +83,5 @@ class Period:
         return float(objective.relative_error(self.values, self.errors))
 
     def ambiguity_of(self, objective: Objective) -> float:
-        """How much other balanced motions could change an objective, relative, at most."""
+        """Relative change of an objective by other balanced motions."""
         return float(objective.relative_error(self.values, self.others))

@@ -27,75 +27,66 @@ class Regime:
     """
 
     froude: ClassVar[float] = 0.0
-    """Froude number at which gaits are played."""
     free_pace: ClassVar[bool] = False
-    """Whether the pace is sought with the gait, whose last parameter it is."""
+    """Whether the pace is a parameter, the last one of a gait."""
     grade: ClassVar[float] = 0.0
-    """Tangent of the inclination of the ground; +x is straight uphill."""
+    """Tangent of the inclination; +x is straight uphill."""
     slides: ClassVar[bool] = False
-    """Whether the body may slide back, so that there may be no gait that is worth anything."""
+    """Whether the body may slide back."""
     spent: ClassVar[str] = "friction"
     """What the joints' work goes into."""
     others: ClassVar[str] = ""
-    """Between which motions a certificate looks, where these are not the balanced motions of an
-    instant."""
+    """Motions compared by a certificate, where these are not balanced motions of an instant."""
     others_measured: ClassVar[bool] = True
-    """Whether it is known what other balanced motions would change."""
     pace: ClassVar[str] = ""
-    """Why the pace of a gait matters; "" where it does not."""
+    """Why the pace of a gait matters."""
 
     @property
     def slow_on_level(self) -> bool:
-        """Whether it is this one, of which most is known."""
         return type(self) is Regime
 
     @property
     def ahead(self) -> float:
-        """Direction whose way counts, where the plane has directions [rad]."""
+        """Direction of travel that counts [rad]."""
         return 0.0
 
     @property
     def keeps_ahead(self) -> bool:
-        """Whether no way is made across it."""
         return False
 
     @property
     def label(self) -> str:
-        """For lines that say what a problem asks."""
         return ""
 
     @property
     def slowly(self) -> Regime:
-        """The same, so slow that inertia does not matter."""
+        """The quasi-static regime."""
         return self
 
     def check(self, problem: Any) -> None:
-        """A `ProblemError` for what cannot be asked of a problem."""
+        """Raise `ProblemError` for what this regime cannot do."""
 
     def class_of(self, gait_class: Any) -> Any:
-        """What a class of gaits is here."""
+        """Class of gaits with the static parameters of this regime."""
         return gait_class.level
 
     def at(self, gait: Any) -> Self:
-        """The regime of a gait, which may say its pace."""
+        """Regime at the pace of a gait."""
         return self
 
     def in_units_of(self, unit: float) -> Self:
-        """The same in forces divided by a unit."""
         return self
 
     def counted(self, way: complex) -> complex:
-        """What counts of the way of a period, and the way across that: on the level it is as long
-        as it is."""
+        """Distance that counts, and across it as the imaginary part."""
         return complex(abs(way))
 
     def pull(self, theta: Array) -> Array | None:
-        """An outside force on the centre of mass of a body at orientations theta ``(1, n_time)``,
-        in its axes, ``(2, n_time)``; None if there is none. NumPy and CasADi."""
+        """Outside force on the centre of mass in body axes, ``(2, n_time)``, at orientations theta
+        ``(1, n_time)``; None if there is none. NumPy and CasADi."""
         return None
 
     def describe(self) -> str:
-        """In words, for reports; "" if there is nothing to say."""
         return ""
 
 

@@ -1,12 +1,9 @@
-"""A problem on a slope: how steep it is, gaits that know where the body points, and what can be
-asked there.
+"""Problems on a slope of grade g, the tangent of its inclination.
 
-On a plane whose inclination has the tangent g, the *grade*, the weight pulls the body down the fall
-line with g, in units of the force that presses it on the ground. The motion depends on where the
-body points, so where it points at the start is a parameter of the gait, and no half of a period
-follows from the other. What a period comes to keeps its names: its *distance* is the climb of the
-centre of mass, or its way in the direction asked for; its *work* is that of the joints, against
-friction and the weight.
+The weight pulls the body down the fall line with g, in units of the normal force. The motion
+depends on the heading, so the initial one is a gait parameter. *Distance* is the climb of the
+centre of mass, or its way in the direction asked for; *work* is that of the joints, against
+friction and weight.
 """
 
 from __future__ import annotations
@@ -34,8 +31,8 @@ _ANY_ANGLE = 100.0
 
 @dataclass(frozen=True)
 class Slope(Regime):
-    """A slope: the tangent of its inclination, and the direction whose way counts, from straight
-    uphill to the left [rad]; None: the climb counts, whatever the way aside."""
+    """Grade, and the direction whose way counts, from straight uphill to the left [rad]; None: the
+    climb."""
 
     grade: float  # type: ignore[misc]
     towards: float | None = None
@@ -61,8 +58,6 @@ class Slope(Regime):
         return replace(super().in_units_of(unit), grade=self.grade / unit)
 
     def class_of(self, gait_class: Any) -> Any:
-        """Any class that derives from `LinearClass`, one's own too, can be here.
-        `ProblemError` for others."""
         level = super().class_of(gait_class)
         name = type(level).__name__
         if not level.may_tell:
@@ -83,8 +78,8 @@ class Slope(Regime):
         return way * np.exp(-1j * self.ahead)
 
     def pull(self, theta: Array) -> Array:
-        """Of the weight, in the body's axes, ``(2, n_time)``, with its tail link at angles theta
-        ``(1, n_time)`` from straight uphill; NumPy and CasADi."""
+        """Weight in body axes, ``(2, n_time)``, at tail headings theta ``(1, n_time)`` from
+        straight uphill."""
         xp = namespace(theta)
         return xp.stack([-self.grade * xp.cos(theta), self.grade * xp.sin(theta)])
 
@@ -112,8 +107,7 @@ class Slope(Regime):
 
 
 class OnSlope(Telling):
-    """What a slope changes in a class of gaits: members say where the tail link points at phase
-    0."""
+    """Members state the heading of the tail link at phase 0."""
 
     tells = "theta"
     least_and_most = -_ANY_ANGLE, _ANY_ANGLE
@@ -133,11 +127,11 @@ class OnSlope(Telling):
 
     @property
     def closing_symmetry(self) -> str:
-        """Bilateral gaits keep every heading (docs/howto/slopes.md), others have to be told to."""
+        """Bilateral gaits keep every heading (docs/howto/slopes.md)."""
         return BILATERAL if self.symmetry == BILATERAL else NONE
 
     def said(self, gait: Any) -> float:
-        """NaN also if the member nearest to the gait starts in another phase."""
+        """NaN also where the nearest member starts in another phase."""
         return gait.theta if gait.theta is not None and self.in_phase(gait) else np.nan
 
     def parameters(self, gait: Any) -> np.ndarray:
@@ -154,7 +148,7 @@ def _checked_grade(grade: object) -> float:
 
 
 def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
-    """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
+    """The body, or a `ProblemError` why it cannot be on a slope."""
     if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
         raise ProblemError(
             f"only a Chain, whose joints are its own, can be put on a slope, not "
@@ -171,8 +165,7 @@ def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
 
 
 def slope_from(body: Body, friction: Law, grade: object, towards: object) -> Slope | None:
-    """The slope that a problem states; None for the level. `ProblemError` if there is none like it,
-    or the body cannot be on it."""
+    """Slope of a problem; None for the level."""
     tangent = _checked_grade(grade)
     if towards is not None and not is_number(towards):
         raise ProblemError(

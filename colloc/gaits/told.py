@@ -1,8 +1,4 @@
-"""Classes of gaits whose members say one number more than how the joints move: where they point,
-how long a period takes.
-
-The number is the last parameter, and no joint angle depends on it.
-"""
+"""Gait classes with an additional static parameter, the last one: initial heading or log period."""
 
 from __future__ import annotations
 
@@ -17,26 +13,25 @@ from colloc.mechanics.bodies import Body
 
 
 class Telling(ClassOfGaits):
-    """What saying a number changes in a class; members whose last parameter
-    is NaN do not say it yet. Such classes derive from a child of this one first and then from the
-    class that they are without (`telling`)."""
+    """Base of a class with a static parameter; members whose last parameter is NaN do not state
+    it."""
 
     tells: ClassVar[str]
-    """What members call the number."""
+    """Attribute of members."""
     _own: ClassVar[tuple[tuple[str, Any], ...]]
 
     @property
     def least_and_most(self) -> tuple[float, float]:
-        """What the number may be."""
+        """Bounds of the parameter."""
         raise NotImplementedError
 
     def said(self, gait: Any) -> float:
-        """The number of any gait; NaN if it is not known."""
+        """The parameter of any gait; NaN if it is unknown."""
         raise NotImplementedError
 
     @property
     def without(self) -> Any:
-        """The class that does not say it."""
+        """The class without the parameter."""
         return type(self).__bases__[1](**{f.name: getattr(self, f.name) for f in fields(self)})  # type: ignore[arg-type]
 
     @property
@@ -53,7 +48,6 @@ class Telling(ClassOfGaits):
         return self.without.size(n_joint) + 1
 
     def _basis(self, n_joint: int) -> np.ndarray:
-        """Of a class that is linear in its parameters."""
         basis = self.without._basis(n_joint)
         return np.column_stack([basis, np.zeros(len(basis))])
 
@@ -84,7 +78,6 @@ class Telling(ClassOfGaits):
 
 
 def telling(kind: type[Telling], gait_class: Any, **own: Any) -> Any:
-    """A class of gaits whose members say a number, with attributes of its own."""
     return _made(kind, gait_class, tuple(own.items()))
 
 

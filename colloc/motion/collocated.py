@@ -19,20 +19,19 @@ from colloc.numerics.schemes import Scheme
 
 
 def stage_weights(mesh: Mesh) -> np.ndarray:
-    """Weights ``(n, s)`` of the stages of a mesh in an integral over it."""
+    """Quadrature weights ``(n, s)`` of the stages."""
     return mesh.h[:, None] * mesh.scheme.b
 
 
 def point_weights(mesh: Mesh) -> np.ndarray:
-    """Weights ``(n_point,)`` of the points of a mesh in an integral over it; neighbours may share a
-    point."""
+    """Quadrature weights ``(n_point,)`` of the points; neighbours may share a point."""
     weights = np.zeros(mesh.n_point)
     np.add.at(weights, mesh.points, stage_weights(mesh))
     return weights
 
 
 def sums(increments: np.ndarray, start: float | complex = 0.0) -> np.ndarray:
-    """A quantity at the edges, ``(n + 1,)``, from its increments over the intervals, ``(n,)``."""
+    """Values at the edges, ``(n + 1,)``, from increments over the intervals."""
     found = np.empty(increments.size + 1, dtype=increments.dtype)
     found[0] = 0.0
     np.cumsum(increments, out=found[1:])
@@ -40,31 +39,16 @@ def sums(increments: np.ndarray, start: float | complex = 0.0) -> np.ndarray:
 
 
 class CollocatedPose:
-    """The pose along intervals, from the rates at their stages.
-
-    Parameters
-    ----------
-    scheme
-        The collocation scheme.
-    h
-        Lengths of the intervals, ``(n,)``. They follow one another, unless only `rotations` and
-        `displacements` are used.
-    omega
-        Rotation rate at the stages [rad per unit of h], ``(n, s)``.
-    centre
-        Velocity of the centre of mass in the axes of the body, complex, ``(n, s)``.
-    theta_0
-        Orientation at the begin [rad].
-    """
+    """Pose along intervals of lengths h ``(n,)``, from rotation rates `omega` and complex
+    velocities `centre` in body axes at the stages, ``(n, s)``."""
 
     rotations: np.ndarray
-    """By how much the body turns over each interval [rad], ``(n,)``."""
+    """Rotation over each interval [rad], ``(n,)``."""
     theta: np.ndarray
     """Orientation at the edges, ``(n + 1,)``."""
     stage_theta: np.ndarray
-    """Orientation at the stages, ``(n, s)``."""
     velocity: np.ndarray
-    """Velocity of the centre of mass in the plane at the stages, complex, ``(n, s)``."""
+    """Velocity in the plane at the stages, complex, ``(n, s)``."""
     place: np.ndarray
     """Centre of mass in the plane at the edges, complex, from 0, ``(n + 1,)``."""
 
@@ -91,26 +75,23 @@ class CollocatedPose:
     def on_mesh(
         cls, mesh: Mesh, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0
     ) -> CollocatedPose:
-        """The pose along a mesh, from rates ``(n_point,)`` at its points; `centre` has two rows,
-        forward and to the left."""
+        """Pose along a mesh, from rates ``(n_point,)`` at its points; `centre` has two rows."""
         c = centre[0] + 1j * centre[1]
         return cls(mesh.scheme, mesh.h, omega[mesh.points], c[mesh.points], theta_0)
 
     def theta_on(self, mesh: Mesh) -> np.ndarray:
-        """Orientation at the points of the mesh, ``(n_point,)``."""
         theta = np.empty(mesh.n_point)
         theta[mesh.points] = self.stage_theta
         return theta
 
     @property
     def displacements(self) -> np.ndarray:
-        """Displacement over each interval in the axes the body has at its begin, complex,
-        ``(n,)``."""
+        """Displacement over each interval in the body axes at its begin, complex, ``(n,)``."""
         return (self._weight * np.exp(1j * self._turned) * self._centre).sum(axis=1)
 
     def at(self, k: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Orientation and place, complex, at fractions tau of intervals k, ``(n_time,)`` each, by
-        the scheme's polynomials."""
+        """Orientation and place at fractions tau of intervals k, ``(n_time,)``, by the scheme's
+        polynomials."""
         weights = self._h[k][:, None] * self._scheme.integrals(tau)
         turned, moved = (
             (weights * self._omega[k]).sum(axis=1),
@@ -119,9 +100,9 @@ class CollocatedPose:
         return self.theta[k] + turned, self.place[k] + moved
 
     def on_pose(self, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the displacements along directions ``(m,)``, complex, whose size counts:
-        with respect to the orientation at the stages, ``(m, n, s)``, and to both components of the
-        velocity of the centre of mass in the axes of the body, ``(m, 2, n, s)``."""
+        """Derivatives of displacements along directions `sides` ``(m,)`` (complex, size counts):
+        along the orientation at the stages, ``(m, n, s)``, and the velocity in body axes, ``(m, 2,
+        n, s)``."""
         on_theta, on_centre = (
             np.zeros((sides.size, *self._weight.shape)),
             np.zeros((sides.size, 2, *self._weight.shape)),
@@ -133,8 +114,7 @@ class CollocatedPose:
         return on_theta, on_centre
 
     def on_rates(self, on_theta: np.ndarray) -> np.ndarray:
-        """Derivatives with respect to the rotation rate, from those with respect to the
-        orientation, ``(m, n, s)`` both."""
+        """Derivatives along the rotation rate, from those along the orientation, ``(m, n, s)``."""
         # the rotation over an interval turns all that come later
         after = np.cumsum(on_theta.sum(axis=2)[:, ::-1], axis=1)[:, ::-1]
         later = np.concatenate([after[:, 1:], np.zeros((len(after), 1))], axis=1)

@@ -1,6 +1,5 @@
-"""How a chain's momenta change (`colloc.mechanics.inertia`), with exact derivatives at many
-instants, by the compiled kernel; and at one instant after another, by its symbolic statement, which
-does where there is no kernel."""
+"""Rates of a chain's momenta (`colloc.mechanics.inertia`) with derivatives, by the compiled kernel
+or, without one, by CasADi."""
 
 from __future__ import annotations
 
@@ -21,8 +20,8 @@ N_OUT = 9
 
 @lru_cache(maxsize=32)
 def _function(body: Chain, friction: Law, *, differentiated: bool) -> Any:
-    """(angles, rates, momenta, delta, Froude number) to the outputs, and their derivatives along
-    the first three."""
+    """(angles, rates, momenta, delta, Froude number) to outputs and derivatives along the first
+    three."""
     import casadi as ca  # which nothing slow needs, nor a search
 
     sizes = {"angles": body.n_joint, "rates": body.n_joint, "momenta": len(STATES)}
@@ -45,17 +44,8 @@ def momenta_at(
     states: np.ndarray,
     froude: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The outputs ``(9, n_time)``, and their derivatives ``(9, 2 n_joint + 3, n_time)`` along
-    angles, rates and momenta.
-
-    Parameters
-    ----------
-    body, friction
-    shapes
-        Angles and rates ``(n_joint, n_time)``, and delta.
-    states : (3, n_time)
-    froude : float
-    """
+    """Outputs ``(9, n_time)`` and derivatives ``(9, 2 n_joint + 3, n_time)`` along angles, rates,
+    momenta; `shapes` are angles, rates ``(n_joint, n_time)`` and delta."""
     return _momenta(body, friction, shapes, states, froude, 2 * body.n_joint + len(STATES))
 
 
@@ -66,7 +56,7 @@ def momenta_along_states(
     states: np.ndarray,
     froude: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same with derivatives along the momenta alone, ``(9, 3, n_time)``."""
+    """Outputs, and derivatives along the momenta alone, ``(9, 3, n_time)``."""
     return _momenta(body, friction, shapes, states, froude, len(STATES))
 
 
@@ -96,8 +86,7 @@ def _momenta(
 
 
 class MomentaAt:
-    """The outputs at one instant after another, of n momenta each, ``(n, 9)``: a few
-    microseconds."""
+    """Outputs ``(n, 9)`` for n momenta at one time, in a few microseconds."""
 
     def __init__(self, body: Chain, friction: Law, delta: float, froude: float, n: int = 1) -> None:
         shapes, momenta, numbers = (
@@ -114,7 +103,6 @@ class MomentaAt:
         self._buffer.set_res(0, memoryview(self._out.reshape(-1).data))
 
     def __call__(self, angles: np.ndarray, rates: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Of angles and rates ``(n_joint,)`` and momenta ``(n, 3)``."""
         self._given[0][:], self._given[1][:], self._given[2][:] = angles, rates, states
         self._evaluate()
         return self._out.copy()

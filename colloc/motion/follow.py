@@ -1,9 +1,5 @@
-"""A differential equation followed through a period by Adams' method, with steps of its own: how a
-motion is checked.
-
-It knows nothing of meshes and of collocation. Rates may jump at given phases, and are one-sided
-there.
-"""
+"""Integration of a differential equation through a period, by adaptive multistep methods: an
+independent check of collocated motions. Rates may jump at given phases."""
 
 from __future__ import annotations
 
@@ -22,33 +18,26 @@ if TYPE_CHECKING:
     from scipy.integrate import OdeSolution
 
 STEP = 1 / 100
-"""Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and
-then skip one unnoticed (Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams'
-takes short ones, and errs by 8 to 40 times a step."""
+"""Local error over that of a run. Stick and slip make kinks, which methods of long steps skip
+(Runge and Kutta's left 1e-5 at 1e-7 a step); Adams' errs by 8 to 40 times a step."""
 _METHODS = ("LSODA", 50_000), ("Radau", np.inf)
-"""Adams' and Gear's, and how often they may ask for rates; and where these give up, as where
-friction is stiff beside little inertia, one that costs more. Adams' may not see that his steps are
-as short as stability, not accuracy, wants them: 1e-8."""
+"""Methods and their largest number of evaluations; the second for friction that is stiff beside
+little inertia."""
 ONE_SIDED = 1e-12
-"""How far beside a jump of the rates they are asked for on its side, in phase."""
+"""Distance in phase from a jump at which rates are evaluated."""
 _ONE_AT_A_TIME = threading.RLock()
-"""Older ones of SciPy's LSODA can do no more in a process, and which warnings are ignored is the
-same for all its threads."""
+"""Old LSODA is not reentrant, and warning filters are shared by all threads."""
 
 
-class _TooOften(Exception):
-    """Rates were asked for more often than a method may."""
+class _TooOften(Exception): ...
 
 
 class Course(NamedTuple):
-    """States through a period."""
-
     phases: np.ndarray
-    """Where the solver stepped, ``(n,)``."""
+    """Steps of the solver, ``(n,)``."""
     states: np.ndarray
-    """There, ``(n_state, n)``."""
     between: list[OdeSolution]
-    """As functions of the phase, one between any two breaks."""
+    """Dense output between any two breaks."""
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """States at ascending phases, ``(n_state, n_time)``."""

@@ -1,9 +1,8 @@
-"""Which of several balanced motions a gait follows, and how much the others differ from it.
+"""Branch of the balanced motions that a gait follows, and the spread of the others.
 
-Where the law of friction allows several velocities at an instant, a body with a little inertia
-keeps to the branch it is on until that ends in a fold, and then jumps. Followed forwards and
-backwards in time, a gait may so run through one shape in two ways. Both, and every other choice,
-differ from each other by no more than the solutions do, instant by instant.
+Where the law of friction allows several velocities, a body with a little inertia stays on its
+branch until that ends in a fold, and then jumps. So a gait may run through one shape in two ways;
+both differ by no more than the solutions do, instant by instant.
 """
 
 from __future__ import annotations
@@ -24,19 +23,15 @@ from colloc.system.errors import NotConvergedError
 
 FORWARDS, BACKWARDS = 1, -1
 _SAME = 1e-5
-"""Velocities that differ by less, relative to the largest, are one."""
+"""Relative difference of velocities that are one."""
 
 
 class FollowedMotion(NamedTuple):
-    """One motion through the branches at instants, and the range of all of them."""
-
     z: np.ndarray
-    """``(3, n_time)``: tail velocities of the branch that is followed; NaN where no solution was
-    found."""
+    """Tail velocities of the branch, ``(3, n_time)``; NaN where no solution exists."""
     apart: np.ndarray
-    """``(3 + k, n_time)``: how far the velocities of the centre of mass, the rotation rates, the
-    powers and the densities of k quantities lie apart among the stable solutions; 0 where there is
-    one."""
+    """Spread of velocities of the centre of mass, rotation rates, powers and densities of k
+    quantities among the stable solutions, ``(3 + k, n_time)``."""
 
 
 def followed_motion(
@@ -103,13 +98,11 @@ def followed_motion(
 def on_one_branch(
     body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
 ) -> np.ndarray:
-    """The motion followed in time, ``(3, n_time)``, from balanced velocities z that were solved for
+    """Tail velocities ``(3, n_time)`` continued in time, from balanced ones that were solved for
     one by one.
 
-    Each is solved for again from the one before, round the period, until none changes: where
-    several motions are balanced, some lay on one branch and some on another, as a solver's steps
-    fell. Of those that change all balanced velocities are found, and the nearest that lasts is
-    taken. Where none changes, z itself is given back.
+    Each is solved for again from the one before, round the period, until none changes; of those
+    that change, the nearest stable solution is taken. Where none changes, z itself is returned.
     """
     if friction.associated or not body.looks_for_all_velocities:
         return z
@@ -138,7 +131,7 @@ def on_one_branch(
 
 
 def _order(several: np.ndarray, sense: int) -> Iterator[tuple[int, int]]:
-    """Instants with several motions and those before them, from one on where there is one only."""
+    """(instant, instant before) of those with several motions, from one with a single one on."""
     certain = np.flatnonzero(~several)
     first = certain[0] if certain.size else 0
     for previous, now in pairwise((first + sense * np.arange(several.size + 1)) % several.size):
@@ -147,15 +140,13 @@ def _order(several: np.ndarray, sense: int) -> Iterator[tuple[int, int]]:
 
 
 def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """The solution, among the stable ones if there are any, that is nearest to a velocity
-    ``(3,)``."""
+    """Solution nearest to a velocity ``(3,)``, among the stable ones if there are any."""
     distance = np.abs(z - before[:, None].T).max(axis=1)
     stable = np.where(sign > 0, distance, np.inf)
     return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]
 
 
 def _ranges(at: Instants, found: Branches, quantities: Sequence[Quantity]) -> np.ndarray:
-    """`FollowedMotion.apart`."""
     rows = []
     for z, sign in zip(found.z, found.sign, strict=True):
         now = at.body.sliding(at.friction, at.angles, at.rates, z, at.delta)

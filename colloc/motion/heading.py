@@ -1,9 +1,7 @@
-"""How a symmetry closes a period: the direction in which a gait travels, and its orientations, from
-the part that is solved.
+"""Closing of a period by symmetry: direction of travel and orientations from the solved part.
 
-A bilateral gait repeats its displacement, so it travels along it. The second half of an antipodal
-gait is the mirror image of the first; together they travel along the bisector of the orientations
-at the ends of the first.
+A bilateral gait repeats its displacement and travels along it. The second half of an antipodal gait
+mirrors the first; together they travel along the bisector of the orientations at its ends.
 """
 
 from __future__ import annotations
@@ -14,8 +12,7 @@ from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 
 
 def heading(symmetry: str, displacement: complex, rotation: float) -> float:
-    """Angle of the travel from the initial orientation [rad], from displacement and rotation [rad]
-    of the solved part."""
+    """Direction of travel from the initial orientation [rad]."""
     if symmetry != ANTIPODAL:
         return float(np.angle(displacement))
     # it may travel either way along its axis
@@ -24,19 +21,17 @@ def heading(symmetry: str, displacement: complex, rotation: float) -> float:
 
 
 def closing_sign(symmetry: str) -> float | None:
-    """The sign with which the first orientation counts where the last one and it add up to nothing,
-    or a whole number of turns. None: nothing has to close."""
+    """Sign s with which theta_end + s theta_0 = 0 (or whole turns) closes a period; None: nothing
+    to close."""
     return {NONE: -1.0, ANTIPODAL: 1.0, BILATERAL: None}[symmetry]
 
 
 def whole_turns(first: float, last: float) -> float:
-    """The whole turns [rad] that the orientations at the ends of an antipodal gait's first half add
-    up to: 0, or, where it travels the other way along its axis, one."""
+    """Whole turns [rad] that the orientations at the ends of an antipodal half period add up to."""
     return float(2 * np.pi * np.round((first + last) / (2 * np.pi)))
 
 
 def momenta_image(symmetry: str) -> np.ndarray | None:
-    """What a symmetry makes of the momenta (Vx, Vy, H) in the axes of the tail at the begin of the
-    solved part, to be those at its end, ``(3, 3)``; None: they are the same. Bilateral gaits run
-    backwards in time, as no motion with inertia does."""
+    """Map ``(3, 3)`` of the momenta (Vx, Vy, H) in tail axes from the begin of the solved part to
+    its end; None for the identity."""
     return {NONE: None, ANTIPODAL: np.diag([1.0, -1.0, -1.0])}[symmetry]

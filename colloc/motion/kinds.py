@@ -46,59 +46,50 @@ from colloc.numerics.mesh import Mesh
 
 _MORE = slice(-len(STATES), None)
 _VISCOUS, _WETTER = 3.0, 10**0.5
-"""Delta [body lengths per period] at which friction is as good as viscous, and the factor from each
-tried to the next."""
+"""Delta at which friction is as good as viscous, and the factor between deltas."""
 Near = tuple[np.ndarray | None, np.ndarray | None]
-"""States and tail velocities to start from, as far as they are known."""
+"""States and tail velocities to start from."""
 NOWHERE: Near = (None, None)
 TOLERANCE = 1e-12
 _ACCEPTED = 1e3
-"""Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance
-will do."""
+"""Factor on the tolerance where rounding stops the solver."""
 OMEGA, OUTPUTS = 2, slice(2, None)
-"""Among the rows of `Kind.slopes`: rotation rate; the same, velocity of the centre, power, and what
-there is more."""
+"""Rows of `Kind.slopes`: rotation rate; all after the tail's velocity."""
 
 
 class Shapes(NamedTuple):
-    """Angles and rates ``(n_joint, n_point)`` at the points of a mesh, per time divided by `unit`,
-    and delta in that unit."""
+    """Angles and rates ``(n_joint, n_point)`` per time over `unit`, delta in that unit, and the
+    pace ``(n_point,)`` that multiplies velocities."""
 
     angles: np.ndarray
     rates: np.ndarray
     delta: float
     unit: float = 1.0
     pace: np.ndarray | float = 1.0
-    """By which velocities at the points are multiplied, ``(n_point,)``, of gaits along paths."""
 
 
 class Along(NamedTuple):
     """A motion at the points of a mesh."""
 
     begin: np.ndarray
-    """Of the states that are told it, ``(n_told,)``."""
+    """Initial values of static parameters, ``(n_told,)``."""
     states: np.ndarray
     """``(n_state, n_point)``."""
     z: np.ndarray
-    """Tail velocity, ``(3, n_point)``."""
     now: BalancedMotion
-    """Per time divided by the shapes' unit."""
+    """Per time over the shapes' unit."""
     held: np.ndarray
-    """Where the equations hold, ``(n_point,)``."""
+    """Points where the equations hold, ``(n_point,)``."""
     slopes: tuple[np.ndarray, np.ndarray] | None = None
-    """What `Kind.slopes` gives, if it is known."""
+    """Cached `Kind.slopes`."""
     solved: BalanceSolution | None = None
-    """The balance, where it holds instant by instant."""
     edges: np.ndarray = np.empty((0, 0))
-    """States that are variables of a full program, at the edges of the mesh, ``(n_state, n +
-    1)``."""
+    """States at the edges of the mesh, ``(n_state, n + 1)``."""
 
 
 class Passed(NamedTuple):
-    """What the solved part of a period comes to: displacement from the initial orientation 0 or,
-    where the orientation is a state, in the plane; rotation [rad], work against friction.
-    Displacement and rotation are seen from axes that turn evenly (`Kind.turn`). And what the gait
-    tells of it."""
+    """Totals of the solved part of a period: displacement (from orientation 0, or in the plane
+    where that is a state), rotation, work, static parameters; seen from axes that turn evenly."""
 
     displacement: complex
     rotation: float
@@ -107,8 +98,8 @@ class Passed(NamedTuple):
 
 
 class Share(NamedTuple):
-    """What makes a number of a period grow: a way along a direction, the size of which counts;
-    rotation, work; and the first that the gait tells."""
+    """Gradient of a period total: along a displacement, rotation, work, and the first static
+    parameter."""
 
     side: complex = 0.0
     rotation: float = 0.0
@@ -117,23 +108,20 @@ class Share(NamedTuple):
 
 
 class Kind(Protocol):
-    """A kind of motion of a body."""
+    """Dynamics of a body."""
 
     body: Body
     friction: Law
     states: tuple[str, ...]
-    """States of a period that are solved for."""
     told: tuple[str, ...]
-    """What a gait says in its last parameters: the begin of some of them, a period closing the
-    others, or its pace."""
+    """Static parameters, the last gait parameters: initial values of states, log period."""
     periods: float
-    """A whole period over the part that is solved."""
     lack: str
     """What may be wrong where a gait has no motion, and what to try."""
     turn: float
-    """By which a period is asked to turn the body [rad]."""
+    """Prescribed rotation over a period [rad]."""
     followed: bool
-    """Whether what a mesh misses is told by a differential equation
+    """Whether mesh errors come from a differential equation
     (`colloc.verification.reference_motion`)."""
 
     def along(
@@ -144,17 +132,16 @@ class Kind(Protocol):
         near: Near = NOWHERE,
         tolerance: float = TOLERANCE,
     ) -> Along:
-        """The motion along a mesh from the begin of its states."""
+        """Motion along a mesh from the begin of its states."""
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
-        """What formulas see of shapes ``(n_joint, n)`` at orientations ``(n,)`` and tail velocities
-        ``(3, n)``; unless these are given, those that balance the body, if no other state
-        counts."""
+        """Instants for formulas, at orientations ``(n,)`` and tail velocities ``(3, n)``, by
+        default balanced ones."""
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles,
-        rates), ``(6, 2 n_joint, n_point)``, and to the states, ``(6, n_state, n_point)``; then of
-        the rates of states, where they are none of these."""
+        """Derivatives of (tail velocity, velocity of the centre, power, rates of states) along
+        (angles, rates), ``(6 + k, 2 n_joint, n_point)``, and along the states, ``(6 + k, n_state,
+        n_point)``."""
 
     def through_pose(
         self,
@@ -164,23 +151,20 @@ class Kind(Protocol):
         on_out: np.ndarray,
         on_states: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Add what m numbers owe to the orientation to their derivatives `on_out` with respect to
-        (rotation rate, velocity of the centre, power, and rates of states) at the stages, ``(m, 4 +
-        more, n, s)``, from those with respect to the orientation, ``(m, n, s)``, and those of the
-        outputs with respect to the states; and give those with respect to what is told, ``(m,
-        n_told)``, and to what is added to the states at the ends of the intervals, ``(m, n_state,
-        n)``."""
+        """Adjoint of the orientation: add its part to `on_out` ``(m, 4 + more, n, s)``, derivatives
+        of m numbers along (rotation rate, velocity of the centre, power, rates of states) at the
+        stages; return derivatives along static parameters, ``(m, n_told)``, and along the states at
+        the ends of intervals, ``(m, n_state, n)``."""
 
     def counted(self, passed: Passed) -> dict[str, float]:
-        """What a whole period comes to."""
+        """Totals of a whole period."""
 
     def shares(self, passed: Passed) -> dict[str, Share]:
-        """Derivatives of `counted`."""
+        """Gradients of `counted`."""
 
 
 class SlowOnLevel:
-    """No state: the balance holds instant by instant, wherever the body points. Distance is along
-    the direction of travel."""
+    """Quasi-static on level ground: no states, distance along the direction of travel."""
 
     states: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
@@ -274,13 +258,13 @@ class SlowOnLevel:
 
 
 class _WithStates:
-    """How numbers of a period depend on states, which are solved for together."""
+    """Adjoint of states that are solved for together."""
 
     states: tuple[str, ...]
     told: tuple[str, ...]
     followed: bool = True
     _grow: np.ndarray
-    """Which rows of `Kind.slopes` are the rates of the states."""
+    """Rows of `Kind.slopes` that are the rates of the states."""
 
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
         return CollocatedStates(mesh, unit=unit)
@@ -309,8 +293,7 @@ class _WithStates:
 
 
 class SlowOnSlope(_WithStates):
-    """One state, the orientation, from straight uphill. Distance is along the direction that
-    counts; joints lift the body."""
+    """Quasi-static on a slope: the orientation is a state, from straight uphill."""
 
     states: tuple[str, ...] = ("theta",)
     told: tuple[str, ...] = ("theta",)
@@ -369,7 +352,7 @@ class SlowOnSlope(_WithStates):
         return along.slopes
 
     def counted(self, passed: Passed) -> dict[str, float]:
-        """Not a number where the joints brake."""
+        """Totals; NaN where the joints brake."""
         way = self._slope.counted(passed.displacement)
         work = passed.work + self._slope.grade * passed.displacement.real
         found = {
@@ -392,9 +375,8 @@ class SlowOnSlope(_WithStates):
 
 
 class WithInertia(_WithStates):
-    """Three states, the momenta, and on a slope the orientation: what friction and weight change
-    momenta by over a period is nothing. They are those of `colloc.mechanics.inertia`, in the axes
-    of the tail link, so that on the level it does not matter where the body points."""
+    """Momenta (and on a slope the orientation) as states, periodic over a period; in the axes of
+    the tail link (`colloc.mechanics.inertia`)."""
 
     lack: str = (
         "no period with inertia was found that repeats itself; give another guess, or a "
@@ -404,8 +386,8 @@ class WithInertia(_WithStates):
     def __init__(
         self, slow: SlowOnLevel | SlowOnSlope, regime: Regime, image: np.ndarray | None = None
     ) -> None:
-        """Of a body that would move as the kind `slow` says if it had no mass; `image` as of
-        `colloc.motion.heading.momenta_image`."""
+        """Wraps the quasi-static dynamics in the limit of zero mass; `image` is that of
+        `momenta_image`."""
         self.body, self.friction, self.turn, self.periods = (
             slow.body,
             slow.friction,
@@ -466,10 +448,8 @@ class WithInertia(_WithStates):
     def _closed(
         self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """The states with momenta that repeat every period, sought from others ``(n_state,
-        n_point)``; what the body does with them (`colloc.motion.compiled_momenta.N_OUT`); and
-        whether there are any. Where Newton's method does not lead to them, as on feet that hold,
-        they are reached through more viscous friction."""
+        """Periodic states, outputs, and whether they exist. Where Newton's method fails from
+        `near`, as on sticking feet, by continuation through more viscous friction."""
         found = self._newton(mesh, shapes, near, begin)
         if found[-1] or shapes.delta * shapes.unit > _VISCOUS:
             return found
@@ -479,7 +459,6 @@ class WithInertia(_WithStates):
     def _newton(
         self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """The same by Newton's method alone."""
         out, first = near, np.append(near[: len(STATES), 0], begin[len(self._timed) :])
         froude, equations = self._froude_at(shapes, begin), self._equations(mesh, shapes.unit)
         library = None if self._slow.states else native_kernel(self._chain, self.friction)
@@ -501,9 +480,8 @@ class WithInertia(_WithStates):
     def alone(
         self, mesh: Mesh, shapes: Shapes, along: Along, begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Every interval by itself, from given states at its begin ``(n_state, n)``: what the body
-        does with those at the points, the states at its end ``(n_state, n)``, and where there are
-        any, ``(n,)``; sought near states at the points."""
+        """Outputs and final states of every interval from initial states ``(n_state, n)``, sought
+        near states at the points; and whether they exist, ``(n,)``."""
         equations, froude = self._equations(mesh, shapes.unit), self._froude_at(shapes, along.begin)
         states, ends, found = equations.alone(
             lambda states: self._rates(shapes, states, froude)[1], begins, near
@@ -518,7 +496,7 @@ class WithInertia(_WithStates):
     def _pulled(
         self, out: np.ndarray, slopes: np.ndarray, states: np.ndarray, froude: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """With the weight's pull, and derivatives along the orientation after those along
+        """Outputs with the weight's pull, and derivatives along the orientation after the
         momenta."""
         for theta in states[len(STATES) :]:
             pull: Any = self._regime.pull(theta[None]) / froude  # type: ignore[operator]
@@ -534,13 +512,11 @@ class WithInertia(_WithStates):
         )
 
     def _froude_at(self, shapes: Shapes, begin: np.ndarray) -> float:
-        """Momentum grows by what friction gives it in a unit of time, and has as much to grow."""
         froude = float(np.exp(-2.0 * begin[0])) if self._timed else self._regime.froude
         return froude * shapes.unit**2
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
-        """A pace that is told has a column after those of the momenta: in a longer period friction
-        changes them by more."""
+        """A free pace has a column after the momenta: a longer period changes them by more."""
         froude, momenta, k = (
             self._froude_at(shapes, along.begin),
             along.states[: len(STATES)],
@@ -561,10 +537,9 @@ def through_motion(
     on_states: np.ndarray,
     by_theta: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives of m numbers of a period with respect to (rotation rate, velocity of the centre,
-    power, rates of states) at the stages, ``(m, 4 + more, n, s)``, then those that
-    `Kind.through_pose` gives; `on_states` as of `Kind.slopes`, `by_theta` is what they depend on
-    the orientation by themselves, ``(m, n, s)``."""
+    """Derivatives of m period totals along (rotation rate, velocity of the centre, power, rates of
+    states) at the stages, ``(m, 4 + more, n, s)``, and those of `Kind.through_pose`; `by_theta`
+    ``(m, n, s)`` are direct derivatives along the orientation."""
     side, rotation, work, _ = (np.array(column) for column in zip(*shares, strict=True))
     weight = stage_weights(mesh)
     on_theta, on_centre = pose.on_pose(side)
@@ -576,7 +551,7 @@ def through_motion(
 
 @singledispatch
 def kind_in(regime: Regime, of: Dynamics) -> Kind:
-    """How a body moves in a regime; that of another is registered with ``kind_in.register``."""
+    """Dynamics of a regime; ``kind_in.register`` adds one."""
     return SlowOnLevel(of.body, of.law, of.symmetry, of.turn, of.joint_map)
 
 
@@ -598,15 +573,14 @@ def _with_inertia_on_slope(regime: PacedOnSlope, of: Dynamics) -> Kind:
 
 
 def kind_of_motion(dynamics: Dynamics) -> Kind:
-    """How a body moves."""
     return kind_in(dynamics.regime, dynamics)
 
 
 def begin_of(kind: Kind, gait: AnyGait) -> np.ndarray:
-    """Where a gait says that states begin, ``(n_told,)``."""
+    """Static parameters of a gait, ``(n_told,)``."""
     return np.array([getattr(gait, name) for name in kind.told])
 
 
 def first_theta(kind: Kind, begin: np.ndarray) -> float:
-    """The orientation at the begin: 0 where it is no state."""
+    """Initial orientation; 0 where it is no state."""
     return float(begin[kind.told.index("theta")]) if "theta" in kind.told else 0.0

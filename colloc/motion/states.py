@@ -23,45 +23,35 @@ from colloc.numerics.mesh import Mesh
 
 _CLOSED, _STEPS = 1e-12, 200
 _ROUNDED = 1e-11
-"""Newton's step that counts as none: where rates are steep, rounding leaves more of the equations
-than `_CLOSED`."""
+"""Newton step that counts as none where steep rates leave rounding."""
 _SHARES, _ASTRAY = 0.5 ** np.arange(7), 5
-"""Of Newton's step, tried until the equations are off by less; steps in a row of which none does,
-after which there is no motion near here."""
+"""Damping factors; steps in a row without descent before giving up."""
 _LEAST_SHARE = 1 / 16
-"""Of a step that is to make the next one shorter; where less is asked for the search had better
-come another way."""
+"""Give up if the damping factor falls below this."""
 _FAR = np.errstate(over="ignore", invalid="ignore")
-"""Far from any motion, what grows from interval to interval has no number at the end."""
+"""Far from any motion states overflow."""
 _ALONE, _FOUND = 60, 1e-9
-"""Steps by which the states of single intervals are found, and what their equations may be off by
-then."""
 
 
 class Rates(NamedTuple):
-    """Rates of the states at the points of a mesh."""
-
     value: np.ndarray
-    """``(n_state, n_point)``."""
     on_states: np.ndarray
-    """Their derivatives with respect to the states, ``(n_state, n_state, n_point)``."""
+    """``(n_state, n_state, n_point)``."""
     known: bool = True
-    """Whether the rates could be found everywhere."""
 
 
 class CollocatedStates:
-    """The equations of states on a mesh whose neighbours share no stage; points are in order of the
-    stages.
+    """Equations of states on a mesh whose neighbours share no stage.
 
     Parameters
     ----------
     mesh
     free : (n_state,), optional
-        Which states close a period; by default none, and all start where they are told to.
+        States that close a period; the others start where they are told to.
     image : (n_state, n_state), optional
-        Where a symmetry sends the start of the free states; by default they end where they start.
+        Map from the start of the free states to their end; identity by default.
     unit
-        Rates are per time divided by this.
+        Rates are per time over this.
     """
 
     def __init__(
@@ -81,13 +71,11 @@ class CollocatedStates:
 
     @property
     def scheme(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A ``(n, s, s)`` and b ``(n, s)`` times the lengths of the intervals, and the image of the
-        start."""
+        """h A ``(n, s, s)``, h b ``(n, s)`` and the image."""
         return self._a, self._b, np.eye(len(self._free)) if self._image is None else self._image
 
     def integrals(self, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``, of rates
-        ``(n_state, n_point)``."""
+        """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``."""
         stages = rates.reshape(len(rates), *self._shape)
         gained = np.cumsum((self._b * stages).sum(axis=2), axis=1)
         before = np.concatenate([np.zeros((len(rates), 1)), gained[:, :-1]], axis=1)
@@ -99,26 +87,9 @@ class CollocatedStates:
         start: np.ndarray,
         near: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """States at the points by Newton's method: as much of a step is taken as makes the
-        equations be off by less.
-
-        Parameters
-        ----------
-        rates
-            Of states ``(n_state, n_point)``.
-        start : (n_state,)
-            At the begin; of free states where the search for it begins.
-        near : (n_state, n_point), optional
-            Where the search for the states begins; by default at their start.
-
-        Returns
-        -------
-        states : (n_state, n_point)
-            Those that `rates` was asked for last.
-        start : (n_state,)
-        held : bool
-            Whether there is such a motion: it was found, and all rates are known.
-        """
+        """States, start and convergence of a damped Newton's method with monotone residual; `start`
+        ``(n_state,)`` is the begin (of free states a guess), `near` ``(n_state, n_point)`` an
+        initial guess."""
         x = self._begun(start, near)
         now, residual, off = self._residual(rates, x)
         astray = 0
@@ -145,14 +116,9 @@ class CollocatedStates:
     def settled(
         self, rates: Callable[[np.ndarray], Rates], start: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """The same, damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear Problems*,
-        section 3.3): a share of a step is taken if the next step, of the same derivatives, is a
-        shorter one.
-
-        For momenta, which friction as steep as 1/delta pulls to and fro: their equations may well
-        be off by more on the way. On a slow slope rates are not known everywhere, and it does
-        worse.
-        """
+        """Newton's method damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear
+        Problems*, 3.3): a step is accepted if the next one, with the same derivatives, is shorter.
+        For momenta, whose residual may grow on the way under steep friction."""
         x = self._begun(start, near)
         now, residual, off = self._residual(rates, x)
         next_step, trusted = np.zeros_like(x), np.inf
@@ -194,7 +160,6 @@ class CollocatedStates:
         return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
 
     def _begun(self, start: np.ndarray, near: np.ndarray | None) -> np.ndarray:
-        """States and, in the last column, their start."""
         start = np.array(start, dtype=float)
         states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
         return np.column_stack([states, start])
@@ -202,9 +167,8 @@ class CollocatedStates:
     def alone(
         self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States at the points of every interval by itself, from given ones at its begin
-        ``(n_state, n)``; those at its end, ``(n_state, n)``; and where they were found, ``(n,)``.
-        `near` is where Newton's method begins, as in `solved`."""
+        """States of every interval by itself from begins ``(n_state, n)``; its ends ``(n_state,
+        n)``; convergence ``(n,)``."""
         n, s = self._shape
         begin, share = np.repeat(begins, s, axis=1), np.ones(n)
 
@@ -233,15 +197,12 @@ class CollocatedStates:
         return states, begins + (self._b * found).sum(axis=2), off < _FOUND
 
     def _within(self, stages: np.ndarray) -> np.ndarray:
-        """What states gain from the begin of an interval to its stages, of rates ``(n_state, n,
-        s)`` there."""
         return np.einsum("nij,anj->ani", self._a, stages)
 
     def _residual(
         self, rates: Callable[[np.ndarray], Rates], x: np.ndarray
     ) -> tuple[Rates, np.ndarray, float]:
-        """Rates at states and start, the last column of x; what the equations are off by at the
-        points and, of the free states, at the end; and the largest of these."""
+        """Rates, residuals at the points and (of free states) at the end, and the largest."""
         states, start = x[:, :-1], x[:, -1]
         now = rates(states)
         gained, whole = self.integrals(now.value)
@@ -255,8 +216,7 @@ class CollocatedStates:
 
     @_FAR
     def _newton(self, on_states: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """Of what the equations are off by, the change of the states and of their start that does
-        it to first order."""
+        """Map from residuals to Newton steps."""
         within, free = _Linear(self._a, self._b, on_states), self._free
 
         @_FAR
@@ -274,31 +234,17 @@ class CollocatedStates:
         return step
 
     def _open(self, through: np.ndarray) -> np.ndarray:
-        """Of the free states ``d s_end / d s_0 - M``."""
+        """``d s_end / d s_0 - M`` of the free states."""
         image = np.eye(len(through)) if self._image is None else self._image
         return (through - image)[np.ix_(self._free, self._free)]
 
     def pulled_back(
         self, on_states: np.ndarray, of_states: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives of numbers by way of the states.
-
-        Parameters
-        ----------
-        on_states : (n_state, n_state, n_point)
-            Those of the rates with respect to the states.
-        of_states : (m, n_state, n_point)
-            Those of m numbers with respect to the states.
-
-        Returns
-        -------
-        on_start : (m, n_state)
-            With respect to the start; 0 of free states, whose start follows.
-        on_rates : (m, n_state, n_point)
-            With respect to the rates at given states.
-        on_ends : (m, n_state, n)
-            With respect to what is added to the states at the end of every interval.
-        """
+        """Adjoint: derivatives of m numbers along the start ``(m, n_state)``, the rates ``(m,
+        n_state, n_point)`` and the states at the ends of intervals ``(m, n_state, n)``, from
+        `of_states` ``(m, n_state, n_point)`` and the rates' derivatives `on_states` ``(n_state,
+        n_state, n_point)``."""
         within = _Linear(self._a, self._b, on_states)
         on_start, on_rates, on_ends = within.pulled_back(of_states)
         if self._free.size:
@@ -315,8 +261,7 @@ class CollocatedStates:
 
 
 class _Linear:
-    """``I - H R``, condensed to the begins of the intervals: their stages are ``own + response @
-    begin``."""
+    """``I - H R``, condensed to the begins of the intervals."""
 
     def __init__(self, a: np.ndarray, b: np.ndarray, on_states: np.ndarray) -> None:
         (n, s), k = b.shape, len(on_states)
@@ -342,12 +287,12 @@ class _Linear:
         )
 
     def own(self, right: np.ndarray) -> np.ndarray:
-        """What stages have of a right side ``(k, n_point)`` alone, ``(n, s k)``."""
+        """Stages for a right side ``(k, n_point)`` with zero begins, ``(n, s k)``."""
         return (self._inverse @ self._by_interval(right)[:, :, None])[:, :, 0]
 
     def handed_on(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """``(I - H R) x = begin + right``: `own` of the right side ``(k, n_point)``, and the states
-        at the edges as ``through @ begin + gained``, ``(n + 1, k, k)`` and ``(n + 1, k)``."""
+        """Stages of a right side with zero begins, and states at the edges as ``through @ begin +
+        gained``."""
         own, k = self.own(right), len(right)
         more = self._gain @ own[:, :, None]
         through, gained = _one_after_another(
@@ -360,15 +305,14 @@ class _Linear:
         return own, edges[:, :, :-1], edges[:, :, -1]
 
     def at_points(self, own: np.ndarray, begins: np.ndarray) -> np.ndarray:
-        """x ``(k, n_point)``, from the states at the begins of the intervals, ``(n, k)``."""
+        """States ``(k, n_point)`` from those at the begins of the intervals, ``(n, k)``."""
         return self._by_point(own + (self._response @ begins[:, :, None])[:, :, 0])
 
     def pulled_back(
         self, of_states: np.ndarray, of_end: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of numbers with derivatives ``(m, k, n_point)`` with respect to the states and ``(m, k)``
-        to those at the end: to their begin, ``(m, k)``, to the rates, ``(m, k, n_point)``, as
-        ``H'(I - H R)'^-1``, and to the states at the ends of the intervals, ``(m, k, n)``."""
+        """Adjoint: along the begin ``(m, k)``, the rates, ``H'(I - H R)'^-1``, ``(m, k, n_point)``,
+        and the states at the ends of intervals ``(m, k, n)``."""
         (n, s, k), given = self._shape, self._by_interval(of_states)
         through = np.einsum("mni,nia->mna", given, self._response)
         end = np.zeros((len(given), k)) if of_end is None else of_end
@@ -386,8 +330,7 @@ class _Linear:
 
 
 def _one_after_another(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of maps ``x -> x t + c``, ``(n, k, k)`` and ``(n, m, k)``, what all up to each do, in log2 n
-    steps for all of them."""
+    """Prefix products of affine maps ``x -> x t + c`` in log2 n steps."""
     t, c, reach = t.copy(), c.copy(), 1
     while reach < len(t):
         c[reach:] += c[:-reach] @ t[reach:]

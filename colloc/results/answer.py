@@ -1,5 +1,4 @@
-"""The answer of a search: a gait with every variable of its full program; how the search came
-there, and what else it met."""
+"""The answer of a search: a gait as a point of its full program, with its history."""
 
 from __future__ import annotations
 
@@ -22,27 +21,23 @@ REDUCED, PRESCRIBED, EVALUATED = "reduced", "prescribed", "evaluated"
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a search: a gait that was optimised at one delta on one mesh.
+    """An iterate of a search, as a line of a table.
 
     Attributes
     ----------
     delta : float
-        Regularisation speed, in the units of the problem's class of gaits: per period, or relative
-        to the shape speed.
+        In the units of the class of gaits.
     intervals : int
     value, distance, work : float
-        The problem's objective, distance and work of a period, as collocation sees them.
+        Objective, distance and work of a period, as collocated.
     kkt_error : float
-        Largest component of the Lagrangian's gradient.
     optimal : bool
-        Whether the first-order conditions hold, as far as this step needs them.
+        Whether the first-order conditions hold to the tolerance of the step.
     status : str
-        In words.
     iterations : int
     seconds : float
     program : str
-        What was solved: "reduced" by SQP in the gait's parameters, or the problem's formulation by
-        IPOPT.
+        "reduced", or the problem's formulation as solved by IPOPT.
     """
 
     delta: float
@@ -60,19 +55,8 @@ class Step:
 
 @dataclass(frozen=True)
 class SecondOrder:
-    """Curvature of the Lagrangian at an answer, in the space of its class
-    (`colloc.reduced.second_order`).
-
-    Attributes
-    ----------
-    smallest, error : float
-        Smallest curvature along a free direction, over the value of the objective [1/rad^2], and
-        its error; infinite if no direction is free, NaN if it was not measured.
-    n_free : int
-        Free directions.
-    why_not : str
-        Why it was not measured; empty if it was.
-    """
+    """Smallest curvature of the Lagrangian over the value of the objective [1/rad^2], and its
+    error; infinite if no direction is free, NaN (`why_not`) if it was not measured."""
 
     smallest: float
     error: float
@@ -160,7 +144,6 @@ class Answer:
 
     @property
     def step(self) -> Step:
-        """The answer as a step of its search."""
         return Step(
             self.delta,
             self.edges.size - 1,
@@ -177,17 +160,15 @@ class Answer:
 
     @property
     def layout(self) -> Layout:
-        """Where every variable is in `x`."""
         return layout_of(control_problem(self.problem), self.mesh)
 
     @property
     def delta_per_period(self) -> float:
-        """Regularisation speed in body lengths per period, whatever the class measures it in."""
+        """Regularisation speed [body lengths per period]."""
         return delta_per_period(self.problem.gait, self.gait, self.delta)
 
     @cached_property
     def motion(self) -> CollocatedMotion:
-        """What the variables say of the motion."""
         return CollocatedMotion(
             self.problem, self.mesh, self.layout, self.x, self.gait, self.delta_per_period
         )
@@ -195,21 +176,7 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
-    """A gait that a search over many starts met.
-
-    Attributes
-    ----------
-    value : float
-        Of the objective, as collocation sees it on a coarse mesh, which may be a little more than a
-        fine one would.
-    delta : float
-        To which it was followed.
-    starts : int
-        How many led to it.
-    on_speed_floor : bool
-        Whether the bound on the shape speed decided its size.
-    gait : AnyGait
-    """
+    """A distinct gait that starts met; its value is that on a coarse mesh."""
 
     value: float
     delta: float

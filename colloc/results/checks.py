@@ -1,5 +1,4 @@
-"""What a certificate is: checks (what was measured, how much is allowed, what it means) and the
-numbers of the replay."""
+"""Certificates: checks, and the numbers of the replay."""
 
 from __future__ import annotations
 
@@ -14,8 +13,7 @@ from colloc.gaits.period import Period
 
 @dataclass(frozen=True)
 class Check:
-    """One line of a certificate: what was measured, the largest value allowed, and what it
-    means."""
+    """One line of a certificate."""
 
     name: str
     value: float
@@ -27,7 +25,6 @@ class Check:
         return bool(np.isfinite(self.value) and abs(self.value) <= self.threshold)
 
     def line(self) -> str:
-        """For a terminal."""
         return (
             f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= "
             f"{self.threshold:.0e})  {self.meaning}"
@@ -90,7 +87,7 @@ class Certificate(Period):
 
     @property
     def replayed(self) -> bool:
-        """Whether there was a replay at all; if not, all numbers are NaN."""
+        """Whether there was a replay; if not, all numbers are NaN."""
         return bool(self.instants)
 
     @property
@@ -99,7 +96,6 @@ class Certificate(Period):
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Quantities of the period, their errors, and the rest that was measured, by names."""
         errors = {f"{name}_error": error for name, error in self.errors.items()}
         return {
             **self.values,
@@ -109,8 +105,7 @@ class Certificate(Period):
         }
 
     def with_samples(self, errors: tuple[float, ...] | None) -> Certificate:
-        """The same for a gait through samples, which put (value, efficiency, distance, work) off by
-        `errors`."""
+        """The certificate with errors of samples added to (value, efficiency, distance, work)."""
         if errors is None or not self.replayed:
             return self
         value, efficiency, distance, work = errors
@@ -130,7 +125,7 @@ class Certificate(Period):
 
     @property
     def by_replay(self) -> Certificate:
-        """The same with the errors of the replay alone, whatever samples a gait goes through."""
+        """The certificate with the errors of the replay alone."""
         if self.of_samples is None:
             return self
         return replace(
@@ -138,7 +133,7 @@ class Certificate(Period):
         )
 
     def facts(self) -> dict[str, Any]:
-        """All of it as plain numbers (JSON)."""
+        """Plain numbers (JSON)."""
         listed = {
             c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed}
             for c in self.checks
@@ -153,7 +148,6 @@ class Certificate(Period):
 
 
 NUMBERS = tuple(each.name for each in fields(Certificate) if each.type in ("int", "float"))
-"""Of a certificate, beside the quantities of its period."""
 UNCERTIFIED = Certificate(
     values=dict.fromkeys(QUANTITIES, np.nan),
     errors=dict.fromkeys(("distance", "work"), np.nan),
@@ -165,4 +159,4 @@ UNCERTIFIED = Certificate(
     ),
     **(dict.fromkeys(NUMBERS, np.nan) | {"instants": 0}),  # type: ignore[arg-type]
 )
-"""Of a solve that did not converge: it fails, and says that nothing was checked."""
+"""Certificate of a solve that did not converge."""

@@ -1,5 +1,4 @@
-"""The motion of a collocated gait at any instant, by the scheme's own interpolant: the error
-between nodes is visible."""
+"""Motion of a collocated gait at any time, by the scheme's own interpolant."""
 
 from __future__ import annotations
 
@@ -24,17 +23,12 @@ from colloc.transcription.layout import RADIANS, Layout
 
 @dataclass(frozen=True, eq=False)
 class CollocatedMotion:
-    """A gait with everything that its variables say of the motion."""
-
     problem: Problem
-    """As the program stated it."""
     mesh: Mesh
     layout: Layout
     x: np.ndarray
-    """The variables, ``(n,)``."""
     gait: AnyGait
     delta: float
-    """Regularisation speed per period."""
 
     def __repr__(self) -> str:
         return (
@@ -43,13 +37,11 @@ class CollocatedMotion:
         )
 
     def sliding(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> Sliding:
-        """The body with given tail velocities."""
         delta = np.full((1, z.shape[1]), self.delta)
         return self.problem.body.sliding(self.problem.law, angles, rates, z, delta)
 
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, rates and tail velocities per period at the collocation points."""
         angles, rates = self.gait(self.mesh.times)
         unit: float | np.ndarray = RADIANS
         if self.problem.gait.relative_delta:  # the gait has another pace than the variables
@@ -58,8 +50,7 @@ class CollocatedMotion:
 
     @cached_property
     def at_points(self) -> Sliding:
-        """The body at the collocation points; its force is what is left over: with the weight's
-        pull if it is on a slope, and less what its momenta grow by if it has inertia."""
+        """The body at the collocation points; its force is the residual of the balance."""
         now, body = self.sliding(*self._points), self.problem.body
         force = np.array(now.force)
         if (load := self.problem.regime.pull(self._theta[None])) is not None:
@@ -70,8 +61,7 @@ class CollocatedMotion:
 
     @property
     def _growth(self) -> np.ndarray:
-        """Force, and torque about the tail, that change the momenta as the scheme's polynomials
-        say, ``(3, n_point)``."""
+        """Force and torque about the tail that change the momenta, ``(3, n_point)``."""
         mesh = self.mesh
         momenta = RADIANS * self.x[self.layout.momenta]
         grown = momenta[:, mesh.sites] - momenta[:, mesh.edge_sites[:-1], None]
@@ -88,28 +78,20 @@ class CollocatedMotion:
 
     @property
     def _theta(self) -> np.ndarray:
-        """At the collocation points."""
         theta = np.empty(self.mesh.n_point)
         theta[self.mesh.points] = self.x[self.layout.theta[0]][self.mesh.sites]
         return theta
 
     @property
     def rotation(self) -> float:
-        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves
-        none."""
+        """Net rotation over a period [rad], counter-clockwise."""
         problem, theta = self.problem, self.x[self.layout.theta[0]]
         turns = problem.gait.motion_symmetry == NONE
         return float(theta[-1] - theta[0]) + (problem.rotation or 0.0) if turns else 0.0
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
-        """The motion at phases t, any real numbers; periods follow each other, turned by the net
-        rotation of those before.
-
-        Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's.
-        The lab frame has the centre of mass at the origin at t = 0, and the first period's way
-        along +x; on a slope +x is straight uphill, and the arc of a gait that is asked to turn sets
-        out along +x.
-        """
+        """Motion at phases t; periods follow each other. The centre of mass is at the origin at t =
+        0, and the first period's displacement along +x; on a slope +x is straight uphill."""
         t = finite_array("t", np.atleast_1d(t), 1)
         period, phase = np.divmod(t, 1.0)
         symmetry, body = self.problem.gait.motion_symmetry, self.problem.body
@@ -138,8 +120,7 @@ class CollocatedMotion:
         )
 
     def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """z, theta and centre of mass at phases t of the solved part, and the centre's displacement
-        at its end."""
+        """z, theta and centre of mass at phases of the solved part, and its displacement."""
         mesh, z_points = self.mesh, self._points[2]
         k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
         tau = (t - mesh.edges[k]) / mesh.h[k]

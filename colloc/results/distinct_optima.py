@@ -36,26 +36,23 @@ from colloc.results.solution import SOLVED
 _GRID = 64
 _NEWTON_STEPS = 6
 SAME_VALUE, SAME_GAIT = 1e-3, 0.05
-"""Two gaits are one if their values differ by less than this relative amount and their paths by
-less than this root-mean-square distance [rad], modulo symmetries. The objective is flat at its
-maximum, so the path is the laxer."""
+"""Relative difference of values and root-mean-square distance [rad] of gaits that are one; the
+objective is flat at its maximum, so the path is the laxer."""
 SERIES_HARMONICS = 16
-"""Free paths and polygons are tabulated and told apart by their Fourier series in arc length."""
 
 
 def reversed_in_time(gait: Fourier) -> Fourier:
-    """The gait run backwards, q(-t)."""
+    """Gait q(-t)."""
     return Fourier(gait.mean, gait.cos, -gait.sin)
 
 
 def swapped(gait: Fourier, body: Body) -> Fourier:
-    """The shapes with tail and head exchanged: of chains -q_(n+1-j)(t)."""
+    """Gait with tail and head exchanged: -q_(n+1-j)(t) for chains."""
     return Fourier(*(body.swapped(rows) for rows in (gait.mean, gait.cos, gait.sin)))
 
 
 def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
-    """The gait and all gaits that differ from it by a symmetry of body and friction, but for the
-    start phase."""
+    """All symmetry images of a gait, up to the start phase."""
     result = []
     for mirror, reversal, swap in product((False, True), repeat=3):
         if (swap and not body.symmetric) or (reversal != swap and not friction.reversible):
@@ -88,26 +85,22 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
 
 
 def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
-    """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body
-    and friction."""
+    """Root-mean-square distance [rad] modulo start phase and symmetries."""
     return min(phase_distance(a, image) for image in images(b, body, friction))
 
 
 def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, friction: Law) -> bool:
-    """True if two gaits, each by its value and its path, are the same gait."""
+    """Whether two gaits, each by its value and its path, are the same."""
     (one, path), (other, near) = a, b
     close = abs(one - other) <= SAME_VALUE * max(abs(one), abs(other))
     return close and distance(path, near, body, friction) < SAME_GAIT
 
 
 def series_class(problem: Problem) -> Harmonic:
-    """The class of the Fourier series that stand for gaits of a problem: its own, if that is one of
-    harmonics."""
     return problem.gait.series(SERIES_HARMONICS)
 
 
 def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:
-    """The Fourier series that stands for a gait of a problem."""
     return series_class(problem).through(gait)
 
 

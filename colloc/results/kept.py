@@ -1,5 +1,5 @@
-"""Results take their place without loss: what another problem, or a better answer, left there
-before is kept beside it."""
+"""Results saved without loss: a former one of another problem, or a better one, is kept beside the
+new one."""
 
 from __future__ import annotations
 
@@ -17,14 +17,12 @@ from colloc.system.files import FAILED, INTERRUPTED, SHRUNK, alone_in, beside
 from colloc.system.interruption import interruptible
 
 _HOW = {"guess", "intervals", "scheme", "formulation", "mesh_tolerance", "delta_start"}
-"""Fields of a problem that say how it is solved: results that differ in these alone answer the same
-question."""
+"""Fields of a problem that do not change the question."""
 
 
 @dataclass(frozen=True)
 class Saved:
-    """A result that was saved at `path`; where the former one is kept now, if it is, and what that
-    one is, in words."""
+    """A saved result, and where and why the former one was kept."""
 
     path: Path
     former: Path | None = None
@@ -83,8 +81,7 @@ def _question(solution: Solution) -> dict:
 
 
 def _worth(there: Solution | None, new: Solution, path: Path) -> str:
-    """The result at a path that the new solution must not replace, in words; "" if there is no such
-    thing."""
+    """Description of a result that must not be replaced; "" if there is none."""
     if there is None:
         return "what was there and cannot be read" if path.exists() else ""
     if _question(there) != _question(new):
@@ -103,12 +100,7 @@ def _worth(there: Solution | None, new: Solution, path: Path) -> str:
 
 @contextmanager
 def _set_aside(path: Path, place: Path) -> Iterator[None]:
-    """Keep a result under another name, with its figures and its gait that shrank; back again if
-    the block fails.
-
-    The block replaces the result itself: under its own name there is always the former one or the
-    new one.
-    """
+    """Move a result aside with its figures; back again if the block fails."""
     pairs = [(path.with_suffix(kind), place.with_suffix(kind)) for kind in (".png", ".pdf")]
     pairs.append((beside(path, SHRUNK), beside(place, SHRUNK)))
     try:

@@ -1,5 +1,5 @@
-"""What replays say of a gait: its objective, efficiency, distance and work with errors, and for
-delta -> 0."""
+"""Objective, efficiency, distance and work of a gait by replays, with errors, and for delta ->
+0."""
 
 from __future__ import annotations
 
@@ -17,25 +17,19 @@ from colloc.verification.played import Path, Replay
 from colloc.verification.replay import replay
 
 PARTS_OF_DELTA = (1.0, 0.1, 0.01)
-"""At which a gait's value is to be known."""
 _DECADE = PARTS_OF_DELTA[1]
 _SLOWEST = 0.9
 _FEWER = 4
-"""Times fewer instants that replays at smaller deltas begin with: nothing but the limit is asked of
-them, and what that leaves open is in its error."""
+"""Factor on the first instants of replays at smaller deltas."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """An extrapolated value and its estimated error."""
-
     value: float
     error: float
 
 
 class Estimate(NamedTuple):
-    """Error of a value at delta, and the value for delta -> 0."""
-
     error: float
     limit: Limit
 
@@ -63,12 +57,8 @@ def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limi
 
 
 class Measured(NamedTuple):
-    """What replays of a gait at delta, a tenth and a hundredth of it say, with errors that hold for
-    every balanced motion."""
-
     fine: Replay
     errors: dict[str, float]
-    """Of distance and work."""
     value: Estimate
     efficiency: Estimate
 
@@ -88,13 +78,8 @@ def measured(
     limits: Iterable[PathLimit] | PathLimits = (),
     run: Callable[..., Replay] = replay,
 ) -> Measured:
-    """An objective, efficiency, distance and work of a path at delta, and the first two for delta
-    -> 0, with their errors.
-
-    Arguments are those of `colloc.verification.replay.replay`, and the net rotation that is asked
-    for: the distance of a body that turns by more depends on the point that is followed. `run` is
-    what replays (`colloc.verification.replay.replayer`).
-    """
+    """Measure a path by replays at delta, delta/10 and delta/100; arguments are those of
+    `colloc.verification.replay.replay`, the prescribed rotation, and the replay `run`."""
     replays: list[Replay] = []
     smoothed = friction.regularised or any(each.smoothed for each in objective.integrals)
     for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
@@ -130,13 +115,12 @@ def measured(
 
 
 def astray(replayed: Replay, rotation: float | None) -> float:
-    """How far the distance depends on the point of the body that is followed: by the rotation
-    beyond what is asked for."""
+    """Change of the distance with the point of the body that is followed, by rotation beyond the
+    prescribed one."""
     return 0.0 if rotation is None else abs(replayed.rotation - rotation) * replayed.lever
 
 
 def _error(replayed: Replay, aim: Objective, rotation: float | None) -> float:
-    """Relative error of an objective, for every reason."""
     by_lever = float(aim.relative_error(replayed.values, {"distance": astray(replayed, rotation)}))
     error = replayed.error if aim == replayed.objective else replayed.error_of(aim)
     return error + by_lever + replayed.ambiguity_of(aim)

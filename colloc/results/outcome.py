@@ -1,5 +1,4 @@
-"""What became of one start of a search over many; as a plain dictionary (JSON) every number to the
-bit, every gait as it is."""
+"""Outcomes of the starts of a multi-start."""
 
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED
 
 TRIVIAL, ERROR, TIME_LIMIT, CRASHED = "trivial gait", "error", "time limit", "crashed"
 PASSED_OVER = "passed over"
-"""No better than what was known, before its mesh was refined: not certified."""
+"""Status of a start that was no better than the incumbent and was not certified."""
 UNITS = {
     "efficiency": "1/weight",
     "efficiency_error": "1/weight",
@@ -27,9 +26,7 @@ UNITS = {
     "delta": "length/period",
     "seconds": "s",
 }
-"""Of the numbers of an outcome, for files."""
 RETRIED = (ERROR, CRASHED, TIME_LIMIT)
-"""What may end otherwise when it is tried again."""
 STATUSES = (
     SOLVED,
     TRIVIAL,
@@ -105,7 +102,7 @@ _NUMBERS = tuple(
 
 
 def outcome_fields(outcome: Outcome) -> dict[str, Any]:
-    """The fields of an outcome as numbers (also NaN), strings and lists."""
+    """Plain fields (numbers, strings, lists) of an outcome."""
     plain = {name: getattr(outcome, name) for name in (*_COUNTS, *_TEXTS, *_NUMBERS)}
     return (
         plain
@@ -115,8 +112,7 @@ def outcome_fields(outcome: Outcome) -> dict[str, Any]:
 
 
 def outcome_from(entry: dict[str, Any]) -> Outcome:
-    """The outcome that `outcome_fields` described. KeyError, TypeError, ValueError, OverflowError
-    or ProblemError if it did not."""
+    """Outcome from `outcome_fields`."""
     if entry["status"] not in STATUSES:
         raise ValueError(f"no status: {entry['status']}")
     kinds: list[tuple[Callable, tuple[str, ...]]] = [
@@ -129,5 +125,5 @@ def outcome_from(entry: dict[str, Any]) -> Outcome:
 
 
 def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:
-    """How many starts ended in each status; only those that occur."""
+    """Number of starts of each status that occurs."""
     return {s: n for s in STATUSES if (n := sum(o.status == s for o in outcomes))}

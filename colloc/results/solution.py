@@ -50,10 +50,8 @@ SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED, INTERRUPTED = (
     "interrupted",
 )
 _HOLDS, _INSTANTS = 3.0, np.arange(2000) / 2000
-"""Speed of a foot, in delta, up to which it holds: below friction is less than 95 % of what it can
-be; phases to count at."""
+"""Speed of a foot over delta below which it sticks; phases to count at."""
 _MOST_OTHERS = 4
-"""Of the gaits that a search met besides, so many are told."""
 
 
 @dataclass(eq=False)
@@ -118,7 +116,7 @@ class Solution:
 
     @property
     def status(self) -> str:
-        """One of "solved", "not converged", "certificate failed", "interrupted"."""
+        """ "solved", "not converged", "certificate failed" or "interrupted"."""
         reached = self.answer.optimal and self.answer.delta <= self.problem.delta * (1 + 1e-9)
         solved = reached and self.certificate.replayed and self.certificate.passed
         if self.interrupted and not solved:
@@ -129,39 +127,36 @@ class Solution:
 
     @property
     def success(self) -> bool:
-        """Whether the solve converged and every check of the certificate holds."""
         return self.status == SOLVED
 
     @property
     def history(self) -> tuple[Step, ...]:
-        """How the search came to the answer; the last step is the answer."""
+        """Steps of the search; the last one is the answer."""
         return self.answer.history or (self.answer.step,)
 
     @property
     def measured(self) -> Certificate | Answer:
-        """What says the objective, efficiency, distance and work best: the replay if there was one,
-        else the answer."""
+        """Certificate if there was a replay, else the answer."""
         return self.certificate if self.certificate.replayed else self.answer
 
     @property
     def value(self) -> float:
-        """The problem's objective, by replay (by collocation, if there was no replay)."""
+        """Value of the objective, by replay if there was one."""
         return self.measured.value
 
     @property
     def efficiency(self) -> float:
-        """Distance over work, by replay (by collocation, if there was no replay)."""
+        """Distance over work, by replay if there was one."""
         return self.measured.efficiency
 
     @property
     def distance(self) -> float:
-        """Displacement over a period, by replay (by collocation, if there was no replay)."""
+        """Displacement over a period, by replay if there was one."""
         return self.measured.distance
 
     @property
     def work(self) -> float:
-        """Work against friction over a period, by replay (by collocation, if there was no
-        replay)."""
+        """Work over a period, by replay if there was one."""
         return self.measured.work
 
     @property
@@ -277,33 +272,26 @@ class Solution:
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh of the answer."""
         return self.answer.mesh
 
     @property
     def layout(self) -> Layout:
-        """Where every variable of the answer is."""
         return self.answer.layout
 
     @property
     def gait(self) -> AnyGait:
-        """The gait of the answer."""
         return self.answer.gait.named(self.problem.body.coordinate)
 
     @property
     def delta_per_period(self) -> float:
-        """Regularisation speed of the answer in body lengths per period, whatever the class
-        measures it in."""
+        """Regularisation speed [body lengths per period]."""
         return self.answer.delta_per_period
 
     @property
     def motion(self) -> CollocatedMotion:
-        """What the variables of the answer say of the motion."""
         return self.answer.motion
 
     def at_points(self) -> tuple[np.ndarray, Sliding]:
-        """Phases of the collocation points and the body there, from the variables of the answer
-        (per period)."""
         return self.mesh.times, self.motion.at_points
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
@@ -482,8 +470,8 @@ class Solution:
 
 
 def direction_of_travel(centre: np.ndarray, tail: np.ndarray) -> str:
-    """Which way a body points as it travels, on average: "head first", "tail first" or "sideways";
-    from places of its centre of mass and of its tail over a period, ``(2, n_time)``."""
+    """ "head first", "tail first" or "sideways", from places of centre of mass and tail, ``(2,
+    n_time)``."""
     (x, y), (ahead, aside) = (centre - tail).mean(axis=1), centre[:, -1] - centre[:, 0]
     along, across = x * ahead + y * aside, abs(x * aside - y * ahead)
     return "sideways" if abs(along) <= across else "head first" if along > 0 else "tail first"

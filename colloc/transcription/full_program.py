@@ -60,34 +60,12 @@ from colloc.transcription.velocity_map import BalancedVelocity, velocity_map
 from colloc.transcription.warm_start import balanced_variables
 
 ACTUATORS, AT_LEAST, SHAPE_SPEED = "actuators", "at least", "shape speed"
-"""Rows of what actuators can do, of what has to be reached, and of the mean square shape speed."""
 
 
 @dataclass(frozen=True, eq=False)
 class FullProgram:
-    """A nonlinear program ``min f(x), lower <= x <= upper, row_lower <= g(x) <= row_upper``.
-
-    Attributes
-    ----------
-    control : ControlProblem
-    mesh : Mesh
-    far : tuple of pairs of int
-        Links more than two apart that are kept from crossing.
-    layout : Layout
-        Where the variables of the motion are; those of shape checks follow them.
-    groups : dict of str to slice
-        Rows of a name.
-    cells : dict of str to (n_cell,) int
-        Mesh cells in which a shape check has its rows.
-    lower, upper : (n,)
-    row_lower, row_upper : (m,)
-    repeated : tuple of Repeated
-    rows : (m, n + n_out + 1)
-        Sparse, of the variables, the outputs of the repeated functions, and 1.
-    objective : (1, n + n_out + 1)
-    limits : ShapeLimits
-        How the variables of shape checks follow from the parameters.
-    """
+    """A nonlinear program ``min f(x), lower <= x <= upper, row_lower <= g(x) <= row_upper``;
+    `groups` are the rows of a name, `cells` the mesh cells of a path constraint."""
 
     control: ControlProblem
     mesh: Mesh
@@ -112,21 +90,18 @@ class FullProgram:
 
     @property
     def delta_unit(self) -> float:
-        """What delta is divided by before the functions see it."""
         return 1.0 if self.control.admissible.gait.relative_delta else RADIANS
 
     @cached_property
     def nlp(self) -> Nlp:
-        """Its functions and their derivatives."""
         return nonlinear_program(self.n, self.repeated, self.rows, self.objective)
 
     def member(self, x: np.ndarray) -> AnyGait:
-        """The gait of variables x."""
         return self.control.admissible.member(x[self.layout.parameters[:, 0]])
 
     def moved_to(self, x: np.ndarray) -> tuple[FullProgram, np.ndarray]:
-        """The program with the limits of the shape at the worst instants of the gait of variables
-        x, and its variables there."""
+        """The program with path constraints at the worst instants of variables x, and its variables
+        there."""
         p, edges, scheme = self.layout.parameters[:, 0], self.mesh.edges, self.mesh.scheme.name
         program = full_program(self.control, x[p], edges, scheme, self.far)
         for name in ("rotation", ACTUATORS):
@@ -136,14 +111,12 @@ class FullProgram:
         return program, np.concatenate([x[: self.layout.n], program.limits.bends(x[p])])
 
     def with_bounds(self, name: str, lower: np.ndarray, upper: np.ndarray) -> FullProgram:
-        """The program with other bounds of the rows of a name."""
         low, high = self.row_lower.copy(), self.row_upper.copy()
         low[self.groups[name]], high[self.groups[name]] = lower, upper
         return replace(self, row_lower=low, row_upper=high)
 
     def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
-        """Variables ``(n,)`` of a gait, by its parameters ``(n_parameter,)``, that satisfy every
-        equation but the closure of the net rotation; delta in the units of the class."""
+        """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
         motion = balanced_variables(self.control, self.layout, self.mesh, parameters, delta)
         return np.concatenate([motion, self.limits.bends(parameters)])
 
@@ -155,18 +128,8 @@ def full_program(
     scheme: str = "",
     far: Pairs = (),
 ) -> FullProgram:
-    """The program on the first mesh, or on the one with the given edges and scheme.
-
-    Parameters
-    ----------
-    control : ControlProblem
-    parameters : (n_parameter,)
-        Those of a gait at whose worst instants the limits of the shape are constrained.
-    edges : (n + 1,), optional
-    scheme : str
-    far : tuple of pairs of int
-        Links more than two apart that are kept from crossing; those two apart always are.
-    """
+    """The program on the first mesh, or on given edges and scheme, with path constraints at the
+    worst instants of a gait and pairs of links `far` kept from crossing."""
     mesh = control.mesh(edges, scheme)
     layout, admissible, aims = layout_of(control, mesh), control.admissible, control.aims
     gaits, n_joint, fraction = admissible.gait, admissible.n_joint, admissible.gait.fraction
@@ -273,19 +236,16 @@ class _Motion:
         self.functions()
 
     def functions(self) -> None:
-        """Add the repeated functions."""
         raise NotImplementedError
 
     def of_points(self, size: int) -> sparse.csr_matrix:
-        """The sum over `size` parts, for every point."""
         return self.spread(np.ones((1, size)))
 
     def spread(self, matrix: np.ndarray) -> sparse.csr_matrix:
-        """A matrix that acts on the parts of a body, for every point."""
         return sparse.csr_matrix(sparse.kron(matrix, sparse.eye(self.mesh.n_point)))
 
     def at_points(self, formulas: Sequence[Any]) -> np.ndarray:
-        """Where the values of formulas of an instant are at every point, ``(n_value, n_point)``."""
+        """Values of formulas at every point, ``(n_value, n_point)``."""
         body, law = self.dynamics.body, self.dynamics.law
         local, gather, q, r, moment = self.joints(any(each.needs_forces for each in formulas))
         slow = self.delta * ca.norm_2(r) if self.relative else self.delta
@@ -297,17 +257,16 @@ class _Motion:
         return self.program.repeat(local, out, gather, delta=self.delta)
 
     def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
-        """Local variables of a point, where they are, and angles, rates and moments of them."""
+        """Local variables of a point, and angles, rates and moments of them."""
         raise NotImplementedError
 
     def totals(self) -> list[np.ndarray]:
-        """Where the densities of integrals, and what actuators do, are at the points."""
+        """Densities of integrals, and shares of actuator limits, at the points."""
         actuators = self.control.actuators
         self.limited = self.at_points([actuators]) if actuators.names else None
         return [self.at_points([quantity]) for quantity in self.control.aims.integrals]
 
     def add_limits(self) -> None:
-        """Add the rows of what actuators can do, point by point."""
         if self.limited is not None:
             least = np.tile(self.control.actuators.least, self.mesh.n_point)
             self.program.add(
@@ -331,7 +290,7 @@ class _Motion:
         self.program.add("orientation", rows, even, even)
 
     def _lengths_of_sides(self) -> np.ndarray:
-        """Where the length of every side of a polygon over that of all is, ``(n_side, 1)``."""
+        """Length of every side of a polygon over that of all, ``(n_side, 1)``."""
         gait, p = self.control.admissible.gait, self.layout.parameters
         shares, rates = gait.side_rates(self.control.admissible.n_joint)
         w = ca.SX.sym("p", p.size)
@@ -341,8 +300,8 @@ class _Motion:
 
 
 def _square_of_speed(gaits: AnyClass, p: ca.SX, n_joint: int) -> ca.SX:
-    """The square of the root-mean-square shape speed or, where the pace does not matter, of the
-    mean one."""
+    """Square of the root-mean-square shape speed, or of the mean one where the pace does not
+    matter."""
     if not gaits.relative_delta:
         return ca.bilin(ca.DM(gaits.mean_square_rate(n_joint) / RADIANS**2), p, p)
     shares, rates = gaits.side_rates(n_joint)
@@ -374,11 +333,10 @@ class _Links(_Motion):
         return self.chain.contact.groups(self.dynamics.law)
 
     def _instances(self, rows: Sequence[np.ndarray], parts: Any) -> np.ndarray:
-        """Where local variables are, ``(n_local, n_part * n_point)``, part by part."""
+        """Local variables, ``(n_local, n_part * n_point)``, part by part."""
         return np.stack([row[parts].ravel() for row in rows])
 
     def _given(self, **columns: np.ndarray) -> tuple[list[Any], ca.SX, np.ndarray]:
-        """Numbers of parts: those that all share as they are, others as given of a function."""
         shared, symbols, values = [], [], []
         for name, column in columns.items():
             column = np.ravel(column)
@@ -402,9 +360,7 @@ class _Links(_Motion):
         return self.program.repeat(local, out, gather, given, values, delta=self.delta)
 
     def _contact(self, group: Any, inertial: bool) -> np.ndarray:
-        """Of parts under one law: laws of friction, scaled like velocities, force in the axes of
-        the plane, moment about the link's midpoint, or with inertia about the centre of mass, and
-        power."""
+        """Force in the plane, moment and power of parts under one law."""
         layout, contact = self.layout, self.chain.contact
         law, rows, links = group.law, group.rows, np.array(contact.links)[group.rows]
         (along, offset, cos, sin, length, pressure), given, values = self._given(
@@ -451,7 +407,7 @@ class _Links(_Motion):
         return self.program.repeat(local, out, gather, given, values, delta=self.delta)
 
     def _load(self) -> np.ndarray | None:
-        """Of every link, m g in the axes of the plane, and its power; None without a load."""
+        """m g in the plane of every link, and its power."""
         layout, local = self.layout, ca.SX.sym("link", 3)
         pull = self.dynamics.regime.pull(local[0])
         if pull is None:
@@ -492,8 +448,7 @@ class _Links(_Motion):
         return self.program.repeat(local, out, gather, given, values, delta=self.delta)
 
     def _change(self) -> np.ndarray:
-        """Of a point with inertia: velocity of the centre of mass in the tail's axes, and how the
-        momenta change."""
+        """Velocity of the centre of mass in tail axes, and the rates of the momenta."""
         layout, regime = self.layout, self.dynamics.regime
         free = [layout.pace] if regime.free_pace else []
         paces = np.repeat(layout.parameters[free], self.mesh.n_point, axis=1)
@@ -525,7 +480,7 @@ class _Links(_Motion):
         return local, gather, ca.diff(phi), ca.diff(w), moment if with_moments else None
 
     def _on_links(self, output: int) -> sparse.csr_matrix:
-        """The sum over the contacts of each link of one of their outputs."""
+        """Sum over the contacts of each link."""
         n_link = self.chain.n_link
         links, total = np.array(self.chain.contact.links), 0
         for rows, outputs in self.contacts:
@@ -597,7 +552,6 @@ class _Links(_Motion):
         program.add("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin))
 
     def ways(self) -> tuple[Any, Any, Any]:
-        """Velocities of the centre of mass ahead and aside, and power, at every point."""
         pick, layout = self.program.pick, self.layout
         mass, angle = self.spread(self.chain.mass_column().T), self.dynamics.regime.ahead
         vx, vy = mass @ pick(layout.vx), mass @ pick(layout.vy)

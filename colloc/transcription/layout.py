@@ -17,8 +17,7 @@ from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 
 RADIANS = 2 * np.pi
-"""Radians of phase per period: rates, velocities and delta of the variables are those per period
-divided by it."""
+"""Radians of phase per period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +55,11 @@ class Layout:
     z: np.ndarray
     n: int
     integrals: tuple[Quantity, ...] = ()
-    """What `totals` are of, over the solved part of the period."""
     pace: int = -1
-    """Which of the parameters is the logarithm of the period, if one is."""
+    """Index of the log period among the parameters."""
 
     def of_period(self, names: Iterable[str]) -> np.ndarray:
-        """``(n, 1)``: where quantities of the solved part of the period are; of the rotation its
-        end and its begin."""
+        """Totals of the solved part, ``(n, 1)``; of the rotation its end and begin."""
         places = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
         places |= {
             "distance": self.distance[0, -1:],
@@ -73,12 +70,10 @@ class Layout:
         return np.concatenate([places[name] for name in names])[:, None]
 
     def shape_speed(self, x: np.ndarray) -> np.ndarray:
-        """Shape speed ``(n_point,)`` that variables x say, where delta is relative to it."""
         speed: np.ndarray = x[self.speed[0]] if self.speed.size else x[self.rates]
         return speed if speed.ndim == 1 else np.linalg.norm(speed, axis=0)
 
     def tail_velocity(self, body: Body, x: np.ndarray) -> np.ndarray:
-        """z ``(3, n_point)`` that variables x say."""
         if self.z.size:
             return x[self.z]
         phi, w, vx, vy = (x[part[0]] for part in (self.directions, self.spins, self.vx, self.vy))
@@ -87,7 +82,6 @@ class Layout:
 
 
 def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
-    """Index arrays of all variables on a mesh."""
     body, gait, dynamics = control.dynamics.body, control.admissible.gait, control.dynamics
     n_joint, inertial = body.n_joint, bool(dynamics.regime.froude)
     lifted = mesh.n_point * (control.formulation == FULL)
@@ -120,9 +114,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
 def distance_and_work(
     control: ControlProblem, layout: Layout, x: np.ndarray
 ) -> tuple[float, float]:
-    """Distance and work of a whole period as the problem states them, from variables ``(n,)`` in
-    units of friction. A gait that turns has the way in x that is seen from axes that turn evenly
-    (`colloc.gaits.period`)."""
+    """Distance and work of a period in the problem's units; a gait that turns has its chord."""
     way, work = (
         float(x[row[0, -1]]) / control.admissible.gait.fraction
         for row in (layout.distance, layout.work)

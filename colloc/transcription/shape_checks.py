@@ -1,5 +1,5 @@
-"""CasADi expressions of the bounds on shapes and their rates: joint limits, joint speeds, and links
-that must not cross."""
+"""Path constraints of shapes and their rates: joint limits, joint speeds, links that must not
+cross."""
 
 from __future__ import annotations
 
@@ -49,72 +49,61 @@ class ShapeCheck:
 
     @property
     def linear(self) -> bool:
-        """Whether, at given shares, it is linear in the shape coordinates."""
         return self.row is not None or self.place >= 0
 
     @property
     def n_joint(self) -> int:
-        """Number of shape coordinates."""
         return int(self.slope.size1_in(0))
 
     @property
     def joints(self) -> np.ndarray:
-        """Shape coordinates on which it depends, ``(n,)`` int."""
+        """Shape coordinates it depends on, ``(n,)`` int."""
         pattern = self.slope.sparsity_out(0)
         return np.array(pattern.row(), dtype=int)
 
     def slopes(self, shares: np.ndarray) -> np.ndarray:
-        """Derivatives ``(n_time, n_joint)`` of a linear one with respect to the shape."""
+        """Derivatives ``(n_time, n_joint)`` of a linear one."""
         still = np.zeros((self.n_joint, shares.size))
         return np.array(ca.densify(self.slope(still, shares[None]))).T.reshape(shares.size, -1)
 
     @property
     def both_ways(self) -> bool:
-        """Whether there is a bound from below, too."""
         return self.fixed is None or np.isfinite(self.fixed[0])
 
     def bounds(self, limit: Limit) -> tuple[float, float]:
-        """The least and the largest value allowed, for a limit on the body's angles, or one on
-        each."""
         return self.fixed or range_of(limit[self.place] if isinstance(limit, tuple) else limit)
 
     def of(self, gait: Any, times: np.ndarray) -> np.ndarray:
-        """What of a gait it is a function of, ``(n_joint, n_time)``: its shapes, or their rates."""
+        """Shapes of a gait, or their rates, ``(n_joint, n_time)``."""
         return np.asarray(gait.rates(times) if self.derivative else gait.angles(times))
 
     def matrix(self, gait_class: Any, times: np.ndarray, n_joint: int) -> np.ndarray:
-        """The same of a class that is linear in its parameters, ``(n_time, n_joint,
-        n_parameter)``."""
+        """The same of a linear class, ``(n_time, n_joint, n_parameter)``."""
         matrix = gait_class.rate_matrix if self.derivative else gait_class.angle_matrix
         return np.asarray(matrix(times, n_joint))
 
     def offset(self, gait_class: Any, n_joint: int) -> np.ndarray:
-        """What is added to it, ``(n_joint, 1)``."""
         return np.zeros((n_joint, 1)) if self.derivative else np.asarray(gait_class.offset(n_joint))
 
     def magnitudes(self, shapes: np.ndarray, limit: Limit) -> np.ndarray:
-        """What a bound from above is laid on, ``(n_time,)``: an angle is bounded both ways, by as
-        much from their middle."""
+        """Distance of values from the middle of their bounds."""
         values = self.along(shapes)
         return np.abs(values - self.middle(limit)) if self.both_ways else values
 
     def middle(self, limit: Limit) -> float:
-        """Of an angle's bounds; 0 of other checks."""
         return 0.5 * sum(self.bounds(limit)) if self.both_ways else 0.0
 
     def itself(self, shapes: np.ndarray) -> np.ndarray:
-        """The shares at which the cuts are the function itself at shapes ``(n_joint, n_time)``."""
+        """Shares at which the cuts are the function itself."""
         return self.share(shapes) if self.both_ways else np.full(shapes.shape[1], -1.0)
 
     def nearer_bounds(self, values: np.ndarray, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
-        """Of the bounds on values ``(n,)``, lower and upper, the nearer one; infinite in the place
-        of the other."""
+        """The nearer bound of values ``(n,)``; infinite in place of the other."""
         lower, upper = self.bounds(limit)
         below = values - lower < upper - values
         return np.where(below, lower, -np.inf), np.where(below, np.inf, upper)
 
     def excess(self, values: np.ndarray, limit: Limit) -> np.ndarray:
-        """How far values are beyond their bounds; negative where they are not."""
         lower, upper = self.bounds(limit)
         return np.maximum(values - upper, lower - values)
 
@@ -126,12 +115,8 @@ def shape_checks(
     speeds: tuple[float, ...] = (),
     joint_map: JointMap | None = None,
 ) -> list[ShapeCheck]:
-    """Functions of the shape, or of its rates, that admissibility bounds.
-
-    Angles to be kept within the limit of the problem; then functions that must not be positive: for
-    parts that might cross, and for the pairs `far` of parts farther apart; then rates over the
-    largest allowed, `speeds` [rad per period] of each motor.
-    """
+    """Angles within the limit, then contacts of near pairs and of pairs `far`, then rates over the
+    largest allowed, `speeds` [rad per period]."""
     angles = ca.SX.sym("q", body.n_joint)
     names, stretches = enumerate(body.limit_names), body.stretches
     if stretches:
@@ -161,8 +146,6 @@ def shape_checks(
 
 @lru_cache(maxsize=64)
 def _contact_checks(body: Body) -> dict[str, ShapeCheck]:
-    """Those of a body's contacts that were made, by their names: most are in the checks of many
-    sets of pairs."""
     return {}
 
 
@@ -188,8 +171,7 @@ def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> Sh
     rows = stretch.angles_at(fine)
 
     def largest(shapes: np.ndarray) -> np.ndarray:
-        """Where on the body it is, ``(n_time,)``: a parabola through the largest of some places and
-        those beside it."""
+        """Place of the maximum, ``(n_time,)``, by a parabola."""
         heights = np.abs(rows @ shapes)
         inner, every = (
             np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2),

@@ -1,5 +1,4 @@
-"""Rows that keep the shapes of a gait within their limits, in the cells of a mesh in which they may
-bind."""
+"""Rows of path constraints, in the mesh cells in which they may bind."""
 
 from __future__ import annotations
 
@@ -19,26 +18,21 @@ from colloc.transcription.worst_instants import held_shares, near_peaks
 
 
 class _Placed(NamedTuple):
-    """A shape check at its worst instants."""
+    """A path constraint at its worst instants."""
 
     check: ShapeCheck
     cells: np.ndarray
-    """In which it may bind, ``(n,)`` int."""
     shares: np.ndarray
-    """Of its cuts, ``(n,)``."""
     matrix: np.ndarray
-    """From parameters to shapes, ``(n, n_joint, n_parameter)``."""
+    """Parameters to shapes, ``(n, n_joint, n_parameter)``."""
     offset: np.ndarray
-    """Shape with all parameters 0, ``(n_joint,)``."""
     bends: np.ndarray
-    """Where the shape coordinates of which it is a function are among the variables, ``(k, n)``;
-    none for one that is linear."""
+    """Variables of its shape coordinates, ``(k, n)``; none if it is linear."""
 
 
 class ShapeLimits:
-    """Shape checks of a program, at the worst instants of a gait in the cells in which they may
-    bind. Those that are linear are rows in the parameters p; others are functions of the angles
-    between their links, which are variables."""
+    """Linear path constraints are rows in the parameters; others are functions of angles that are
+    variables."""
 
     def __init__(
         self,
@@ -74,11 +68,9 @@ class ShapeLimits:
         self._offset = np.concatenate(offsets)
 
     def bends(self, parameters: np.ndarray) -> np.ndarray:
-        """The angles ``(n_bend,)`` that are variables, from the parameters of a gait."""
         return np.asarray(self._matrix @ parameters + self._offset)
 
     def repeat(self, program: Rows) -> dict[str, np.ndarray]:
-        """Where the values of the checks that are not linear are, by their names."""
         delta, share, values = ca.SX.sym("delta"), ca.SX.sym("share"), {}
         for check, _, shares, _, _, bends in self._placed:
             if bends.size:
@@ -90,7 +82,6 @@ class ShapeLimits:
         return values
 
     def add_rows(self, program: Rows, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Add the rows; the cells in which each check has its own, by its name."""
         p = program.pick(self._p)
         if self.n_bend:
             bends = program.pick(self._first + np.arange(self.n_bend))

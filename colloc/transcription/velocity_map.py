@@ -17,14 +17,12 @@ from colloc.mechanics.law import Law
 from colloc.numerics.repeated import LocalFunction
 
 _TOLERANCE, ACCEPTED = 1e-12, 1e3
-"""Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance
-will do."""
+"""Tolerance, and the factor on it where rounding stops the solver."""
 
 
 @lru_cache(maxsize=32)
 def velocity_map(body: Body, law: Law, *, relative: bool = False) -> LocalFunction:
-    """Of local variables (theta, q, r, z): what vanishes, z - Z, then the velocities of the centre
-    of mass ahead and aside, and the power at Z. Delta may be relative to the shape speed."""
+    """Local functions of (theta, q, r, z): z - Z, velocities of the centre of mass, power at Z."""
     sizes = (("theta", 1), ("q", body.n_joint), ("r", body.n_joint), ("z", 3), ("delta", 1))
     theta, q, r, z, delta = (ca.SX.sym(name, size) for name, size in sizes)
     solved, slow = ca.SX.sym("Z", 3), delta * ca.norm_2(r) if relative else delta
@@ -37,13 +35,8 @@ def velocity_map(body: Body, law: Law, *, relative: bool = False) -> LocalFuncti
 
 
 class BalancedVelocity(ca.Callback):
-    """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``; not differentiable
-    by CasADi.
-
-    The start only saves steps; NaN stands for the velocities last found. The same arguments are not
-    solved twice. An instant that does not converge gives NaN, which an optimiser takes as a step
-    too far.
-    """
+    """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``, cached; NaN where
+    the balance does not converge."""
 
     def __init__(self, body: Body, friction: Law, n_time: int) -> None:
         ca.Callback.__init__(self)
@@ -54,7 +47,6 @@ class BalancedVelocity(ca.Callback):
         self.construct("velocity_map", {"enable_fd": False})
 
     def of_local(self, local: ca.MX, delta: ca.MX, *, relative: bool) -> ca.MX:
-        """Z of the local variables of `velocity_map`, ``(3, n_time)``."""
         ends = np.cumsum([1, self._body.n_joint, self._body.n_joint]).tolist()
         _, q, r, start = ca.vertsplit(local, [0, *ends, local.shape[0]])
         if not relative:

@@ -1,5 +1,4 @@
-"""Feasible starting points: from a gait alone to all variables of a full program, through the
-balance solver."""
+"""Feasible variables of a full program from a gait, through the balance solver."""
 
 from __future__ import annotations
 
@@ -22,9 +21,7 @@ def balanced_variables(
     delta: float,
     gait: AnyGait = None,
 ) -> np.ndarray:
-    """Variables ``(n,)`` that satisfy every equation but the closure of the net rotation, for
-    parameters ``(n_parameter,)`` and delta in the units of the class; `gait` is in the time of the
-    mesh, by default that of the parameters."""
+    """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
     gaits, n_joint = control.admissible.gait, control.admissible.n_joint
     kind = kind_of_motion(control.dynamics.in_speeds_of(RADIANS))
     if gait is None:
@@ -89,8 +86,7 @@ def _lift(
     delta: np.ndarray,
     theta: np.ndarray,
 ) -> None:
-    """Set the variables of the links, from joint angles, rates and tail velocities, and delta and
-    the tail's orientations ``(n_point,)``."""
+    """Set the variables of the links."""
     angles, rates, z = motion
     dynamics = control.dynamics.in_speeds_of(RADIANS)
     body, law, pull = dynamics.body, dynamics.law, dynamics.regime.pull(theta[None])

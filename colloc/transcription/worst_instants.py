@@ -1,10 +1,8 @@
-"""Where a gait comes closest to the bounds on its shapes and rates: one instant for every check in
-every mesh cell.
+"""Worst instants of path constraints, one in every mesh cell.
 
-An inequality between nodes is kept by constraining it at these instants; repeated at every solve,
-this is the exchange method for semi-infinite programs. Links that pass each other's ends give peaks
-with a kink, so the instants are found by sampling finer and finer around the highest sample, not by
-curvature alone.
+An inequality between nodes is kept by constraining it at these instants, repeated at every solve:
+the exchange method for semi-infinite programs. Links that pass each other's ends give peaks with a
+kink, so instants are found by nested sampling.
 """
 
 from __future__ import annotations
@@ -20,34 +18,25 @@ from colloc.numerics.peaks import SAMPLES, peaks, vertex
 from colloc.transcription.shape_checks import ShapeCheck
 
 _NEAR, _FAR = 0.1, 1.0
-"""A search watches every cell in which a check is nearer to its bound than the first [rad], and
-peaks nearer than the second: the rest is looked at again when the gait has moved."""
+"""Distances from the bound [rad] below which a cell, or a peak, is watched."""
 _HELD_SHARE, _HELD_NEAR = 1e-3, 0.05
-"""A check is replaced by its tangent plane where both sums have at least this share in it and where
-it is nearer to its bound than this [rad]: elsewhere the gait may move far, and the plane would
-forbid what is free."""
+"""A check is replaced by its tangent plane where both sums have at least this share in it and it is
+this near to its bound [rad]: elsewhere the gait may move far."""
 _STEP, _LARGEST, _STEPS = 1e-3, 0.1, 4
-"""Of Newton's method for a moving worst instant, as shares of its cell: between the samples, and
-the largest; and how many."""
+"""Sampling and largest step of Newton's method, as parts of a cell; number of steps."""
 
 
 def worst_instants(
     gait: AnyGait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit
 ) -> list[np.ndarray]:
-    """For each check, the instant in every mesh cell where it comes closest to its bound,
-    ``(n_interval,)``."""
+    """Worst instant of each check in every mesh cell, ``(n_interval,)``."""
     return [_worst(gait, mesh, check, np.arange(mesh.n), limit) for check in checks]
 
 
 def near_peaks(
     gait: AnyGait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For each check, the mesh cells in which it might bind soon, and its worst instants there,
-    ``(n,)`` each.
-
-    Those are the cells in which it is near its bound (`limit` for angles, else 0), and those in
-    which it has a peak.
-    """
+    """Cells in which each check might bind soon, and its worst instants there."""
     fine = np.linspace(0.0, 1.0, SAMPLES + 1)
     times, found = (mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel(), []
     given = {check.derivative: check for check in checks}
@@ -86,9 +75,7 @@ def moving(
     mesh: Mesh,
     cells: np.ndarray,
 ) -> np.ndarray:
-    """Which of the worst instants of cells move with the gait and might bind, ``(k,)`` int: those
-    near their bound and off the edges of their cells. What is on an edge stays there: the next cell
-    has it too."""
+    """Worst instants near their bound and off the edges of their cells, ``(k,)`` int."""
     near = check.excess(values, limit) > -_NEAR
     share = (times - mesh.edges[cells]) / mesh.h[cells]
     return np.flatnonzero(near & (share > _STEP) & (share < 1 - _STEP))
@@ -103,12 +90,7 @@ def followed(
     cells: tuple[np.ndarray, np.ndarray],
     limit: Limit,
 ) -> np.ndarray:
-    """The worst instants of a gait near those of another one, in the same cells and with the shares
-    held, ``(n,)``.
-
-    By Newton's method on the check along the gait. `cells`: where they begin and how wide they are,
-    ``(n,)`` each.
-    """
+    """Worst instants of a gait near those of another one, in the same cells, by Newton's method."""
     left, h = cells
     step, held = _STEP * h, np.tile(shares, 3)
 
@@ -133,13 +115,11 @@ def followed(
 
 
 def check_values(check: ShapeCheck, gait: AnyGait, times: np.ndarray) -> np.ndarray:
-    """A check along a gait, ``(n_time,)``."""
     return check.along(check.of(gait, times))
 
 
 def held_shares(check: ShapeCheck, gait: AnyGait, times: np.ndarray) -> np.ndarray:
-    """The share of the first sum to hold in the cut at each of the instants, or that of the check
-    itself, ``(n_time,)``."""
+    """Shares that the cuts hold at the instants, ``(n_time,)``."""
     shapes = check.of(gait, times)
     shares = check.share(shapes)
     if check.both_ways:
