@@ -23,27 +23,23 @@ from colloc.gaits.record import FEWEST, read_record
 from colloc.system.errors import ProblemError
 
 _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
-_WORTH, _EXACT = 1.05, 1e-16
-"""The fewest numbers are taken whose score is the best one's, to a factor and a mean square
-[rad^2]."""
+_WORTH, _EXACT = 1.05, 1e-16  # factor and mean square [rad^2] by which scores count as equal
 _PHASES = 1024  # at which a function is sampled
-_GAP, _GAPS = 5.0, 21
-"""Steps after the last sample at which the next period begins, at most; gaps that are tried."""
-_DRIFT = 0.1  # drift a period that still closes, as a share of a joint's range
+_GAP, _GAPS = 5.0, 21  # most steps from the last sample to the next period; gaps that are tried
+_DRIFT = 0.1  # drift a period that still closes, of a joint's range
 _LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
 _ALIKE = 1e-3, 0.03, 0.2
 """Excess of the mean square difference of a record from itself a period later over that several
 periods later: the first length below each is a candidate for the period."""
 _REPEATED, _SLOW, _SMALL = 2.0, 10.0, 1e-2
-"""How much larger the score of several periods may be than that of one long one with as many
-harmonics: a factor, and a larger one, for slow noise, up to a share of the variance."""
+"""Ratio of the score of several periods to that of one long one with as many harmonics, at most;
+for slow noise the second, up to a share of the variance."""
 _DRIFTS, _OPEN = 1.3, 4.0
-"""The same for no drift, as a part of a wave with noise looks like one, and if the record would not
-close else."""
+"""Ratio of the scores without and with a drift, at most: a part of a wave with noise looks like a
+drift; and the second if the record would not close else."""
 _TOLD = 0.5  # share of a record beyond which a period is told without a drift
 _ROUGH = 6  # harmonics by which the period is told
-SEVERAL = 1.1
-"""Periods from which a record holds more than one."""
+SEVERAL = 1.1  # periods from which a record holds more than one
 _STEP = 1e-5  # relative, of differences by the period
 _HIGHEST = 64  # harmonics of a class at most
 _CHANCE = 0.05  # that noise alone seems worth more harmonics
@@ -59,12 +55,10 @@ class Uncertainty:
     """Uncertainty of the coefficients of a series through samples."""
 
     directions: np.ndarray
-    """Independent changes of (mean, cos 1, sin 1, cos 2, ...) of a standard deviation each,
-    ``(n_direction, n_joint, n_coefficient)``; also of harmonics beyond the series."""
-    factor: float
-    """Standard deviations that cover 95 %: two, or Student's for few samples."""
-    richer: Fourier | None
-    """A series of more harmonics, if smoothing leaves out more than noise."""
+    """Independent changes by a standard deviation, ``(n_direction, n_joint, n_coefficient)``, as
+    `Fourier.table`; also of harmonics beyond the series."""
+    factor: float  # standard deviations that cover 95 %: two, or Student's for few samples
+    richer: Fourier | None  # of more harmonics, if smoothing leaves out more than noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +72,10 @@ class FittedGait:
     periods: float = 1.0  # that the samples hold
     period: float = 1.0  # in the unit of time of a file
     uncertainty: Uncertainty | None = None  # None for a series
-    taken: str = ""  # what was read from a file, in words
+    taken: str = ""  # `colloc.gaits.record.Record.taken`
     centre: int = 0  # `colloc.gaits.record.Record.centre`
 
     def describe(self) -> str:
-        """How the gait was made, in words."""
         if not self.samples:
             return "the series as it was given"
         plural = "s" * (self.gait.n_harmonic > 1)
@@ -112,33 +105,9 @@ def fitted_gait(
 ) -> FittedGait:
     """Fit a gait to joint angles.
 
-    Parameters
-    ----------
-    given : gait, array, path of a CSV file, or callable
-        See `Given`. A file has a column of times and one for each joint
-        (`colloc.gaits.record.read_record`).
-    n_joint : int
-        Of the body.
-    period : float, optional
-        Of a file, in its unit of time; more than one may be recorded. By default it is told from
-        the samples.
-    harmonics : int, optional
-        By default as many as the samples are worth.
-    degrees : bool
-        Whether angles are degrees; of a file, where it does not say what they are.
-
-    Raises
-    ------
-    ProblemError
-        If there are no such angles, they are not finite, times fall, the path is far from closed,
-        or angles look like degrees.
-
-    Examples
-    --------
-    >>> t = np.arange(40) / 40
-    >>> fit = fitted_gait(np.stack([np.cos(2 * np.pi * t), 0.5 * np.sin(2 * np.pi * t)]), 2)
-    >>> np.allclose(fit.gait.sin, [[0], [0.5]]), fit.largest < 1e-12
-    (True, True)
+    `period`, in the unit of time of a file, is by default told from the samples, which may hold
+    several; `harmonics` are by default as many as the samples are worth; `degrees` holds for a file
+    where it does not name a unit.
     """
     name, record = "the gait", None
     if isinstance(given, Fourier):
@@ -280,44 +249,40 @@ class _Samples(NamedTuple):
         self.check(period, harmonics)
         time, step = self.time, self.step
 
-        def fit_up_to(
-            period: float, drifts: bool, chosen: int = 0, most: int = _MOST_HARMONICS
+        def fits(
+            period: float, chosen: int = 0, *, drifts: bool = False, most: int = _MOST_HARMONICS
         ) -> list[_Fit]:
             many = min(time.size, int(period / step))  # samples of a period
             most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
             return self.fits(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
 
-        def both_fits(period: float, chosen: int) -> list[_Fit]:
-            return [*fit_up_to(period, False, chosen), *fit_up_to(period, True, chosen)]
+        def both(period: float, chosen: int) -> list[_Fit]:
+            return fits(period, chosen) + fits(period, chosen, drifts=True)
 
         def smallest_score(period: float) -> float:
-            return _best(fit_up_to(period, False, most=_ROUGH))
+            return _best(fits(period, most=_ROUGH))
 
         def best_period(low: float, high: float) -> float:
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
             return float(minimize_scalar(smallest_score, bounds=(low, high), **how).x)
 
-        if period:
-            fits = both_fits(period, 0)
-        else:
-            fits = [*both_fits(time[-1], 0), *both_fits(time[-1] + step, 0)]
+        found = both(period, 0) if period else both(time[-1], 0) + both(time[-1] + step, 0)
         if period is None:
             grid = time[-1] + step * np.linspace(0.0, _GAP, _GAPS)
-            near = min(grid, key=smallest_score)
-            around = max(near - grid[1] + grid[0], grid[0]), near + grid[1] - grid[0]
-            repeats = [best_period(low, high) for low, high in self.find_repeats()]
-            fits += both_fits(best_period(*around), 1)
+            near, width = min(grid, key=smallest_score), grid[1] - grid[0]
+            found += both(best_period(max(near - width, grid[0]), near + width), 1)
+            repeats = sorted(best_period(low, high) for low, high in self.find_repeats())
             for each in repeats:
-                fits += fit_up_to(each, False, 1) if each > _TOLD * time[-1] else []
-            several = [both_fits(each, 1) for each in sorted(repeats) if each <= _TOLD * time[-1]]
-            best = min(map(_best, (fits, *several)))
+                found += fits(each, 1) if each > _TOLD * time[-1] else []
+            several = [both(each, 1) for each in repeats if each <= _TOLD * time[-1]]
+            best = min(map(_best, (found, *several)))
             slow = min(_SLOW * best, _SMALL * float(self.angles.var(axis=1).mean()))
             enough = max(_REPEATED * best, slow) + _EXACT
-            fits = next((each for each in several if _best(each) <= enough), fits)
-        closed = [fit for fit in fits if not fit.drifts]
-        if _best(closed) <= _DRIFTS * _best(fits) + _EXACT:
-            fits = closed
-        fit = _cheapest(fits)
+            found = next((each for each in several if _best(each) <= enough), found)
+        closed = [fit for fit in found if not fit.drifts]
+        if _best(closed) <= _DRIFTS * _best(found) + _EXACT:
+            found = closed
+        fit = _cheapest(found)
         if fit.drifts and not _closes(*self.drift_and_ranges(fit)):
             return _cheapest(closed) if _best(closed) <= _OPEN * fit.score else fit
         return fit

@@ -57,66 +57,60 @@ class Problem:
     Parameters
     ----------
     name : str
-        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200, and no ending
-        that colloc itself gives to files (`colloc.system.files`).
+        Of files: letters, digits, ``_``, ``-`` and ``.``, at most 200, and no ending that colloc
+        itself gives to files.
     guess : Fourier, Combination or Corners, optional
-        An admissible gait to start from, of any class; it is projected onto the class `gait`. By
-        default a travelling wave (`colloc.gaits.guesses`).
+        An admissible gait of any class to start from. By default a travelling wave
+        (`colloc.gaits.guesses`).
     body : Chain or ModalBody
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
         Or any other `colloc.mechanics.law.Law` (docs/howto/laws.md).
     gait : Harmonic, BSpline or Polygon
-        The class of gaits; which paths in shape space are allowed decides the answer
-        (docs/gait_classes.md). By default one harmonic or, for a body whose motion is prescribed,
-        that motion (`colloc.gaits.prescribed`).
+        The class of gaits, which decides the answer (docs/gait_classes.md). By default one
+        harmonic, or the motion of a body whose motion is prescribed.
     delta : float
         Regularisation speed of friction at which the problem is finally solved, in body lengths per
-        period; for polygons relative to the shape speed, in body lengths per radian of path.
-        By default 1e-4 for chains; 1e-2 for smooth bodies, whose panels have to resolve it.
+        period; for polygons in body lengths per radian of path. By default 1e-4 for chains; 1e-2
+        for smooth bodies, whose panels have to resolve it.
     delta_start : float
         Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), 0.02 on a
-        slope, and 0.01 where delta is relative to the shape speed.
+        slope, and 0.01 for polygons.
     joint_limit : float, or sequence of float or (float, float)
         Largest |joint angle| [rad], at most pi, of all joints or of each, or the least and the
         largest of a joint, as in ``((-1, 2), 1.5)``; of a smooth body, largest |tangent angle| from
         its mean direction, at most pi/2.
     smallest_shape_speed : float
         Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the
-        length of a path over 2 pi. It keeps the search away from gaits
-        whose speeds sink to delta, where regularised friction is viscous and efficiency
-        meaningless.
+        length of a path over 2 pi. Where speeds sink to delta, regularised friction is viscous and
+        efficiency meaningless.
     intervals : int
-        Intervals of the first mesh, on the part of the period that is solved; by default as many as
-        the class asks for.
+        Intervals of the first mesh, on the solved part of the period.
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"full", "implicit velocity"}
-        The program whose solution is the answer (`colloc.transcription.full_program`): with
-        link velocities and forces as variables and the balance as constraints, or with the
-        velocities tied to those of the balance solver. The first is usual for chains; of smooth
-        bodies there is only the second.
+        Of the program whose solution is the answer (`colloc.transcription.full_program`): with
+        link velocities and forces as variables and the balance as constraints, as usual for chains,
+        or with the velocities tied to those of the balance solver, as for smooth bodies.
     mesh_tolerance : float
         Relative error of the objective to which the mesh is refined at the final delta; 0 keeps the
         uniform mesh.
     objective : Objective or str
-        What is maximised (`colloc.gaits.objective`): "efficiency", "speed", "turning", "driven
-        efficiency", or an expression of distance, work, rotation, length, driven_work and, with
-        inertia, period.
+        What is maximised: "efficiency", "speed", "turning", "driven efficiency", or an expression
+        of distance, work, rotation, length, driven_work and, with inertia, period.
     rotation : float or None
         Net rotation over a period [rad], counter-clockwise; None leaves it free. Other values than
         0 need a class without symmetry.
     at_least : mapping or pairs of (Objective or str, float)
         Values of a period that must be reached, as ``{"distance": 0.3}``.
     torque_limit, power_limit : float or sequence of float, optional
-        The most that the joints' actuators can do, all or each: magnitude of the moment [weight x
-        body length], power delivered [weight x body length / period]. With a power limit the pace
-        matters.
+        Of all motors or of each: magnitude of the moment [weight x body length], power delivered
+        [weight x body length / period]. With a power limit the pace matters.
     limits : PathLimit or sequence of PathLimit, optional
         Others, on functions of an instant of your own (docs/howto/motors.md).
     speed_limit : float or sequence of float, optional
-        The largest speed of the joints at any instant, all or each [rad per period]: that of a
-        motor [rad/s] times the period [s]. The pace matters.
+        Largest speed of all motors or of each [rad per period]: that of a motor [rad/s] times the
+        period [s]. The pace matters.
     grade : float
         Tangent of the inclination of the ground; 0 is the level (docs/howto/slopes.md). On a slope
         "distance" is the climb and "work" that of the joints, and where the body points is sought
