@@ -57,10 +57,14 @@ class GaitFunction:
         """The gait of the motors."""
         return self
 
+    def scaled(self, factor: float) -> Any:
+        """The gait with all angles but those at rest multiplied by a factor."""
+        return self.mapped(factor * np.eye(self.n_joint))
+
     @property
     def mirrored(self) -> Any:
         """The mirror image: all angles negated."""
-        return self.mapped(-np.eye(self.n_joint))
+        return self.scaled(-1.0)
 
     def grown(self, factor: float) -> Any:
         """The gait with shapes multiplied by a factor about their mean, if it can grow."""
@@ -113,7 +117,6 @@ class ClassOfGaits:
     """Base of classes of gaits."""
 
     symmetry: str
-    symmetries: tuple[str, ...] = SYMMETRIES  # that the class may have
     free = True  # has parameters
     stages: tuple[float, ...] = ()  # phases that every mesh has as edges
     relative_delta = False  # delta is relative to the shape speed, as the pace does not matter
@@ -122,9 +125,9 @@ class ClassOfGaits:
     may_tell = False  # members can have static parameters (`colloc.gaits.told`)
 
     def _check_symmetry(self) -> None:
-        if self.symmetry not in self.symmetries:
+        if self.symmetry not in SYMMETRIES:
             raise ProblemError(
-                f"gait.symmetry must be one of {', '.join(self.symmetries)}, not {self.symmetry!r}."
+                f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}."
             )
 
     def with_symmetry(self, symmetry: str) -> Any:

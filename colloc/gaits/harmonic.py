@@ -118,10 +118,6 @@ class Fourier(GaitFunction):
         """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
         return Fourier(matrix @ self.mean, matrix @ self.cos, matrix @ self.sin)
 
-    def scaled(self, factor: float) -> Fourier:
-        """The gait with all angles multiplied by a factor."""
-        return Fourier(factor * self.mean, factor * self.cos, factor * self.sin)
-
     def grown(self, factor: float) -> Fourier:
         """The gait with all angles multiplied by a factor about their mean."""
         return Fourier(self.mean, factor * self.cos, factor * self.sin)

@@ -98,12 +98,7 @@ class Combination(GaitFunction):
         return self.basis.series(_SERIES).through(self).mapped(matrix)
 
     def scaled(self, factor: float) -> Combination:
-        """The gait with all angles but those at rest multiplied by a factor."""
         return Combination(self.basis, factor * self.table)
-
-    @property
-    def mirrored(self) -> Combination:
-        return self.scaled(-1.0)
 
     def grown(self, factor: float) -> Combination:
         return self.scaled(factor)  # a class need not have constant angles
@@ -198,17 +193,15 @@ class LinearClass(ClassOfGaits):
         largest = largest_coordinate(body) * limit * np.abs(inverse).sum(axis=1)
         return -largest, largest
 
-    def angle_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
+    def angle_matrix(self, t: np.ndarray, n_joint: int, derivative: int = 0) -> np.ndarray:
         """Joint angles per parameter at phases t, ``(n_time, n_joint, n_parameter)``."""
-        return self._combined(self.functions(t), n_joint)
+        functions = self.functions(t, derivative)
+        basis = self._basis(n_joint).reshape(n_joint, functions.shape[0], -1)
+        return np.einsum("wt,jwp->tjp", functions, basis)
 
     def rate_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
         """Joint rates per period and parameter at phases t, ``(n_time, n_joint, n_parameter)``."""
-        return self._combined(self.functions(t, 1), n_joint)
-
-    def _combined(self, functions: np.ndarray, n_joint: int) -> np.ndarray:
-        basis = self._basis(n_joint).reshape(n_joint, functions.shape[0], -1)
-        return np.einsum("wt,jwp->tjp", functions, basis)
+        return self.angle_matrix(t, n_joint, 1)
 
     def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
         """`rate_matrix` at the points of a mesh, at corners that of the point's interval."""

@@ -59,13 +59,15 @@ class Prescribed(ClassOfGaits):
     stages: tuple[float, ...] = (0.0, 1.0)
     symmetry: str = NONE
 
-    symmetries = (NONE, ANTIPODAL)
     free = False
 
     def __post_init__(self) -> None:
         stages = tuple(float(t) for t in self.stages)
         object.__setattr__(self, "stages", stages)
-        self._check_symmetry()
+        if self.symmetry not in (NONE, ANTIPODAL):
+            raise ProblemError(
+                f"gait.symmetry must be one of none, antipodal, not {self.symmetry!r}."
+            )
         ends = (stages[0], stages[-1]) if len(stages) > 1 else ()
         if ends != (0.0, self.fraction) or min(np.diff(stages)) <= 0:
             raise ProblemError(
