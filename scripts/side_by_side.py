@@ -19,7 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import colloc
-from colloc.pictures.foot_marks import FootMarks
+from colloc.pictures.figure import FootMarks
 from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled

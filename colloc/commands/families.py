@@ -1,10 +1,10 @@
-"""Commands that solve many problems: many starts, a grid, a front of two objectives, gaits that
-steer."""
+"""Commands that solve many problems: many starts, a grid, a Pareto front, gaits that steer."""
 
 from __future__ import annotations
 
 import argparse
 import csv
+import io
 import json
 import math
 import os
@@ -16,30 +16,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from colloc.commands import options as cli
 from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, naming_saved_files
-from colloc.commands.options import (
-    BOUND,
-    NO_FIGURE,
-    PROBLEM,
-    RETRY,
-    WORKERS,
-    check_least,
-    check_positive,
-    choice,
-    command,
-    complain,
-    count,
-    number,
-    output,
-    output_folder,
-    output_path,
-    quiet,
-    read_problem,
-    status_line,
-    tell,
-    text,
-    values,
-)
 from colloc.commands.summary import bound_facts, kept_facts, kept_lines
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
@@ -53,23 +31,19 @@ from colloc.system.files import locked, replaced_file
 
 if TYPE_CHECKING:
     from colloc.results.archive import Archive
-    from colloc.results.kept import Saved
     from colloc.studies.pareto import ParetoFront
-    from colloc.studies.run import CellState, StudyRun
+    from colloc.studies.run import StudyRun
     from colloc.studies.steering import Steering
 
 _MOST_SHOWN = 12
-_SAVE_EVERY = 60.0
-_POINTS = 9
-_AIMS, _PAIR = (SPEED.name, EFFICIENCY.name), ("FIRST", "SECOND")
-_TURNS = (-30.0, -15.0, 0.0, 15.0, 30.0)
-OUTCOME_HEADER = " start       value   iter  seconds  status"
+_SAVE_EVERY = 60.0  # seconds
+_AIMS = SPEED.name, EFFICIENCY.name
 
 
 def starts_summary(
     problem: Problem, outcomes: Sequence[Outcome], path: Path | None
 ) -> tuple[list[Basin], dict[str, Any], list[str]]:
-    """The distinct optima of starts, facts about all of them, and lines for people."""
+    """Distinct optima of starts, facts about all of them, and lines for people."""
     optima, tally = basins(problem, outcomes), counts(outcomes)
     failures = [o for o in outcomes if o.status != SOLVED]
     floors = [on_speed_floor(problem, basin.best.gait) for basin in optima]
@@ -108,7 +82,7 @@ def starts_summary(
     return optima, facts, lines
 
 
-@command(
+@cli.command(
     "multistart",
     """\
 Start k of a seed is the same gait whatever --starts and --workers are. What the archive of the
@@ -116,22 +90,22 @@ problem holds already is not solved again: the same command goes on after Ctrl-C
 --starts or another --seed adds to it.
 
   colloc multistart problems/three_link.py --starts 100 --workers 2""",
-    *PROBLEM,
-    count("--starts", "N", "starts 0 to N-1 (default: 20)", 20),
-    count("--seed", "N", "of the sampler (default: 0)", 0),
-    WORKERS,
-    choice("--sampler", SAMPLERS, "perturbed: near the problem's guess", LATIN_HYPERCUBE),
-    number("--time-limit", "S", "seconds for one start (default: 300)", 300.0),
-    RETRY,
-    BOUND,
-    output("folder, or .h5 file (default: results/NAME.starts.h5)"),
+    *cli.PROBLEM,
+    cli.count("--starts", "N", "starts 0 to N-1 (default: 20)", 20),
+    cli.SEED,
+    cli.WORKERS,
+    cli.choice("--sampler", SAMPLERS, "perturbed: near the problem's guess", LATIN_HYPERCUBE),
+    cli.number("--time-limit", "S", "seconds for one start (default: 300)", 300.0),
+    cli.RETRY,
+    cli.BOUND,
+    cli.output("folder, or .h5 file (default: results/NAME.starts.h5)"),
 )
 def multistart(options: argparse.Namespace) -> int:
-    check_least(options, starts=1, workers=1, seed=0)
-    check_positive(options, "time_limit")
-    problem = read_problem(options)[1]
-    path = output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
-    # heavy imports only now: a bad problem is refused at once
+    cli.check_least(options, starts=1, workers=1, seed=0)
+    cli.check_positive(options, "time_limit")
+    problem = cli.read_problem(options)[1]
+    path = cli.output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
+    # slow imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
     from colloc.results.archive import open_archive, save_archive
 
@@ -156,30 +130,30 @@ def multistart(options: argparse.Namespace) -> int:
             line += f"; the best of all, {solved[best]:.6f}, is {where}"
         lines.append(line)
     lines.append(f"  saved {path}")
-    tell(options, facts | {"bound": bound_facts(bound), "interrupted": interrupted}, lines)
+    cli.tell(options, facts | {"bound": bound_facts(bound), "interrupted": interrupted}, lines)
     if interrupted:
-        complain("interrupted; run the same command again to go on.")
+        cli.complain("interrupted; run the same command again to go on.")
         return INTERRUPTED
     return OK if optima else NONE_FOUND
 
 
 def _run_starts(archive: Archive, options: argparse.Namespace) -> bool:
-    """Solve the starts that are asked for and missing; whether Ctrl-C came."""
+    """Solve the missing starts; whether Ctrl-C came."""
     from colloc.studies.multistart import run_archive
 
     done = archive.done(options.sampler, options.seed, options.starts, retry=options.retry)
-    # there may be more than memory holds
-    todo = (k for k in range(options.starts) if k not in done)
-    to_go, name = options.starts - len(done), archive.problem.name
-    settings = values(options, "sampler", "seed", "workers", "time_limit")
-    if not quiet(options):
-        print(f"{len(done)} starts done already, {to_go} to go\n{OUTCOME_HEADER}", flush=True)
+    todo = (k for k in range(options.starts) if k not in done)  # may be more than memory holds
+    to_go, name, loud = options.starts - len(done), archive.problem.name, not cli.quiet(options)
+    settings = cli.values(options, "sampler", "seed", "workers", "time_limit")
+    if loud:
+        header = " start       value   iter  seconds  status"
+        print(f"{len(done)} starts done already, {to_go} to go\n{header}", flush=True)
     begin = time.perf_counter()
     try:
-        with status_line(options) as line:
+        with cli.status_line(options) as line:
             line.say(f"{name}: 0 of {to_go} starts")
             for k, o in enumerate(run_archive(archive, todo, **settings), 1):
-                if not quiet(options):
+                if loud:
                     line.clear()
                     numbers = f"{o.start:6d} {o.value:11.6f} {o.iterations:6d} {o.seconds:8.2f}"
                     print(f"{numbers}  {o.status}", flush=True)
@@ -190,29 +164,33 @@ def _run_starts(archive: Archive, options: argparse.Namespace) -> bool:
     return False
 
 
-@command(
+@cli.command(
     "sweep",
     """\
 Starts travel between neighbours. What is done is kept, and not solved again. A study file is Python
 code, and is executed. Exit code 3: some cells have no certified gait.""",
-    text("study", None, "a Python file that states STUDY, for example studies/friction_plane.py"),
-    WORKERS,
-    text("--dask", "ADDRESS", "scheduler of a Dask cluster (tcp://host:8786), or 'local'"),
-    count("--chunk", "N", "cells to a task, instead of the study's own number"),
-    RETRY,
-    text("--output", "FOLDER", "for NAME.nc and NAME.study/ (default: results)", default="results"),
+    cli.text(
+        "study", None, "a Python file that states STUDY, for example studies/friction_plane.py"
+    ),
+    cli.WORKERS,
+    cli.text("--dask", "ADDRESS", "scheduler of a Dask cluster (tcp://host:8786), or 'local'"),
+    cli.count("--chunk", "N", "cells to a task, instead of the study's own number"),
+    cli.RETRY,
+    cli.text(
+        "--output", "FOLDER", "for NAME.nc and NAME.study/ (default: results)", default="results"
+    ),
 )
 def sweep(options: argparse.Namespace) -> int:
     from colloc.studies.study import read_study_file
 
-    check_least(options, workers=1, chunk=1)
+    cli.check_least(options, workers=1, chunk=1)
     study, source = read_study_file(options.study)
     if options.chunk is not None:
         study = replace(study, chunk=options.chunk)
-    # heavy imports only now: a bad study is refused at once
+    # slow imports only now: a bad study is refused at once
     from colloc.studies.run import StudyRun
 
-    out = output_folder(options.output)
+    out = cli.output_folder(options.output)
     folder = out / f"{study.name}.study"
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -222,23 +200,23 @@ def sweep(options: argparse.Namespace) -> int:
         raise StoreError(f"cannot write in {out}; choose another --output.")
     with locked(folder / "lock"):
         run = StudyRun(study, folder, retry=options.retry)
-        if not quiet(options):
+        if not cli.quiet(options):
             total = math.prod(study.shape)
             print(f"{study.name}: {total} cells, {run.visited} of them in the journal", flush=True)
         try:
             interrupted = _run_cells(run, options, lambda: _save(run, out, source, options.command))
         finally:
             path = _save(run, out, source, options.command)
-    tell(options, *sweep_summary(run, path))
+    cli.tell(options, *sweep_summary(run, path))
     if interrupted:
-        complain("interrupted; what is done is kept, and the same command goes on from there.")
+        cli.complain("interrupted; what is done is kept, and the same command goes on from there.")
         return INTERRUPTED
     solved = sum(state.best is not None for state in run.cells.values())
     return OK if solved == math.prod(study.shape) else NONE_FOUND
 
 
 def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], Path]) -> bool:
-    """Work until all is done; whether Ctrl-C came."""
+    """Work until all is done, saving now and then; whether Ctrl-C came."""
     from colloc.system.task_pool import process_pool
 
     executor: Callable[[int], Executor] = process_pool
@@ -246,14 +224,14 @@ def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], Pa
     if options.dask is not None:
         from colloc.system.dask_pool import connect
 
-        executor, workers = connect(options.dask, workers, complain)
+        executor, workers = connect(options.dask, workers, cli.complain)
     begin = time.perf_counter()
     due, number = begin + _SAVE_EVERY, 0
     try:
         for news in run.run(workers=workers, executor=executor):
             if news.round != number:
                 number, begin = news.round, time.perf_counter()
-            if not quiet(options):
+            if not cli.quiet(options):
                 best = news.state.best
                 value = f"{best.outcome.value:9.6f}" if best else "     none"
                 tally = Counter(a.outcome.status for a in news.new)
@@ -287,19 +265,14 @@ def _save(run: StudyRun, out: Path, source: str, command: str) -> Path:
     return save_study(study_table(run, bound), path, source=source, command=command)
 
 
-def _verdict(state: CellState) -> str:
-    if state.best:
-        return "solved"
-    if state.problem is None:
-        return "no problem"
-    return "no certified gait" if state.attempts else "not tried yet"
-
-
 def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]:
     """Facts about a study at its end, and lines for people."""
     study, cells = run.study, run.cells
     total, reached = math.prod(study.shape), list(cells)
-    tally = Counter(_verdict(cells[cell]) for cell in reached)
+    tally: Counter[str] = Counter()
+    for state in cells.values():
+        tried = "no certified gait" if state.attempts else "not tried yet"
+        tally["solved" if state.best else tried if state.problem else "no problem"] += 1
     if total > len(reached):
         tally["not tried yet"] += total - len(reached)
     below = [cell for cell in reached if run.below_neighbour(cell)]
@@ -334,30 +307,29 @@ def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]
     return facts, lines + failed
 
 
-def _save_members(
-    members: Iterable[tuple[str, Solution]], folder: Path, source: str
-) -> tuple[list[Path], list[Saved]]:
-    """Save solutions that belong together by their names; their files, and all that was saved."""
+def _save_family(
+    options: argparse.Namespace,
+    family: ParetoFront | Steering,
+    table: Path,
+    members: Iterable[tuple[str, Solution]],
+    source: str,
+    describe: Callable[[list[Path]], tuple[str, dict[str, Any], list[str], str]],
+) -> int:
+    """Save the members and the table of a family, draw and print it, and return the exit code.
+
+    From the paths of the members, `describe` gives the text of the table, facts, lines for people
+    and how members are named among the saved files.
+    """
     from colloc.results.kept import save_result
 
     paths, saved = [], []
     for name, solution in members:
         solution.source = source
-        saved += (one := save_result(solution, folder / f"{name}.h5"))
+        saved += (one := save_result(solution, table.with_suffix("") / f"{name}.h5"))
         paths.append(one[0].path)
-    return paths, saved
-
-
-def _tell_family(
-    options: argparse.Namespace,
-    family: ParetoFront | Steering,
-    table: Path,
-    points: str,
-    saved: Sequence[Saved],
-    facts: dict[str, Any],
-    lines: list[str],
-) -> int:
-    """Draw a family, print its table, and return the exit code; `points` names their files."""
+    content, facts, lines, points = describe(paths)
+    with replaced_file(table) as temporary:
+        Path(temporary).write_text(content, encoding="utf-8", newline="")
     files = [table]
     if not options.no_figure:
         from colloc.pictures.style import save as save_figure
@@ -365,11 +337,11 @@ def _tell_family(
         with naming_saved_files([f"{table}{points}"]):
             files += save_figure(family.plot(), table.with_suffix(""), ("png",))
     lines = [*lines, f"  saved {', '.join(map(str, files))}{points}", *kept_lines(saved)]
-    tell(options, facts | {"kept": kept_facts(saved)}, lines)
+    cli.tell(options, facts | {"kept": kept_facts(saved)}, lines)
     return OK if family.certified else FAILED
 
 
-@command(
+@cli.command(
     "pareto",
     """\
 An objective is "efficiency", "speed", "turning", or an expression of distance, work, rotation and
@@ -379,27 +351,28 @@ not certified.
 
   colloc pareto problems/three_link.py
   colloc pareto mine.py --objectives distance "distance / work" --points 15""",
-    *PROBLEM,
-    text("--objectives", _PAIR, f"default: {' '.join(_AIMS)}", nargs=2, default=_AIMS),
-    count("--points", "N", f"of the front, if none hardly differ (default: {_POINTS})", _POINTS),
-    count("--starts", "N", "starts to find both ends of (default: 32)"),
-    output("folder, or .csv file (default: results/NAME.front.csv)"),
-    NO_FIGURE,
+    *cli.PROBLEM,
+    cli.text(
+        "--objectives", ("FIRST", "SECOND"), f"default: {' '.join(_AIMS)}", nargs=2, default=_AIMS
+    ),
+    cli.count("--points", "N", "of the front, without duplicates (default: 9)", 9),
+    cli.count("--starts", "N", "starting points for both ends (default: 32)"),
+    cli.output("folder, or .csv file (default: results/NAME.front.csv)"),
+    cli.NO_FIGURE,
 )
 def pareto(options: argparse.Namespace) -> int:
-    check_least(options, starts=1)
+    cli.check_least(options, starts=1)
     if options.points < 2:
         raise ProblemError(f"a front has at least 2 points, not {options.points}.")
-    stated, problem = read_problem(options)
+    stated, problem = cli.read_problem(options)
     first, second = aims = [objective_from(text) for text in options.objectives]
-    table = output_path(options.output, Path("results") / f"{problem.name}.front.csv")
-    folder = table.with_suffix("")
+    table = cli.output_path(options.output, Path("results") / f"{problem.name}.front.csv")
     from colloc.search.options import OPTIONS
     from colloc.studies.pareto import pareto_front
     from colloc.studies.saved import checkpoints_in
 
-    with checkpoints_in(folder):
-        with status_line(options) as line:
+    with checkpoints_in(table.with_suffix("")):
+        with cli.status_line(options) as line:
             line.say(f"{problem.name}: the ends of the front")
 
             def report(k: int, point: Solution) -> None:
@@ -411,36 +384,33 @@ def pareto(options: argparse.Namespace) -> int:
             front = pareto_front(
                 problem, first, second, options.points, starts=starts, progress=report
             )
+
+        def describe(paths: list[Path]) -> tuple[str, dict[str, Any], list[str], str]:
+            names = ["point", *(x.expression for x in aims), "distance", "work", "status", "file"]
+            rows = [
+                [k, *both, point.measured.distance, point.measured.work, point.status, str(path)]
+                for k, (point, both, path) in enumerate(
+                    zip(front.points, front.values.tolist(), paths, strict=True)
+                )
+            ]
+            content = io.StringIO(newline="")
+            csv.writer(content).writerows([names, *rows])
+            empty = {gap.after: f"\n       nothing found between: {gap.why}" for gap in front.gaps}
+            facts = {
+                "objectives": [aim.fields() for aim in aims],
+                "points": [dict(zip(names, row, strict=True)) for row in rows],
+                "gaps": [asdict(gap) for gap in front.gaps],
+            }
+            lines = [f"{problem.name}: {first.name} against {second.name}, {len(rows)} points"]
+            for k, a, b, _, _, status, _ in rows:
+                lines.append(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}")
+            return content.getvalue(), facts, lines, f", {paths[0]} ..."
+
         members = [(f"{k:02d}", point) for k, point in enumerate(front.points)]
-        paths, saved = _save_members(members, folder, stated.source)
-        names = ["point", *(aim.expression for aim in aims), "distance", "work", "status", "file"]
-        rows = [
-            [k, *both, point.measured.distance, point.measured.work, point.status, str(path)]
-            for k, (point, both, path) in enumerate(
-                zip(front.points, front.values.tolist(), paths, strict=True)
-            )
-        ]
-        with (
-            replaced_file(table) as temporary,
-            open(temporary, "w", newline="", encoding="utf-8") as file,
-        ):
-            csv.writer(file).writerows([names, *rows])
-        empty = {gap.after: f"\n       nothing was found between: {gap.why}" for gap in front.gaps}
-        lines = [
-            f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}"
-            for k, a, b, _, _, status, _ in rows
-        ]
-        facts = {
-            "objectives": [aim.fields() for aim in aims],
-            "points": [dict(zip(names, row, strict=True)) for row in rows],
-            "gaps": [asdict(gap) for gap in front.gaps],
-        }
-        head = f"{problem.name}: {first.name} against {second.name}, {len(rows)} points"
-        points = f", {paths[0]} ..."
-        return _tell_family(options, front, table, points, saved, facts, [head, *lines])
+        return _save_family(options, front, table, members, stated.source, describe)
 
 
-@command(
+@cli.command(
     "steer",
     """\
 Positive angles turn left, counter-clockwise. The problem states the gait that goes straight. Every
@@ -451,29 +421,31 @@ the arc that a period crawls.
 
   colloc steer problems/three_link.py
   colloc steer mine.py --turn -40 -20 -10 0 10 20 40 --spot -30 30""",
-    *PROBLEM,
-    number("--turn", "DEG", "of a period (default: -30 -15 0 15 30)", list(_TURNS), nargs="+"),
-    number("--spot", "DEG", "turns on the spot, with the least work", [], nargs="+"),
-    count("--starts", "N", "starts to find the straight gait of (default: 32)"),
-    output("folder, or .json file (default: results/NAME.steer.json)"),
-    NO_FIGURE,
-)
+    *cli.PROBLEM,
+    cli.number(
+        "--turn", "DEG", "per period (default: -30 -15 0 15 30)", [-30.0, -15.0, 0.0, 15.0, 30.0],
+        nargs="+",
+    ),
+    cli.number("--spot", "DEG", "turns on the spot, with the least work", [], nargs="+"),
+    cli.count("--starts", "N", "starting points for the straight gait (default: 32)"),
+    cli.output("folder, or .json file (default: results/NAME.steer.json)"),
+    cli.NO_FIGURE,
+)  # fmt: skip
 def steer(options: argparse.Namespace) -> int:
-    check_least(options, starts=1)
+    cli.check_least(options, starts=1)
     if not all(abs(turn) < 180 for turn in (*options.turn, *options.spot)) or 0 in options.spot:
         raise ProblemError(
             "--turn and --spot take degrees between -180 and 180, --spot not 0: by more a body "
             "could turn the other way."
         )
-    stated, problem = read_problem(options)
-    table = output_path(options.output, Path("results") / f"{problem.name}.steer.json")
-    folder = table.with_suffix("")
+    stated, problem = cli.read_problem(options)
+    table = cli.output_path(options.output, Path("results") / f"{problem.name}.steer.json")
     from colloc.search.options import OPTIONS
     from colloc.studies.saved import checkpoints_in
     from colloc.studies.steering import steer as steer_problem
 
-    with checkpoints_in(folder):
-        with status_line(options) as line:
+    with checkpoints_in(table.with_suffix("")):
+        with cli.status_line(options) as line:
             line.say(f"{problem.name}: the straight gait")
 
             def report(turn: float, point: Solution) -> None:
@@ -485,18 +457,18 @@ def steer(options: argparse.Namespace) -> int:
         spots = () if family.on_the_spot is None else family.on_the_spot.points
         members = [(f"{k:02d}", point) for k, point in enumerate(family.points)]
         members += [(f"spot_{k:02d}", point) for k, point in enumerate(spots)]
-        paths, saved = _save_members(members, folder, stated.source)
-        rows = []
-        for (_, point), path in zip(members, paths, strict=True):
-            arc = point.arc
-            radius = f"{arc.radius:8.4f}" if math.isfinite(arc.radius) else "       -"
-            rows.append(
-                f"  {math.degrees(arc.angle):+7.2f}°  radius {radius}  chord {arc.chord:.6f}  work "
-                f"{point.work:.6f}  efficiency {arc.chord / point.work:.6f}  {point.status}  {path}"
-            )
-        facts = family.table() | {"efficiency": family.efficiency.tolist()}
-        with replaced_file(table) as temporary:
-            Path(temporary).write_text(json.dumps(facts) + "\n", encoding="utf-8")
-        head = f"{problem.name}: {len(rows)} gaits that steer"
-        facts |= {"file": str(table)}
-        return _tell_family(options, family, table, "", saved, facts, [head, *rows])
+
+        def describe(paths: list[Path]) -> tuple[str, dict[str, Any], list[str], str]:
+            lines = [f"{problem.name}: {len(members)} gaits that steer"]
+            for (_, point), path in zip(members, paths, strict=True):
+                arc = point.arc
+                radius = f"{arc.radius:8.4f}" if math.isfinite(arc.radius) else "       -"
+                lines.append(
+                    f"  {math.degrees(arc.angle):+7.2f}°  radius {radius}  chord {arc.chord:.6f}  "
+                    f"work {point.work:.6f}  efficiency {arc.chord / point.work:.6f}  "
+                    f"{point.status}  {path}"
+                )
+            facts = family.table() | {"efficiency": family.efficiency.tolist()}
+            return json.dumps(facts) + "\n", facts | {"file": str(table)}, lines, ""
+
+        return _save_family(options, family, table, members, stated.source, describe)

@@ -1,4 +1,4 @@
-"""The command init: write a commented problem file that runs as it is, for a user to change."""
+"""The command init: write a commented problem file that runs as it is."""
 
 from __future__ import annotations
 
@@ -56,11 +56,7 @@ PROBLEM = Problem(
 
 
 def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bool = False) -> str:
-    """Text of a problem file for a chain of links of such lengths, in any unit, on the floor, on
-    feet or on wheels.
-
-    Raises `ProblemError` if a number is out of range, or the file's name cannot be a problem's.
-    """
+    """Text of a problem file for a chain with link lengths in any unit."""
     links, whole = len(lengths), math.fsum(lengths)
     if not _FEWEST <= links <= _MOST:
         raise ProblemError(
@@ -78,7 +74,7 @@ def problem_text(path: Path, lengths: Sequence[float], feet: int = 0, wheels: bo
         )
     if path.suffix != ".py":
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
-    # refuses what files cannot have
+    # raises for a name that files cannot have
     Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))
     names = ["Chain", "Friction", "Harmonic", "Problem", *(["Wheel"] if wheels else [])]
     floor = _FLOOR["wheels" if wheels else "feet" if feet else ""]
@@ -108,7 +104,7 @@ or --wheels.
     text("problem", "FILE.py", "the file to write", type=Path),
     count("--links", "N", f"equal links (default: {_FEWEST})"),
     number("--lengths", "L", "of the links, tail to head, in any unit", nargs="+"),
-    count("--feet", "N", "feet on each link (default: none, it lies)"),
+    count("--feet", "N", "feet on each link (default: none, links lie flat)"),
     flag("--wheels", "a wheel in the middle of each link"),
 )
 def init(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""The entry point ``colloc``: a subcommand's module is only imported when it is asked for."""
+"""The entry point ``colloc``, which imports the module of the subcommand alone."""
 
 from __future__ import annotations
 
@@ -23,18 +23,13 @@ From a problem to a page to send:
 
 
 def help_text() -> str:
-    """The text of ``colloc --help``."""
     width = max(map(len, SUBCOMMANDS))
-    head = (
-        "usage: colloc COMMAND ...\n\nThe most efficient ways to crawl, found and certified.\n\n"
-        "commands:\n"
-    )
+    head = "usage: colloc COMMAND ...\n\nFind and certify efficient gaits of crawling robots.\n\n"
     lines = [f"  {name:<{width}}  {summary}" for name, (_, summary) in SUBCOMMANDS.items()]
-    return head + "\n".join([*lines, "", _EXAMPLE])
+    return head + "\n".join(["commands:", *lines, "", _EXAMPLE])
 
 
 def command(name: str) -> Command:
-    """The subcommand of that name."""
     importlib.import_module(f"colloc.commands.{SUBCOMMANDS[name][0]}")
     return COMMANDS[name]
 

@@ -1,5 +1,4 @@
-"""Shared by the subcommands: their list, their options, one way to refuse bad ones, to name the
-output and to print the end."""
+"""Commands, their options, and what they share: errors, output paths, printing."""
 
 from __future__ import annotations
 
@@ -27,49 +26,40 @@ SUBCOMMANDS = {
     "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
     "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
     "multistart": ("families", "solve from many random starts; distinct optima, how often found"),
-    "open": ("solve", "what an archive of starts holds; the whole result of one of them"),
+    "open": ("solve", "list the optima of an archive of starts; make a result of one start"),
     "sweep": ("families", "solve a study, a grid of problems, over processes or a cluster"),
-    "pareto": ("families", "what two objectives cost each other: a front of certified gaits"),
+    "pareto": ("families", "trade-off (Pareto front) of two objectives, as certified gaits"),
     "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
-    "evaluate": ("solve", "what a gait of your own achieves: joint angles from a CSV file"),
+    "evaluate": ("solve", "evaluate a gait of your own: joint angles from a CSV file"),
     "verify": ("verify", "check a result again by independent replay, without CasADi"),
-    "compare": ("verify", "hold two results against each other"),
+    "compare": ("verify", "compare two results"),
     "report": ("results", "one self-contained web page about a result, to read or to send"),
     "animate": ("results", "the motion as GIF or MP4"),
     "export": ("results", "joint angles over time for a robot, as CSV or JSON; or the robot"),
-    "robot": ("results", "speed, power and torques on a robot of so many metres and kilograms"),
+    "robot": ("results", "speed, power and torques on a robot of given length and mass"),
     "sensitivity": ("results", "how the best value changes with friction, lengths, feet, limits"),
 }
 """Name to module of this package and what the command does."""
-_LONGEST_NAME = 220
-"""Bytes of the name of an output: systems allow 255, and files under way have longer names than
-finished ones."""
+_LONGEST_NAME = 220  # bytes; systems allow 255, and temporary files have longer names
 _MOST = 2**63 - 1
 _EXIT_CODES = """\
-Exit codes: 0 well; 1 different (compare); 2 bad problem, option or file; 3 nothing found; 4 a
+Exit codes: 0 success; 1 different (compare); 2 bad problem, option or file; 3 nothing found; 4 a
 certificate failed; 130 interrupted."""
 _IN_WORDS = (
-    (r"^argument (\S+): invalid int value: (.*)", r"\1 must be a whole number, not \2"),
-    (r"^argument (\S+): invalid float value: (.*)", r"\1 must be a number, not \2"),
-    (
-        r"^argument (\S+): invalid choice: (.*) \(choose from (.*)\)",
-        r"\1 must be one of \3, not \2",
-    ),
+    (r"invalid int value: (.*)", r"must be a whole number, not \2"),
+    (r"invalid float value: (.*)", r"must be a number, not \2"),
+    (r"invalid choice: (.*) \(choose from (.*)\)", r"must be one of \3, not \2"),
 )
-"""What argparse says, and how a person would."""
 Option = tuple[str, dict[str, Any]]
+Function = Callable[[argparse.Namespace], int]
 
 
 class Parser(argparse.ArgumentParser):
-    """Refuses bad options in one sentence; line breaks of the epilog are kept."""
-
-    def __init__(self, prog: str, description: str, epilog: str) -> None:
-        style = argparse.RawDescriptionHelpFormatter
-        super().__init__(prog=prog, description=description, epilog=epilog, formatter_class=style)
+    """Refuses bad options in one sentence."""
 
     def error(self, message: str) -> NoReturn:
         for argparses, ours in _IN_WORDS:
-            message = re.sub(argparses, ours, message)
+            message = re.sub(rf"^argument (?P<name>\S+): {argparses}", rf"\g<name> {ours}", message)
         raise ProblemError(f"{message}; see {self.prog} --help.")
 
 
@@ -80,33 +70,29 @@ class Command:
     name: str
     epilog: str
     options: Sequence[Option]
-    function: Callable[[argparse.Namespace], int]
+    function: Function
 
-    def parser(self) -> Parser:
+    def __call__(self, arguments: Sequence[str] | None = None) -> int:
         what = SUBCOMMANDS[self.name][1]
         parser = Parser(
             f"colloc {self.name}",
-            f"{what[0].upper()}{what[1:]}.",
-            f"{self.epilog}\n\n{_EXIT_CODES}",
+            description=f"{what[0].upper()}{what[1:]}.",
+            epilog=f"{self.epilog}\n\n{_EXIT_CODES}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         for name, settings in (*self.options, *PRINTING):
             parser.add_argument(name, **settings)
-        return parser
-
-    def __call__(self, arguments: Sequence[str] | None = None) -> int:
-        return run(self.parser(), self.function, arguments)
+        return run(parser, self.function, arguments)
 
 
 COMMANDS: dict[str, Command] = {}
 """Those whose modules are imported."""
 
 
-def command(
-    name: str, epilog: str, *options: Option
-) -> Callable[[Callable[[argparse.Namespace], int]], Command]:
-    """Make a subcommand of what it does with its options."""
+def command(name: str, epilog: str, *options: Option) -> Callable[[Function], Command]:
+    """Make a subcommand of a function of its options."""
 
-    def register(function: Callable[[argparse.Namespace], int]) -> Command:
+    def register(function: Function) -> Command:
         COMMANDS[name] = Command(name, epilog, options, function)
         return COMMANDS[name]
 
@@ -141,16 +127,17 @@ PRINTING = (
     flag("--json", "print one JSON object on standard output, and nothing else"),
     flag("--quiet", "no progress, only the final summary"),
 )
-VERBOSE = flag("--verbose", "also tell the search, the gait and every check")
+VERBOSE = flag("--verbose", "also print the search, the gait and every check")
 NO_FIGURE = flag("--no-figure", "do not draw a figure")
 BOUND = flag("--bound", "compute an upper bound on every gait (a minute; kept in bounds.sqlite)")
 WORKERS = count("--workers", "N", "processes, one BLAS thread each (default: 1)", 1)
 RETRY = flag("--retry", "solve again what ended in an error, a crash or the time limit")
 RESULT = text("result", "FILE.h5", "a result that colloc solve wrote")
+SEED = count("--seed", "N", "of the sampler (default: 0)", 0)
 PROBLEM = (
     text("problem", None, "a Python file that states PROBLEM, for example problems/three_link.py"),
     number("--delta", "SPEED", "final regularisation speed of friction"),
-    number("--delta-start", "SPEED", "where the continuation in delta begins"),
+    number("--delta-start", "SPEED", "first delta of the continuation"),
     count("--mesh", "N", "intervals of the first mesh", dest="intervals"),
     number("--mesh-tolerance", "TOL", "relative error to refine to; 0: never"),
     text("--scheme", "NAME", "trapezoid, hermite-simpson, gauss-N or radau-N"),
@@ -158,24 +145,21 @@ PROBLEM = (
 )
 """The problem file, and the changes to it that every solving command takes."""
 _CHANGES = ("delta", "delta_start", "intervals", "mesh_tolerance", "scheme", "formulation")
-LENGTH = number("--length", "M", "of the robot, stretched [m]")
+LENGTH = number("--length", "M", "of the stretched robot [m]")
 MASS = number("--mass", "KG", "of the robot [kg]")
 ROBOT = (LENGTH, MASS, number("--gravity", "G", "default: 9.81 m/s^2", 9.81))
-PERIOD = number("--period", "S", "seconds a period takes")
+PERIOD = number("--period", "S", "seconds per period")
 MAX_SPEED = number("--max-speed", "V", "of the joints [rad/s], one or one each", nargs="+")
 MAX_TORQUE = number("--max-torque", "M", "of the joints [N m], one or one each", nargs="+")
-PACE = (PERIOD, MAX_SPEED, MAX_TORQUE)
 
 
 def read_problem(options: argparse.Namespace) -> tuple[ProblemFile, Problem]:
-    """The contents of the problem file; and its problem with the changes of `PROBLEM`, and with the
-    gait of the result that ``--start`` names as guess."""
+    """The problem file; and its problem with the changes of the options of `PROBLEM`, and the gait
+    of the result of ``--start`` as guess."""
     from colloc.gaits.problem_file import read_problem_file
 
     stated = read_problem_file(options.problem)
-    changes = {
-        name: getattr(options, name) for name in _CHANGES if getattr(options, name) is not None
-    }
+    changes = {name: x for name in _CHANGES if (x := getattr(options, name)) is not None}
     problem = stated.problem.with_(**changes) if changes else stated.problem
     if getattr(options, "start", None) is None:
         return stated, problem
@@ -189,7 +173,7 @@ def read_problem(options: argparse.Namespace) -> tuple[ProblemFile, Problem]:
 
 
 def robot_size(options: argparse.Namespace) -> dict[str, float]:
-    """Values of `ROBOT` by name; none where neither length nor mass was given."""
+    """Values of `ROBOT` by name; none without length and mass."""
     missing = [name for name in ("length", "mass") if getattr(options, name) is None]
     if len(missing) == 1:
         raise ProblemError(f"a robot needs --length and --mass; --{missing[0]} is missing.")
@@ -201,7 +185,6 @@ def values(options: argparse.Namespace, *names: str) -> dict[str, Any]:
 
 
 def check_least(options: argparse.Namespace, **least: int) -> None:
-    """A `ProblemError` for the first of some whole numbers that is too small, or too large."""
     for name, smallest in least.items():
         value = getattr(options, name)
         if value is not None and not smallest <= value <= _MOST:
@@ -220,7 +203,6 @@ def quiet(options: argparse.Namespace) -> bool:
 
 
 def status_line(options: argparse.Namespace) -> StatusLine:
-    """The line of progress, if it is wanted."""
     return StatusLine(enabled=not quiet(options))
 
 
@@ -229,8 +211,7 @@ def complain(sentence: str) -> None:
 
 
 def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
-    """Print the end of a command: one JSON object of the facts if that was asked for, else lines
-    for people."""
+    """Print the result of a command: facts as one JSON object, or lines for people."""
     show(json.dumps(facts) if options.json else "\n".join(lines))
 
 
@@ -243,8 +224,6 @@ def output_kind(options: argparse.Namespace, kinds: Sequence[str]) -> str:
 
 
 def _is_folder(output: str | None) -> bool:
-    """True if the user named a folder: by a separator at its end, by having no ending, or because
-    it is one."""
     if output is None or output.endswith(("/", os.sep)):
         return True
     return not Path(output).suffix or os.path.isdir(output)
@@ -266,9 +245,10 @@ def _wrong_ending(output: str, wanted: str) -> ProblemError:
 
 
 def output_path(output: str | None, default: Path) -> Path:
-    """The file to write, in a folder that exists and can be written: what the user named, a folder
-    or a file with the suffix of `default` that does not end like one that another command makes, or
-    else the default."""
+    """The file to write: the default, or a folder or file with its suffix that the user named.
+
+    `ProblemError` if it cannot be written, or is named like one that another command makes.
+    """
     path = default
     if output is not None:
         path = Path(output) / default.name if _is_folder(output) else Path(output)
@@ -288,9 +268,8 @@ def output_path(output: str | None, default: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ProblemError(
-            f"cannot make the folder {path.parent}: {error.strerror or error}."
-        ) from None
+        why = error.strerror or error
+        raise ProblemError(f"cannot make the folder {path.parent}: {why}.") from None
     try:
         tempfile.TemporaryFile(dir=path.parent).close()
         writable = not path.is_dir()

@@ -1,48 +1,26 @@
-"""Commands that make something of a result: a page, a film, joint angles for a robot, what they
-come to on it, and how the best value depends on what was stated."""
+"""Commands about a result: report, animate, export, robot, sensitivity."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from colloc.commands import options as cli
 from colloc.commands.ending import OK
-from colloc.commands.options import (
-    LENGTH,
-    MASS,
-    MAX_SPEED,
-    MAX_TORQUE,
-    PACE,
-    PERIOD,
-    RESULT,
-    ROBOT,
-    choice,
-    command,
-    count,
-    flag,
-    number,
-    output,
-    output_kind,
-    output_path,
-    quiet,
-    robot_size,
-    status_line,
-    tell,
-    text,
-    values,
-)
+from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
-
-if TYPE_CHECKING:
-    from colloc.results.robot import Robot
-    from colloc.results.solution import Solution
 
 _PACE = ("period", "max_speed", "max_torque")
 
 
-@command(
+def _written(path: Path) -> tuple[dict[str, Any], str]:
+    size = path.stat().st_size
+    return {"status": "written", "file": str(path), "bytes": size}, f"{size / 1000:.0f} kB"
+
+
+@cli.command(
     "report",
     """\
 The page needs no network and no other file. Results that failed get one too.
@@ -50,53 +28,43 @@ The page needs no network and no other file. Results that failed get one too.
   colloc report results/three_link.h5                 results/three_link.html
   colloc report results/three_link.h5 --figures       also PDF and PNG of each panel
   colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5   of a robot""",
-    RESULT,
-    text("--problem", "FILE.py", "problem file whose REFERENCE to hold the result against"),
-    flag("--figures", "also write publication figures, PDF and PNG, one panel each"),
-    *ROBOT,
-    *PACE,
-    output("folder, or .html file (default: beside the result)"),
+    cli.RESULT,
+    cli.text("--problem", "FILE.py", "problem file with the REFERENCE to compare the result with"),
+    cli.flag("--figures", "also write publication figures, PDF and PNG, one panel each"),
+    *cli.ROBOT,
+    *(cli.PERIOD, cli.MAX_SPEED, cli.MAX_TORQUE),
+    cli.output("folder, or .html file (default: beside the result)"),
 )
 def report(options: argparse.Namespace) -> int:
     from colloc.gaits.problem_file import read_problem_file
     from colloc.pictures.report_page import write_report
+    from colloc.results.robot import Robot
 
     source = Path(options.result)
     solution = load(source)
-    path = output_path(options.output, source.with_suffix(".html"))
+    path = cli.output_path(options.output, source.with_suffix(".html"))
     reference = read_problem_file(options.problem).reference if options.problem else None
-    figures: list[Path] = []
-    with status_line(options) as line:
+    size, pace, robot = cli.robot_size(options), cli.values(options, *_PACE), None
+    if size or any(value is not None for value in pace.values()):
+        if not size or options.period is None:
+            raise ProblemError("the page of a robot needs --length, --mass and --period.")
+        robot = Robot(solution, **size, **pace)
+    figures: list[str] = []
+    with cli.status_line(options) as line:
         line.say("writing the page")
-        write_report(solution, path, reference, source.parent, robot=_robot(solution, options))
+        write_report(solution, path, reference, source.parent, robot=robot)
         if options.figures:
             from colloc.pictures.publication import save_panels
 
             line.say("drawing the figures")
-            figures = save_panels(solution, path.with_suffix(""))
-    size = path.stat().st_size
-    facts = {"status": "written", "file": str(path), "bytes": size}
-    saved = f"saved {path} ({size / 1000:.0f} kB, self-contained)"
-    tell(
-        options,
-        facts | {"figures": [*map(str, figures)]},
-        [saved, *(f"  {figure}" for figure in figures)],
-    )
+            figures = [*map(str, save_panels(solution, path.with_suffix("")))]
+    facts, kilobytes = _written(path)
+    lines = [f"saved {path} ({kilobytes}, self-contained)", *(f"  {each}" for each in figures)]
+    cli.tell(options, facts | {"figures": figures}, lines)
     return OK
 
 
-def _robot(solution: Solution, options: argparse.Namespace) -> Robot | None:
-    from colloc.results.robot import Robot
-
-    size, pace = robot_size(options), values(options, *_PACE)
-    if not size and not any(value is not None for value in pace.values()):
-        return None
-    if not size or options.period is None:
-        raise ProblemError("the page of a robot needs --length, --mass and --period.")
-    return Robot(solution, **size, **pace)
-
-
-@command(
+@cli.command(
     "animate",
     """\
 Orange arrows are the friction on the links; the large disc is the head; the small plane shows the
@@ -105,40 +73,39 @@ first two joint angles.
   colloc animate results/three_link.h5                            results/three_link.gif
   colloc animate results/three_link.h5 --format mp4 --fps 50      needs ffmpeg
   colloc animate results/three_link.h5 --periods 4 --seconds 2 --no-arrows""",
-    RESULT,
-    choice("--format", ("gif", "mp4"), "default: by the suffix of --output, else gif"),
-    count("--periods", "N", "periods in a row (default: 2)", 2),
-    number("--seconds", "S", "a period takes (default: 4)", 4.0),
-    number("--fps", "N", "pictures a second (default: 20)", 20.0),
-    count("--width", "PIXELS", "default: 900", 900),
-    flag("--from-rest", "with inertia: the first periods of a body that is at rest before"),
-    flag("--no-arrows", "do not draw friction"),
-    output("folder or file (default: beside the result)"),
+    cli.RESULT,
+    cli.choice("--format", ("gif", "mp4"), "default: by the suffix of --output, else gif"),
+    cli.count("--periods", "N", "periods in a row (default: 2)", 2),
+    cli.number("--seconds", "S", "per period (default: 4)", 4.0),
+    cli.number("--fps", "N", "frames per second (default: 20)", 20.0),
+    cli.count("--width", "PIXELS", "default: 900", 900),
+    cli.flag("--from-rest", "with inertia: the first periods of a body that starts at rest"),
+    cli.flag("--no-arrows", "do not draw friction"),
+    cli.output("folder or file (default: beside the result)"),
 )
 def animate(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
-    kind = output_kind(options, ("gif", "mp4"))
-    path = output_path(options.output, source.with_suffix(f".{kind}"))
-    # heavy imports only now: a bad option is refused at once
+    kind = cli.output_kind(options, ("gif", "mp4"))
+    path = cli.output_path(options.output, source.with_suffix(f".{kind}"))
+    # slow imports only now: a bad option is refused at once
     from colloc.pictures.movie import write_movie
 
-    settings = values(options, "periods", "seconds", "fps", "width", "from_rest")
-    write_movie(solution, path, **settings, arrows=not options.no_arrows, quiet=quiet(options))
-    size = path.stat().st_size
-    facts = {"status": "written", "file": str(path), "bytes": size}
-    tell(options, facts, [f"saved {path} ({size / 1000:.0f} kB)"])
+    settings = cli.values(options, "periods", "seconds", "fps", "width", "from_rest")
+    write_movie(solution, path, **settings, arrows=not options.no_arrows, quiet=cli.quiet(options))
+    facts, kilobytes = _written(path)
+    cli.tell(options, facts, [f"saved {path} ({kilobytes})"])
     return OK
 
 
-@command(
+@cli.command(
     "export",
     """\
-With --max-speed the path is run through as evenly as the limits allow; without --period as fast as
-they allow. Where the pace matters (drag, power limits) it stays the gait's own, and limits make the
-period longer. The period is rounded up to a whole number of samples, and the sample after the last
-is the first one again. Samples at times below 0 lead from the straight body, at rest, into the
-gait; --no-ramp leaves them out.
+With --max-speed the path is retimed as evenly as the limits allow; without --period as fast as they
+allow. Where the pace matters (drag, power limits) the gait's own timing is kept and the period
+stretched. The period is rounded up to a whole number of samples; the cycle repeats after the last
+sample. Samples at times below 0 lead from the straight body, at rest, into the gait; --no-ramp
+leaves them out.
 
   colloc export results/three_link.h5 --period 4                          50 samples a second
   colloc export results/three_link.h5 --max-speed 2.0 --rate 100          as fast as 2 rad/s allow
@@ -150,48 +117,42 @@ gait; --no-ramp leaves them out.
 CSV: '#' lines about the result, then time_s, joint_1_rad, ..., joint_1_rad_per_s, ... (mode_1_rad,
 ... of a smooth body) and, with --length and --mass, joint_1_N_m, ..., joint_1_W, ... Joints count
 from tail to head; angles are positive counter-clockwise.""",
-    RESULT,
-    number("--rate", "HZ", "samples a second (default: 50)", 50.0),
-    PERIOD,
-    MAX_SPEED,
-    *ROBOT,
-    count("--periods", "N", "repeat the period N times (default: 1)", 1),
-    text(
-        "--ramp",
-        None,
-        "begin straight, at rest, before time 0 (default)",
+    cli.RESULT,
+    cli.number("--rate", "HZ", "samples a second (default: 50)", 50.0),
+    cli.PERIOD,
+    cli.MAX_SPEED,
+    *cli.ROBOT,
+    cli.count("--periods", "N", "repeat the period N times (default: 1)", 1),
+    cli.text(
+        "--ramp", None, "begin straight, at rest, before time 0 (default)", default=True,
         action=argparse.BooleanOptionalAction,
-        default=True,
     ),
-    choice("--format", ("csv", "json", "mjcf", "urdf"), "default: --output's, else csv"),
-    output("folder or file (default: beside the result)"),
-)
+    cli.choice("--format", ("csv", "json", "mjcf", "urdf"), "default: --output's, else csv"),
+    cli.output("folder or file (default: beside the result)"),
+)  # fmt: skip
 def export(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
     options.format = "xml" if options.format == "mjcf" else options.format
-    kind = output_kind(options, ("csv", "json", "xml", "urdf"))
-    path = output_path(options.output, source.with_suffix(f".{kind}"))
-    settings = values(options, "period", "max_speed", "rate", "periods", "ramp")
-    facts = solution.export(path, **settings, **robot_size(options)) | {"file": str(path)}
+    kind = cli.output_kind(options, ("csv", "json", "xml", "urdf"))
+    path = cli.output_path(options.output, source.with_suffix(f".{kind}"))
+    settings = cli.values(options, "period", "max_speed", "rate", "periods", "ramp")
+    facts = solution.export(path, **settings, **cli.robot_size(options)) | {"file": str(path)}
     if kind in ("xml", "urdf"):
-        tell(options, facts, _model_lines(facts))
-        return OK
-    facts["samples"] = facts["samples_per_period"] * options.periods
-    tell(options, facts, _trajectory_lines(solution, facts, options.periods))
+        lines = [
+            f"saved {path}: a robot of {facts['length_m']:g} m and {facts['mass_kg']:g} kg; "
+            f"its joint angles: --format csv"
+        ]
+        if (moves := facts.get("moves_body_lengths_per_period")) is not None:
+            lines.append(
+                f"  colloc has it move {moves:.4g} body lengths a period on its floor, with inertia"
+            )
+        lines += [f"  note: {facts['note']}"] if "note" in facts else []
+    else:
+        facts["samples"] = facts["samples_per_period"] * options.periods
+        lines = _trajectory_lines(solution, facts, options.periods)
+    cli.tell(options, facts, lines)
     return OK
-
-
-def _model_lines(facts: dict[str, Any]) -> list[str]:
-    lines = [
-        f"saved {facts['file']}: a robot of {facts['length_m']:g} m and {facts['mass_kg']:g} kg; "
-        f"its joint angles: --format csv"
-    ]
-    if (moves := facts.get("moves_body_lengths_per_period")) is not None:
-        lines.append(
-            f"  colloc has it move {moves:.4g} body lengths a period on its floor, with inertia"
-        )
-    return [*lines, *([f"  note: {facts['note']}"] if "note" in facts else [])]
 
 
 def _trajectory_lines(solution: Solution, facts: dict[str, Any], periods: int) -> list[str]:
@@ -225,11 +186,7 @@ def _trajectory_lines(solution: Solution, facts: dict[str, Any], periods: int) -
     return lines
 
 
-def _required(*options: tuple[str, dict[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
-    return [(name, settings | {"required": True}) for name, settings in options]
-
-
-@command(
+@cli.command(
     "robot",
     """\
 The robot is as long as its links together, and its mass is spread over them as the problem says.
@@ -238,48 +195,48 @@ The numbers are those at the period that is given, with inertia.
   colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 \\
     --max-speed 2.0 --max-torque 2.5 2.0
   colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --figure   with a picture""",
-    RESULT,
-    *_required(LENGTH, MASS, PERIOD),
-    ROBOT[-1],
-    MAX_SPEED,
-    MAX_TORQUE,
-    flag("--figure", "also draw torque, speed and power over time"),
-    output("folder or .png file of the figure (default: beside the result)"),
+    cli.RESULT,
+    *(
+        (name, settings | {"required": True})
+        for name, settings in (cli.LENGTH, cli.MASS, cli.PERIOD)
+    ),
+    *(cli.ROBOT[-1], cli.MAX_SPEED, cli.MAX_TORQUE),
+    cli.flag("--figure", "also draw torque, speed and power over time"),
+    cli.output("folder or .png file of the figure (default: beside the result)"),
 )
 def robot(options: argparse.Namespace) -> int:
     from colloc.results.robot import Robot
 
     source = Path(options.result)
-    found = Robot(load(source), **robot_size(options), **values(options, *_PACE))
-    facts, lines = dict(found.facts), found.lines()
+    sheet = Robot(load(source), **cli.robot_size(options), **cli.values(options, *_PACE))
+    facts, lines = dict(sheet.facts), sheet.lines()
     if options.figure or options.output:
-        path = output_path(options.output, source.with_suffix(".robot.png"))
+        path = cli.output_path(options.output, source.with_suffix(".robot.png"))
         from colloc.pictures.style import save
 
-        save(found.plot(), path.with_suffix(""), kinds=("png",))
+        save(sheet.plot(), path.with_suffix(""), kinds=("png",))
         facts["figure"] = str(path)
         lines.append(f"saved {path}")
-    tell(options, facts | {"notes": found.sentences()}, lines)
+    cli.tell(options, facts | {"notes": sheet.sentences()}, lines)
     return OK
 
 
-@command(
+@cli.command(
     "sensitivity",
     """\
 The slope is the exact derivative at the optimum; multiply it by 0.1 for a tenth more. With --again
-the gait is sought again for every number, from the gait on file, with each a tenth smaller and
-larger; that takes a second or two for each.
+every number is made a tenth smaller and larger and the gait re-optimised, a second or two each.
 
   colloc sensitivity results/three_link.h5
   colloc sensitivity results/three_link.h5 --again""",
-    RESULT,
-    flag("--again", "also seek the best gaits there, and replay this one"),
+    cli.RESULT,
+    cli.flag("--again", "also re-optimise there, and compare with this gait"),
 )
 def sensitivity(options: argparse.Namespace) -> int:
     solution = load(options.result)
-    with status_line(options) as line:
+    with cli.status_line(options) as line:
         if options.again:
-            line.say(f"{solution.problem.name}: seeking the best gaits again")
+            line.say(f"{solution.problem.name}: re-optimising")
         slopes = solution.sensitivity(resolve=options.again)
-    tell(options, {"file": options.result, **slopes.facts()}, slopes.lines())
+    cli.tell(options, {"file": options.result, **slopes.facts()}, slopes.lines())
     return OK

@@ -33,7 +33,7 @@ EXIT = {
 
 
 def save_and_tell(options: argparse.Namespace, solution: Solution, path: Path) -> int:
-    """Save a solution, print its summary, and return the exit code."""
+    """Save a solution and print its summary; returns the exit code."""
     from colloc.results.kept import save_result
 
     saved = save_result(solution, path)
@@ -46,18 +46,16 @@ def save_and_tell(options: argparse.Namespace, solution: Solution, path: Path) -
 def summary_lines(
     solution: Solution, reference: Reference | None, *, verbose: bool = False
 ) -> list[str]:
-    """The result, whether the checks hold, and what failed, for people; with `verbose` also the
-    search, the gait and every check."""
+    """Lines about a result for people; with `verbose` also the search, the gait and every check."""
     verdict = f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"
     certificate, best = solution.certificate, solution.problem.objective
     lines = [verdict]
     if certificate.replayed:
-        # what these are the best of, `_search_lines` tells
         alone = solution.answer.program in (PRESCRIBED, EVALUATED)
         lines = [
             verdict if alone else f"{verdict} ({solution.standing[0]})",
-            f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e} by "
-            f"independent replay ({certificate.instants} instants); "
+            f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e}, "
+            f"re-simulated at {certificate.instants} time points; "
             f"{certificate.value_at_zero_delta:.6f} +- "
             f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
             *_quantities(solution),
@@ -75,7 +73,6 @@ def summary_lines(
 
 
 def _background(solution: Solution) -> list[str]:
-    """The search, the scene, and the gait itself."""
     problem = solution.problem
     paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
     gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
@@ -87,24 +84,24 @@ def _background(solution: Solution) -> list[str]:
 
 
 def _check_lines(certificate: Certificate, verbose: bool) -> list[str]:
-    """Every check; or in one line that they hold, with the one that comes nearest to its limit, and
-    those that fail."""
+    """Every check; or those that failed, and the one nearest to its tolerance of the others."""
     if verbose:
         return [f"  {check.line()}" for check in certificate.checks]
     lines = [f"  {check.line()}" for check in certificate.failures]
     passed = [check for check in certificate.checks if check.passed]
     if passed:
         nearest = max(passed, key=lambda check: abs(check.value) / max(check.threshold, 1e-300))
+        every = "" if lines else "all "
         lines.insert(
             0,
-            f"  {len(passed)} checks hold (largest: {nearest.name}, {abs(nearest.value):.1e} where "
-            f"{nearest.threshold:.0e} is allowed)",
+            f"  {every}{len(passed)} checks passed (tightest: {nearest.name} "
+            f"{abs(nearest.value):.1e}, tolerance {nearest.threshold:.0e})",
         )
     return lines
 
 
 def _quantities(solution: Solution) -> list[str]:
-    """Results of a period that its objective, and what is asked for, make worth telling."""
+    """Numbers of a period that matter to its objective and limits."""
     period, problem, rows = solution.certificate, solution.problem, []
     if problem.objective != EFFICIENCY:
         error = f"{period.efficiency_error:.0e}"
@@ -114,13 +111,13 @@ def _quantities(solution: Solution) -> list[str]:
         rows.append(("dry friction", f"between {low:.8f} and {high:.8f}, with no delta"))
     for each in problem.integrals:
         rows.append((each.name.replace("_", " "), f"{period.values[each.name]:.6f}"))
-    with suppress(NotConvergedError):  # of what a slope holds only while it moves
+    with suppress(NotConvergedError):  # a body that slides down a slope
         if problem.froude:
             what = f"({problem.objective.short} of the same gait without inertia)"
             rows.append(("played slowly", f"{solution.played_slowly:.6f} {what}"))
     if (held := solution.share_held).any():
         shares = ", ".join(f"{100 * share:.0f}" for share in held)
-        rows.append(("feet hold", f"{shares} % of the period, from the tail"))
+        rows.append(("feet stick", f"during {shares} % of the period (tail to head)"))
     if (travels := solution.travels) != "head first":
         rows.append(("travels", travels))
     rows += [("limits", text) for text in limit_use.lines(solution)]
@@ -130,7 +127,6 @@ def _quantities(solution: Solution) -> list[str]:
 
 
 def _search_lines(solution: Solution) -> list[str]:
-    """The program that was solved last, and what the gait is the best of."""
     answer = solution.answer
     measured = f"measured on a mesh of {answer.edges.size - 1} intervals"
     if answer.program == PRESCRIBED:
@@ -146,7 +142,7 @@ def _search_lines(solution: Solution) -> list[str]:
 def summary_dict(
     solution: Solution, path: Path | None, reference: Reference | None, bound: Bound | None
 ) -> dict:
-    """A solution as one JSON object; without a path it is not saved."""
+    """A solution as one JSON object."""
     problem, answer, certificate = solution.problem, solution.answer, solution.certificate
     replayed = certificate.replayed
     numbers = ("value", "efficiency", "distance", "work", "travels")
@@ -182,15 +178,12 @@ def summary_dict(
 
 
 def bound_facts(bound: Bound | None) -> dict | None:
-    """An upper bound, if there is one, as the one JSON object states it."""
     return None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed}
 
 
 def kept_lines(saved: Sequence[Saved]) -> list[str]:
-    """The places of former results, for people."""
     return [f"  {one.why} is kept as {one.former}" for one in saved if one.former is not None]
 
 
 def kept_facts(saved: Sequence[Saved]) -> list[str]:
-    """The places of former results, as the one JSON object lists them."""
     return [str(one.former) for one in saved if one.former is not None]

@@ -1,7 +1,6 @@
-"""Commands that hold a result against a new replay, or against another result; without CasADi.
+"""Commands verify, by a new replay with the NumPy solver at other instants, and compare.
 
-The gait is replayed anew by the NumPy solver, on other instants than before; optimality (KKT error,
-violation) is what the solver recorded, since it takes derivatives of the whole program.
+KKT error and constraint violation are the solver's record: they need derivatives of the program.
 """
 
 from __future__ import annotations
@@ -13,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.commands import options as cli
 from colloc.commands.ending import FAILED, OK
-from colloc.commands.options import RESULT, command, flag, number, status_line, tell, text
 from colloc.gaits.objective import EFFICIENCY
 from colloc.results.checks import Certificate
 from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE, distance, fourier_series
@@ -25,10 +24,8 @@ from colloc.system.errors import ProblemError
 
 DIFFERENT = 1
 _TOLERANCE = 1e-6
+# largest difference of numbers over the sum of their errors, and ratio of these (measured: 2.2, 8)
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
-"""Certified and new numbers may differ by so many times the sum of their estimated errors, and
-1e-9; these errors by so many times the smaller one, and the tolerance: replays on other instants
-estimate them anew (measured: 2.2 and 8)."""
 _MOST_INSTANTS = 100_000
 _NUMBERS = {
     "efficiency": ("efficiency_error", "an efficiency"),
@@ -39,15 +36,14 @@ _NUMBERS = {
     "value_at_zero_delta": ("value_error_at_zero_delta", "a value for delta -> 0"),
     "rotation": ("", "a rotation"),
 }
-"""Numbers of a certificate: the error of each, and words. What has no error of its own is known to
-the tolerance."""
+"""Numbers of a certificate: the name of the error (else the tolerance is taken), and words."""
 
 
 def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TOLERANCE) -> str:
-    """A sentence if the certificate in a file is not what a new one says; empty if they agree."""
+    """A sentence if the certificate in a file disagrees with a new one, else ""."""
     if not recorded.replayed:
         return "the file holds no certificate."
-    recorded, now = recorded.by_replay, now.by_replay  # what samples are off by is not found anew
+    recorded, now = recorded.by_replay, now.by_replay  # without the residual of samples
     others = (name for name in recorded.values if name not in _NUMBERS)
     numbers = _NUMBERS | {name: ("", f"a {name.replace('_', ' ')}") for name in others}
     for name, (error, words) in numbers.items():
@@ -80,15 +76,14 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
 
 
 def recheck_certificate(solution: Solution, tolerance: float = _TOLERANCE) -> Solution:
-    """The solution with a new certificate, on other instants than before; first- and second-order
-    conditions are those that the answer states."""
+    """The solution with a new certificate at other instants."""
     before = min(solution.certificate.instants or 1600, _MOST_INSTANTS)
     instants = 2 * (3 * before // 8) + 2
     certificate = certify(solution.answer, tolerance=tolerance, instants=instants)
     return replace(solution, certificate=certificate.with_samples(solution.certificate.of_samples))
 
 
-@command(
+@cli.command(
     "verify",
     """\
 The gait in the file is replayed with the NumPy solver on a grid of instants that no earlier replay
@@ -97,16 +92,16 @@ used. KKT error and constraint violation are the solver's own record.
   colloc verify results/three_link.h5
   colloc verify results/three_link.h5 --tolerance 1e-8
   colloc verify results/three_link.h5 --dry""",
-    RESULT,
-    number("--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE),
-    flag("--dry", "also bounds under dry friction, with no delta"),
+    cli.RESULT,
+    cli.number("--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE),
+    cli.flag("--dry", "also bounds under dry friction, with no delta"),
 )
 def verify(options: argparse.Namespace) -> int:
     if not 0 < options.tolerance < 1:
         raise ProblemError(f"--tolerance must lie between 0 and 1, not {options.tolerance:g}.")
     solution = load(options.result)
     problem, recorded = solution.problem, solution.certificate
-    with status_line(options) as line:
+    with cli.status_line(options) as line:
         line.say(f"{problem.name}: replaying")
         now = recheck_certificate(solution, options.tolerance).certificate
     complaint = disagreement(recorded, now, options.tolerance)
@@ -145,13 +140,13 @@ def verify(options: argparse.Namespace) -> int:
         "complaint": complaint,
         **({} if dry is None else {"dry": dry.facts()}),
     }
-    tell(options, facts | now.facts(), lines)
+    cli.tell(options, facts | now.facts(), lines)
     return OK if good else FAILED
 
 
 def gait_distance(a: Solution, b: Solution) -> float | None:
-    """Root-mean-square distance [rad] of the joint angles of two gaits, where start phase and the
-    symmetries of body and friction bring them nearest; None for other bodies."""
+    """R.m.s. distance [rad] of two gaits of a body, minimised over phase and symmetries; or
+    None."""
     if a.problem.body != b.problem.body:
         return None
     law = b.problem.law if a.problem.law.reversible else a.problem.law
@@ -160,7 +155,7 @@ def gait_distance(a: Solution, b: Solution) -> float | None:
 
 
 def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
-    """True if the two are the same optimum; and why, in a sentence."""
+    """Whether two results are the same optimum, and a sentence."""
     what, other = a.problem.objective, b.problem.objective
     if other != what:
         return False, f"other objectives: {what.name} and {other.name}."
@@ -179,7 +174,7 @@ def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
 
 
 def _changed_fields(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
-    """Fields of the two problems that differ, as text."""
+    """Fields of the problems that differ, as text."""
     first, second = a.problem.to_dict(), b.problem.to_dict()
     names = [name for name in {**first, **second} if first.get(name) != second.get(name)]
     return [(name, _short(first.get(name)), _short(second.get(name))) for name in names]
@@ -191,7 +186,6 @@ def _short(value: object) -> str:
 
 
 def _outcome(solution: Solution) -> dict[str, str]:
-    """Results of a solution, as text."""
     answer, certificate, measured = solution.answer, solution.certificate, solution.measured
     error, value_error, limit = " (not replayed)", "-", "-"
     if certificate.replayed:
@@ -215,16 +209,15 @@ def _outcome(solution: Solution) -> dict[str, str]:
     }
 
 
-@command(
+@cli.command(
     "compare",
     """\
-Joint angles are compared at the start phase, and in the mirror image, where they are nearest; of a
-symmetric body also values_of from the other end, under friction that is the same both ways also run
-backwards.
+Joint angles are compared at the start phase and the symmetry of body and friction (mirror image,
+other end, reversed in time) for which they are nearest.
 
   colloc compare results/a.h5 results/b.h5""",
-    text("first", "A.h5", "a result that colloc solve wrote"),
-    text("second", "B.h5", "another one"),
+    cli.text("first", "A.h5", "a result that colloc solve wrote"),
+    cli.text("second", "B.h5", "another one"),
 )
 def compare(options: argparse.Namespace) -> int:
     a, b = load(options.first), load(options.second)
@@ -243,5 +236,5 @@ def compare(options: argparse.Namespace) -> int:
         lines += [(f"  {name}", x, y) for name, x, y in changes]
     widths = [max(len(line[k]) for line in lines) for k in range(2)]
     table = [f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines]
-    tell(options, facts, [*table, sentence])
+    cli.tell(options, facts, [*table, sentence])
     return OK if same else DIFFERENT

@@ -1,13 +1,4 @@
-"""A gait's shape coordinates over time as a file for a robot: comma-separated values or JSON, with
-what a reader has to know; and the robot itself as a model for simulators.
-
-Where the pace of a gait matters (viscous drag, power limits), its own pace is kept, and limits on
-the speeds make the period longer. With inertia the numbers of the result hold for a robot of one
-length at that period, which is said.
-
-A robot is straight before it begins: samples before time 0 take it into the gait
-(`colloc.verification.trajectory.approach`).
-"""
+"""Shape coordinates of a gait over time as CSV or JSON, and the robot as a model for simulators."""
 
 from __future__ import annotations
 
@@ -44,9 +35,8 @@ from colloc.verification.trajectory import (
 )
 
 KINDS = ".csv", ".json", *FORMATS
-_CROSSES = 1e-8  # depth of links in each other that is more than rounding [body lengths]
-_FINE, _ACCURACY = 2000, 1e-5
-"""Samples a period, and the error, with which it is computed where the body ends."""
+_CROSSES = 1e-8  # depth of links in each other above rounding [body lengths]
+_FINE, _ACCURACY = 2000, 1e-5  # samples per period, and error, of where the body ends
 _SETTLED = 10  # periods after which all are alike
 _UNITS = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
 
@@ -71,39 +61,32 @@ def write_export(
     ----------
     solution : Solution
     path : Path
-        Ends in ``.csv`` or ``.json``; or in ``.xml`` or ``.urdf`` for the robot as a model of
-        MuJoCo (MJCF) or a URDF (`colloc.pictures.robot_model`), which takes `period`, `length` and
-        `mass`.
+        Ends in ``.csv`` or ``.json``; or in ``.xml`` (MJCF) or ``.urdf`` for a model of the robot,
+        which takes `period`, `length` and `mass`.
     period : float, optional
-        Seconds a period takes, rounded up to a whole number of samples; by default the shortest
-        that `max_speed` allows.
+        [s], rounded up to a whole number of samples; by default the shortest within `max_speed`.
     max_speed : float or (n_joint,), optional
-        Largest speeds [rad/s]. Under dry friction the path is run through as evenly as they allow;
-        where the pace matters, at the gait's own pace.
+        Limits [rad/s]. Under dry friction the path is retimed as evenly as they allow; where the
+        pace matters the gait's own timing is kept.
     rate : float
-        Samples a second.
+        Samples per second.
     periods : int
-        How often the period is repeated.
     ramp : bool
-        Whether samples at times below 0 lead from the straight body, at rest, into the gait, no
-        joint faster than `max_speed`, the problem's `speed_limit` or the fastest one of the gait.
-        Then the file says where the body ends.
+        Lead from the straight body, at rest, into the gait at times below 0.
     length, mass : float, optional
-        Of the robot [m], [kg]: then torques [N m] and powers [W] of the joints are written too.
+        Of the robot [m], [kg], to write torques [N m] and powers [W], too.
     gravity : float
         [m/s^2]
 
     Returns
     -------
     dict
-        What stands in the file about the samples, as plain numbers and strings.
+        What the file says about the samples.
 
     Raises
     ------
     ProblemError
-        If neither `period` nor `max_speed` is given, the period is too short for the limits, a
-        number or the ending of the path is unusable, the solution holds a prescribed motion, only
-        one of `length` and `mass` is given, or the way from the straight body crosses itself.
+        If an argument is missing or unusable, the motion is prescribed, or the ramp crosses itself.
     """
     check_count(periods=periods)
     problem, is_model = solution.problem, path.suffix in FORMATS
@@ -126,20 +109,20 @@ def write_export(
     if is_model:
         return _write_model(Robot(solution, length, mass, period, gravity), path)  # type: ignore[arg-type]
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
-    gait, own_pace = solution.gait.driven, bool(problem.paced_by)  # which matters
+    gait, own_pace = solution.gait.driven, bool(problem.paced_by)
     trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=own_pace)
     facts = _about(solution, trajectory, rate, limits) | _pace(solution, trajectory.period, gravity)
     way = _approach(solution, trajectory, rate, limits) if ramp else None
     parts: list[Approach | Trajectory] = [trajectory] if way is None else [way, trajectory]
     rows = [[part.angles, part.speeds] for part in parts]
-    at_pace = None  # the robot, if the pace is the gait's own
+    at_pace = None  # the robot, if the timing is the gait's own
     if length is not None or mass is not None:
         if length is None or mass is None:
             raise ProblemError("torques need both the length and the mass of the robot.")
-        # the period as it is asked for: that of whole samples may be another pace
+        # the period that was requested: that of whole samples may be another pace
         robot = Robot(solution, length, mass, period or trajectory.period, gravity)
         at_pace = robot if limits is None or own_pace else None
-        if at_pace is None:  # what inertia does at another pace is not known
+        if at_pace is None:  # inertia with another timing is not known
             there = joint_torques(solution, trajectory.phase, froude=solution.froude)
             torques = [robot.torque_unit * there]
         else:
@@ -160,7 +143,7 @@ def write_export(
             f"{periods} periods have too many samples: a file holds at most {MOST_SAMPLES}."
         )
     time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
-    table = np.tile(rows[-1], periods)  # of units, joints and times
+    table = np.tile(rows[-1], periods)  # (unit, joint, time)
     if way is not None:
         facts["ramp_s"] = -float(way.time[0])
         facts |= _end(solution, trajectory, limits, periods, at_pace)
@@ -179,7 +162,7 @@ def _write(path: Path, text: str) -> None:
 def _approach(
     solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None
 ) -> Approach:
-    """From the straight body, which every range of joints allows."""
+    """Way from the straight body into the gait."""
     problem, speeds = solution.problem, np.abs(trajectory.speeds)
     most: Any = limits
     if limits is None:
@@ -197,7 +180,7 @@ def _approach(
 
 
 def _pull(solution: Solution, count: int) -> np.ndarray | None:
-    """Of the weight while the tail link points as it does at first."""
+    """Downhill pull while the tail link keeps its initial heading."""
     theta = getattr(solution.gait, "theta", None) or 0.0
     return solution.problem.regime.pull(np.full((1, count), theta))
 
@@ -209,9 +192,8 @@ def _end(
     periods: int,
     robot: Robot | None,
 ) -> dict[str, Any]:
-    """Where the centre of mass is after the periods, from where it is in the straight body that
-    points along +x, and by how much the tail link has turned; with inertia where the pace is known.
-    Nothing on slopes."""
+    """Displacement of the centre of mass and turn of the tail link from the straight body along +x
+    to the end, with inertia if the pace is known; nothing on slopes."""
     if solution.problem.regime.slides:
         return {}
     period = trajectory.period
@@ -232,8 +214,7 @@ def _end(
     }
 
 
-_Way = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Times in periods, up to 0, angles and rates."""
+_Way = tuple[np.ndarray, np.ndarray, np.ndarray]  # times up to 0 [periods], angles, rates
 
 
 def _end_slowly(solution: Solution, way: _Way, periods: int) -> tuple[complex, float]:
@@ -251,8 +232,7 @@ def _end_slowly(solution: Solution, way: _Way, periods: int) -> tuple[complex, f
 def _end_with_inertia(
     solution: Solution, froude: float, way: _Way, periods: int
 ) -> tuple[complex, float]:
-    """How far the centre of mass comes, and the angle by which the tail link turns, on a way to
-    phase 0, and through periods after it; after some these are alike."""
+    """Displacement and turn over a way and the periods after it."""
     body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
     long, gait = -float(way[0][0]), solution.gait
     spline = CubicHermiteSpline(1.0 + way[0] / long, way[1], long * way[2], axis=1)
@@ -326,8 +306,7 @@ def _about(
 
 
 def _pace(solution: Solution, period: float, gravity: float) -> dict[str, Any]:
-    """Why the gait keeps its own pace, and of which robot distance and work are, where these depend
-    on it."""
+    """Why the gait's timing is kept, and the robot for which distance and work hold."""
     reason, froude = solution.problem.paced_by, solution.froude
     if not reason:
         return {}
@@ -344,8 +323,7 @@ def _pace(solution: Solution, period: float, gravity: float) -> dict[str, Any]:
 
 
 def _csv(facts: dict[str, Any], time: np.ndarray, table: np.ndarray, coordinate: str) -> str:
-    """Comma-separated values, with the facts in '#' lines; of every unit a column for each
-    joint."""
+    """CSV with the facts in '#' lines; for every unit a column per joint."""
     units = list(_UNITS)[: len(table)]
     names = [f"{coordinate}_{j}_{unit}" for unit in units for j in range(1, table.shape[1] + 1)]
     text = io.StringIO()

@@ -1,8 +1,8 @@
-"""Panels about a solution. Titles are left to who places a panel."""
+"""Panels about a solution, without titles."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,11 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.pictures.foot_marks import FootMarks
+from colloc.mechanics.feet import FOOT, WHEEL
 from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
 from colloc.pictures.style import (
     BLUE,
+    GREEN,
     GREY,
     INK,
     ORANGE,
@@ -29,21 +30,48 @@ from colloc.pictures.style import (
 )
 from colloc.results.solution import Solution
 
-_GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08
-"""Between snapshots, the room for the words below one, and above and below [body lengths]."""
-_FLAT, _SEEN = 0.12, 0.3
-"""A motion that rises by less than the first [body lengths] is drawn higher, by the second."""
-_SMALL = 1.6  # extent [rad] below which a path in shape space is shown from closer
+_GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08  # around snapshots [body lengths]
+_FLAT, _SEEN = 0.12, 0.3  # flatter motions are drawn of this height [body lengths]
+_SMALL = 1.6  # extent [rad] below which a path in shape space is magnified
 _MOST_PERIODS = 3  # drawn in the lab
-_NAMED = 5  # lines that a legend names where there are too many for all of them
+_NAMED = 5  # lines that a legend names if there are too many
 _CELLS = 180
 _ROUND = 9  # vertices of the round end of a link
 _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
+class FootMarks:
+    """Marks of given sizes [points] for feet (squares), wheels and pads (bars), hollow while they
+    slide; kinds as `colloc.mechanics.feet.Foot.kind`."""
+
+    def __init__(self, axes: Axes, kinds: Sequence[str], size: float) -> None:
+        self._kinds, self._marks = np.array(kinds), {}
+        for kind in dict.fromkeys(kinds):
+            look: Any = {"zorder": 3} | ({"marker": "s", "ls": ""} if kind == FOOT else {})
+            colour, small = GREEN if kind == WHEEL else VERMILION, 0.55 * size
+            self._marks[kind] = (
+                *axes.plot([], [], c=colour, ms=size, lw=size, solid_capstyle="projecting", **look),
+                *axes.plot([], [], c="white", ms=small, lw=small, solid_capstyle="butt", **look),
+            )
+
+    def place(self, places: np.ndarray, held: np.ndarray) -> None:
+        """Move the marks to both ends of the feet ``(2, 2, n_foot)``, of which some hold."""
+        # no line from foot to foot
+        apart = np.concatenate([places, np.full_like(places[:, :1], np.nan)], axis=1)
+        for kind, (filled, hollow) in self._marks.items():
+            of_kind = self._kinds == kind
+            for line, chosen in ((filled, of_kind), (hollow, of_kind & ~held)):
+                line.set_data(*apart[..., chosen].transpose(0, 2, 1).reshape(2, -1))
+
+    def key(self) -> dict[str, Any]:
+        """Legend texts and what they explain."""
+        last = next(reversed(self._marks), "")
+        words = {kind: f"{kind} (filled: holds)" if kind == last else kind for kind in self._marks}
+        return {words[kind]: marks for kind, marks in self._marks.items()}
+
+
 def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
-    """The body at equal steps of a period, side by side and apart; below, the phase and how far its
-    centre has come."""
+    """The body at equal steps of a period, with the phase and the displacement of its centre."""
     body, motion = solution.problem.body, solution.sample(np.linspace(0.0, 1.0, count))
     at = (body, motion.angles, motion.theta, motion.tail)
     x, y = lab_outline(*at)
@@ -76,8 +104,7 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
 
 
 def strips(ends: np.ndarray, width: float) -> np.ndarray:
-    """Round-ended strips of a width about the parts of an outline ``(2, n_point)``: polygons
-    ``(n_part, n_vertex, 2)``."""
+    """Round-ended polygons ``(n_part, n_vertex, 2)`` around the parts of an outline."""
     along = np.arctan2(*np.diff(ends)[::-1])[:, None]
     half_turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ROUND)
     rims = [
@@ -88,8 +115,7 @@ def strips(ends: np.ndarray, width: float) -> np.ndarray:
 
 
 def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body) -> None:
-    """One body from its outline, ``(2, n_point)``: links of their width, if they have one, joints
-    hollow, the head a disc."""
+    """A body with an outline ``(2, n_point)``: hollow joints, the head a disc."""
     if body.drawn_width:
         links = list(strips(ends, body.drawn_width))
         axes.add_collection(PolyCollection(links, facecolors=[colour], edgecolors="white", lw=0.2))
@@ -100,12 +126,8 @@ def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body
 
 
 def draw_lab(axes: Axes, solution: Solution) -> None:
-    """Paths of the body's ends and its centre of mass in the lab, and the body at both ends of
-    them, apart.
-
-    As many periods as it takes for the body to leave the place where it began, and one body if that
-    takes too many.
-    """
+    """Paths of tail, head and centre of mass, over the periods that separate the first body from
+    the last one; of one period with one body if these are too many."""
     body, start = solution.problem.body, solution.sample(0.0)
     begin = lab_outline(body, start.angles, start.theta, start.tail)[:, :, 0]
     step = solution.sample(1.0).centre[:, 0] - start.centre[:, 0]
@@ -135,19 +157,8 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
 def forbidden(
     body: Body, joint_limit: Limit, first: int = 0, second: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of two shape coordinates that are forbidden whatever the others are.
-
-    Of a body with no others: by its limits, and where parts cross. Of one with more: by limits on
-    these two alone, as those of a chain's joints are; what a smooth body may do in one of several
-    modes depends on all.
-
-    Returns
-    -------
-    grid : (n,)
-        Values of the coordinates from -pi to pi.
-    excess : (n, n)
-        Positive where forbidden; rows are the second coordinate.
-    """
+    """Grid ``(n,)`` of two shape coordinates, and ``(n, n)`` values that are positive where a pair
+    is infeasible for any values of the others; rows are the second coordinate."""
     grid = np.linspace(-np.pi, np.pi, _CELLS + 1)
     a, b = np.meshgrid(grid, grid)
     shapes = np.zeros((body.n_joint, a.size))
@@ -164,7 +175,6 @@ def forbidden(
 def draw_allowed(
     axes: Axes, body: Body, joint_limit: Limit, first: int = 0, second: int = 1
 ) -> None:
-    """Grey over the pairs of two shape coordinates that are `forbidden`."""
     grid, excess = forbidden(body, joint_limit, first, second)
     if excess.max() > 1e-9:
         axes.contourf(grid, grid, excess, levels=[1e-9, 10.0], colors=[GREY], alpha=0.4)
@@ -179,11 +189,10 @@ def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> No
 def draw_shape_path(
     axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1
 ) -> None:
-    """The gait in the plane of two of all joint angles, light to dark, its start a disc, over the
-    shapes that are allowed."""
+    """Path in the plane of two joint angles, light to dark, its start a disc; grey: infeasible."""
     draw_allowed(axes, problem.body, problem.joint_limit, first, second)
     q = angles[[first, second]]
-    colours = colormaps[PHASE](np.linspace(0.1, 0.8, 200))  # to be seen on white and on black
+    colours = colormaps[PHASE](np.linspace(0.1, 0.8, 200))  # visible on white and on black
     pieces = np.array_split(np.arange(q.shape[1] - 1), min(200, q.shape[1] - 1))
     lines = [q[:, piece[0] : piece[-1] + 2].T for piece in pieces]
     axes.add_collection(LineCollection(lines, colors=colours, lw=2.2, capstyle="round"))
@@ -192,7 +201,6 @@ def draw_shape_path(
     arrow = {"arrowstyle": "-|>", "color": VERMILION, "lw": 1.4}
     axes.annotate("", (q[0, at + 2], q[1, at + 2]), (q[0, at], q[1, at]), arrowprops=arrow)
     middle, half = np.zeros(2), 1.02 * np.pi
-    # of all coordinates: every plane of a gait has one scale
     extent = float(np.ptp(angles, axis=1).max())
     if extent < _SMALL:
         middle, half = 0.5 * (q.min(axis=1) + q.max(axis=1)), 0.6 * max(extent, 0.05)
@@ -209,8 +217,7 @@ def draw_shape_path(
 
 
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
-    """Speeds of links, or of other parts, over a period, on a logarithmic scale that shows stick,
-    and delta."""
+    """Sliding speeds over a period on a logarithmic scale, with delta: below it, sticking."""
     problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
     part, speed = problem.body.speeds(motion.angles, motion.rates, motion.z)
     speed = np.maximum(speed, 0.1 * delta)
@@ -223,7 +230,7 @@ def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
 
 
 def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
-    """Power against friction over a period, with the mesh below."""
+    """Power against friction over a period, with the mesh."""
     motion = solution.sample(t)
     axes.plot(t, solution.power(motion), color=BLUE, lw=1.5)
     axes.set(xlim=(0, 1), xlabel="phase t", ylabel="power  [weight·length/period]")
@@ -232,14 +239,12 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
 
 
 def draw_mesh_ticks(axes: Axes, edges: np.ndarray) -> None:
-    """Strokes on the time axis where mesh intervals meet."""
     at_axis = axes.get_xaxis_transform()
     axes.plot(edges, 0.0 * edges, "|", color=GREY, ms=7, transform=at_axis, clip_on=False)
 
 
 def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
-    """A logarithmic axis with powers of ten as plain text, which costs a tenth of what typeset ones
-    do."""
+    """Logarithmic axis "x" or "y" with plain text labels, ten times as fast as typeset ones."""
     axes.set(**{f"{which}scale": "log", f"{which}lim": limits})
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_locator(LogLocator(numticks=6))
@@ -248,8 +253,7 @@ def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
 
 
 def draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
-    """A line for every joint, or part, that is named by its number; where there are more than
-    colours that differ, from dark to light, and a few are named."""
+    """A line for every joint or part; many are coloured from dark to light, and a few named."""
     count = len(rows)
     many = count > len(SERIES)
     colours = colormaps[SEQUENTIAL](np.linspace(0.0, 0.9, count)) if many else SERIES
@@ -259,7 +263,7 @@ def draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
 
 
 def draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) -> None:
-    """The names of the lines, and of more marks, in a row above the axes, where no line runs."""
+    """Legend of the lines, and of more marks, in a row above the axes."""
     handles, labels = axes.get_legend_handles_labels()
     handles, labels = [*handles, *(more or {}).values()], [*labels, *(more or {})]
     if of:

@@ -1,4 +1,4 @@
-"""Figures of a result one panel each, in the column widths of journals, as PDF and PNG."""
+"""Figures of one panel each in the column widths of journals."""
 
 from __future__ import annotations
 
@@ -28,20 +28,18 @@ from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.verification.mesh_error import mesh_error
 
-COLUMN, PAGE = 3.4, 7.0
-"""Widths of a column and of two [inches]."""
+COLUMN, PAGE = 3.4, 7.0  # widths of a column and of two [inches]
 _RESOLUTION = 300
 
 
 class Panel(NamedTuple):
-    """A picture about a solution: width and height [inches], and what draws it."""
+    """Width and height of a picture [inches], and what draws it."""
 
     width: float
     height: float
     draw: Callable[[Axes], object]
 
     def draw_on(self, axes: Axes) -> Axes:
-        """Draw it there, and return the axes. `ProblemError` if these are none."""
         if not isinstance(axes, Axes):
             how = 'plot().savefig("mine.png"), or .pdf, or .svg, writes a file'
             raise ProblemError(f"ax must be a matplotlib Axes to draw on, not {axes!r}; {how}.")
@@ -56,7 +54,7 @@ class Panel(NamedTuple):
 
 
 def draw_convergence(axes: Axes, solution: Solution) -> None:
-    """The objective at every step of the search against its delta; crosses did not converge."""
+    """Objective against delta at every step of the search; crosses did not converge."""
     deltas, values, good = np.array(
         [(step.delta, step.value, step.optimal) for step in solution.history]
     ).T
@@ -71,15 +69,14 @@ def draw_convergence(axes: Axes, solution: Solution) -> None:
 
 
 def mesh_errors(solution: Solution) -> np.ndarray:
-    """Estimated error of the objective from every mesh interval, ``(n,)``, magnitudes."""
+    """Estimated error of the objective from every mesh interval, ``(n,)``."""
     control = control_problem(solution.answer.problem)
     at = (solution.mesh, solution.gait, solution.delta_per_period)
     return np.abs(mesh_error(control, *at).value)
 
 
 def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:
-    """Estimated error of the objective from every mesh interval, `mesh_errors`, and what is allowed
-    in all."""
+    """`mesh_errors` and the tolerance of their sum."""
     edges, shown = solution.mesh.edges, np.maximum(errors, 1e-12)
     tolerance, high = solution.problem.mesh_tolerance, float(shown.max())
     axes.stairs(shown, edges, color=ORANGE, lw=1.2, baseline=None)
@@ -110,7 +107,6 @@ def panels(solution: Solution) -> dict[str, Panel]:
 
 
 def draw_panel(axes: Axes, solution: Solution, panel: str = "gait") -> Axes:
-    """Draw the panel of that name, and return the axes. `ProblemError` if there is none."""
     gait = Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))
     return find_panel({"gait": gait} | panels(solution), panel).draw_on(axes)
 

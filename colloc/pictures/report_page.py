@@ -1,5 +1,4 @@
-"""One self-contained HTML page about a result: no network, no other file; everything from the file
-is escaped."""
+"""One self-contained HTML page about a result; everything from the file is escaped."""
 
 from __future__ import annotations
 
@@ -17,9 +16,9 @@ from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.inertia import GRAVITY
+from colloc.pictures.families import robot_panels
 from colloc.pictures.motion_frames import Frames, foot_kinds, foot_words, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
-from colloc.pictures.robot_figure import robot_panels
 from colloc.pictures.style import INK, styled
 from colloc.pictures.templates import render
 from colloc.results.robot import SLOW_ENOUGH, Robot
@@ -29,12 +28,11 @@ from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import replaced_file
 
 _MOST_PLANES = 6
-_ANY_FLOOR = 0.5  # friction of a floor, over the stated one, for which a period is stated
+_ANY_FLOOR = 0.5  # share of the stated friction for which a period is stated
 
 
 class Drawn(NamedTuple):
-    """A panel as SVG, and where its axes lie: left, right, top, bottom as percent, and limits of
-    both axes."""
+    """A panel as SVG; left, right, top and bottom of its axes [percent], and limits of both."""
 
     caption: str
     svg: Markup
@@ -51,9 +49,7 @@ def report_page(
     *,
     robot: Robot | None = None,
 ) -> str:
-    """The page as a string, also of a solution that failed: what does not exist is left out. The
-    reference is the value to hold the result against, `gap` a sentence about the upper bound;
-    `robot` gets a section of its own."""
+    """The page with what exists; `gap` is a sentence about the upper bound, `robot` a section."""
     problem, body, errors = solution.problem, solution.problem.body, mesh_errors(solution)
     drawn = panels(solution) | {
         "mesh": Panel(COLUMN, 2.4, lambda x: draw_mesh(x, solution, errors))
@@ -61,7 +57,7 @@ def report_page(
     planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
     captions = {
         "angles": f"{body.quantity}s",
-        "speeds": "speeds along the body; what is near δ sticks",
+        "speeds": "sliding speeds (near δ: sticking)",
         "power": "power against friction; ticks: mesh",
     }
     replayed = solution.certificate.replayed
@@ -111,8 +107,7 @@ def write_report(
     *,
     robot: Robot | None = None,
 ) -> Path:
-    """Write the page; `known` is the folder where upper bounds are kept, by default that of the
-    page. With a `robot` (`Solution.robot`) the page has its sheet."""
+    """Write the page; `known` is the folder of upper bounds, by default that of the page."""
     gap = ""
     if solution.certificate.replayed:
         bound = upper_bound(solution.problem, known or path.parent, compute=False)
@@ -124,9 +119,9 @@ def write_report(
 
 
 def _pace(solution: Solution) -> str:
-    """How slow is slow enough, where that is known."""
+    """Pace up to which inertia does not matter, if that is known."""
     if solution.problem.froude:
-        return ""  # the answer is for its own pace
+        return ""
     try:
         froude = solution.slow_enough(SLOW_ENOUGH)
     except (ProblemError, NotConvergedError):
@@ -140,8 +135,7 @@ def _pace(solution: Solution) -> str:
 
 
 def _dry(solution: Solution) -> str:
-    """Bounds of the efficiency under dry friction, where there are any: those of the certificate,
-    or made now."""
+    """Bounds of the efficiency under dry friction, if there are any."""
     if solution.certificate.dry is not None:
         return "d/W between {:.8f} and {:.8f}".format(*solution.certificate.dry)
     try:
@@ -151,24 +145,22 @@ def _dry(solution: Solution) -> str:
 
 
 def _floor(solution: Solution) -> list[list[str]]:
-    """Rows of what other friction, lengths, feet and limits do to the best value, where that is
-    known."""
+    """Rows of the sensitivities of the best value, if they are known."""
     try:
-        found = solution.sensitivity()
+        slopes = solution.sensitivity()
     except (ProblemError, NotConvergedError):
         return []
-    return [[effect.name, f"{effect.now:.4g}", *found.beside(effect)] for effect in found.seen]
+    return [[effect.name, f"{effect.now:.4g}", *slopes.beside(effect)] for effect in slopes.seen]
 
 
 def _picture(
     panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False
 ) -> Drawn:
-    """The panel as SVG that takes its text colour and font from the page; nothing in it comes from
-    a file but numbers."""
+    """A panel as SVG with text colour and font of the page; of a file it has only numbers."""
     text, figure = StringIO(), panel.figure()
-    unsaid = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    without = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with styled():
-        figure.savefig(text, format="svg", transparent=True, metadata=unsaid)
+        figure.savefig(text, format="svg", transparent=True, metadata=without)
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # it would style the whole page
@@ -189,8 +181,7 @@ def _picture(
 
 
 def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
-    """What report.js draws: rows over time, the window that holds all of it, the length of the
-    arrows."""
+    """What report.js draws."""
     low, high = shown.window
     steps = (0.1, 0.2, 0.5, 1, 2, 5, 10, 1e9)
     kinds, (wide, tall) = foot_kinds(body), high - low

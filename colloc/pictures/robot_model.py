@@ -1,19 +1,14 @@
-"""The robot of a result for simulators: MJCF (MuJoCo) and URDF, in metres, kilograms and seconds.
+"""The robot of a result as a model for simulators, MJCF (MuJoCo) and URDF, in SI units.
 
-Links have the problem's lengths, masses and moments of inertia and are drawn as boxes; joints are
-hinges about the vertical. Links of no width are drawn `_THIN` wide.
+Links have the problem's lengths, masses and inertias; joints are hinges about the vertical.
 
-In MJCF the tail link slides in the plane, and what touches the floor presses with the weight that
-the problem says: each foot is a small body on a vertical slide with a spring, and what lies on the
-floor, a pad or a link, stands on `_POINTS` of them (Gauss points). MuJoCo gives a contact two
-coefficients, along and across, in an explicit `<pair>`; it lays the first one along the axis of a
-capsule, so a foot whose friction has a direction is a very short one. Its friction is that of
-`colloc.Elliptic` (of all forces within an ellipse the one that takes the most power), also where
-the problem's is another law; `floor_of` is the floor that the file has, on which colloc says how it
-moves. A sliding contact of MuJoCo is lifted the more the longer it takes to respond: hence the
-short steps, the constraints of two steps, and an impedance that begins at 0.
+MJCF: each foot is a small body on a vertical slide with a spring that presses with its weight; pads
+and links stand on Gauss points. A contact `<pair>` has two coefficients, the first along the axis
+of a capsule, so a foot with directed friction is a very short capsule. MuJoCo's friction is that of
+`colloc.Elliptic`, also for other laws (`floor_of`). Its sliding contacts are lifted the more the
+slower they respond: hence short steps, constraints of two steps, and an impedance that begins at 0.
 
-URDF has no friction, no springs and no motors: the shapes that touch the floor alone.
+URDF has no friction, springs or motors.
 """
 
 from __future__ import annotations
@@ -36,11 +31,8 @@ from colloc.system.errors import ProblemError
 
 _THIN = 0.02  # width and height of links that have none [body lengths]
 _POINTS = 16  # on which a pad or a link stands
-_STEPS, _LONGEST = 8000, 1e-3
-"""Time steps of a period, and the longest one [s]: where a period is long, weight and friction set
-the time, not the gait."""
-_AXIS, _MASS = 1e-4, 1e-6
-"""Half of the length of a capsule and the mass of a foot, in those of the body: next to nothing."""
+_STEPS, _LONGEST = 8000, 1e-3  # time steps of a period, and the longest one [s]
+_AXIS, _MASS = 1e-4, 1e-6  # half length of a capsule, and mass of a foot, in those of the body
 _STIFF = 5000.0  # gain of the position servos per rad, over the largest torque of the gait
 _LEAST = 1e-5  # smallest coefficient of friction in MuJoCo
 _RESERVE = 1.5  # effort and speed that a URDF allows a joint, over the largest of the gait
@@ -57,8 +49,7 @@ class _Parts(NamedTuple):
 
 
 def _parts(robot: Robot) -> _Parts:
-    """Links and joints in SI units. About the vertical and across a link its inertia is that of
-    colloc, about its length that of the box."""
+    """Links and joints in SI units; the inertia about a link's length is that of its box."""
     problem = robot.solution.problem
     chain, limit = problem.body, problem.joint_limit
     if problem.joint_map is not None:
@@ -92,37 +83,12 @@ def _xml(template: str, /, **values: Any) -> str:
 
 
 def mjcf(robot: Robot, *, contacts: bool = True) -> str:
-    """The robot as a model of MuJoCo, with position servos and its first posture as the keyframe
-    "start".
-
-    Parameters
-    ----------
-    robot : Robot
-    contacts : bool
-        Whether it touches a floor. Under a law that is not dry, which no contact has, it never
-        does.
-
-    Returns
-    -------
-    str
-        XML.
-
-    Raises
-    ------
-    ProblemError
-        If the body is no chain with a motor in every joint.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
-    >>> mjcf(robot).count('type="hinge"')
-    3
-    """
+    """The robot as MJCF with position servos and the keyframe "start"; without `contacts`, and
+    under laws that are not dry, it touches no floor. `ProblemError` for other bodies than such
+    chains."""
     parts, problem, gait = _parts(robot), robot.solution.problem, robot.solution.gait
     pull = problem.regime.pull(np.array([[getattr(gait, "theta", None) or 0.0]]))
-    leaning = (0.0, 0.0) if pull is None else pull[:, 0]  # the floor is level, and gravity leans
+    leaning = (0.0, 0.0) if pull is None else pull[:, 0]  # gravity leans, not the floor
     floor = contacts and rate_independent(problem.law)
     feet = _feet(robot, parts) if floor else []
     start = gait.angles(np.zeros(1))[:, 0]
@@ -149,8 +115,7 @@ def mjcf(robot: Robot, *, contacts: bool = True) -> str:
 
 
 def _feet(robot: Robot, parts: _Parts) -> list[dict[str, Any]]:
-    """Points on which it stands: small bodies, each on a vertical slide; a spring presses it on the
-    floor with its weight, and it moves as if it had that."""
+    """Points on which it stands, each pressed on the floor with its share of the weight."""
     chain, feet = parts.chain, list[dict[str, Any]]()
     for foot in chain.standing_on or whole_links(chain.weight_column()[:, 0]):
         law: Any = _elliptic(foot.friction or robot.solution.problem.friction)
@@ -171,12 +136,7 @@ def _feet(robot: Robot, parts: _Parts) -> list[dict[str, Any]]:
 
 
 def urdf(robot: Robot) -> str:
-    """The robot as a URDF: link_1 is its tail, joint_1 the one nearest to it; efforts and speeds
-    are 1.5 times the gait's.
-
-    A URDF has no friction of contacts, and nothing that spreads the weight over them: a simulator
-    chooses both. Parameters and errors are as of `mjcf`.
-    """
+    """The robot as a URDF; link_1 is its tail. Efforts and speeds are 1.5 times the gait's."""
     parts = _parts(robot)
     return _xml(
         "robot.urdf",
@@ -189,11 +149,10 @@ def urdf(robot: Robot) -> str:
 
 
 FORMATS = {".xml": mjcf, ".urdf": urdf}
-"""Ending of a file to what writes it."""
 
 
 def floor_of(robot: Robot) -> tuple[Chain, Law]:
-    """The robot's body and law of friction as the contacts of its MJCF have them."""
+    """Body and law of friction as the contacts of the MJCF have them."""
     chain, law = _parts(robot).chain, robot.solution.problem.friction
     feet = tuple(
         replace(foot, friction=foot.friction and _elliptic(foot.friction))
@@ -203,7 +162,7 @@ def floor_of(robot: Robot) -> tuple[Chain, Law]:
 
 
 def note_of(robot: Robot) -> str:
-    """What MJCF makes of the problem's friction, in a sentence; "" where it has the same."""
+    """How friction in the MJCF differs from the problem's, or ""."""
     problem = robot.solution.problem
     stated = problem.friction
     if not rate_independent(problem.law):
@@ -222,7 +181,7 @@ def _is_exact(law: Law) -> bool:
 
 
 def _elliptic(law: Law) -> Law:
-    """What MuJoCo makes of a law that is dry."""
+    """The law of MuJoCo that is nearest to a dry one."""
     if _is_exact(law):
         return law
     one, none = np.ones((1, 1)), np.zeros((1, 1))

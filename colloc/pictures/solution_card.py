@@ -1,4 +1,4 @@
-"""A solution as a small HTML card: what a notebook shows of it, a film and the numbers."""
+"""A solution as a small HTML card for notebooks: a film and the numbers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ from colloc.pictures.motion_frames import foot_kinds, foot_words, frames
 from colloc.pictures.templates import render
 from colloc.results.solution import Solution
 
-_FRAMES, _PERIODS, _SECONDS = 24, 2, 3.0
-"""Of the film: frames and seconds a period."""
-_POINTS = 30  # that draw a body, at most
+_FRAMES, _PERIODS, _SECONDS = 24, 2, 3.0  # frames and seconds of each period of the film
+_POINTS = 30  # of a body, at most
 _WIDTH, _TALLEST = 320, 200  # of the film [pixels]
 
 
 def solution_card(solution: Solution) -> str:
-    """Verdict, film, numbers and checks as HTML; all text is escaped."""
     checks = solution.certificate.checks if solution.certificate.replayed else ()
     return render(
         "card.html",
@@ -36,8 +34,7 @@ def solution_card(solution: Solution) -> str:
 
 
 def _film(solution: Solution) -> dict[str, Any]:
-    """Two periods from above, as points of an SVG that moves by itself, in the colour of the text
-    around it; feet that hold are filled."""
+    """Two periods from above, as points of an animated SVG."""
     shown, body = frames(solution, _FRAMES + 1, arrows=1, periods=_PERIODS), solution.problem.body
     count = shown.ends.shape[1]
     points = np.linspace(0, count - 1, min(_POINTS, count)).round().astype(int)
@@ -45,7 +42,7 @@ def _film(solution: Solution) -> dict[str, Any]:
     scale = min(_WIDTH / (high - low)[0], _TALLEST / (high - low)[1])
 
     def pixels(places: np.ndarray) -> np.ndarray:
-        """All periods in a row, ``(2, n_point, n_time)``; y points down."""
+        """Pixels of all periods in a row, ``(2, n_point, n_time)``; y points down."""
         once = places[..., :-1]
         moved = [before.of(once.reshape(2, -1)).reshape(once.shape) for before in shown.before]
         x, y = np.concatenate(moved, axis=-1)
@@ -71,7 +68,7 @@ def _film(solution: Solution) -> dict[str, Any]:
 
 
 def _texts(places: np.ndarray) -> list[str]:
-    """Points ``(2, n_point, n_time)`` of every instant."""
+    """Points ``(2, n_point, n_time)`` of every frame."""
     return [" ".join(f"{x:.1f},{y:.1f}" for x, y in at.T) for at in np.moveaxis(places, -1, 0)]
 
 

@@ -1,9 +1,4 @@
-"""What all figures share: one style, colours that colour-blind readers tell apart, saving, bodies
-with arrows.
-
-Figures are made without pyplot, so that drawing one neither opens a window nor changes anybody's
-backend.
-"""
+"""Style, colours (Okabe and Ito) and saving of figures, which are made without pyplot."""
 
 from __future__ import annotations
 
@@ -22,10 +17,8 @@ from colloc.system.files import replaced_file
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
-"""Of the palette of Okabe and Ito."""
 GREY, INK = "#777777", "#1d2329"
-SERIES = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, GREY, "#8a7a00")
-"""Colours of links or joints; the palette's yellow is darkened to be read on white."""
+SERIES = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, GREY, "#8a7a00")  # of links or joints
 VELOCITY, FORCE = BLUE, VERMILION
 SEQUENTIAL, PHASE = "viridis", "cividis_r"
 _DPI = 150
@@ -51,7 +44,7 @@ _STYLE: Any = {
 
 @contextmanager
 def styled(font_size: float = 9) -> Iterator[None]:
-    """The common style, for figures made inside, whatever a user's own is."""
+    """Common style of figures made inside."""
     with style.context(
         ["default", {**_STYLE, "font.size": font_size, "axes.labelsize": font_size}]
     ):
@@ -59,7 +52,7 @@ def styled(font_size: float = 9) -> Iterator[None]:
 
 
 class Picture(Figure):
-    """A figure that notebooks show: they know by themselves only those of pyplot."""
+    """A figure that notebooks show, as they do those of pyplot."""
 
     def _repr_png_(self) -> bytes:
         content = io.BytesIO()
@@ -71,7 +64,6 @@ class Picture(Figure):
 def subplots(
     rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], **options: Any
 ) -> tuple[Figure, Any]:
-    """A figure of `figsize` inches and its axes."""
     figure = Figure(figsize=figsize)
     return figure, figure.subplots(rows, columns, **options)
 
@@ -79,23 +71,13 @@ def subplots(
 def save(
     figure: Figure, stem: Path, kinds: tuple[str, ...] = ("png", "pdf"), dpi: float = _DPI
 ) -> list[Path]:
-    """Write ``STEM.KIND`` for every kind, and return the paths.
-
-    Raises
-    ------
-    StoreError
-        If they cannot be written.
-    """
+    """Write ``STEM.KIND`` for every kind; returns the paths."""
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     for path, kind in zip(paths, kinds, strict=True):
         with replaced_file(path) as temporary, styled():
-            figure.savefig(
-                temporary,
-                format=kind,
-                dpi=dpi,
-                metadata={"CreationDate": None} if kind == "pdf" else None,
-            )
-        figure.set_layout_engine("none")  # what the first saving laid out holds for the others
+            metadata = {"CreationDate": None} if kind == "pdf" else None
+            figure.savefig(temporary, format=kind, dpi=dpi, metadata=metadata)
+        figure.set_layout_engine("none")  # the first layout holds for the others
     return paths
 
 

@@ -1,4 +1,4 @@
-"""Pages and models that are filled in from templates in `assets`."""
+"""Templates in `assets`."""
 
 from __future__ import annotations
 
@@ -9,10 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 
 def environment() -> Environment:
-    """Templates of this package; they escape whatever is put into them.
-
-    The filter ``g`` writes a number, or several, to nine digits.
-    """
+    """Environment with autoescape; the filter ``g`` writes numbers to nine digits."""
     templates = Environment(
         loader=PackageLoader("colloc.pictures", "assets"), autoescape=True,
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
@@ -23,5 +20,4 @@ def environment() -> Environment:
 
 
 def render(template: str, /, **values: Any) -> str:
-    """A template filled in."""
     return environment().get_template(template).render(**values)

@@ -276,8 +276,8 @@ class Robot:
         """Draw torque, speed and power of every joint over a period as a matplotlib Figure; with a
         matplotlib Axes `ax` the panel "torque", "speed" or "power" there, and return the Axes."""
         if ax is None:
-            return higher("pictures.robot_figure:robot_figure")(self)
-        return higher("pictures.robot_figure:draw_robot")(ax, self, panel)
+            return higher("pictures.families:robot_figure")(self)
+        return higher("pictures.families:draw_robot")(ax, self, panel)
 
     @cached_property
     def facts(self) -> dict[str, Any]:

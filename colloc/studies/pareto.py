@@ -74,8 +74,8 @@ class ParetoFront:
         """Draw the front and its gaits as a matplotlib Figure; with a matplotlib Axes `ax` the
         front there, and return the Axes."""
         if ax is None:
-            return higher("pictures.front_figure:front_figure")(self)
-        return higher("pictures.front_figure:draw_front")(ax, self)
+            return higher("pictures.families:front_figure")(self)
+        return higher("pictures.families:draw_front")(ax, self)
 
     def __repr__(self) -> str:
         first, second = (aim.name for aim in self.objectives)

@@ -95,8 +95,8 @@ class Steering:
         """Draw efficiency against the turn, and the tracks, as a matplotlib Figure; with a
         matplotlib Axes `ax` the panel "cost" or "tracks" there, and return the Axes."""
         if ax is None:
-            return higher("pictures.steering_figure:steering_figure")(self)
-        return higher("pictures.steering_figure:draw_steering")(ax, self, panel)
+            return higher("pictures.families:steering_figure")(self)
+        return higher("pictures.families:draw_steering")(ax, self, panel)
 
     def __repr__(self) -> str:
         turns = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)

@@ -37,7 +37,7 @@ def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
     assert f"  {bad[0].line()}" in lines
     assert f"  {bad[1].line()}" in lines
     assert sum(line.startswith("  NO ") for line in lines) == 2
-    assert any(line.startswith(f"  {len(good)} checks hold (largest: ") for line in lines)
+    assert any(line.startswith(f"  {len(good)} checks passed (tightest: ") for line in lines)
 
 
 LOOP = ellipse(0.0, 1.2, 0.8)
@@ -140,7 +140,7 @@ def test_what_solve_prints_is_what_the_file_and_verify_say(tmp_path, capsys):
     assert colloc(words[:-1]) == 0
     printed = capsys.readouterr().out
     assert f"{facts['efficiency']:.6f} +- " in printed
-    assert re.search(r"\d+ checks hold \(largest: ", printed)
+    assert re.search(r"\d+ checks passed \(tightest: ", printed)
     assert "cos 2πt" not in printed
     assert colloc([*words[:-1], "--verbose"]) == 0
     assert "cos 2πt" in capsys.readouterr().out
@@ -189,7 +189,7 @@ def test_whatever_shows_a_number_shows_its_own_error_with_it(three_link):
     shown = replace(three_link, certificate=known)
     told = "\n".join(summary_lines(shown, None))
     for words in (
-        "0.210000 +- 3e-03 by",
+        "0.210000 +- 3e-03, re-simulated",
         "0.220000 +- 4e-03 for delta",
         "d      0.310000 +- 1e-03",
         "work W  1.070000 +- 2e-03",

@@ -13,7 +13,7 @@ from colloc.mechanics.native_kernel import numpy_instead
 from colloc.motion import kinds
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
 from colloc.motion.kinds import Shapes, begin_of, kind_of_motion
-from colloc.pictures.animation import pictures
+from colloc.pictures.movie import pictures
 from colloc.reduced.program import ReducedProgram
 from colloc.search.spaces import space_near
 from colloc.verification.mesh_error import mesh_error

@@ -13,9 +13,8 @@ from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.animation import pictures
 from colloc.pictures.motion_frames import frames, lab_outline
-from colloc.pictures.movie import write_movie
+from colloc.pictures.movie import pictures, write_movie
 from colloc.pictures.publication import save_panels
 from colloc.results.store import save
 

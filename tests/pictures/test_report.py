@@ -101,7 +101,7 @@ def test_the_page_holds_what_it_should(page, three_link):
         "1 harmonic, symmetry bilateral",
         "μt = 1 sideways", "0.3333, 0.3333, 0.3333", "replay gap", "finds the same value",
         "joints 1 and 2",
-        "speeds along the body", "power against friction", "efficiency at each level",
+        "sliding speeds", "power against friction", "efficiency at each level",
         "mesh: error of",
         "How to reproduce", "colloc solve three_link.py", "casadi", three_link.problem.hash,
     ):  # fmt: skip

@@ -174,7 +174,7 @@ def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, th
         shares, frames(on_feet, 1001).holding[:, :-1].mean(axis=1), atol=3e-3
     )
     assert 0.25 < shares[[0, 2]].min() < shares[[0, 2]].max() < 0.5
-    assert any("feet hold" in line for line in summary_lines(on_feet, None))
+    assert any("feet stick" in line for line in summary_lines(on_feet, None))
     # a foot holds where friction is less than 3 / sqrt(10) of the most it can be
     body, motion = on_feet.problem.body, on_feet.sample(np.linspace(0, 1, 300))
     at = on_feet.problem.law, motion.angles, motion.rates, on_feet.delta_per_period, motion.z
@@ -184,4 +184,4 @@ def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, th
     )
     np.testing.assert_array_equal(on_feet.holding(motion), used < 3 / np.sqrt(10))
     assert three_link.share_held.size == 0
-    assert not any("feet hold" in line for line in summary_lines(three_link, None))
+    assert not any("feet stick" in line for line in summary_lines(three_link, None))

@@ -21,7 +21,7 @@ from colloc import (
     replay,
 )
 from colloc.commands.main import main
-from colloc.pictures.front_figure import front_figure
+from colloc.pictures.families import front_figure
 from colloc.search.solve import solve
 from colloc.studies.pareto import Gap, ParetoFront
 

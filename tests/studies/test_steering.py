@@ -20,7 +20,7 @@ from colloc import (
 )
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.harmonic import Fourier
-from colloc.pictures.steering_figure import steering_figure
+from colloc.pictures.families import steering_figure
 from colloc.studies.steering import Steering
 
 PROBLEM = Problem(
