@@ -31,7 +31,7 @@ from benchmarks.known import known
 from benchmarks.tables import cached, markdown_table
 from colloc import Chain, Fourier, Harmonic, Problem
 from colloc.commands.ending import OK, run
-from colloc.mechanics.contact import smooth_minimum
+from colloc.mechanics.contact import crossing_depth, smooth_minimum
 
 INTERVALS, DEGREE, LENGTH = 40, 2, 1 / 3
 RELAXED = [10.0**-k for k in range(2, 9)]
@@ -191,7 +191,7 @@ def starts(count: int) -> list[np.ndarray]:
     while len(found) < count:
         p = rng.uniform([-1, 0.5, -1, -1.5, -1.5], [1, 1.5, 1, 1.5, 1.5])
         q = member(p).angles(phases)
-        if np.abs(q).max() < 3 and BODY.crossing_depth(q).max() <= 0:
+        if np.abs(q).max() < 3 and crossing_depth(BODY, q).max() <= 0:
             found.append(p)
     return found
 

@@ -35,7 +35,7 @@ _NAMES = {
     "gaits.objective": "Objective",
     "mechanics.chain": "Chain",
     "gaits.coupled": "Coupled",
-    "mechanics.feet": "Foot Pad Wheel",
+    "mechanics.floor_contact": "Foot Pad Wheel",
     "mechanics.densities": "PathLimit Quantity",
     "smooth.modal_body": "ModalBody",
     "smooth.concertina": "Concertina",

@@ -7,7 +7,7 @@ from colloc.gaits.problem_file import Reference as Reference, load_problem as lo
 from colloc.gaits.objective import Objective as Objective
 from colloc.mechanics.chain import Chain as Chain
 from colloc.gaits.coupled import Coupled as Coupled
-from colloc.mechanics.feet import Foot as Foot, Pad as Pad, Wheel as Wheel
+from colloc.mechanics.floor_contact import Foot as Foot, Pad as Pad, Wheel as Wheel
 from colloc.mechanics.densities import PathLimit as PathLimit
 from colloc.mechanics.densities import Quantity as Quantity
 from colloc.smooth.modal_body import ModalBody as ModalBody

@@ -18,7 +18,7 @@ from colloc.bounds.sampled import efficiency_bound
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.feet import Wheel
+from colloc.mechanics.floor_contact import Wheel
 from colloc.mechanics.friction import Friction
 from colloc.search.solve import solve
 from colloc.system.errors import CollocError, ProblemError

@@ -54,23 +54,9 @@ def test_a_body_of_your_own_is_solved_certified_kept_and_read(monkeypatch, tmp_p
     assert again.value == pytest.approx(found.value, rel=1e-9)
 
 
-def test_a_body_that_says_its_outline_alone_looks_like_one_that_says_everything():
-    """The defaults, asked of a chain that answers better."""
-    body, rng = Chain((0.2, 0.5, 0.3)), np.random.default_rng(3)
-    angles, rates, z = rng.normal(size=(2, 6)), rng.normal(size=(2, 6)), rng.normal(size=(3, 6))
+def test_a_body_that_says_its_outline_alone_has_its_centre_of_mass():
+    body, angles = Chain((0.2, 0.5, 0.3)), np.random.default_rng(3).normal(size=(2, 6))
     np.testing.assert_allclose(Body.centre(body, angles), body.centre(angles), atol=1e-14)
-    np.testing.assert_allclose(
-        Body.speeds(body, angles, rates, z)[1], body.speeds(angles, rates, z)[1], atol=1e-8
-    )
-    places, force = Body.rubbing(body, Friction(), angles, rates, 1e-9, z, 3)
-    x, y = body.outline(angles)
-    np.testing.assert_allclose(
-        places, np.stack([0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])]), atol=1e-14
-    )
-    # dry, and alike in all directions
-    np.testing.assert_allclose(np.linalg.norm(force, axis=0), 1.0, atol=1e-12)
-    one, _ = Body.rubbing(body, Friction(), angles[:, :1], rates[:, :1], 1e-9, z[:, :1], 1)
-    np.testing.assert_array_equal(one, places[:, :1, :1])
 
 
 @dataclass(frozen=True)

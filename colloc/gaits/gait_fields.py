@@ -24,7 +24,7 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.feet import FeetLaw, Foot
+from colloc.mechanics.floor_contact import FeetLaw, Foot
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.smooth.concertina import Concertina

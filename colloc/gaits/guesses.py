@@ -17,6 +17,7 @@ from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import symmetric_samples
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.contact import crossing_depth, link_width
 from colloc.system.errors import ProblemError
 
 WAVES = -1.0
@@ -43,15 +44,15 @@ def largest_factor(
     and stay admissible; inf for straight ones."""
     angles = angles - rest
     stretched, joint_limit = under_one_limit(angles, joint_limit)
-    peak = body.largest_angles(stretched).max()
+    peak = body.bounded_angles.largest(stretched).max()
     if peak == 0:
         return np.inf
     low, high = 0.0, joint_limit / peak
-    if not body.crossing_depth(high * angles + rest).any():
+    if not crossing_depth(body, high * angles + rest).any():
         return high * SAFE
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        crossing = bool(body.crossing_depth(middle * angles + rest).any())
+        crossing = bool(crossing_depth(body, middle * angles + rest).any())
         low, high = (low, middle) if crossing else (middle, high)
     return low * SAFE
 
@@ -138,7 +139,8 @@ def check_guess(
     """Raise a `ProblemError` for a gait of another body, at rest, or inadmissible."""
     if guess.n_joint != body.n_joint:
         raise ProblemError(
-            f"guess has {guess.n_joint} {body.coordinate}s but the body has {body.n_joint}."
+            f"guess has {guess.n_joint} {body.defaults.coordinate}s but the body has "
+            f"{body.n_joint}."
         )
     member, rms = checked_member(gait_class, guess)
     if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
@@ -149,14 +151,14 @@ def check_guess(
         )
     angles = member.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
     stretched, limit = under_one_limit(angles, joint_limit)
-    largest = body.largest_angles(stretched).max()
-    if largest > limit + body.usual.excess:
-        each = np.abs(body.limited @ stretched).max(axis=1, initial=0.0)
-        which = body.limit_names[np.argmax(each)] if each.size else "the tangent"
+    largest = body.bounded_angles.largest(stretched).max()
+    if largest > limit + body.defaults.excess:
+        each = np.abs(body.bounded_angles.rows @ stretched).max(axis=1, initial=0.0)
+        which = body.bounded_angles.names[np.argmax(each)] if each.size else "the tangent"
         beyond = f"{which} reaches {largest:.4g} rad, beyond the limit {limit:.4g}"
         raise ProblemError(f"guess is inadmissible: {beyond}; make its amplitude smaller.")
-    depth = body.crossing_depth(angles)
+    depth = crossing_depth(body, angles)
     if depth.max() > _SLACK:
         when = np.argmax(depth) / _CHECKED_PHASES
-        how = "overlap" if body.drawn_width else "cross each other"
+        how = "overlap" if link_width(body) else "cross each other"
         raise ProblemError(f"guess is inadmissible: links {how} at phase {when:.3f}.")

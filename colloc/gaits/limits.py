@@ -21,7 +21,7 @@ def checked_limit(body: Body, limit: Any) -> Limit:
     if not isinstance(limit, (tuple, list, np.ndarray)):
         return _checked_number(body, limit)
     each = tuple(_checked_joint(body, joint) for joint in limit)
-    if len(each) != body.n_joint or len(body.limit_names) != body.n_joint:
+    if len(each) != body.n_joint or len(body.bounded_angles.names) != body.n_joint:
         raise ProblemError(
             f"joint_limit has {len(each)} values; give one for all joints, or one for each joint "
             f"of a chain."
@@ -32,7 +32,7 @@ def checked_limit(body: Body, limit: Any) -> Limit:
 def _checked_joint(body: Body, limit: Any) -> Any:
     if np.ndim(limit) == 0:
         return _checked_number(body, limit)
-    pair, largest = _numbers(limit), body.usual.largest_limit
+    pair, largest = _numbers(limit), body.defaults.largest_limit
     if len(pair) != 2:
         raise ProblemError(
             f"joint_limit of a joint is a number, or its least and its largest angle, not "
@@ -49,7 +49,7 @@ def _checked_joint(body: Body, limit: Any) -> Any:
 
 
 def _checked_number(body: Body, limit: Any) -> float:
-    largest = body.usual.largest_limit
+    largest = body.defaults.largest_limit
     if not is_number(limit) or not 0 < limit <= largest + 1e-12:
         most = f"pi/{np.pi / largest:g}".removesuffix("/1")
         shown = f"{limit:g}" if is_number(limit) else repr(limit)

@@ -235,7 +235,7 @@ class LinearClass(ClassOfGaits):
 
 def largest_coordinate(body: Body) -> float:
     """Largest shape coordinate per unit of the angles that are limited, at least 1."""
-    return max(1.0, np.abs(np.linalg.pinv(body.limited)).sum(axis=1).max())
+    return max(1.0, np.abs(np.linalg.pinv(body.bounded_angles.rows)).sum(axis=1).max())
 
 
 def enclosed_area(gait_class: LinearClass, n_joint: int) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import Any
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.feet import Foot
+from colloc.mechanics.floor_contact import Foot
 from colloc.mechanics.law import Law
 from colloc.system.arguments import is_number
 

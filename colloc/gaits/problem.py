@@ -22,6 +22,7 @@ from colloc.gaits.sloped import slope_from
 from colloc.gaits.symmetry import ANTIPODAL, NONE, check_symmetric
 from colloc.mechanics.bodies import FULL, Body, formulations
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.densities import (
     PathLimit,
     PathLimits,
@@ -32,7 +33,9 @@ from colloc.mechanics.densities import (
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law, rate_independent
+from colloc.mechanics.links import Links
 from colloc.numerics.schemes import scheme
+from colloc.smooth.prescribed_body import schedule
 from colloc.system.arguments import (
     STATED_IF_SET,
     check_finite,
@@ -174,13 +177,14 @@ class Problem:
         # asked first: to look what else a body answers can take gigabytes
         coordinates = getattr(self.body, "n_joint", 0)
         if is_whole(coordinates, MOST_COORDINATES + 1):
+            name = self.body.defaults.coordinate
             raise ProblemError(
-                f"the body has {coordinates} {self.body.coordinate}s, and {MOST_COORDINATES} are "
+                f"the body has {coordinates} {name}s, and {MOST_COORDINATES} are "
                 f"allowed: fewer links, or a smooth body of a few modes, come near it."
             )
         check_kind("body", self.body, gait_fields.BODIES, Body)
-        schedule, usual = self.body.schedule, self.body.usual
-        self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
+        stages, usual = schedule(self.body), self.body.defaults
+        self._fill(gait=Prescribed(stages, self.body.symmetries[0]) if stages else Harmonic())
         self._check_parts()
         self._set(objective=objective_from(self.objective), at_least=least_values(self.at_least))
         regime, froude = self.regime, self.froude
@@ -237,7 +241,7 @@ class Problem:
         check_kind("gait", self.gait, gait_fields.CLASSES)
         motion = LEVEL if self.motion is None else self.motion
         check_kind("motion", motion, [Regime, *gait_fields.MOTIONS])
-        if self.gait.free == bool(self.body.schedule):
+        if self.gait.free == bool(schedule(self.body)):
             what = (
                 "a prescribed motion has no class of gaits"
                 if self.gait.free
@@ -344,7 +348,7 @@ class Problem:
                 raise ProblemError(
                     f"Coupled is for the joints of a Chain, not of a {type(self.body).__name__}."
                 )
-            if self.body.crossing_depth(self.joint_map.offset).any():
+            if crossing_depth(self.body, self.joint_map.offset).any():
                 raise ProblemError("links cross where joints are stuck.")
         self.gait.check_joints(self.body.n_joint)
         if self.gait.relative_delta and self.paced_by:
@@ -354,7 +358,7 @@ class Problem:
             )
         alone = self.body.n_joint == 1
         if self.law.reversible and not self.froude and (alone or _retraces(self)):
-            coordinate = self.body.coordinate
+            coordinate = self.body.defaults.coordinate
             which = (
                 f"a body with one {coordinate}" if alone else f"the class ({self.gait.describe()})"
             )
@@ -409,7 +413,8 @@ class Problem:
     @property
     def law(self) -> Law:
         """The law of friction of all contacts: `friction`, unless feet have their own."""
-        return self.body.law(self.friction)
+        body = self.body
+        return body.law(self.friction) if isinstance(body, Links) else self.friction
 
     @property
     def regime(self) -> Regime:
@@ -465,14 +470,16 @@ class Problem:
         return (
             self.body.n_joint == 1
             and self.law.reversible
-            and self.body.symmetric
+            and self.body.reversal is not None
             and not self.grade
         )
 
     @property
     def asked(self) -> str:
         """The problem in a line, for reports."""
-        coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
+        coordinates = (
+            f"{self.body.n_joint} {self.body.defaults.coordinate}{'s' * (self.body.n_joint > 1)}"
+        )
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
         return f"{best}{coordinates}, {self.law.label}{self.regime.label}, {self.gait.describe()}"
 

@@ -129,7 +129,7 @@ def over_links(
     Linear in the joint angles, it keeps the symmetries. Where links would cross, or a joint pass
     its limit, all angles shrink.
     """
-    matrix = other.laid(np.array(body.lengths))
+    matrix = other.from_chain(np.array(body.lengths))
     angles = matrix @ gait.angles(_PERIOD)
     return gait.mapped(matrix * min(1.0, largest_factor(other, joint_limit, angles)))
 

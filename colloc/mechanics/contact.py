@@ -1,31 +1,22 @@
-"""Which shapes of a chain are admissible: links must not cross, nor come nearer to each other than
-their width.
+"""Self-contact of chains: links must not cross, nor come nearer to each other than their width.
 
-Neighbours can only fold onto each other (|angle| <= pi). Links i and i + 2 with a joint at both
-ends of link i + 1 cross iff, with a and b the two joint angles, ``min(b + chi(a; l_i), a + chi(b;
-l_i+2)) > pi`` or the mirror image, where ``chi(a; l) = atan2(l sin a, m + l cos a)`` and m is the
-length between; for equal lengths chi = a/2 and the condition is ``min(2 a + b, a + 2 b) > 2 pi``.
-(Base m, base angles pi - a and pi - b: the tip of one link lies beyond the line of the other on
-both sides.)
+Neighbours can only fold onto each other (|angle| <= pi). Links i and i + 2 cross iff, with a and b
+the joint angles between them, ``min(b + chi(a; l_i), a + chi(b; l_i+2)) > pi`` or the mirror image,
+where ``chi(a; l) = atan2(l sin a, m + l cos a)`` and m is the length between; for equal lengths chi
+= a/2. Links farther apart cross iff each has its ends on both sides of the other's line.
 
-Links farther apart cross iff each has its ends on both sides of the other's line (`clearance`).
-
-A link of width w is a strip with round ends, w/2 to either side of its middle line. The rule: *no
-joint and no free end comes nearer than w to the middle line of a link that it is not an end of*.
-Where no middle lines cross this says, since the distance of two segments is that of an end of one
-from the other:
-
-- links that are not neighbours do not overlap: their middle lines are at least w apart;
-- neighbours, which overlap about their joint whatever they do (a hinge is cut away there), close
-  until the free end of the shorter one, of length l, lies beside the other: the joint turns up to
-  ``pi - asin(w / l)``.
+A link of width w is a strip with round ends: *no joint and no free end comes nearer than w to the
+middle line of a link that it is not an end of*. So neighbours, which overlap about their joint (a
+hinge is cut away there), close until the free end of the shorter one, of length l, lies beside the
+other: the joint turns up to ``pi - asin(w / l)``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -38,24 +29,7 @@ CLEARANCE_SMOOTHING = 2e-4
 """Width [body lengths] of smoothed absolute values and minima; they err to the safe side, by at
 most twice this."""
 Pair = tuple[int, int]
-
-
-def _subtended(angle: Array, link: float, middle: float) -> Array:
-    if link == middle:
-        return 0.5 * angle
-    xp = namespace(angle)
-    return xp.arctan2(link * xp.sin(angle), middle + link * xp.cos(angle))
-
-
-def crossing_sums(body: Links, angles: Array, i: int) -> tuple[Array, Array]:
-    """For links i and i + 2, the two sums that both exceed pi, or both fall below -pi, where they
-    cross; ``(1, n_time)`` each.
-
-    Joint angles ``(n_joint, n_time)``.
-    """
-    before, middle, after = body.lengths[i : i + 3]
-    a, b = angles[i : i + 1, :], angles[i + 1 : i + 2, :]
-    return b + _subtended(a, before, middle), a + _subtended(b, after, middle)
+Pairs = tuple[Pair, ...]
 
 
 def smooth_minimum(first: Array, second: Array, width: float = SMOOTHING) -> Array:
@@ -74,13 +48,12 @@ def share_of_first(first: Array, second: Array, width: float = SMOOTHING) -> Arr
 def tangent_of_minimum(
     first: Array, second: Array, share: Array, width: float = SMOOTHING
 ) -> Array:
-    """The tangent plane of `smooth_minimum` that has the slope `share` in the first argument; never
-    below the minimum.
+    """Tangent plane of `smooth_minimum` with the slope `share` in the first argument; never below
+    the minimum.
 
-    Where a path rounds the corner at which both sums are pi, the smaller sum has a peak with a
-    kink, and the instant of the peak moves with the path. By the envelope theorem the peak's height
-    changes like the tangent plane at the peak, its slope held; the minimum itself, at a fixed
-    instant, falls whichever way the peak moves along the path.
+    Where a path rounds the corner at which both sums are pi, the smaller one peaks at a kink, whose
+    time moves with the path. By the envelope theorem its height changes like this plane; the
+    minimum itself, at a fixed time, falls whichever way the peak moves.
     """
     share_of_second = 1.0 - share
     bulge = 0.5 - namespace(share).sqrt(share * share_of_second)
@@ -89,93 +62,105 @@ def tangent_of_minimum(
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Two parts of a body that must not cross: the smaller of two functions of the shape must not
-    be positive."""
+    """Two parts that must not cross: the smaller of two functions of shapes ``(n_joint, n_time)``,
+    ``(1, n_time)`` each, must not be positive; it is smoothed over `width`. NumPy and CasADi."""
 
     name: str
     pair: Callable[[Array], tuple[Array, Array]]
-    """Of shapes ``(n_joint, n_time)``, the two functions, ``(1, n_time)`` each; NumPy and
-    CasADi."""
     width: float
-    """Over which the minimum is smoothed."""
 
     def excess(self, angles: Array) -> Array:
         """The smoothed minimum ``(1, n_time)``."""
         return smooth_minimum(*self.pair(angles), self.width)
 
+    def share(self, angles: Array) -> Array:
+        """Derivative of the minimum in the first function, ``(1, n_time)``."""
+        return share_of_first(*self.pair(angles), self.width)
+
     def after(self, joints_at: Callable[[Array], Array]) -> Contact:
-        """The same parts as a function of other coordinates, of which the joint angles are a
-        function."""
+        """The contact as a function of other coordinates."""
         return replace(self, pair=lambda shape: self.pair(joints_at(shape)))
 
-    def share(self, angles: Array) -> Array:
-        """What the first function has of its derivative, ``(1, n_time)``."""
-        return share_of_first(*self.pair(angles), self.width)
+
+def link_contacts(body: Links, far: Sequence[Pair] = ()) -> list[Contact]:
+    """Links two apart, bending to either side, the pairs `far` of links farther apart, and all ends
+    and links if the links are wide."""
+    contacts = []
+    for i in range(body.n_link - 2):
+        for side, sign in (("left", 1), ("right", -1)):
+            name = f"links {i + 1} and {i + 3} ({side})"
+            contacts.append(Contact(name, partial(_crossing_excess, body, i, sign), SMOOTHING))
+    for i, j in far:
+        pair = partial(intrusions, body, first=i, second=j)
+        contacts.append(Contact(f"links {i + 1} and {j + 1}", pair, CLEARANCE_SMOOTHING))
+    for end, link in ends_and_links(body) if body.width else ():
+        pair = partial(_width_excess, body, end, link)
+        contacts.append(Contact(f"end {end} and link {link + 1}", pair, CLEARANCE_SMOOTHING))
+    return contacts
+
+
+def _crossing_excess(body: Links, i: int, sign: int, angles: Array) -> tuple[Array, Array]:
+    first, second = crossing_sums(body, angles, i)
+    return sign * first - np.pi, sign * second - np.pi
+
+
+def _width_excess(body: Links, end: int, link: int, angles: Array) -> tuple[Array, Array]:
+    both = excess(body, angles, end, link)
+    return both, both  # one condition alone is the smaller of two that are the same
+
+
+def _subtended(angle: Array, link: float, middle: float) -> Array:
+    if link == middle:
+        return 0.5 * angle
+    xp = namespace(angle)
+    return xp.arctan2(link * xp.sin(angle), middle + link * xp.cos(angle))
+
+
+def crossing_sums(body: Links, angles: Array, i: int) -> tuple[Array, Array]:
+    """Two sums ``(1, n_time)`` that both exceed pi, or both fall below -pi, where links i and i + 2
+    cross."""
+    before, middle, after = body.lengths[i : i + 3]
+    a, b = angles[i : i + 1, :], angles[i + 1 : i + 2, :]
+    return b + _subtended(a, before, middle), a + _subtended(b, after, middle)
 
 
 def crossing_bounds(body: Links, angles: Array) -> Array | None:
-    """Smooth functions that are <= pi only at shapes where no links i and i + 2 cross, ``(2 (n_link
-    - 2), n_time)``.
-
-    None for a body of two links. Joint angles ``(n_joint, n_time)``.
-    """
-    if body.n_link < 3:
-        return None
+    """Smooth functions that are <= pi only where no links i and i + 2 cross, ``(2 (n_link - 2),
+    n_time)``; None for two links."""
     rows = []
     for i in range(body.n_link - 2):
         first, second = crossing_sums(body, angles, i)
         rows += [smooth_minimum(first, second), smooth_minimum(-first, -second)]
-    return namespace(angles).stack(rows)
-
-
-def far_pairs(body: Links) -> list[tuple[int, int]]:
-    """All pairs of links that are more than two apart; `crossing_bounds` has those that are two
-    apart."""
-    return [(i, j) for i in range(body.n_link) for j in range(i + 3, body.n_link)]
+    return namespace(angles).stack(rows) if rows else None
 
 
 def intrusions(body: Links, angles: Array, first: int, second: int) -> tuple[Array, Array]:
-    """Two smooth functions that are both > 0 where links `first` < `second` cross [body lengths];
-    ``(1, n_time)`` each.
+    """Two smooth functions ``(1, n_time)`` that are both > 0 where links `first` < `second` cross
+    [body lengths].
 
     With m and d the mean and half the difference of the distances of one link's ends from the
-    other's line, that link lies on one side iff ``|d| - |m| <= 0``; this for one link, and for the
-    other.
+    other's line, that link lies on one side iff ``|d| - |m| <= 0``. Smoothing also closes the gap
+    through which parallel links would slip through each other when both ends pass at once.
     """
     return -_side(body, angles, first, second), -_side(body, angles, second, first)
 
 
-def clearance(body: Links, angles: Array, first: int, second: int) -> Array:
-    """A smooth function that is >= 0 only where links `first` < `second` do not cross [body
-    lengths], ``(1, n_time)``.
-
-    Two segments cross iff neither lies on one side of the other: the smaller of the two
-    `intrusions` decides. Smoothing also closes the gap through which parallel links would slip
-    through each other at one instant, when both ends pass at once.
-    """
-    return -smooth_minimum(*intrusions(body, angles, first, second), CLEARANCE_SMOOTHING)
-
-
-def _smooth_abs(xp, value: Array) -> Array:
-    """Never above the absolute value, and below it by at most 0.3 `CLEARANCE_SMOOTHING`."""
-    square = value * value
-    return square / xp.sqrt(square + CLEARANCE_SMOOTHING**2)
-
-
 def _side(body: Links, angles: Array, line: int, link: int) -> Array:
-    """How far `link` stays on one side of the line through the link `line`; negative if its ends
-    are on both sides."""
+    """Distance by which `link` stays on one side of the line through the link `line`; negative if
+    its ends are on both sides."""
     xp, (turns, rises) = namespace(angles), _walk(tuple(body.lengths), line, link)
     heights = xp.matmul(rises, xp.sin(xp.matmul(turns, angles)))
-    mean, spread = heights[0:1, :], heights[1:2, :]
-    return _smooth_abs(xp, mean) - xp.sqrt(spread * spread + CLEARANCE_SMOOTHING**2)
+    mean, spread = heights[0:1, :] ** 2, heights[1:2, :] ** 2
+    # never above |mean|, and below it by at most 0.3 of the smoothing
+    smooth = mean / xp.sqrt(mean + CLEARANCE_SMOOTHING**2)
+    return smooth - xp.sqrt(spread + CLEARANCE_SMOOTHING**2)
 
 
 @lru_cache(maxsize=4096)
 def _walk(lengths: tuple[float, ...], line: int, link: int) -> tuple[np.ndarray, np.ndarray]:
-    """Along the chain, in the frame of `line`, to the end of `link`: the turns of the links passed,
-    of joint angles ``(n, n_joint)``, and of their sines the mean height of that link's ends, and
-    half their difference, ``(2, n)``."""
+    """From `line` along the chain to `link`, in the frame of `line`: turns of the links passed, of
+    joint angles ``(n, n_joint)``; and of their sines the mean height of the link's ends, and half
+    their difference, ``(2, n)``."""
     step = 1 if link > line else -1
     passed = list(range(line + step, link + step, step))
     turns = np.cumsum(np.eye(len(lengths))[[k - 1 if step > 0 else k for k in passed], :-1], axis=0)
@@ -185,43 +170,91 @@ def _walk(lengths: tuple[float, ...], line: int, link: int) -> tuple[np.ndarray,
     return turns, rises
 
 
-def separate_pairs(body: Links) -> list[tuple[int, int]]:
-    """All pairs of links that are not neighbours."""
-    return [(i, j) for i in range(body.n_link) for j in range(i + 2, body.n_link)]
+def square_distance(body: Links, angles: Array, end: int, link: int) -> Array:
+    """Square distance of the joint or tip number `end` from a link, ``(1, n_time)``."""
+    xp = namespace(angles)
+    step = 1 if end > link else -1
+    length, along, across, turn = body.lengths[link], 0.0, 0.0, 0.0
+    # along the chain in the frame of the link, from its near end
+    for k in range(link + 1, end) if step > 0 else range(link - 1, end - 1, -1):
+        joint = k - 1 if step > 0 else k
+        turn = turn + angles[joint : joint + 1, :]
+        along = along - body.lengths[k] * xp.cos(turn)
+        across = across + body.lengths[k] * xp.sin(turn)
+    # `along` is counted from the near end into the link: what lies outside of [0, length]
+    outside = 0.5 * (along - xp.abs(along)) + 0.5 * (along - length + xp.abs(along - length))
+    return outside * outside + across * across
+
+
+def excess(body: Links, angles: Array, end: int, link: int) -> Array:
+    """The width that an end and a link lack, to first order, negative where they keep it [body
+    lengths], ``(1, n_time)``; unlike the distance it has a derivative on the link."""
+    w = body.width
+    return (w * w - square_distance(body, angles, end, link)) / (2 * w)
+
+
+def ends_and_links(body: Links) -> list[Pair]:
+    """All (end, link) where the joint or tip number `end`, from 0 at the tail, is no end of the
+    link."""
+    return [
+        (end, link)
+        for link in range(body.n_link)
+        for end in range(body.n_link + 1)
+        if end not in (link, link + 1)
+    ]
+
+
+# exact intersection, independent of the smooth functions; bodies that are no chains never cross
+
+
+def _separate(body: Links, distance: int) -> Pairs:
+    return tuple((i, j) for i in range(body.n_link) for j in range(i + distance, body.n_link))
+
+
+def link_width(body: Any) -> float:
+    return body.width if isinstance(body, Links) else 0.0
+
+
+def far_pairs(body: Any) -> Pairs:
+    """All pairs of links more than two apart."""
+    return _separate(body, 3) if isinstance(body, Links) else ()
 
 
 def crossing_depth(
-    body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None
+    body: Any, angles: np.ndarray, pairs: Sequence[Pair] | None = None
 ) -> np.ndarray:
-    """How far links penetrate each other, ``(n_time,)``; 0 where no two of them cross.
-
-    Plain segment intersection of the given pairs, by default of all that are not neighbours,
-    independent of `crossing_bounds` and `clearance`: the depth is the smallest distance from an end
-    of one of two crossing segments to the other segment.
-    """
+    """Depth to which links cross each other, the smallest distance from an end of one of two
+    crossing segments to the other, and the width that they lack [body lengths], ``(n_time,)``; of
+    the given pairs, by default of all."""
+    if not isinstance(body, Links):
+        return np.zeros(angles.shape[1])
     ends = np.stack(body.joints(angles))
-    return _crossing(ends, _within_reach(ends, separate_pairs(body) if pairs is None else pairs))
+    if pairs is None:
+        every, distances = _separate(body, 2), ends_and_links(body)
+    else:
+        every, distances = tuple(pairs), _their_ends(pairs)
+    return _overlap(ends, _within_reach(ends, every), body.width, distances)
 
 
-def passing_depth(body: Links, angles: np.ndarray) -> float:
-    """How far links pass through each other between successive instants of a path [body lengths]; 0
-    if none does.
+def passing_depth(body: Any, angles: np.ndarray) -> float:
+    """Depth to which links pass through each other between successive points of a path [body
+    lengths].
 
-    A link cannot cross another without an end of one passing through the other. That shows even
-    where no sample holds a crossing (parallel links that slip through each other): an end that is
-    beside the other link changes its side. The value is the smaller of the end's distances before
-    and after.
+    A link cannot cross another without an end of one passing through the other, also where no
+    sample holds a crossing: an end beside the other link changes its side. The depth is the smaller
+    of its distances before and after.
     """
+    if not isinstance(body, Links):
+        return 0.0
     ends = np.stack(body.joints(angles))
-    return _passing(ends, _within_reach(ends, separate_pairs(body)))
+    return _passing(ends, _within_reach(ends, _separate(body, 2)))
 
 
 def overlapping_pairs(
     ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float
 ) -> tuple[Pair, ...]:
-    """Those of pairs of links that overlap, or pass through each other between successive instants
-    of a path, by more than `least` [body lengths]; from the coordinates ``(2, n_link + 1, n_time)``
-    of joints and tips."""
+    """Pairs of links that overlap, or pass through each other along a path, by more than `least`
+    [body lengths]; from the coordinates ``(2, n_link + 1, n_time)`` of joints and tips."""
 
     def depth(one: list[Pair]) -> float:
         return max(float(_overlap(ends, one, width, _their_ends(one)).max()), _passing(ends, one))
@@ -229,9 +262,21 @@ def overlapping_pairs(
     return tuple(pair for pair in _within_reach(ends, pairs, width) if depth([pair]) > least)
 
 
+def gap(body: Links, angles: np.ndarray) -> np.ndarray:
+    """Smallest distance of an end from a link that it is not an end of [body lengths],
+    ``(n_time,)``; 0 where links cross."""
+    ends = np.stack(body.joints(angles))
+    crosses = _crossing(ends, _separate(body, 2)) > 0
+    return np.where(crosses, 0.0, _gap(ends, ends_and_links(body)))
+
+
+def _their_ends(pairs: Sequence[Pair]) -> list[Pair]:
+    return [(end, b) for i, j in pairs for a, b in ((j, i), (i, j)) for end in (a, a + 1)]
+
+
 def _within_reach(ends: np.ndarray, pairs: Sequence[Pair], width: float = 0.0) -> list[Pair]:
-    """Those of pairs whose links can come nearer than their width, at an instant or on the straight
-    way to the next: most of a long body never do, and their middles say so."""
+    """Pairs whose links can come nearer than their width, at a time point or on the straight way to
+    the next: their middles say that most never do."""
     middles, near = 0.5 * (ends[:, 1:] + ends[:, :-1]), []
     lengths = np.hypot(*(ends[:, 1:] - ends[:, :-1])).max(axis=1, initial=0.0)
     for i, j in pairs:
@@ -274,109 +319,29 @@ def _end_distances(
         along = ends[:, line + 1] - ends[:, line]
         length = np.hypot(*along)
         seen = [ends[:, link] - ends[:, line], ends[:, link + 1] - ends[:, line]]
-        result.append([_cross(along, p) / length for p in seen])
+        result.append([(along[0] * p[1] - along[1] * p[0]) / length for p in seen])
         beside += [
             np.abs((along * p).sum(axis=0) / length - 0.5 * length) < 0.5 * length for p in seen
         ]
     return result[0], result[1], beside
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[0] * b[1] - a[1] * b[0]
-
-
-def ends_and_links(body: Links) -> list[Pair]:
-    """All (end, link) where the joint or tip number `end`, from 0 at the tail, is no end of the
-    link."""
-    return [
-        (end, link)
-        for link in range(body.n_link)
-        for end in range(body.n_link + 1)
-        if end not in (link, link + 1)
-    ]
-
-
-def _their_ends(pairs: Sequence[Pair]) -> list[Pair]:
-    """The same of pairs of links."""
-    return [
-        (end, link)
-        for i, j in pairs
-        for link, ends in ((i, (j, j + 1)), (j, (i, i + 1)))
-        for end in ends
-    ]
-
-
-def square_distance(body: Links, angles: Array, end: int, link: int) -> Array:
-    """Of a joint or tip from a link, ``(1, n_time)``, from joint angles ``(n_joint, n_time)``;
-    NumPy and CasADi."""
-    xp = namespace(angles)
-    step = 1 if end > link else -1
-    length, along, across, turn = body.lengths[link], 0.0, 0.0, 0.0
-    # walk along the chain in the frame of the link, from its near end; away from the tail or
-    # towards it
-    for k in range(link + 1, end) if step > 0 else range(link - 1, end - 1, -1):
-        joint = k - 1 if step > 0 else k
-        turn = turn + angles[joint : joint + 1, :]
-        along = along - body.lengths[k] * xp.cos(turn)
-        across = across + body.lengths[k] * xp.sin(turn)
-    # `along` is counted from the near end into the link: what lies outside of [0, length]
-    outside = 0.5 * (along - xp.abs(along)) + 0.5 * (along - length + xp.abs(along - length))
-    return outside * outside + across * across
-
-
-def excess(body: Links, angles: Array, end: int, link: int) -> Array:
-    """A smooth function that is <= 0 where an end and a link keep the width, to first order the
-    width that they lack [body lengths], ``(1, n_time)``; it has a derivative on the link too, where
-    the distance has none."""
-    w = body.width
-    return (w * w - square_distance(body, angles, end, link)) / (2 * w)
-
-
-def gap(body: Links, angles: np.ndarray) -> np.ndarray:
-    """The smallest distance of an end from a link that it is not an end of [body lengths],
-    ``(n_time,)``; 0 where links cross.
-
-    Neighbours of equal lengths l folded by an angle beyond pi/2 have the gap l sin(pi - |angle|).
-    """
-    ends = np.stack(body.joints(angles))
-    return np.where(
-        _crossing(ends, separate_pairs(body)) > 0, 0.0, _gap(ends, ends_and_links(body))
-    )
-
-
-def overlap(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None) -> np.ndarray:
-    """What links lack of their width, and how far they cross besides [body lengths], ``(n_time,)``;
-    0 where they keep it.
-
-    Of all, or of pairs of links.
-    """
-    ends = np.stack(body.joints(angles))
-    every, apart = (
-        (separate_pairs(body), ends_and_links(body))
-        if pairs is None
-        else (pairs, _their_ends(pairs))
-    )
-    return _overlap(ends, _within_reach(ends, every), body.width, apart)
-
-
 def _overlap(
-    ends: np.ndarray, pairs: Sequence[Pair], width: float, apart: Sequence[Pair]
+    ends: np.ndarray, pairs: Sequence[Pair], width: float, distances: Sequence[Pair]
 ) -> np.ndarray:
     depth = _crossing(ends, pairs)
-    return (
-        depth
-        if width == 0
-        else depth + np.maximum(width - np.where(depth > 0, 0.0, _gap(ends, apart)), 0.0)
-    )
+    if width == 0:
+        return depth
+    lack = width - np.where(depth > 0, 0.0, _gap(ends, distances))
+    return depth + np.maximum(lack, 0.0)
 
 
-def _gap(ends: np.ndarray, apart: Sequence[Pair]) -> np.ndarray:
-    return np.min([_from_segment(ends, end, link) for end, link in apart], axis=0, initial=np.inf)
+def _gap(ends: np.ndarray, pairs: Sequence[Pair]) -> np.ndarray:
+    """Smallest distance of joints or tips from links, pairs of (end, link), ``(n_time,)``."""
 
+    def distance(end: int, link: int) -> np.ndarray:
+        along, to = ends[:, link + 1] - ends[:, link], ends[:, end] - ends[:, link]
+        part = np.clip((along * to).sum(axis=0) / (along * along).sum(axis=0), 0.0, 1.0)
+        return np.hypot(*(to - part * along))
 
-def _from_segment(ends: np.ndarray, end: int, link: int) -> np.ndarray:
-    """Distance of a joint or tip from a link, by the coordinates ``(2, n_link + 1, n_time)`` of
-    all, ``(n_time,)``."""
-    along, to = ends[:, link + 1] - ends[:, link], ends[:, end] - ends[:, link]
-    part = np.clip((along * to).sum(axis=0) / (along * along).sum(axis=0), 0.0, 1.0)
-    return np.hypot(*(to - part * along))
+    return np.min([distance(*pair) for pair in pairs], axis=0, initial=np.inf)

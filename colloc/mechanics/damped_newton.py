@@ -1,18 +1,13 @@
-"""Damped Newton with a fixed-point safeguard, batched over instants, for three rigid velocities. No
-CasADi.
+"""Damped Newton with a fixed-point safeguard for three rigid velocities, batched over time points.
 
-An associated law (`colloc.mechanics.law`) is the gradient of a strictly convex, coercive
-dissipation potential, so Armijo-damped Newton on that potential converges from any start. Other
-laws have no potential; there Newton steps are taken while they reduce the residual. In both cases
-the paper's fixed point (which minimises a majorant of the potential: iteratively reweighted least
-squares) is the safeguard when a Newton step fails. What ends in a valley of the residual goes on by
-"natural" steps: one counts if the next one, taken with the same matrix, is shorter (Deuflhard,
-Numer. Math. 22, 1974), so the residual may rise.
+An associated law is the gradient of a strictly convex, coercive dissipation potential, so
+Armijo-damped Newton on it converges from any start. Other laws have none; there Newton steps are
+taken while they reduce the residual. Where a step fails the paper's fixed point (iteratively
+reweighted least squares on a majorant) goes on. "Natural" steps count if the next one, taken with
+the same matrix, is shorter (Deuflhard, Numer. Math. 22, 1974): the residual may rise.
 
-What a body is made of (links, panels of a smooth curve) is the business of the `Batch`. Velocities
-are those of a *reference* of the body, and the iteration moves it to the slowest one, the *anchor*:
-a stretch at stick moves at speeds of order delta, which a velocity of order one could only
-represent to 1e-16 in absolute terms.
+Velocities are those of a *reference* of the body, which moves to the slowest part, the *anchor*: at
+stick, speeds of order delta keep their relative precision there.
 """
 
 from __future__ import annotations
@@ -29,13 +24,11 @@ _ARMIJO = 1e-4
 _NATURAL_GAIN = 0.25
 _BACKTRACKING = (0.5,) * 4 + (0.1,) * 8
 _SHORT_BACKTRACKING = (0.5, 0.25)
-"""Without a potential a Newton direction may not descend at all, and shorter steps than these creep
-along a valley of the residual for a hundred iterations; the fixed point leaves it (2 to 3 times
-less time at (10, 1, 1), (0.5, 1, 5), (1.7, 1, 1.3) than with 0.25 and 0.1)."""
+"""Without a potential shorter steps creep along a valley of the residual; the fixed point leaves it
+(2 to 3 times faster at (10, 1, 1), (0.5, 1, 5), (1.7, 1, 1.3) than with 0.25 and 0.1)."""
 _ROUNDING = 8e-16
 _FIXED_POINT_STEPS_AFTER_FAILURE = 5
 _DIRECT_ITERATIONS = 40
-"""Steps before the regularisation is followed down instead."""
 _LADDER_ITERATIONS = 240
 _DRY, _VISCOUS = 1e-100, 1e8
 _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
@@ -48,68 +41,57 @@ Evaluated = tuple[np.ndarray, np.ndarray, np.ndarray | None]
 
 
 class Batch(Protocol):
-    """Instants that share a reference: what the iteration evaluates on subsets of them."""
+    """Time points that share a reference."""
 
     @property
     def friction(self) -> Law: ...
 
     def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
-        """What there is at z ``(3, n)`` of the selected instants."""
+        """State and forces of the selected time points at z ``(3, n)``."""
 
     def matrix(self, state: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
-        """Minus the derivative of the net force, or the matrix of the paper's fixed point, ``(n, 3,
-        3)``."""
+        """Minus the derivative of the net force, or the fixed point's matrix, ``(n, 3, 3)``."""
 
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The slowest reference ``(n,)`` of every instant, and its velocity ``(3, n)``, for z in
-        the batch's own."""
+        """The slowest reference ``(n,)``, and its velocity ``(3, n)``."""
 
 
 def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
-    """Regularisation ``(1, n_time)`` in units of the largest rate ``(n_time,)``.
-
-    Beyond the limits the law has reached its viscous or its dry limit to the last digit, but its
-    squares would overflow.
-    """
+    """Delta ``(1, n_time)`` in units of the largest rate ``(n_time,)``."""
+    # beyond the limits the law is viscous or dry to the last digit, but its squares would overflow
     with np.errstate(over="ignore", under="ignore"):
         return np.clip(delta / speed, _DRY, _VISCOUS)[None]
 
 
 def force_unit(friction: Law, delta: np.ndarray) -> np.ndarray:
-    """Friction on a body that moves at unit speed: the largest coefficient where delta is small.
-
-    Above unit delta dry friction is viscous and falls with delta; a residual in units of the
-    coefficient would then vanish whatever the velocity.
-    """
+    """Friction on a body that moves at unit speed; above unit delta dry friction is viscous, and
+    falls with delta."""
     degree = 1.0 if friction.degree is None else friction.degree
     return friction.largest * np.hypot(1.0, delta) ** (degree - 1.0)
 
 
 def groups(anchor: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """The anchors ``(n_time,)`` that occur, and the instants that have each."""
+    """The anchors ``(n_time,)`` that occur, and the time points of each."""
     for reference in np.unique(anchor):
         yield int(reference), np.flatnonzero(anchor == reference)
 
 
 MakeBatch = Callable[[np.ndarray, int], Batch]
-"""Makes the batch of some instants (indices) with a given reference."""
+"""Indices of time points, and their reference."""
 
 
 @dataclass(eq=False)
 class State:
-    """Current anchors, anchor velocities, residuals and step counts of all instants; updated in
-    place."""
+    """Anchors ``(n_time,)``, their velocities ``(3, n_time)``, residuals (as of `BalanceSolution`)
+    and step counts; updated in place."""
 
-    anchor: np.ndarray  # (n_time,)
-    velocity: np.ndarray  # (3, n_time)
+    anchor: np.ndarray
+    velocity: np.ndarray
     residual: np.ndarray
-    """Largest of |net force| and |torque about the anchor| / body length, in units of the friction
-    at unit speed (see `force_unit`), ``(n_time,)``."""
-    iterations: np.ndarray  # (n_time,)
+    iterations: np.ndarray
 
 
 def starting_state(anchor: np.ndarray, velocity: np.ndarray) -> State:
-    """The state before any step."""
     return State(anchor, velocity, np.full(anchor.size, np.inf), np.zeros(anchor.size, dtype=int))
 
 
@@ -122,50 +104,37 @@ def solve(
     budget: int,
     method: str,
 ) -> None:
-    """Bring every instant of `state` to a residual below `tolerance`, in up to four attempts of
-    `budget` steps each.
+    """Bring residuals below `tolerance`, in up to four attempts of `budget` steps each.
 
-    "auto" first damps Newton from where the state is; then, for instants that fail, from rest; then
-    it follows the regularisation down from 1 to `delta` ``(1, n_time)``, and at last takes
-    fixed-point steps only. The second attempt begins with the first anchor, since the failed one
-    may have moved it to a link from which nothing converges. "direct" is the first attempt alone;
-    the other methods are for comparison.
+    "auto": damped Newton from the state; from rest and the first anchor, since a failed attempt may
+    have moved it to a bad one; down a ladder of regularisations from 1 to `delta` ``(1, n_time)``;
+    fixed-point steps only. "direct" is the first attempt alone; the other methods are for
+    comparison.
     """
+
+    def attempt(which: np.ndarray, delta: np.ndarray, budget: int, method: str = method) -> None:
+        _advance(state, make_batch, n_reference, which, delta, tolerance, budget, method)
+
+    def failed() -> np.ndarray:
+        return np.flatnonzero(state.residual > tolerance)
+
     everything, first_anchor = np.arange(state.residual.size), state.anchor.copy()
     direct = min(budget, _DIRECT_ITERATIONS) if method in ("auto", "direct", "natural") else budget
     at_rest = ~state.velocity.any(axis=0)
-    _advance(state, make_batch, n_reference, everything, delta, tolerance, direct, method)
+    attempt(everything, delta, direct)
     if method != "auto":
         return
-
-    bad = np.flatnonzero((state.residual > tolerance) & ~at_rest)
-    if bad.size:
+    if (bad := np.flatnonzero((state.residual > tolerance) & ~at_rest)).size:
         state.velocity[:, bad], state.anchor[bad] = 0.0, first_anchor[bad]
-        _advance(state, make_batch, n_reference, bad, delta, tolerance, direct, method)
-    bad = np.flatnonzero(state.residual > tolerance)
-    if bad.size:
+        attempt(bad, delta, direct)
+    if (bad := failed()).size:
         state.velocity[:, bad] = 0.0
-        for level in _ladder(float(delta[0, bad].min())):
-            now = np.maximum(delta, level)
-            _advance(
-                state,
-                make_batch,
-                n_reference,
-                bad,
-                now,
-                tolerance,
-                min(budget, _LADDER_ITERATIONS),
-                method,
-            )
-        bad = np.flatnonzero(state.residual > tolerance)
-        if bad.size:
-            _advance(state, make_batch, n_reference, bad, delta, tolerance, budget, "fixed_point")
-
-
-def _ladder(delta: float) -> np.ndarray:
-    """Regularisations from 1 down to delta, for instants that do not converge directly."""
-    count = max(2, int(np.ceil(-np.log10(delta) / 0.5)) + 1)
-    return np.geomspace(1.0, delta, count)
+        least = float(delta[0, bad].min())
+        count = max(2, int(np.ceil(-np.log10(least) / 0.5)) + 1)
+        for level in np.geomspace(1.0, least, count):
+            attempt(bad, np.maximum(delta, level), min(budget, _LADDER_ITERATIONS))
+        if (bad := failed()).size:
+            attempt(bad, delta, budget, "fixed_point")
 
 
 def _advance(
@@ -178,28 +147,20 @@ def _advance(
     max_iterations: int,
     method: str,
 ) -> None:
-    """Iterate the chosen instants, moving the anchor to the slowest reference as long as that still
-    helps."""
+    """Iterate the chosen time points, moving anchors to the slowest part as long as that helps."""
     todo = chosen
     for _ in range(n_reference):
         moved = []
-        for reference, chosen_of_todo in groups(state.anchor[todo]):
-            members = todo[chosen_of_todo]
-            batch = make_batch(members, reference)
-            z, residual, iterations = iterate(
-                batch,
-                state.velocity[:, members],
-                delta[:, members],
-                tolerance,
-                max_iterations,
-                method,
-            )
+        for reference, at in groups(state.anchor[todo]):
+            members = todo[at]
+            batch, d = make_batch(members, reference), delta[:, members]
+            start = state.velocity[:, members]
+            z, residual, iterations = iterate(batch, start, d, tolerance, max_iterations, method)
             state.iterations[members] += iterations
-            state.residual[members] = residual
-            state.velocity[:, members] = z
+            state.residual[members], state.velocity[:, members] = residual, z
             failed = residual > tolerance
             if failed.any():
-                anchor, velocity = batch.slowest(z, delta[:, members])
+                anchor, velocity = batch.slowest(z, d)
                 change = failed & (anchor != reference)
                 state.anchor[members[change]] = anchor[change]
                 state.velocity[:, members[change]] = velocity[:, change]
@@ -217,25 +178,17 @@ def iterate(
     max_iterations: int,
     method: str,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Damped Newton from z ``(3, n)``, with fixed-point steps where a Newton step fails; returns z,
-    residual, iterations."""
+    """Damped Newton from z ``(3, n)``, with fixed-point steps where one fails: z, residual, number
+    of steps."""
 
-    def evaluated(
-        select: np.ndarray, z: np.ndarray, delta: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """With the merit ``(n,)`` that a step has to reduce: the potential if there is one, else
-        half the squared residual."""
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # a step that leads so far away is not taken
+    def evaluate(select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, ...]:
+        # the merit that a step has to reduce: the potential, or half the squared residual
+        with np.errstate(over="ignore", invalid="ignore"):  # such far steps are not taken
             state, force, potential = batch.evaluate(select, z, delta)
-            return (
-                state,
-                force,
-                0.5 * np.sum(force * force, axis=0) if potential is None else potential,
-            )
+            squared = 0.5 * np.sum(force * force, axis=0)
+            return state, force, squared if potential is None else potential
 
-    shares = (
+    backtracking = (
         _BACKTRACKING if batch.friction.associated or method == "natural" else _SHORT_BACKTRACKING
     )
     n_time = z.shape[1]
@@ -243,7 +196,7 @@ def iterate(
     residual, iterations = np.full(n_time, np.inf), np.zeros(n_time, dtype=int)
     fixed_point_steps_due = np.full(n_time, np.iinfo(int).max if method == "fixed_point" else 0)
     active = np.arange(n_time)
-    links, force, merit = evaluated(active, z, delta)
+    links, force, merit = evaluate(active, z, delta)
     while True:
         residual[active] = np.abs(force).max(axis=0) / force_unit(batch.friction, delta[0, active])
         keep = (residual[active] > tolerance) & (iterations[active] < max_iterations)
@@ -251,7 +204,11 @@ def iterate(
             return z, residual, iterations
         active, links, force, merit = active[keep], links[:, :, keep], force[:, keep], merit[keep]
         d, newton = delta[:, active], fixed_point_steps_due[active] == 0
-        step, matrix = _step(batch, links, force, d, newton)
+        matrix = np.empty((active.size, 3, 3))
+        for by_newton, some in ((True, newton), (False, ~newton)):
+            if some.any():
+                matrix[some] = batch.matrix(links[:, :, some], d[:, some], newton=by_newton)
+        step = solve3(matrix, force)
         if batch.friction.associated:
             slope, slack = -np.sum(force * step, axis=0), _ROUNDING * merit
         else:
@@ -263,13 +220,13 @@ def iterate(
             force.copy(),
             merit.copy(),
         )
-        for shrink in (1.0, *shares):
+        for shrink in (1.0, *backtracking):
             retry = np.flatnonzero(failed)
             if not retry.size:
                 break
             alpha[retry] *= shrink
             trial[:, retry] = z[:, active[retry]] + alpha[retry] * step[:, retry]
-            again = evaluated(active[retry], trial[:, retry], d[:, retry])
+            again = evaluate(active[retry], trial[:, retry], d[:, retry])
             new_links[:, :, retry], new_force[:, retry], new_merit[retry] = again
             if method == "natural":
                 following = np.abs(solve3(matrix, new_force)).max(axis=0)
@@ -287,21 +244,8 @@ def iterate(
             iterations[active[failed]] = max_iterations
 
 
-def _step(
-    batch: Batch, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``, and their
-    matrices ``(n, 3, 3)``."""
-    matrix = np.empty((newton.size, 3, 3))
-    for by_newton, chosen in ((True, newton), (False, ~newton)):
-        if chosen.any():
-            matrix[chosen] = batch.matrix(state[:, :, chosen], delta[:, chosen], newton=by_newton)
-    return solve3(matrix, force), matrix
-
-
 def solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve ``matrix[t] x[:, t] = right[:, t]`` after symmetric scaling; where that is singular,
-    the step is zero."""
+    """Solve ``matrix[t] x[:, t] = right[:, t]`` after symmetric scaling; zero where singular."""
     diagonal = np.sqrt(np.clip(np.abs(np.einsum("tii->ti", matrix)), _TINY, _HUGE))
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = matrix / diagonal[:, :, None] / diagonal[:, None, :]

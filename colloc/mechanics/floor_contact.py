@@ -1,38 +1,386 @@
-"""What touches the floor: feet at points of a chain's links, and pads along parts of them; a link
-that lies is one pad.
+"""Contacts of a chain with the floor: feet and wheels at points of its links, pads along parts.
 
-A contact turns the velocities of links into the friction on them, with derivatives, and says which
-forces a full program has for variables. Feet ask the law of friction at a point, pads its integral
-along a straight line, in closed form where there is one (`colloc.mechanics.line_integrals`). With
-the velocity of a part in its own direction, and its force and couple f,
-
-    v = T (vs, vn, w) = (R (vs - h w, vn + a w), w),     on the link T' f,
-
-a and h its place from the link's midpoint, R the turn into its own direction. A foot lifts nothing
-and sinks nowhere: its weight is a number. One that changes with the shape would be a function of
-the posture here.
+A link that lies is one pad. With a and h the place of a part from its link's midpoint and R the
+turn into its direction, a part moves with ``v = T (vs, vn, w) = (R (vs - h w, vn + a w), w)``, and
+its force and couple f act on the link as ``T' f``. Weights are numbers: no foot lifts or sinks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cached_property
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from colloc.mechanics.feet import FeetLaw, Foot
-from colloc.mechanics.law import Law, Matrix
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
+from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments, shown
+from colloc.system.errors import ProblemError
 
-FOOT = "foot"
-"""What a part is called, where it is not a whole link."""
+FOOT, WHEEL, PAD = "foot", "wheel", "pad"
+_TOLERANCE = 1e-9
+"""Differences that count as none [body lengths, weights, rad]."""
+_MAX_PER_LINK = 20
+"""Largest `feet` as a number; with more a line is meant."""
+_AT_POINT = {
+    "force": "density",
+    "jacobian": "density_jacobian",
+    "secant": "density_secant",
+    "potential": "density_potential",
+}
+"""Methods of `LineIntegrals`, and of a `Law` at a point."""
 
 
-class LinkVelocities(Protocol):
-    """As `colloc.mechanics.links.LinkVelocity`; of parts, too."""
+@named_arguments
+@dataclass(frozen=True)
+class Foot:
+    """A point of a chain that touches the floor, or a straight part of one.
+
+    Parameters
+    ----------
+    link : int
+        The link it is on, 0 at the tail.
+    place : float
+        Position on the link, from 0 (the end towards the tail) to 1.
+    weight : float, optional
+        Load it bears, as a fraction of the body's weight; by default its share of its link's
+        weight.
+    offset : float
+        Distance to the left of the link's middle line [body lengths].
+    friction : Law, optional
+        Its own law; by default the problem's.
+    angle : float
+        Direction that counts as forward, to the left of the link's [rad].
+    extent : float
+        Fraction of the link it covers, centred at `place`; 0 for a point (see `Pad`).
+
+    Examples
+    --------
+    Three links on three feet, the outer ones near the ends:
+
+    >>> from colloc import Chain, Foot
+    >>> len(Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2, 0.9))).feet)
+    3
+    """
+
+    link: int
+    place: float = 0.5
+    weight: float | None = None
+    offset: float = field(default=0.0, metadata=STATED_IF_SET)
+    friction: Law | None = field(default=None, metadata=STATED_IF_SET)
+    angle: float = field(default=0.0, metadata=STATED_IF_SET)
+    extent: float = field(default=0.0, metadata=STATED_IF_SET)
+
+    def __post_init__(self) -> None:
+        if not is_whole(self.link):
+            raise ProblemError(
+                f"the link of a foot must be a whole number, 0 for the tail's, not {self.link!r}."
+            )
+        if not (is_number(self.place) and 0 <= self.place <= 1):
+            raise ProblemError(
+                f"the place of a foot must lie on its link, from 0 (the end towards the tail) to "
+                f"1, not {self.place!r}."
+            )
+        if self.weight is not None and not (is_number(self.weight) and 0 < self.weight <= 1):
+            raise ProblemError(
+                f"the weight of a foot must be a positive part of the body's, at most 1, not "
+                f"{self.weight!r}."
+            )
+        for name in ("offset", "angle"):
+            if not is_number(getattr(self, name)):
+                raise ProblemError(
+                    f"the {name} of a foot must be a finite number, not {getattr(self, name)!r}."
+                )
+        if not (is_number(self.extent) and 0 <= self.extent <= 1):
+            raise ProblemError(
+                f"the extent of a foot must be a part of its link, from 0 (a point) to 1, not "
+                f"{self.extent!r}."
+            )
+        if abs(self.place - 0.5) + 0.5 * self.extent > 0.5 + _TOLERANCE:
+            raise ProblemError(
+                "a pad must lie on its link, from 0 (the end towards the tail) to 1, "
+                f"not from {self.first:.6g} to {self.last:.6g}."
+            )
+        if self.extent and self.angle:
+            raise ProblemError(
+                "a pad presses along its link: only a foot, without extent, may be turned by an "
+                "angle."
+            )
+        if isinstance(self.friction, type) or not isinstance(self.friction, Law | None):
+            raise ProblemError(
+                f"the friction of a foot must be a law of friction, as Friction(), not "
+                f"{shown(self.friction)}."
+            )
+
+    @property
+    def kind(self) -> str:
+        """Its kind: "pad" with an extent, "wheel" if its own friction is lower along than across,
+        else "foot"."""
+        own = self.friction
+        rolls = isinstance(own, Friction) and own.mu_f == own.mu_b < own.mu_t
+        return PAD if self.extent else WHEEL if rolls else FOOT
+
+    @property
+    def first(self) -> float:
+        """The end towards the tail, as a fraction of the link."""
+        return self.place - 0.5 * self.extent
+
+    @property
+    def last(self) -> float:
+        """The end towards the head, as a fraction of the link."""
+        return self.place + 0.5 * self.extent
+
+    @property
+    def mirrored(self) -> Foot:
+        """The foot on the mirror image of the body."""
+        return replace(self, offset=-self.offset, angle=-self.angle)
+
+    def from_head(self, n_link: int) -> Foot:
+        """Return the foot on the body counted from its other end."""
+        link, place = n_link - 1 - self.link, 1.0 - self.place
+        return replace(self, link=link, place=place, offset=-self.offset)
+
+    def is_like(self, other: Foot) -> bool:
+        """Return whether two feet are the same up to rounding."""
+        a, b = ((f.link, f.place, f.weight or 0.0, f.offset, f.extent) for f in (self, other))
+        # a reversible law has no forward direction
+        turns = 1 if self.friction is None or not self.friction.reversible else 2
+        turned = abs(np.sin(0.5 * turns * (self.angle - other.angle))) >= _TOLERANCE
+        same = np.allclose(a, b, rtol=0, atol=_TOLERANCE)
+        return self.friction == other.friction and same and not turned
+
+
+def Wheel(
+    link: int,
+    place: float = 0.5,
+    rolling: float = 0.02,
+    sideways: float = 1.0,
+    angle: float = 0.0,
+    **foot: Any,
+) -> Foot:
+    """Return a passive wheel: a foot that slides easily along its rolling direction only.
+
+    Parameters
+    ----------
+    link, place
+        As for a `Foot`.
+    rolling, sideways : float
+        Friction coefficients along the rolling direction, either way, and across it.
+    angle : float
+        Rolling direction, to the left of the link's [rad].
+    **foot
+        Weight and offset, as for a `Foot`.
+
+    Returns
+    -------
+    Foot
+
+    Examples
+    --------
+    >>> from colloc import Wheel
+    >>> Wheel(0).friction.label
+    'friction (1, 0.02, 0.02)'
+    """
+    for name, value in (("rolling", rolling), ("sideways", sideways)):
+        if not (is_number(value) and value > 0):
+            raise ProblemError(
+                f"the coefficient {name} of a wheel must be positive and finite, not {value!r}."
+            )
+    friction = Friction(mu_t=sideways, mu_f=rolling, mu_b=rolling)
+    return Foot(link, place, friction=friction, angle=angle, **foot)
+
+
+def Pad(link: int, first: float = 0.0, last: float = 1.0, **foot: Any) -> Foot:
+    """Return a contact that presses evenly between two places of a link.
+
+    Parameters
+    ----------
+    link : int
+        The link it is on, 0 at the tail.
+    first, last : float
+        Its ends, from 0 (the end towards the tail) to 1.
+    **foot
+        Weight, offset and friction, as for a `Foot`.
+
+    Returns
+    -------
+    Foot
+
+    Examples
+    --------
+    >>> from colloc import Chain, Pad
+    >>> len(Chain(feet=tuple(Pad(link, 0.25, 0.75) for link in range(3))).feet)
+    3
+    """
+    for name, value in (("begins", first), ("ends", last)):
+        if not (is_number(value) and 0 <= value <= 1):
+            raise ProblemError(
+                f"the place where a pad {name} must lie on its link, from 0 to 1, not {value!r}."
+            )
+    if not first < last:
+        raise ProblemError(
+            f"a pad must end behind where it begins, not at {last!r} and {first!r}: a point is "
+            f"a Foot."
+        )
+    return Foot(link, 0.5 * (first + last), extent=last - first, **foot)
+
+
+def whole_links(weights: np.ndarray) -> tuple[Foot, ...]:
+    """Pads from end to end, for a body that lies on its links."""
+    return tuple(
+        Foot(link, weight=float(weight), extent=1.0) for link, weight in enumerate(weights)
+    )
+
+
+def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot, ...]:
+    """Feet from tail to head, each with its weight, on links that weigh `weights` ``(n_link,)``.
+
+    A number means so many on each link, evenly spread. `ProblemError` for impossible feet.
+    """
+    if is_whole(feet):
+        if not 0 <= feet <= _MAX_PER_LINK:
+            raise ProblemError(
+                f"body.feet must be 0 (a line) to {_MAX_PER_LINK} on each link, not {feet}."
+            )
+        places = (np.arange(feet) + 0.5) / max(feet, 1)
+        feet = [Foot(link, float(place)) for link in range(weights.size) for place in places]
+    given = list(feet) if isinstance(feet, Iterable) else [feet]
+    stated = [foot for foot in given if isinstance(foot, Foot)]
+    if len(stated) < len(given):
+        raise ProblemError(
+            "body.feet must be the number of feet on each link, or a sequence of Foot, Wheel "
+            "and Pad."
+        )
+    if not stated:
+        return ()
+    for foot in stated:
+        if not 0 <= foot.link < weights.size:
+            raise ProblemError(
+                f"a foot stands on link {foot.link}, but the links are numbered 0 to "
+                f"{weights.size - 1}."
+            )
+    feet = tuple(replace(foot, weight=_weight(foot, stated, weights)) for foot in stated)
+    total = sum(foot.weight or 0.0 for foot in feet)
+    if abs(total - 1.0) > _TOLERANCE:
+        carried = sorted(set(range(weights.size)) - {foot.link for foot in feet})
+        hint = f"; no foot is on link {', '.join(map(str, carried))}, so say who bears its weight"
+        raise ProblemError(
+            f"the weights of the feet must add up to 1, not {total:.6g}{hint if carried else ''}."
+        )
+    # the head end of a link is the tail end of the next
+    points = {(foot.link + foot.place, foot.offset) for foot in feet}
+    if len(points) < 2 and not any(foot.extent for foot in feet):
+        raise ProblemError("a body needs feet at two points at least: on one it would spin freely.")
+    if not _same_set(feet, [foot.mirrored for foot in feet]):
+        raise ProblemError(
+            "the feet differ between left and right (offset, angle), which the search takes for "
+            "alike: give every foot that is "
+            "offset or turned its mirror image on the same link."
+        )
+    return tuple(sorted(feet, key=lambda foot: (foot.link, foot.place, foot.offset)))
+
+
+def _weight(foot: Foot, feet: Sequence[Foot], weights: np.ndarray) -> float:
+    """Its stated load, or its share of what the other feet leave of the link's weight."""
+    if foot.weight is not None:
+        return float(foot.weight)
+    others = [other.weight for other in feet if other.link == foot.link]
+    left = float(weights[foot.link]) - sum(weight for weight in others if weight is not None)
+    if left <= 0:
+        raise ProblemError(
+            f"the feet on link {foot.link} bear all that it weighs: give the last of them a "
+            f"weight, too."
+        )
+    return left / others.count(None)
+
+
+def symmetric_feet(feet: Sequence[Foot], n_link: int) -> bool:
+    """Whether the feet are the same counted from the other end of the body."""
+    return _same_set(feet, [foot.from_head(n_link) for foot in feet])
+
+
+def _same_set(feet: Sequence[Foot], others: Sequence[Foot]) -> bool:
+    left = list(others)
+    for foot in feet:
+        match = next((other for other in left if foot.is_like(other)), None)
+        if match is None:
+            return False
+        left.remove(match)
+    return True
+
+
+@dataclass(frozen=True)
+class FeetLaw:
+    """Laws of feet that do not all have the same, foot by foot, as one `Law`.
+
+    Its traits are those of all; `FloorContact` asks each law for its force.
+    """
+
+    laws: tuple[Law, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "laws", tuple(self.laws))
+
+    kernel_numbers = ()
+
+    @property
+    def degree(self) -> float | None:
+        degrees = {law.degree for law in self.laws}
+        return degrees.pop() if len(degrees) == 1 else None
+
+    @property
+    def reversible(self) -> bool:
+        return all(law.reversible for law in self.laws)
+
+    @property
+    def associated(self) -> bool:
+        return all(law.associated for law in self.laws)
+
+    @property
+    def regularised(self) -> bool:
+        return any(law.regularised for law in self.laws)
+
+    @property
+    def smallest(self) -> float:
+        return min(law.smallest for law in self.laws)
+
+    @property
+    def largest(self) -> float:
+        return max(law.largest for law in self.laws)
+
+    @property
+    def label(self) -> str:
+        return " and ".join(dict.fromkeys(law.label for law in self.laws)) + " by foot"
+
+    def describe(self) -> str:
+        counts = {law: self.laws.count(law) for law in self.laws}
+        return "; ".join(
+            f"{count} {'foot' if count == 1 else 'feet'}: {law.describe()}"
+            for law, count in counts.items()
+        )
+
+    def in_units_of(self, unit: float) -> FeetLaw:
+        return FeetLaw(tuple(law.in_units_of(unit) for law in self.laws))
+
+    def in_speeds_of(self, unit: float) -> FeetLaw:
+        return FeetLaw(tuple(law.in_speeds_of(unit) for law in self.laws))
+
+    def density(self, vs: Array, vn: Array, delta: Array) -> Any:
+        raise ProblemError(
+            "feet have laws of friction of their own: this one is for none but a body that stands "
+            "on them."
+        )
+
+    density_jacobian = density_secant = density_potential = density
+
+
+class Velocities(Protocol):
+    """As `colloc.mechanics.links.LinkVelocity`."""
 
     @property
     def vs(self) -> Array: ...
@@ -42,8 +390,8 @@ class LinkVelocities(Protocol):
     def w(self) -> Array: ...
 
 
-class _PartVelocity(NamedTuple):
-    """Of the middles of parts, along and across their own directions, and how fast they turn,
+class PartVelocity(NamedTuple):
+    """Velocity of the parts' middles along and across their directions, and their rotation rate,
     ``(n_part, n_time)`` each."""
 
     vs: Array
@@ -51,31 +399,20 @@ class _PartVelocity(NamedTuple):
     w: Array
 
 
-class _Group(NamedTuple):
-    """Parts of one kind under one law."""
+class Group(NamedTuple):
+    """Feet, or pads, under one law."""
 
     rows: list[int]
     law: Law
     pads: bool
 
 
-def from_middle(n: int) -> list[int]:
-    """Numbers of n links, the middle one first."""
-    return [n // 2, *(link for link in range(n) if link != n // 2)]
-
-
 class FloorContact:
     """Friction on the links of a chain, from the velocities of their midpoints and their rotation
     rates, ``(n_link, n_time)`` each; NumPy and CasADi.
 
-    Parameters
-    ----------
-    lengths : (n_link,)
-        Of the links.
-    parts : tuple of Foot
-        Feet and pads, each with its weight.
-    called : str
-        What they are called: "link" where the links lie on the floor.
+    lengths: of the links, ``(n_link,)``. parts: feet and pads with their weights. called: "link"
+    where the links lie on the floor.
     """
 
     def __init__(self, lengths: np.ndarray, parts: tuple[Foot, ...], called: str = FOOT) -> None:
@@ -84,270 +421,164 @@ class FloorContact:
         place, self.offset, angle, self.weight, extent = (
             np.array([[getattr(part, name)] for part in parts]) for name in names
         )
-        own = lengths[self.links][:, None]
-        self.along, self.length = (place - 0.5) * own, extent * own
+        length = lengths[self.links][:, None]
+        self.along, self.length = (place - 0.5) * length, extent * length
+        # weight of feet, weight per length of pads
         self.pressure = self.weight / np.where(self.length > 0, self.length, 1.0)
-        """Weight of feet, weight per length of pads."""
-        self.cos, self.sin = np.cos(angle), np.sin(angle)
-        self._turn = (
-            (self.cos, self.sin, self.along * self.sin - self.offset * self.cos),
-            (-self.sin, self.cos, self.along * self.cos + self.offset * self.sin),
-            (0.0 * own, 0.0 * own, np.ones_like(own)),
-        )
-        self._scatter = np.zeros((len(lengths), len(parts)))
-        self._scatter[self.links, np.arange(len(parts))] = 1.0
-        self._pads = [k for k, part in enumerate(parts) if part.extent > 0]
-        self._points = [k for k, part in enumerate(parts) if part.extent == 0]
-        self.rests = tuple(link for link in from_middle(len(lengths)) if link in self.links)
-        """Links that may be at rest: from each of them a balance is sought that is not found
-        otherwise."""
-        self._short = any(part.extent < 1 for part in parts)
-        """A part that is shorter than its link may rest while that turns."""
-
-    @property
-    def rounding(self) -> float:
-        """What rounding leaves of the force, times delta over the largest rate; 0 where the solver
-        need not reckon with it.
-
-        Two feet may hold on links that turn, where what turns them cancels: each speed is then
-        known to some units of rounding of the largest, and its friction changes within delta."""
-        return 16 * float(np.finfo(float).eps) if self._short else 0.0
-
-    @property
-    def n_force(self) -> int:
-        """Number of forces that are variables of a full program: along and across every part, and
-        the couples on pads."""
-        return 2 * len(self.parts) + len(self._pads)
+        cos, sin = self.cos, self.sin = np.cos(angle), np.sin(angle)
+        a, h, zero, one = self.along, self.offset, 0.0 * length, np.ones_like(length)
+        self._T = np.array(
+            ((cos, sin, a * sin - h * cos), (-sin, cos, a * cos + h * sin), (zero, zero, one))
+        )[..., 0]  # (3, 3, n_part)
+        self.scatter = np.zeros((len(lengths), len(parts)))
+        self.scatter[self.links, np.arange(len(parts))] = 1.0
+        self.pads = [k for k, part in enumerate(parts) if part.extent > 0]
+        middle = len(lengths) // 2
+        # links that may stick, the middle one first: initial guesses of a hard balance
+        self.rests = tuple(sorted(set(self.links), key=lambda link: (link != middle, link)))
+        # Two feet may stick on links that turn, where rotation cancels: then each speed is known to
+        # some units of rounding of the largest, and its friction changes within delta.
+        short = any(part.extent < 1 for part in parts)
+        self.rounding = 16 * float(np.finfo(float).eps) if short else 0.0
 
     @property
     def force_names(self) -> tuple[str, ...]:
-        """What they are."""
-        kinds = (
-            ("tangential force", range(len(self.parts))),
-            ("normal force", range(len(self.parts))),
-            ("couple", self._pads),
-        )
+        """Names of the contact forces: along and across every part, and couples on pads."""
+        every = range(len(self.parts))
+        kinds = ("tangential force", every), ("normal force", every), ("couple", self.pads)
         return tuple(f"{kind} on {self.called} {k + 1}" for kind, rows in kinds for k in rows)
 
-    @cached_property
-    def _own(self) -> dict[Law, FeetLaw]:
-        return {}
+    def couples(self, parts: Sequence[int]) -> list[int]:
+        """Indices among the contact forces of the couples on pads."""
+        return [2 * len(self.parts) + self.pads.index(part) for part in parts]
 
     def law(self, friction: Law) -> Law:
-        """The law of friction of all that touches, where the problem states `friction`: that, or
-        one that has another for every part, where some have their own."""
+        """The problem's law, or a `FeetLaw` where parts have their own."""
         if isinstance(friction, FeetLaw) or all(part.friction is None for part in self.parts):
             return friction
-        if friction not in self._own:
-            self._own[friction] = FeetLaw(tuple(part.friction or friction for part in self.parts))
-        return self._own[friction]
+        return FeetLaw(tuple(part.friction or friction for part in self.parts))
 
-    def _each(self, friction: Law) -> tuple[Law, ...]:
+    def laws(self, friction: Law) -> tuple[Law, ...]:
+        """The law of every part."""
         law = self.law(friction)
         return law.laws if isinstance(law, FeetLaw) else (law,) * len(self.parts)
 
-    @cached_property
-    def _grouped(self) -> dict[Law, list[_Group]]:
-        return {}
+    def groups(self, friction: Law) -> list[Group]:
+        """The parts, by kind and law."""
+        return _groups(self, friction)
 
-    def couples(self, parts: Sequence[int]) -> list[int]:
-        """Which of the forces are the couples on pads."""
-        return [2 * len(self.parts) + self._pads.index(part) for part in parts]
-
-    def groups(self, friction: Law) -> list[_Group]:
-        """The parts, those of one kind and law together."""
-        if friction not in self._grouped:
-            each, found = self._each(friction), []
-            for rows, pads in ((self._points, False), (self._pads, True)):
-                laws = dict.fromkeys(each[k] for k in rows)
-                found += [_Group([k for k in rows if each[k] == law], law, pads) for law in laws]
-            self._grouped[friction] = found
-        return self._grouped[friction]
-
-    def _evaluated(
-        self,
-        friction: Law,
-        velocity: LinkVelocities,
-        delta: Array,
-        of: tuple[Callable[[Law], Callable], Callable[[Law], Callable]],
-    ) -> list[tuple[_Group, Any]]:
-        """What laws say of points, and of lines."""
-        moves, found = self.velocities(velocity), []
-        for group in self.groups(friction):
-            own = [part[group.rows, :] for part in moves]
-            at = (*own, self.length[group.rows], delta) if group.pads else (*own[:2], delta)
-            found.append((group, of[group.pads](group.law)(*at)))
-        return found
-
-    def _in_order(self, pieces: Sequence[tuple[list[int], Array]]) -> Array:
-        """Rows of some parts each, as rows of all of them, from the tail."""
-        if len(pieces) == 1:
-            return pieces[0][1]
-        rows = [k for some, _ in pieces for k in some]
-        return namespace(*(piece for _, piece in pieces)).stack([piece for _, piece in pieces])[
-            np.argsort(rows).tolist(), :
-        ]
-
-    def velocities(self, velocity: LinkVelocities) -> _PartVelocity:
-        """Of the parts."""
-        vs, vn, w = (
-            velocity.vs[self.links, :],
-            velocity.vn[self.links, :],
-            velocity.w[self.links, :],
-        )
+    def velocities(self, velocity: Velocities) -> PartVelocity:
+        vs, vn, w = (row[self.links, :] for row in (velocity.vs, velocity.vn, velocity.w))
         vs, vn = vs - self.offset * w, vn + self.along * w
-        return _PartVelocity(self.cos * vs + self.sin * vn, self.cos * vn - self.sin * vs, w)
+        return PartVelocity(self.cos * vs + self.sin * vn, self.cos * vn - self.sin * vs, w)
+
+    def _evaluate(
+        self, friction: Law, velocity: Velocities, delta: Array, name: str
+    ) -> list[tuple[Group, Any]]:
+        """A quantity of the law at feet, or integrated along pads, by groups."""
+        parts, values = self.velocities(velocity), []
+        for group in self.groups(friction):
+            vs, vn, w = (row[group.rows, :] for row in parts)
+            if group.pads:
+                integral = getattr(line_integrals(group.law), name)
+                values.append((group, integral(vs, vn, w, self.length[group.rows], delta)))
+            else:
+                values.append((group, getattr(group.law, _AT_POINT[name])(vs, vn, delta)))
+        return values
+
+    def forces(self, friction: Law, velocity: Velocities, delta: Array) -> Array:
+        """Contact forces ``(n_force, n_time)``, see `force_names`."""
+        values, rows = self._evaluate(friction, velocity, delta, "force"), []
+        for k in range(3):
+            pieces = [(g.rows, self.pressure[g.rows] * f[k]) for g, f in values if k < len(f)]
+            if len(pieces) == 1:
+                rows.append(pieces[0][1])
+            elif pieces:
+                stacked = namespace(velocity.vs).stack([piece for _, piece in pieces])
+                order = np.argsort([part for parts, _ in pieces for part in parts])
+                rows.append(stacked[order.tolist(), :])
+        return namespace(velocity.vs).stack(rows)
 
     def on_links(self, forces: Array) -> LinkForce:
-        """The friction on links that the variables mean."""
-        n, xp = len(self.parts), namespace(forces)
+        """Force and couple on the links from contact forces: T' f."""
+        n, matmul = len(self.parts), namespace(forces).matmul
         along, across = forces[:n, :], forces[n : 2 * n, :]
         fs, fn = self.cos * along - self.sin * across, self.sin * along + self.cos * across
-        sums = [
-            xp.matmul(self._scatter, part) for part in (fs, fn, self.along * fn - self.offset * fs)
-        ]
-        if self._pads:
-            sums[2] = sums[2] + xp.matmul(self._scatter[:, self._pads], forces[2 * n :, :])
-        return LinkForce(*sums)
+        couple = matmul(self.scatter, self.along * fn - self.offset * fs)
+        if self.pads:
+            couple = couple + matmul(self.scatter[:, self.pads], forces[2 * n :, :])
+        return LinkForce(matmul(self.scatter, fs), matmul(self.scatter, fn), couple)
 
-    def forces(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        """The variables' values, ``(n_force, n_time)``."""
-        said = self._evaluated(
-            friction,
-            velocity,
-            delta,
-            (lambda law: law.density, lambda law: line_integrals(law).force),
-        )
-        rows = [
-            [(g.rows, self.pressure[g.rows] * own[k]) for g, own in said if k < len(own)]
-            for k in range(3)
-        ]
-        return namespace(velocity.vs).stack([self._in_order(pieces) for pieces in rows if pieces])
-
-    def force(self, friction: Law, velocity: LinkVelocities, delta: Array) -> LinkForce:
-        """On the links."""
+    def force(self, friction: Law, velocity: Velocities, delta: Array) -> LinkForce:
         return self.on_links(self.forces(friction, velocity, delta))
 
-    def _blocks(self, said: list[tuple[_Group, Matrix]]) -> Matrix:
-        """3 x 3 of links from 3 x 3 of pads and 2 x 2 of feet: sum of T' K T."""
-        on_parts: list[list[list[tuple[list[int], Array]]]] = [
-            [[] for _ in range(3)] for _ in range(3)
-        ]
-        for group, own in said:
-            turn = [[entry[group.rows] for entry in row] for row in self._turn]
-            ways = [[p for p in range(len(own)) if turn[p][i].any()] for i in range(3)]
-            none = 0.0 * own[0][0]
-            for i in range(3):
-                for j in range(3):
-                    entry = sum(
-                        (turn[p][i] * own[p][q] * turn[q][j] for p in ways[i] for q in ways[j]),
-                        none,
-                    )
-                    on_parts[i][j].append((group.rows, self.pressure[group.rows] * entry))
-        return tuple(
-            tuple(self._scatter @ self._in_order(pieces) for pieces in row) for row in on_parts
-        )
+    def stiffness(
+        self, friction: Law, velocity: Velocities, delta: Array, *, secant: bool = False
+    ) -> np.ndarray:
+        """Minus the derivative of the force on links with respect to (vs, vn, w), or the matrix of
+        the fixed point (`Law.density_secant`), ``(3, 3, n_link, n_time)``: sum of T' K T."""
+        total = np.zeros((3, 3, *velocity.vs.shape))
+        for group, block in self._evaluate(
+            friction, velocity, delta, "secant" if secant else "jacobian"
+        ):
+            T, rows = self._T[: len(block), :, group.rows], group.rows
+            KT = np.einsum("pqnt,qjn->pjnt", self.pressure[rows] * np.array(block), T)
+            total += self.scatter[:, rows] @ np.einsum("pin,pjnt->ijnt", T, KT)
+        return total
 
-    def stiffness(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        """Minus the derivative of the force on links with respect to (vs, vn, w), 3 x 3."""
-        of = (lambda law: law.density_jacobian, lambda law: line_integrals(law).jacobian)
-        return self._blocks(self._evaluated(friction, velocity, delta, of))
-
-    def secant(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        """The matrix of the paper's fixed point (`colloc.mechanics.law.Law.density_secant`)."""
-        of = (lambda law: law.density_secant, lambda law: line_integrals(law).secant)
-        return self._blocks(self._evaluated(friction, velocity, delta, of))
-
-    def potential(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        """The dissipation potential of the parts, row by row; of associated laws only."""
-        of = (lambda law: law.density_potential, lambda law: line_integrals(law).potential)
-        said = self._evaluated(friction, velocity, delta, of)
-        return self._in_order(
-            [(group.rows, self.pressure[group.rows] * own) for group, own in said]
-        )
+    def potential(self, friction: Law, velocity: Velocities, delta: Array) -> np.ndarray:
+        """Dissipation potential of the parts, ``(n_part, n_time)``; of associated laws only."""
+        values = self._evaluate(friction, velocity, delta, "potential")
+        return np.concatenate([self.pressure[group.rows] * value for group, value in values])
 
     def largest_forces(self, friction: Law) -> np.ndarray:
-        """Their largest magnitudes, ``(n_force, 1)``."""
-        found = np.full((3, len(self.parts), 1), np.inf)
+        """Largest magnitudes of the contact forces, ``(n_force, 1)``."""
+        most = np.full((3, len(self.parts), 1), np.inf)
         for rows, law, pads in self.groups(friction):
             if pads:
-                found[:, rows] = (
-                    line_integrals(law).largest_forces(self.length[rows]).reshape(3, -1, 1)
-                )
+                most[:, rows] = line_integrals(law).largest_forces(self.length[rows])
             elif law.degree == 0:
-                found[:, rows] = law.largest
-        found *= self.pressure
-        return np.concatenate([found[0], found[1], found[2, self._pads]])
+                most[:, rows] = law.largest
+        most *= self.pressure
+        return np.concatenate([most[0], most[1], most[2, self.pads]])
 
     def most_held(self, friction: Law) -> float:
-        """The largest pull on the body that friction may hold, over its weight."""
-        return float(self.weight[:, 0] @ [law.largest for law in self._each(friction)])
+        """Largest pull on the body that friction may hold, over its weight."""
+        return float(self.weight[:, 0] @ [law.largest for law in self.laws(friction)])
 
-    def slowest(self, velocity: LinkVelocities) -> np.ndarray:
-        """How fast the slowest part of each link moves, ``(n_link, n_time)``; infinite for a
-        carried link."""
+    def slowest(self, velocity: Velocities) -> np.ndarray:
+        """Speed of the slowest part of each link, ``(n_link, n_time)``; infinite where there is
+        none."""
         vs, vn, w = map(np.abs, self.velocities(velocity))
-        found = np.full(velocity.vs.shape, np.inf)
-        np.minimum.at(found, self.links, vs + vn + 0.5 * self.length * w)
-        return found
+        speed = np.full(velocity.vs.shape, np.inf)
+        np.minimum.at(speed, self.links, vs + vn + 0.5 * self.length * w)
+        return speed
 
-    def slowness(self, friction: Law, velocity: LinkVelocities) -> np.ndarray:
-        """What has to vanish for a kink of the velocities in time, ``(n_part, n_time)``: the speed
-        of the slowest point of each part, or the one along it where directions differ."""
+    def sticking_speeds(self, friction: Law, velocity: Velocities) -> np.ndarray:
+        """Speeds that vanish at kinks of the velocity in time, ``(n_part, n_time)``: of the slowest
+        point of each part, or along it where directions differ."""
         vs, vn, w = map(np.abs, self.velocities(velocity))
-        return (
-            np.hypot(vs, np.maximum(vn - 0.5 * self.length * w, 0.0))
-            if self.law(friction).reversible
-            else vs
-        )
-
-    @cached_property
-    def _kernel_numbers(self) -> dict[Law, tuple[float, ...]]:
-        return {}
+        if not self.law(friction).reversible:
+            return vs
+        return np.hypot(vs, np.maximum(vn - 0.5 * self.length * w, 0.0))
 
     def kernel_numbers(self, friction: Law) -> tuple[float, ...]:
-        """All that touches and its laws, for the compiled kernel; empty where one of them is
-        neither Coulomb's nor elliptic."""
-        if friction not in self._kernel_numbers:
-            law = self.law(friction)
-            numbers = [each.kernel_numbers[:5] for each in self._each(law)]
-            first = np.searchsorted(self.links, np.arange(len(self._scatter) + 1))
-            head = len(self._scatter), len(self.parts), law.largest, float(law.associated), *first
-            places = self.along, self.offset, self.cos, self.sin, self.length, self.pressure
-            self._kernel_numbers[friction] = (
-                (*head, *np.hstack([*places, numbers]).ravel()) if all(numbers) else ()
-            )
-        return self._kernel_numbers[friction]
+        """Contacts and laws for the compiled kernel; empty where a law is not in closed form."""
+        law = self.law(friction)
+        numbers = [each.kernel_numbers[:5] for each in self.laws(law)]
+        if not all(numbers):
+            return ()
+        first = np.searchsorted(self.links, np.arange(len(self.scatter) + 1))
+        head = len(self.scatter), len(self.parts), law.largest, float(law.associated), *first
+        places = self.along, self.offset, self.cos, self.sin, self.length, self.pressure
+        return (*head, *np.hstack([*places, numbers]).ravel())
 
-    def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
-        """Of what is drawn as sticking or sliding, and what it is called: of the middles of links;
-        of feet, and of pads where they are fastest."""
-        vs, vn, w = map(np.abs, self.velocities(velocity))
-        return self.called, np.hypot(vs, vn + 0.5 * self.length * w if self.called == FOOT else vn)
 
-    def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where friction is drawn, about `count` points along pads, and every foot: the part of
-        each point, and its place from the midpoint of that part's link, along and offset,
-        ``(n,)``."""
-        many = max(2, count // max(len(self._pads), 1))
-        share = (np.arange(many) + 0.5) / many - 0.5
-        part = np.array([*self._points, *np.tile(self._pads, many).astype(int)])
-        ahead = np.concatenate([np.zeros(len(self._points)), np.repeat(share, len(self._pads))])
-        return part, self.along[part, 0] + ahead * self.length[part, 0], self.offset[part, 0]
-
-    def at_points(
-        self, friction: Law, velocity: LinkVelocities, delta: float, count: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Friction there, along and across the link: on a link that lies per length, ``(n,
-        n_time)`` each; on a foot, and on pads beside feet as if all of it moved like this."""
-        part, along, _ = self.points(count)
-        vs, vn, w = self.velocities(velocity)
-        each, turned = (
-            self._each(friction),
-            vn[part] + (along - self.along[part, 0])[:, None] * w[part],
-        )
-        force = [each[k].density(vs[[k]], turned[[i]], delta) for i, k in enumerate(part)]
-        fs, fn = (np.concatenate([own[side] for own in force]) for side in (0, 1))
-        pressed = (self.weight if self.called == FOOT else self.pressure)[part]
-        cos, sin = self.cos[part], self.sin[part]
-        return pressed * (cos * fs - sin * fn), pressed * (sin * fs + cos * fn)
+@lru_cache(maxsize=64)
+def _groups(contact: FloorContact, friction: Law) -> list[Group]:
+    laws, groups = contact.laws(friction), []
+    for pads in (False, True):
+        parts = [k for k, part in enumerate(contact.parts) if (part.extent > 0) == pads]
+        for law in dict.fromkeys(laws[k] for k in parts):
+            groups.append(Group([k for k in parts if laws[k] == law], law, pads))
+    return groups

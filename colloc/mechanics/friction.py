@@ -1,11 +1,5 @@
-"""The usual law: delta-regularised Coulomb friction per unit length, at a point that slides with
-velocity (vs, vn).
-
-With ``r = sqrt(vs^2 + vn^2 + delta^2)`` the force per length is ``-(mu_s vs, mu_t vn)/r`` (paper,
-eqs. frictiondelta and delta). Smooth bodies integrate it by quadrature; straight links have it in
-closed form (`mechanics.link_friction`). All arrays are two-dimensional, ``(n_node, n_time)``, NumPy
-or CasADi.
-"""
+"""Regularised Coulomb friction per length, ``-(mu_s vs, mu_t vn)/r`` with ``r = sqrt(vs^2 + vn^2 +
+delta^2)`` (paper, eqs. frictiondelta and delta)."""
 
 from __future__ import annotations
 
@@ -22,11 +16,11 @@ from colloc.system.arguments import check_positive, named_arguments
 from colloc.system.errors import ProblemError
 
 _LARGEST = 1e9
-"""Coefficient that is taken, far beyond any rail, and far enough from where numbers overflow."""
+"""Largest coefficient, far below overflow."""
 
 
 class Coefficients:
-    """Of sliding across the body, forwards and backwards, and what follows from them."""
+    """Coefficients of sliding across the body, forwards and backwards."""
 
     mu_t: float
     mu_f: float
@@ -43,11 +37,11 @@ class Coefficients:
 
     @property
     def isotropic(self) -> bool:
+        """Whether all coefficients are equal."""
         return self.mu_t == self.mu_f == self.mu_b
 
     @property
     def associated(self) -> bool:
-        """Only equal coefficients make the law the gradient of a convex dissipation potential."""
         return self.isotropic
 
     @property
@@ -55,8 +49,7 @@ class Coefficients:
         return self.mu_b == self.mu_f
 
     def tangential(self, vs: Array) -> Array:
-        """Coefficient mu_s of a part that slides along itself with velocity `vs`; no switch where
-        mu_b = mu_f."""
+        """Coefficient mu_s of sliding along the body with velocity `vs`."""
         if self.reversible:
             return self.mu_f
         return namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
@@ -65,13 +58,13 @@ class Coefficients:
 @named_arguments
 @dataclass(frozen=True)
 class Friction(Coefficients):
-    """Coulomb friction coefficients, in units of the weight; a `colloc.mechanics.law.Law`.
+    """Coulomb friction; a law of friction.
 
     Parameters
     ----------
     mu_t, mu_f, mu_b : float
-        Transverse, forward (towards the head) and backward coefficient; all positive (paper, eq.
-        friction).
+        Transverse, forward (towards the head) and backward coefficient, in units of the weight;
+        all positive (paper, eq. friction).
 
     Examples
     --------
@@ -96,13 +89,13 @@ class Friction(Coefficients):
 
     @property
     def kernel_numbers(self) -> tuple[float, ...]:
-        """Coefficients, stretches of the tangential velocity forwards and backwards, and whether
-        there is a potential."""
+        """Coefficients, stretches forwards and backwards, and whether there is a potential."""
         stretches = [float(self.stretch(np.array(side))) for side in (1.0, -1.0)]
         return self.mu_t, self.mu_f, self.mu_b, *stretches, float(self.associated)
 
     @property
     def label(self) -> str:
+        """A short name with its numbers."""
         return f"friction ({self.mu_t:g}, {self.mu_f:g}, {self.mu_b:g})"
 
     def describe(self) -> str:
@@ -118,7 +111,7 @@ class Friction(Coefficients):
         return self
 
     def stretch(self, vs: Array) -> Array:
-        """How many times its value `vs` counts in the speed r: once."""
+        """Factor of `vs` in the speed r."""
         return 1.0
 
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
@@ -149,7 +142,7 @@ class Friction(Coefficients):
 
 @line_integrals.register(Friction)
 class ClosedForm(LineIntegrals):
-    """Of Coulomb's law on links, and of those that stretch it."""
+    """Coulomb friction on links, also with the tangential velocity stretched."""
 
     def force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
         return link_friction.link_force(vs, vn, w, length, delta, self.law)
@@ -161,21 +154,25 @@ class ClosedForm(LineIntegrals):
         return link_friction.link_secant(vs, vn, w, length, delta, self.law)
 
     def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-        return self.law.mu_t * link_friction.link_dissipation(
-            self.law.stretch(vs) * vs, vn, w, length, delta
-        )
+        stretched = self.law.stretch(vs) * vs
+        return self.law.mu_t * link_friction.link_dissipation(stretched, vn, w, length, delta)
 
     def scaled_laws(
         self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce
     ) -> list[Array]:
-        return link_friction.scaled_laws(vs, vn, w, length, delta, self.law, force)
+        mu_s, mu_t = self.law.tangential(vs), self.law.mu_t
+        vs = self.law.stretch(vs) * vs
+        I0, I1, I2 = link_friction.link_moments(vs, vn, w, length, delta)
+        return [
+            force.tangential / I0 + mu_s * vs,
+            force.normal / I0 + mu_t * (vn + w * I1 / I0),
+            (force.couple / I0 + mu_t * (vn * I1 / I0 + w * I2 / I0)) * (6 / length),
+        ]
 
     def largest_forces(self, length: np.ndarray) -> np.ndarray:
-        tangential = max(self.law.mu_f, self.law.mu_b) * length
-        return np.concatenate([tangential, self.law.mu_t * length, self.law.mu_t * length**2 / 4])
+        mu_s, mu_t = max(self.law.mu_f, self.law.mu_b), self.law.mu_t
+        return np.stack([mu_s * length, mu_t * length, mu_t * length**2 / 4])
 
 
 def regularised_speed(vs: Array, vn: Array, delta: Array) -> Array:
-    """r; it is also the density of the isotropic dissipation potential, whose gradient is minus the
-    force at mu = 1."""
     return namespace(vs, vn, delta).sqrt(vs * vs + vn * vn + delta * delta)

@@ -1,15 +1,14 @@
-r"""Inertia of a chain: its momenta, and how friction changes them.
+r"""Inertia of a chain: its momenta, and their rates under friction.
 
 The states are the velocity (Vx, Vy) of the centre of mass in the axes of the tail link, and the
 angular momentum H about it, of a body of mass 1. With friction's force F and moment M about the
-centre of mass, and the Froude number Fr = L/(g T^2),
+centre of mass, the Froude number Fr = L/(g T^2), the moment of inertia I, and the angular momentum
+H_0 of the joints' motion while the tail rests,
 
-    Fr (dVx/dt - omega Vy) = Fx,    Fr (dVy/dt + omega Vx) = Fy,    Fr dH/dt = M,    omega = (H - H_0) / I,
+    Fr (dVx/dt - omega Vy) = Fx, Fr (dVy/dt + omega Vx) = Fy, Fr dH/dt = M, omega = (H - H_0) / I.
 
-where H_0 is the angular momentum that the joints' motion has while the tail rests, and I the moment
-of inertia. For Fr = 0 this is the balance of forces. Masses and moments of inertia are the chain's;
-by default its links are uniform rods, as heavy as they press on the floor.
-"""  # noqa: E501
+For Fr = 0 this is the balance of forces.
+"""
 
 from __future__ import annotations
 
@@ -28,47 +27,42 @@ from colloc.system.errors import ProblemError
 GRAVITY = 9.81
 """[m/s^2]"""
 STATES = ("Vx", "Vy", "H")
-"""Names of the momenta."""
-
 Path = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 
 
 class MomentumRates(NamedTuple):
-    """A chain with given momenta: how they change, and what it does meanwhile."""
+    """Rates of the momenta ``(3, n_time)``, tail velocity ``(3, n_time)``, and power dissipated by
+    friction ``(1, n_time)``."""
 
     rates: Array
-    """Of the momenta, ``(3, n_time)``."""
     z: Array
-    """Tail velocity, ``(3, n_time)``."""
     power: Array
-    """Dissipated by friction, ``(1, n_time)``."""
 
 
 def momenta(body: Chain, posture: Posture, link: LinkVelocity) -> Array:
-    """Velocity of the centre of mass and angular momentum about it, of links that move so, ``(3,
-    n_time)``."""
+    """Velocity of the centre of mass and angular momentum about it, ``(3, n_time)``."""
     xp, mass = namespace(link.vs), body.mass_column()
     (x, y), (vx, vy) = body.centre_of_mass(posture), body.centre_velocity(posture, link)
-    own_x = link.vs * posture.cos - link.vn * posture.sin
-    own_y = link.vs * posture.sin + link.vn * posture.cos
-    swing = (posture.x - _each(body, x)) * own_y - (posture.y - _each(body, y)) * own_x
+    link_vx = link.vs * posture.cos - link.vn * posture.sin
+    link_vy = link.vs * posture.sin + link.vn * posture.cos
+    swing = (posture.x - _tile(body, x)) * link_vy - (posture.y - _tile(body, y)) * link_vx
     return xp.stack([vx, vy, xp.sum_rows(mass * swing + body.inertia_column() * link.w)])
 
 
 def moment_of_inertia(body: Chain, posture: Posture) -> Array:
-    """Of the body about its centre of mass, ``(1, n_time)``."""
+    """Moment of inertia about the centre of mass, ``(1, n_time)``."""
     xp, (x, y) = namespace(posture.x), body.centre_of_mass(posture)
-    square = (posture.x - _each(body, x)) ** 2 + (posture.y - _each(body, y)) ** 2
+    square = (posture.x - _tile(body, x)) ** 2 + (posture.y - _tile(body, y)) ** 2
     return xp.sum_rows(body.mass_column() * square + body.inertia_column())
 
 
-def _each(body: Chain, row: Array) -> Array:
+def _tile(body: Chain, row: Array) -> Array:
     """A row ``(1, n_time)`` for every link."""
     return namespace(row).matmul(np.ones((body.n_link, 1)), row)
 
 
 def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
-    """Of a body of mass 1 whose tail moves with z, ``(1, n_time)``."""
+    """Kinetic energy of a body of mass 1, ``(1, n_time)``."""
     link = body.velocity(body.posture(angles), rates, z)
     twice = body.mass_column() * (link.vs**2 + link.vn**2) + body.inertia_column() * link.w**2
     return 0.5 * namespace(link.vs).sum_rows(twice)
@@ -77,13 +71,8 @@ def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
 def inertial_moments(
     body: Chain, angles: np.ndarray, link: LinkVelocity, growth: LinkVelocity
 ) -> np.ndarray:
-    """What the motors of the joints spend on changing how the links of a body of mass 1 move,
-    ``(n_joint, n_time)``.
-
-    By virtual power: that of mass times acceleration while one joint turns alone and the tail
-    rests. `growth` is what the velocities `link`, in the axes of the links, change by in a unit of
-    time; these axes turn.
-    """
+    """Joint moments of mass times acceleration, by virtual power, of a body of mass 1, ``(n_joint,
+    n_time)``; `growth` is the rate of the velocities `link` in the turning axes of the links."""
     mass, posture, still = body.mass_column(), body.posture(angles), np.zeros((3, angles.shape[1]))
     along, across = growth.vs - link.w * link.vn, growth.vn + link.w * link.vs
     spin = body.inertia_column() * growth.w
@@ -114,45 +103,39 @@ def momentum_rates(
     delta: Array,
     froude: Array,
 ) -> MomentumRates:
-    """How friction changes the momenta `states` ``(3, n_time)`` of a chain with such joint angles
-    and rates; NumPy, CasADi."""
+    """Rates of the momenta `states` ``(3, n_time)`` under friction; NumPy and CasADi."""
     z = tail_velocity(body, angles, rates, states)
     slides = body.sliding(friction, angles, rates, z, delta)
-    return MomentumRates(
-        about_centre(body, angles, slides.force) / froude + turning(z, states), z, slides.power
-    )
+    growth = about_centre(body, angles, slides.force) / froude + turning(z, states)
+    return MomentumRates(growth, z, slides.power)
 
 
 def about_centre(body: Chain, angles: Array, force: Array) -> Array:
     """Force and moment about the centre of mass, from force and torque about the tail, ``(3,
     n_time)`` both."""
-    return namespace(angles, force).stack(
-        [force[0:2, :], force[2:3, :] - _lever(body, angles, force)]
-    )
+    return _shift(body, angles, force, -1.0)
 
 
 def about_tail(body: Chain, angles: Array, force: Array) -> Array:
     """Force and torque about the tail, from force and moment about the centre of mass, ``(3,
     n_time)`` both."""
-    return namespace(angles, force).stack(
-        [force[0:2, :], force[2:3, :] + _lever(body, angles, force)]
-    )
+    return _shift(body, angles, force, 1.0)
 
 
-def _lever(body: Chain, angles: Array, force: Array) -> Array:
-    """Torque about the tail of a force at the centre of mass, ``(1, n_time)``."""
+def _shift(body: Chain, angles: Array, force: Array, sign: float) -> Array:
     x, y = body.centre_of_mass(body.posture(angles))
-    return x * force[1:2, :] - y * force[0:1, :]
+    torque = x * force[1:2, :] - y * force[0:1, :]
+    return namespace(angles, force).stack([force[0:2, :], force[2:3, :] + sign * torque])
 
 
 def turning(z: Array, states: Array) -> Array:
-    """What the momenta ``(3, n_time)`` change by because their axes turn with the tail link."""
+    """Rates of the momenta ``(3, n_time)`` because their axes turn with the tail link."""
     omega = z[2:3, :]
     return namespace(z, states).stack([omega * states[1:2, :], -omega * states[0:1, :], 0 * omega])
 
 
 def checked_mass(body: Body) -> Chain:
-    """The body, if its parts have masses; else a `ProblemError` that says so."""
+    """The body as a chain, or a `ProblemError`: only its parts have masses."""
     if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
         raise ProblemError(
             f"inertia is known of a Chain, whose links have masses, not of a {type(body).__name__}."

@@ -1,4 +1,4 @@
-"""Joints of a chain that hang on fewer motors, or are stuck: ``q = gears @ m + rest``."""
+"""Joints that share motors, or are stuck: ``q = gears @ m + rest``."""
 
 from __future__ import annotations
 
@@ -12,14 +12,10 @@ from colloc.numerics.arrays import Array, namespace
 
 @dataclass(frozen=True)
 class JointMap:
-    """From the angles of motors to those of joints.
+    """Angles of joints from those of motors.
 
-    Parameters
-    ----------
-    gears : (n_joint, n_motor)
-        How far each motor turns each joint.
-    rest : (n_joint,)
-        Joint angles with all motors at 0; no motor turns a joint that is not at 0 there.
+    gears: turn of each joint per motor, ``(n_joint, n_motor)``. rest: joint angles with all motors
+    at 0, ``(n_joint,)``; no motor turns a joint that is not at 0 there.
     """
 
     gears: tuple[tuple[float, ...], ...]
@@ -31,12 +27,11 @@ class JointMap:
 
     @cached_property
     def inverse(self) -> np.ndarray:
-        """``(n_motor, n_joint)``: the motor angles that come nearest to joint angles."""
+        """Nearest motor angles to joint angles, ``(n_motor, n_joint)``."""
         return np.linalg.pinv(self.matrix)
 
     @cached_property
     def offset(self) -> np.ndarray:
-        """`rest` as a column."""
         return np.array(self.rest)[:, None]
 
     @property
@@ -44,17 +39,17 @@ class JointMap:
         return len(self.gears[0])
 
     def joint_angles(self, motors: Array) -> Array:
-        return namespace(motors).matmul(self.matrix, motors) + self.offset
+        return self.joint_rates(motors) + self.offset
 
     def joint_rates(self, motors: Array) -> Array:
         return namespace(motors).matmul(self.matrix, motors)
 
     def motor_angles(self, joints: Array) -> Array:
-        return namespace(joints).matmul(self.inverse, joints - self.offset)
+        return self.motor_rates(joints - self.offset)
 
     def motor_rates(self, joints: Array) -> Array:
         return namespace(joints).matmul(self.inverse, joints)
 
     def motor_moments(self, joints: Array) -> Array:
-        """Moments of the motors, each of which does the work of all joints that hang on it."""
+        """Moments of the motors: each does the work of all joints that hang on it."""
         return namespace(joints).matmul(self.matrix.T, joints)

@@ -1,10 +1,7 @@
-"""What a law of friction has to answer for: the force on a point that slides, and its traits.
+"""The law of friction at a point that slides along and across the body with velocity (vs, vn).
 
-`colloc.mechanics.friction.Friction` is Coulomb's law, the usual one; the package `colloc.laws` has
-others (docs/howto/laws.md). Everything else, from the balance to the report, asks only these
-questions; what touches the floor integrates (`colloc.mechanics.floor_contact`). Velocities are
-those along and across the body at a point. All arrays are two-dimensional, ``(n_part, n_time)``,
-NumPy or CasADi; forces are per length.
+Arrays are two-dimensional, ``(n_part, n_time)``, NumPy or CasADi; forces are per length. Integrals
+along links follow from it (`colloc.mechanics.line_integrals`).
 """
 
 from __future__ import annotations
@@ -14,37 +11,35 @@ from typing import Any, Protocol, runtime_checkable
 from colloc.numerics.arrays import Array
 
 Matrix = tuple[tuple[Any, ...], ...]
-"""2 x 2 of a point or 3 x 3 of a link, of arrays."""
+"""2 x 2 at a point or 3 x 3 on a link, of arrays."""
 
 
 @runtime_checkable
 class Law(Protocol):
-    """Friction per length as a function of the velocity of sliding."""
+    """Friction per length as a function of the sliding velocity."""
 
     def __hash__(self) -> int: ...
 
     @property
     def degree(self) -> float | None:
-        """Of homogeneity: t times the velocity (and delta) makes t^degree times the force. 0 for
-        dry friction, 1 for viscous drag, None for a law that has none."""
+        """Degree of homogeneity in velocity and delta: 0 dry, 1 viscous; None if there is none."""
 
     @property
     def reversible(self) -> bool:
-        """Reversing the velocity reverses the force: body and gait may be read backwards."""
+        """Whether reversing the velocity reverses the force."""
 
     @property
     def associated(self) -> bool:
-        """Minus the force is the gradient of a convex function of the velocity: a balance has
-        exactly one solution."""
+        """Whether minus the force is the gradient of a convex function: then a balance has exactly
+        one solution."""
 
     @property
     def regularised(self) -> bool:
-        """It depends on delta, the speed below which it is smoothed."""
+        """Whether it depends on delta, the speed below which it is smoothed."""
 
     @property
     def smallest(self) -> float:
-        """Smallest dissipation at unit speed, over all directions: an upper bound of distance per
-        work is its inverse."""
+        """Smallest dissipation at unit speed over all directions; its inverse bounds d/W."""
 
     @property
     def largest(self) -> float:
@@ -52,16 +47,16 @@ class Law(Protocol):
 
     @property
     def label(self) -> str:
-        """The law with its numbers, short."""
+        """A short name with its numbers."""
 
     def describe(self) -> str:
-        """The same in words, for reports."""
+        """A description for reports."""
 
     def in_units_of(self, unit: float) -> Law:
-        """The law whose forces are `unit` times smaller."""
+        """The law with forces divided by `unit`."""
 
     def in_speeds_of(self, unit: float) -> Law:
-        """The law as a function of velocities (and delta) in units of `unit`."""
+        """The law of velocities (and delta) in units of `unit`."""
 
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         """Tangential and normal force per length."""
@@ -70,19 +65,17 @@ class Law(Protocol):
         """Minus its derivative with respect to (vs, vn)."""
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        """A matrix that turns a velocity into minus the force, or a larger one: the safeguard of
-        Newton's method steps with it, as the paper's fixed point (eq. deltatilde)."""
+        """A matrix that turns a velocity into minus the force, or a larger one (paper, eq.
+        deltatilde): the safeguard of Newton's method."""
 
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
-        """The function whose gradient is minus the force; of associated laws only."""
+        """Dissipation potential, whose gradient is minus the force; of associated laws only."""
 
     @property
     def kernel_numbers(self) -> tuple[float, ...]:
-        """The law as the compiled kernel takes it; empty where that does not have it in closed
-        form."""
+        """Parameters for the compiled kernel; empty if it does not have the law."""
 
 
 def rate_independent(law: Law) -> bool:
-    """The force does not depend on the speed: distance and work belong to the path, and its pacing
-    is a gauge."""
+    """Whether distance and work of a path do not depend on its pace."""
     return law.degree == 0

@@ -1,19 +1,13 @@
-r"""Friction on a straight link, integrated along it from what a law says of a point.
+r"""Friction on a straight link, integrated along it from the law at a point.
 
-`line_integrals(law)` is by quadrature, unless the module of a law registers its integrals in closed
-form, as those of Coulomb's law and of drag do.
-
-Along a link the tangential velocity vs is constant and the normal one ``y = vn + w sigma``; a dry
-law changes within ``a = sqrt(vs^2 + delta^2)`` of y = 0. So Gauss nodes are laid in tau, ``y = a
-sinh(tau)``, where that is a stretch of unit width. With tau = m + h x, x in [-1, 1], on a link of
-length l
+Along a link vs is constant and ``y = vn + w sigma``; a dry law changes within ``a = sqrt(vs^2 +
+delta^2)`` of y = 0. So Gauss nodes are equally spaced in tau, ``y = a sinh(tau)``. With tau = m +
+h x, x in [-1, 1], on a link of length l
 
     d sigma = l/2 h/sinh(h) cosh(tau)/cosh(m) dx,
     sigma   = l/2 [sinh(h x) - 2 tanh(m) sinh(h (1+x)/2) sinh(h (1-x)/2)]/sinh(h).
 
-h follows from the end values without cancellation, so a link that hardly turns is no special case.
-The nodes are those of two panels that meet at y = 0, or at the end nearest to it: a law may have a
-kink there, or change faster than within a.
+Two panels meet at y = 0, or at the end nearest to it: a law may have a kink there.
 """
 
 from __future__ import annotations
@@ -29,16 +23,14 @@ from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 
 NODES = 20
-"""Of a panel: force and couple to 1e-9 of the largest at least, where a law does not change much
-faster than within a."""
+"""Gauss nodes of a panel: 1e-9 of the largest force, unless a law changes faster than within a."""
 _X, _WEIGHT = np.polynomial.legendre.leggauss(NODES)
 _SMALL = 1e-8
 """h^2 below which three terms of the series are exact."""
 
 
 class Node(NamedTuple):
-    """A Gauss node of links: distance from the midpoint, normal velocity, and weight; the weights
-    add up to the length."""
+    """Distance from the midpoint, normal velocity, and weight; weights add up to the length."""
 
     sigma: Array
     y: Array
@@ -46,18 +38,13 @@ class Node(NamedTuple):
 
 
 def link_nodes(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Iterator[Node]:
-    """The nodes of links; arguments as of `colloc.mechanics.link_friction.link_moments`.
-
-    With CasADi one after the other; with NumPy those of a panel at once, along a first axis (see
-    `_gathered`).
-    """
+    """Gauss nodes of links: with CasADi one after the other, with NumPy those of a panel at once,
+    along a first axis."""
     xp = namespace(vs, vn, w, delta)
-    at_once = isinstance(vs, np.ndarray)
-    places = (
-        ((_X[:, None, None], _WEIGHT[:, None, None]),)
-        if at_once
-        else tuple(zip(_X, _WEIGHT, strict=True))
-    )
+    if isinstance(vs, np.ndarray):
+        places = [(_X[:, None, None], _WEIGHT[:, None, None])]
+    else:
+        places = list(zip(_X, _WEIGHT, strict=True))
     a = xp.sqrt(vs * vs + delta * delta)
     half = 0.5 * length * w
     y0, y1 = vn - half, vn + half
@@ -83,25 +70,23 @@ def link_nodes(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> I
         for place, weight in places:
             x = centre + reach * place
             tau, rest = m + h * x, 1.0 - x * x
-            series = x * (1.0 - square * rest / 6) - 0.5 * tilt * h * rest * (
-                1.0 - square * rest / 12
-            )
+            bend = 1.0 - square * rest / 12
+            series = x * (1.0 - square * rest / 6) - 0.5 * tilt * h * rest * bend
             product = xp.sinh(0.5 * safe * (1.0 + x)) * xp.sinh(0.5 * safe * (1.0 - x))
             share = xp.where(small, series, (xp.sinh(safe * x) - 2.0 * tilt * product) * per_sinh)
-            yield Node(
-                0.5 * length * share, a * xp.sinh(tau), weight * reach * width * xp.cosh(tau)
-            )
+            mass = weight * reach * width * xp.cosh(tau)
+            yield Node(0.5 * length * share, a * xp.sinh(tau), mass)
 
 
-def _gathered(values: Array) -> Array:
-    """What nodes add up to, where they lie along a first axis."""
+def _sum(values: Array) -> Array:
+    """The sum over nodes along a first axis, if there is one."""
     return values.sum(axis=0) if getattr(values, "ndim", 2) > 2 else values
 
 
 class LineIntegrals:
-    """What a law says of links. Velocities are those along and across them at their midpoints and
-    their rotation rates, ``(n_link, n_time)``, lengths ``(n_link, 1)``; NumPy and CasADi.
-    """
+    """A law on links: velocities along and across them at their midpoints and rotation rates,
+    ``(n_link, n_time)``, lengths ``(n_link, 1)``; NumPy and CasADi. By quadrature; laws in closed
+    form register a subclass."""
 
     def __init__(self, law: Any) -> None:
         self.law = law
@@ -111,73 +96,59 @@ class LineIntegrals:
         tangential = normal = couple = 0.0 * (vs + vn + w)
         for sigma, y, weight in link_nodes(vs, vn, w, length, delta):
             fs, fn = self.law.density(vs, y, delta)
-            tangential, normal = (
-                tangential + _gathered(weight * fs),
-                normal + _gathered(weight * fn),
-            )
-            couple = couple + _gathered(weight * sigma * fn)
+            tangential, normal = tangential + _sum(weight * fs), normal + _sum(weight * fn)
+            couple = couple + _sum(weight * sigma * fn)
         return LinkForce(tangential, normal, couple)
 
     def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        """Minus its derivative with respect to (vs, vn, w)."""
-        return _on_links(
-            [
-                (n, self.law.density_jacobian(vs, n.y, delta))
-                for n in link_nodes(vs, vn, w, length, delta)
-            ]
-        )
+        """Minus its derivative with respect to (vs, vn, w), 3 x 3."""
+        return self._integrate(self.law.density_jacobian, vs, vn, w, length, delta)
 
     def secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        """`colloc.mechanics.law.Law.density_secant`, integrated."""
-        return _on_links(
-            [
-                (n, self.law.density_secant(vs, n.y, delta))
-                for n in link_nodes(vs, vn, w, length, delta)
+        """`colloc.mechanics.law.Law.density_secant`, integrated, 3 x 3."""
+        return self._integrate(self.law.density_secant, vs, vn, w, length, delta)
+
+    def _integrate(
+        self, density: Any, vs: Array, vn: Array, w: Array, length: Array, delta: Array
+    ) -> Matrix:
+        total = [[0.0] * 3 for _ in range(3)]
+        for sigma, y, weight in link_nodes(vs, vn, w, length, delta):
+            (ss, sn), (ns, nn) = density(vs, y, delta)
+            rows = (
+                (ss, sn, sigma * sn),
+                (ns, nn, sigma * nn),
+                (sigma * ns, sigma * nn, sigma * sigma * nn),
+            )
+            total = [
+                [t + _sum(weight * entry) for t, entry in zip(*pair, strict=True)]
+                for pair in zip(total, rows, strict=True)
             ]
-        )
+        return tuple(tuple(row) for row in total)
 
     def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-        """`colloc.mechanics.law.Law.density_potential`, integrated; of associated laws only."""
-        nodes = link_nodes(vs, vn, w, length, delta)
+        """`colloc.mechanics.law.Law.density_potential`, integrated."""
         return sum(
-            _gathered(weight * self.law.density_potential(vs, y, delta)) for _, y, weight in nodes
+            _sum(weight * self.law.density_potential(vs, y, delta))
+            for _, y, weight in link_nodes(vs, vn, w, length, delta)
         )
 
     def scaled_laws(
         self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce
     ) -> list[Array]:
-        """What vanishes where given forces on links obey the law, three arrays scaled like
-        velocities: constraints of a full program, so they must be mild where the force is nearly a
-        step. Here differences over the secants."""
-        own = self.force(vs, vn, w, length, delta)
+        """Residuals of the law for link forces that are variables, scaled like velocities: mild
+        constraints where the force is nearly a step."""
+        integral = self.force(vs, vn, w, length, delta)
         secant = self.secant(vs, vn, w, length, delta)
         return [
-            (force.tangential - own.tangential) / secant[0][0],
-            (force.normal - own.normal) / secant[1][1],
-            (force.couple - own.couple) / secant[1][1] * (6 / length),
+            (force.tangential - integral.tangential) / secant[0][0],
+            (force.normal - integral.normal) / secant[1][1],
+            (force.couple - integral.couple) / secant[1][1] * (6 / length),
         ]
 
     def largest_forces(self, length: np.ndarray) -> np.ndarray:
-        """Bounds on force, normal force and couple of links at any speed, ``(3 n_link, 1)``; or
-        infinity."""
-        return np.full((3 * length.size, 1), np.inf)
+        """Bounds on force, normal force and couple at any speed, ``(3, n_link, 1)``."""
+        return np.full((3, *length.shape), np.inf)
 
 
 line_integrals = singledispatch(LineIntegrals)
 """The `LineIntegrals` of a law."""
-
-
-def _on_links(densities: list[tuple[Node, Matrix]]) -> Matrix:
-    """3 x 3 matrices of links from 2 x 2 ones at their nodes."""
-    total = [[0.0] * 3 for _ in range(3)]
-    for (sigma, _, weight), ((ss, sn), (ns, nn)) in densities:
-        rows = (
-            (ss, sn, sigma * sn),
-            (ns, nn, sigma * nn),
-            (sigma * ns, sigma * nn, sigma * sigma * nn),
-        )
-        total = [
-            [t + _gathered(weight * e) for t, e in zip(*pair, strict=True)]
-            for pair in zip(total, rows, strict=True)
-        ]
-    return tuple(tuple(row) for row in total)

@@ -1,26 +1,22 @@
-r"""Delta-regularised Coulomb friction on a straight link, integrated in closed form.
+r"""Closed forms of Coulomb friction on a straight link (design notes, section 2).
 
-On a rigid link of length `l` the tangential velocity `vs` is constant and the normal velocity is
-``y = vn + w sigma``, with ``sigma`` in [-l/2, l/2] measured from the midpoint. With ``r = sqrt(vs^2
-+ y^2 + delta^2)`` the friction force per unit length is ``-(mu_s vs, mu_t y)/r`` (paper, eqs.
-frictiondelta and delta); `vs` has one sign on a link, so the forward/backward switch is exact. A
-law that measures speeds with the tangential one stretched (`Coefficients.stretch`) has the same
-integrals at the stretched velocity. Everything is expressed through
+Along a link vs is constant and ``y = vn + w sigma`` is linear; with ``r = sqrt(vs^2 + y^2 +
+delta^2)`` the force per length is ``-(mu_s vs, mu_t y)/r`` (paper, eqs. frictiondelta and delta).
+Everything is expressed through
 
     r0, r1   the end values of r,       S = r0 + r1,      a^2 = vs^2 + delta^2
     q        = (w l / S)^2 in [0, 1)
     P        = a^2 + y0 y1 + r0 r1 = (1 - q) S^2 / 2,     Q = a^2 / P
     g        = atanh(sqrt q)/sqrt q,    h = (g - 1)/q
 
-and every formula below is free of cancellation for any ``w``, ``vs``, ``vn`` and ``delta > 0`` (see
-`_roots` for P). They follow from integration by parts; tests/mechanics/test_friction.py holds them
-against adaptive quadrature.
+without cancellation for any ``w``, ``vs``, ``vn`` and ``delta > 0``.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
+from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array, namespace
 
 _SERIES_LIMIT = 0.1
@@ -30,25 +26,21 @@ loses 10 eps."""
 
 
 class Coefficients(Protocol):
-    """What the closed forms ask of a law of friction."""
+    """As `colloc.mechanics.friction.Friction`."""
 
     @property
     def mu_t(self) -> float: ...
 
-    def tangential(self, vs: Array) -> Array:
-        """Coefficient mu_s of a link that slides along itself with velocity `vs`."""
+    def tangential(self, vs: Array) -> Array: ...
 
-    def stretch(self, vs: Array) -> Array:
-        """How many times its value `vs` counts in the speed r."""
+    def stretch(self, vs: Array) -> Array: ...
 
 
 class _Roots(NamedTuple):
     a2: Array
-    """vs^2 + delta^2"""
     r0r1: Array
     S: Array
     Q: Array
-    """a^2 / P"""
     g: Array
     h: Array
 
@@ -81,8 +73,8 @@ def _roots(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> _Root
     T = a2 + y0 * y1
     opposite = T < 0
     Q = xp.where(opposite, r0r1 - T, a2) / xp.where(opposite, 4.0 * half * half, r0r1 + T)
-    # squared before |w| appears: automatic differentiation loses q'' where w = 0 behind an absolute
-    # value
+    # squared before |w| appears: behind an absolute value automatic differentiation loses q'' at
+    # w = 0
     signed_root_q = 2.0 * half / S
     q = signed_root_q * signed_root_q
     small = q < _SERIES_LIMIT
@@ -97,19 +89,8 @@ def _roots(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> _Root
 
 
 def link_moments(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Moments:
-    """Integrals of sigma^j / r over links, j = 0, 1, 2.
-
-    Parameters
-    ----------
-    vs, vn : (n_link, n_time)
-        Tangential and normal velocity of the midpoints [length/time].
-    w : (n_link, n_time)
-        Rotation rates [rad/time].
-    length : (n_link, 1)
-        Link lengths.
-    delta : float
-        Regularisation speed.
-    """
+    """Integrals of sigma^j / r over links, from velocities of the midpoints along and across,
+    rotation rates ``(n_link, n_time)``, lengths ``(n_link, 1)`` and delta."""
     k = _roots(vs, vn, w, length, delta)
     l3 = length**3
     return Moments(
@@ -122,8 +103,6 @@ def link_moments(vs: Array, vn: Array, w: Array, length: Array, delta: Array) ->
 def link_force(
     vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Coefficients
 ) -> LinkForce:
-    """Friction force and couple on links; arguments as for `link_moments` (paper, eq.
-    frictiondelta, integrated)."""
     mu_s, vs = friction.tangential(vs), friction.stretch(vs) * vs
     k = _roots(vs, vn, w, length, delta)
     return LinkForce(
@@ -134,8 +113,7 @@ def link_force(
 
 
 def link_dissipation(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-    """Dissipation potential of links, the integral of r; with mu = 1 its gradient is minus the
-    isotropic force."""
+    """Dissipation potential of links at mu = 1, the integral of r."""
     k = _roots(vs, vn, w, length, delta)
     return length / k.S * (vn * vn + 0.25 * k.S * k.S + k.a2 * k.g)
 
@@ -147,13 +125,9 @@ def power(vs: Array, vn: Array, w: Array, force: LinkForce) -> Array:
 
 def link_force_jacobian(
     vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Coefficients
-) -> tuple[tuple[Array, Array, Array], ...]:
-    """Minus the derivative of (tangential, normal, couple) with respect to (vs, vn, w), as a 3 x 3
-    tuple of arrays.
-
-    An associated law makes it symmetric and positive definite: it is the Hessian of mu_t
-    `link_dissipation`. The switch of a directional law is differentiated on its current side.
-    """
+) -> Matrix:
+    """Minus the derivative of (tangential, normal, couple) with respect to (vs, vn, w); a switch
+    of coefficients is differentiated on its current side."""
     mu_s, mu_t, stretch = friction.tangential(vs), friction.mu_t, friction.stretch(vs)
     vs = stretch * vs
     k = _roots(vs, vn, w, length, delta)
@@ -175,9 +149,8 @@ def link_force_jacobian(
 
 def link_secant(
     vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Coefficients
-) -> tuple[tuple[Array, Array, Array], ...]:
-    """Minus force over velocity with r frozen, as a 3 x 3 tuple: the law of the paper's fixed point
-    on links."""
+) -> Matrix:
+    """Minus force over velocity with r frozen: the paper's fixed point on links."""
     mu_s, mu_t, stretch = friction.tangential(vs), friction.mu_t, friction.stretch(vs)
     I0, I1, I2 = link_moments(stretch * vs, vn, w, length, delta)
     zero = 0.0 * I0
@@ -186,23 +159,3 @@ def link_secant(
         (zero, mu_t * I0, mu_t * I1),
         (zero, mu_t * I1, mu_t * I2),
     )
-
-
-def scaled_laws(
-    vs: Array,
-    vn: Array,
-    w: Array,
-    length: Array,
-    delta: Array,
-    friction: Coefficients,
-    force: LinkForce,
-) -> list[Array]:
-    """What vanishes where given forces on links obey the law, scaled like velocities: ``F / I0 + mu
-    v = 0`` and so on."""
-    mu_s, mu_t, vs = friction.tangential(vs), friction.mu_t, friction.stretch(vs) * vs
-    I0, I1, I2 = link_moments(vs, vn, w, length, delta)
-    return [
-        force.tangential / I0 + mu_s * vs,
-        force.normal / I0 + mu_t * (vn + w * I1 / I0),
-        (force.couple / I0 + mu_t * (vn * I1 / I0 + w * I2 / I0)) * (6 / length),
-    ]

@@ -1,12 +1,8 @@
-"""The compiled kernel of chains: C sources of this package as a shared library, or none, and its
-calls. No CasADi.
+"""The compiled kernel of chains, or none, and its calls.
 
-The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are built with
-the package (setup.py). If that could not be, or they were changed since, everything is done by
-NumPy, the reference (docs/developers/kernel.md), and so are laws of friction that the kernel does
-not have in closed form.
-Calls release the interpreter's lock, so that large batches are shared by threads; an instant's
-answer depends on nothing but its own data, so it is the same in any batch and on any number of
+The C sources (folder `native`) mirror the NumPy solvers step by step (docs/developers/kernel.md).
+Without them, and for laws that are not in closed form, NumPy does everything. Calls release the
+interpreter's lock, so that threads share large batches; results do not depend on batches or
 threads.
 """
 
@@ -28,6 +24,7 @@ from typing import overload
 import numpy as np
 
 from colloc.mechanics.balance import Moving
+from colloc.mechanics.bodies import BalanceSolution
 from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
@@ -37,42 +34,18 @@ from colloc.system.processors import available_threads
 
 SOURCES = resources.files("colloc.mechanics") / "native"
 _PIECE = 4000
-"""Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have
-another piece."""
+"""Time points a call: about 10 ms, after which an interrupt is heard and threads switch."""
 
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
 BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
+_SHAPES = (*BODY, _ARRAY, _ARRAY, _REAL)
+_METHOD = _REAL, ctypes.c_longlong, ctypes.c_int
+_SCHEME = _ARRAY, _REAL, _COUNT, ctypes.c_int
 _SIGNATURES = {
-    "colloc_balance": (
-        *BODY,
-        _ARRAY,
-        _ARRAY,
-        _REAL,
-        _ARRAY,
-        _ARRAY,
-        _REAL,
-        ctypes.c_longlong,
-        ctypes.c_int,
-        *[_ARRAY] * 5,
-    ),
-    "colloc_motion": (*BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
-    "colloc_repeating": (
-        *BODY,
-        *(_ARRAY, _ARRAY, _REAL, _ARRAY, _REAL),
-        *(_COUNT, ctypes.c_int, *[_ARRAY] * 6, ctypes.POINTER(ctypes.c_int)),
-    ),
-    "colloc_momenta": (
-        *BODY,
-        _ARRAY,
-        _ARRAY,
-        _REAL,
-        _ARRAY,
-        _REAL,
-        _ARRAY,
-        ctypes.c_int,
-        _ARRAY,
-        _ARRAY,
-    ),
+    "colloc_balance": (*_SHAPES, _ARRAY, _ARRAY, *_METHOD, *[_ARRAY] * 5),
+    "colloc_motion": (*_SHAPES, *[_ARRAY] * 5),
+    "colloc_repeating": (*_SHAPES, *_SCHEME, *[_ARRAY] * 6, ctypes.POINTER(ctypes.c_int)),
+    "colloc_momenta": (*_SHAPES, _ARRAY, _REAL, _ARRAY, ctypes.c_int, _ARRAY, _ARRAY),
 }
 _SLOW = (
     "the balance is solved by NumPy, 10 to 60 times more slowly: the compiled kernel was not "
@@ -80,23 +53,19 @@ _SLOW = (
     "since; install colloc again with a C compiler on the PATH."
 )
 
-_ANY, _USUAL = Links(), Friction()
+_LINKS, _COULOMB = Links(), Friction()
 _switched_off = False
 
 
-def native_kernel(body: Links = _ANY, friction: Law = _USUAL) -> ctypes.CDLL | None:
-    """The compiled kernel, or None where NumPy has to do: the one place that decides between
-    them."""
-    return (
-        library()
-        if not _switched_off and body.in_series and body.contact.kernel_numbers(friction)
-        else None
-    )
+def native_kernel(body: Links = _LINKS, friction: Law = _COULOMB) -> ctypes.CDLL | None:
+    """The compiled kernel, or None where NumPy has to do."""
+    usable = not _switched_off and body.in_series and _parameters(body, friction)
+    return library() if usable else None
 
 
 @contextlib.contextmanager
 def numpy_instead() -> Iterator[None]:
-    """Within it everything is done by NumPy, on all threads: for comparison."""
+    """A context in which NumPy does everything, on all threads: for comparison."""
     global _switched_off
     before, _switched_off = _switched_off, True
     try:
@@ -107,8 +76,7 @@ def numpy_instead() -> Iterator[None]:
 
 @cache
 def library() -> ctypes.CDLL | None:
-    """The kernel as it was built, or None, with a `SlowWarning`, if there is none of these
-    sources."""
+    """The kernel as it was built; None, with a `SlowWarning`, if there is none of these sources."""
     with resources.as_file(SOURCES) as sources:
         built = built_kernel(sources)
     if built is None:
@@ -121,24 +89,21 @@ def library() -> ctypes.CDLL | None:
 
 
 def built_kernel(sources: Path) -> ctypes.CDLL | None:
-    """The library that was built of these very sources with the package, if there is one."""
+    """The library that was built of these very sources, if there is one."""
     now = hashlib.sha256(
         b"".join(file.read_bytes() for file in sorted(sources.glob("*.[ch]")))
     ).hexdigest()
     for file in _built_files():
         with contextlib.suppress(OSError, ValueError):  # of another machine, or of something else
-            found = ctypes.CDLL(file)
-            made_of = ctypes.string_at(
-                ctypes.addressof(ctypes.c_char.in_dll(found, "colloc_sources"))
-            )
-            if made_of.decode("ascii") == now:
-                return found
+            kernel = ctypes.CDLL(file)
+            address = ctypes.addressof(ctypes.c_char.in_dll(kernel, "colloc_sources"))
+            if ctypes.string_at(address).decode("ascii") == now:
+                return kernel
     return None
 
 
 def _built_files() -> Iterator[str]:
-    """Where a built kernel may be: beside this file; or, where Python runs a clone's source, with
-    what was installed of it."""
+    """Candidates beside this file or, where Python runs a clone's source, of the installation."""
     spec = find_spec("colloc.mechanics._kernel")
     if spec is not None and spec.origin is not None:
         yield spec.origin
@@ -154,7 +119,6 @@ def address(array: np.ndarray) -> int: ...
 @overload
 def address(array: np.ndarray | None) -> int | None: ...
 def address(array: np.ndarray | None) -> int | None:
-    """Where an array's data are, for a call."""
     return None if array is None else array.ctypes.data
 
 
@@ -166,40 +130,38 @@ def call_for_all(
     *arguments: object,
     piece: int = _PIECE,
 ) -> None:
-    """Call a function of the kernel for all instants: with the chain, the law and the instants of a
-    piece, then arguments."""
-    chain, _numbers = _stated(body, friction)  # kept through the calls, which read them
-    _each_piece(
-        n_time, piece, lambda first, last: function(*chain, n_time, first, last, *arguments)
-    )
+    """Call a function of the kernel with the chain, its law and the time points of each piece, then
+    the arguments; on several threads if there are many. `MemoryError` if it fails."""
+    parameters = _parameters(body, friction)  # kept through the calls, which read them
+    chain = body.n_link, *map(address, parameters)
+
+    def call(first: int) -> int:
+        return function(*chain, n_time, first, min(first + piece, n_time), *arguments)
+
+    starts = range(0, n_time, piece)
+    if len(starts) > 1 and (workers := min(available_threads(), len(starts))) > 1:
+        with ThreadPoolExecutor(workers) as pool:
+            failed = any(list(pool.map(call, starts)))
+    else:
+        failed = any(map(call, starts))
+    if failed:
+        raise MemoryError("no memory for the links of a body.")
 
 
 @lru_cache(maxsize=64)
-def _stated(body: Links, friction: Law) -> tuple[tuple[int, ...], tuple[np.ndarray, ...]]:
-    """A chain and its law as calls are told them: how many links, and where the numbers are, which
-    come with it."""
+def _parameters(body: Links, friction: Law) -> tuple[np.ndarray, ...]:
+    """Lengths, pressures, masses, contacts with their laws; empty where the kernel lacks a law."""
     law = np.array(body.contact.kernel_numbers(friction), dtype=float)
-    numbers = (
-        np.array(body.lengths),
-        body.pressure_column().ravel(),
-        body.mass_column().ravel(),
-        law,
-    )
-    return (body.n_link, *map(address, numbers)), numbers
+    if not law.size:
+        return ()
+    columns = body.pressure_column().ravel(), body.mass_column().ravel()
+    return np.array(body.lengths), *columns, law
 
 
-def _each_piece(n_time: int, piece: int, treat: Callable[[int, int], int]) -> None:
-    """Call ``treat(first, last)`` for all of a batch, in pieces, on several threads if it is large.
-    `MemoryError` if a call returns anything but 0."""
-    starts = range(0, n_time, piece)
-    ends = [min(first + piece, n_time) for first in starts]
-    if len(ends) > 1 and (workers := min(available_threads(), len(ends))) > 1:
-        with ThreadPoolExecutor(workers) as pool:
-            failed = any(list(pool.map(treat, starts, ends)))
-    else:
-        failed = any(map(treat, starts, ends))
-    if failed:
-        raise MemoryError("no memory for the links of a body.")
+def _shapes(moving: Moving) -> tuple[tuple[np.ndarray, np.ndarray], tuple[int, int, float]]:
+    """Contiguous angles and rates, to be held through a call, and the arguments they make."""
+    angles, rates = (np.ascontiguousarray(a, dtype=float) for a in (moving.angles, moving.rates))
+    return (angles, rates), (address(angles), address(rates), moving.delta)
 
 
 def compiled_balance(
@@ -212,64 +174,49 @@ def compiled_balance(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3,
     n_time)``."""
-    n_time = moving.angles.shape[1]
-    angles, rates = np.ascontiguousarray(moving.angles), np.ascontiguousarray(moving.rates)
+    n_time, (_held, shapes) = moving.angles.shape[1], _shapes(moving)
     load, start = (None if a is None else np.ascontiguousarray(a) for a in (moving.load, start))
-    numbers, counts = np.empty((7, n_time)), np.empty((2, n_time), dtype=np.int64)
-    (first, row), (first_count, count_row) = ((address(a), a.strides[0]) for a in (numbers, counts))
-    before, after = map(address, (angles, rates)), map(address, (load, start))
-    how = tolerance, max_iterations, METHODS.index(method)
-    found = first, first + 6 * row, first_count, first_count + count_row, first + 3 * row
-    function, delta = library.colloc_balance, moving.delta
+    z, velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
+    iterations, anchor = np.empty((2, n_time), dtype=np.int64)
     call_for_all(
-        function, moving.body, moving.friction, n_time, *before, delta, *after, *how, *found
-    )
-    return numbers[:3], numbers[6], counts[0], counts[1], numbers[3:6]
+        library.colloc_balance, moving.body, moving.friction, n_time, *shapes,
+        address(load), address(start), tolerance, max_iterations, METHODS.index(method),
+        *map(address, (z, residual, iterations, anchor, velocity)),
+    )  # fmt: skip
+    return z, residual, iterations, anchor, velocity
 
 
 def compiled_motion(
-    library: ctypes.CDLL,
-    moving: Moving,
-    anchor: np.ndarray,
-    anchor_velocity: np.ndarray,
-    *,
-    with_slopes: bool,
+    library: ctypes.CDLL, moving: Moving, solved: BalanceSolution, *, derivatives: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6,
-    n, n_time)`` if asked for."""
-    body, friction, angles, rates, delta, load = moving
-    n_time = angles.shape[1]
-    angles, rates, anchor_velocity = (
-        np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity)
-    )
-    load = None if load is None else np.ascontiguousarray(load, dtype=float)
-    anchor = np.ascontiguousarray(anchor, dtype=np.int64)
-    columns = 2 * body.n_joint + (0 if load is None else 2)
-    values, slopes = np.empty((7, n_time)), np.empty((6 if with_slopes else 0, columns, n_time))
-    after = map(address, (load, anchor, anchor_velocity, values, slopes if with_slopes else None))
+    """Tail velocity, velocity of the centre, power and actuators' power ``(7, n_time)``; and
+    derivatives ``(6, n, n_time)`` along angles, rates and load if asked for."""
+    n_time, (_held, shapes) = moving.angles.shape[1], _shapes(moving)
+    velocity = np.ascontiguousarray(solved.anchor_velocity, dtype=float)
+    load = None if moving.load is None else np.ascontiguousarray(moving.load, dtype=float)
+    anchor = np.ascontiguousarray(solved.anchor, dtype=np.int64)
+    columns = 2 * moving.body.n_joint + (0 if load is None else 2)
+    values, slopes = np.empty((7, n_time)), np.empty((6 * derivatives, columns, n_time))
     call_for_all(
-        library.colloc_motion, body, friction, n_time, *map(address, (angles, rates)), delta, *after
-    )
+        library.colloc_motion, moving.body, moving.friction, n_time, *shapes,
+        *map(address, (load, anchor, velocity, values, slopes if derivatives else None)),
+    )  # fmt: skip
     return values, slopes
 
 
 def kernel_momenta(
     library: ctypes.CDLL, moving: Moving, states: np.ndarray, froude: float, *, columns: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What `colloc.motion.compiled_momenta` speaks of: values ``(9, n_time)``, and derivatives
-    ``(9, columns, n_time)``."""
-    body, friction, angles, rates, delta, _ = moving
-    n_time = angles.shape[1]
-    angles, rates, states = (np.ascontiguousarray(a, dtype=float) for a in (angles, rates, states))
-    spin, values, slopes = (
-        body.inertia_column().ravel(),
-        np.empty((9, n_time)),
-        np.empty((9, columns, n_time)),
-    )
-    how = address(spin), froude, address(states), columns, address(values), address(slopes)
+    """Outputs of `colloc.motion.compiled_momenta` ``(9, n_time)``, and derivatives ``(9, columns,
+    n_time)``."""
+    n_time, (_held, shapes) = moving.angles.shape[1], _shapes(moving)
+    states = np.ascontiguousarray(states, dtype=float)
+    spin = moving.body.inertia_column().ravel()
+    values, slopes = np.empty((9, n_time)), np.empty((9, columns, n_time))
     call_for_all(
-        library.colloc_momenta, body, friction, n_time, address(angles), address(rates), delta, *how
-    )
+        library.colloc_momenta, moving.body, moving.friction, n_time, *shapes,
+        address(spin), froude, address(states), columns, address(values), address(slopes),
+    )  # fmt: skip
     return values, slopes
 
 
@@ -280,28 +227,17 @@ def kernel_repeating(
     froude: float,
     scheme: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Momenta ``(3, n_time)`` at the points of a collocation `scheme`
-    (`colloc.motion.states.CollocatedStates.scheme`) that repeat every period, sought near others,
-    of which the last column is the start; their outputs ``(9, n_time)``; and whether there are
-    any."""
-    body, friction, angles, rates, delta, _ = moving
-    n_time, (a, b, image) = (
-        angles.shape[1],
-        (np.ascontiguousarray(each, dtype=float) for each in scheme),
-    )
-    angles, rates = (
-        np.ascontiguousarray(angles, dtype=float),
-        np.ascontiguousarray(rates, dtype=float),
-    )
-    states, start, spin = near[:, :-1].copy(), near[:, -1].copy(), body.inertia_column().ravel()
-    values, held = np.empty((9, n_time)), ctypes.c_int()
-    how = (
-        address(spin),
-        froude,
-        *b.shape,
-        *map(address, (a, b, image, states, start, values)),
-        ctypes.byref(held),
-    )
-    shapes = address(angles), address(rates), delta
-    call_for_all(library.colloc_repeating, body, friction, n_time, *shapes, *how, piece=n_time)
-    return states, values, bool(held.value)
+    """Periodic momenta ``(3, n_time)`` at the points of a collocation `scheme`
+    (`colloc.motion.states.CollocatedStates.scheme`), their outputs ``(9, n_time)``, and whether
+    there are any; from an initial guess whose last column is the start."""
+    n_time, (_held, shapes) = moving.angles.shape[1], _shapes(moving)
+    a, b, image = (np.ascontiguousarray(each, dtype=float) for each in scheme)
+    states, start = near[:, :-1].copy(), near[:, -1].copy()
+    spin = moving.body.inertia_column().ravel()
+    values, converged = np.empty((9, n_time)), ctypes.c_int()
+    call_for_all(
+        library.colloc_repeating, moving.body, moving.friction, n_time, *shapes,
+        address(spin), froude, *b.shape, *map(address, (a, b, image, states, start, values)),
+        ctypes.byref(converged), piece=n_time,
+    )  # fmt: skip
+    return states, values, bool(converged.value)

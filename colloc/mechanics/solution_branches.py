@@ -1,37 +1,56 @@
-"""All velocities that balance a chain at an instant: with unequal coefficients there may be
-several.
+"""All velocities that balance a chain: with unequal coefficients there may be several.
 
-Coulomb friction whose coefficients differ is no gradient and not monotone, so nothing forbids
-several balanced velocities (docs/theory.md). Where they exist, a link is at rest in one of them, or
-nearly; so solving from every link at rest, one after the other, finds them. Whether any is missing
-can be counted: far away the net force opposes the velocity, so the signs of the determinant of
-minus its derivative add up to 1 over all solutions (the degree of the map). A negative one belongs
-to a motion that the slightest inertia leaves.
+Coulomb friction whose coefficients differ is no gradient and not monotone (docs/theory.md). Where
+several balances exist, a link rests in one of them, or nearly; so solving from every link at rest
+finds them. Far away the net force opposes the velocity, so the signs of the determinant of minus
+its derivative add up to 1 over all solutions (the degree of the map). The slightest inertia leaves
+a motion of negative sign.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from colloc.mechanics.balance import Moving, balance_jacobian, instant
-from colloc.mechanics.balance_results import BalanceSolution, Branches
+from colloc.mechanics.bodies import BalanceSolution
 from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links
 
 DISTINCT = 1e-5
-"""Velocities that differ by less, in units of the largest rate, are one."""
+"""Difference of distinct velocities, in units of the largest rate."""
 _TOLERANCE, _ACCEPTED = 1e-12, 1e-11
-"""What the solver is asked for, and what will do where rounding stops it: its own tolerance."""
+"""The solver's tolerance, and the residual accepted where rounding stops it."""
 _BESIDE = tuple(
     side * size for size in (0.8, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005) for side in (-1, 1)
 )
-"""Where more solutions are looked for along the softest direction of one, in units of the largest
-rate."""
+"""Starts along the softest direction of a solution, in units of the largest rate."""
 _BETWEEN = (0.5, 0.2, 0.8, 0.05, 0.95, 0.02, 0.98, 0.005, 0.995)
-"""The same from one solution to another, as parts of the way: the third often lies next to one of
-them."""
+"""Starts between two solutions: the third often lies next to one of them."""
+
+
+class Branches(NamedTuple):
+    """Balanced velocities, from one to `n_root` at each time point.
+
+    z: tail velocities ``(n_root, 3, n_time)``; NaN where there are fewer. sign: of the determinant
+    of `colloc.mechanics.balance.balance_jacobian`, ``(n_root, n_time)``; 0 where there are fewer.
+    """
+
+    z: np.ndarray
+    sign: np.ndarray
+
+    @property
+    def number(self) -> np.ndarray:
+        """Number of solutions, ``(n_time,)``; 0 where the solver failed."""
+        return (self.sign != 0).sum(axis=0)
+
+    @property
+    def complete(self) -> np.ndarray:
+        """Whether the signs add up to 1, as they do over all solutions, ``(n_time,)``."""
+        return self.sign.sum(axis=0) == 1
 
 
 def all_balanced_velocities(
@@ -42,27 +61,8 @@ def all_balanced_velocities(
     delta: float,
     load: np.ndarray | None = None,
 ) -> Branches:
-    """Every balanced velocity that can be found, the one of `solve_balance` first.
+    """Every balanced velocity that can be found, that of `solve_balance` first; arguments as there.
 
-    Parameters
-    ----------
-    body : Links
-    friction : Law
-        An associated one has one balance, which is solved for once.
-    angles, rates : (n_joint, n_time)
-        Joint angles [rad] and their rates [rad/time].
-    delta : float
-        Regularisation speed.
-    load : (2, n_time), optional
-        An outside force, as `colloc.mechanics.fixed_point.solve_balance` takes it.
-
-    Raises
-    ------
-    ProblemError
-        As `colloc.mechanics.fixed_point.solve_balance`.
-
-    Examples
-    --------
     Three links with friction (1, 0.01, 100), the first joint turning:
 
     >>> from colloc.mechanics.friction import Friction
@@ -74,27 +74,24 @@ def all_balanced_velocities(
     friction = body.law(friction)
     moving = Moving(body, friction, angles, rates, delta, load)
     if friction.associated:
-        return Branches(*_solved(moving, np.zeros((1, 3, angles.shape[1])), "auto"))
-    z, sign = _solved(moving, np.stack([moving.at_rest(link) for link in body.contact.rests]))
+        return Branches(*_solve(moving, np.zeros((1, 3, angles.shape[1])), "auto"))
+    z, sign = _solve(moving, np.stack([moving.at_rest(link) for link in body.contact.rests]))
     found = _distinct(z, sign, _speed(rates))
     doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
     if not doubtful.size:
         return found
     # where a branch has just ended the solver may hang with a small residual; the solution then
     # lies beside
-    part, known = moving.at(doubtful), Branches(z[:, :, doubtful], sign[:, doubtful])
-    more = _solved(part, _between_and_beside(part, known.z))
+    part, known = moving.at(doubtful), (z[:, :, doubtful], sign[:, doubtful])
+    more = _solve(part, _between_and_beside(part, known[0]))
     z, sign = (np.concatenate(pair) for pair in zip(known, more, strict=True))
-    found = _merged(found, doubtful, _distinct(z, sign, _speed(part.rates)))
+    found = _replace(found, doubtful, _distinct(z, sign, _speed(part.rates)))
     missed = np.flatnonzero(found.number == 0)
     if not missed.size:
         return found
-    part = moving.at(missed)  # the long way, which hardly ever has to be gone
-    return _merged(
-        found,
-        missed,
-        _distinct(*_solved(part, np.zeros((1, 3, missed.size)), "auto"), _speed(part.rates)),
-    )
+    part = moving.at(missed)  # the long way, which is hardly ever needed
+    z, sign = _solve(part, np.zeros((1, 3, missed.size)), "auto")
+    return _replace(found, missed, _distinct(z, sign, _speed(part.rates)))
 
 
 def _speed(rates: np.ndarray) -> np.ndarray:
@@ -102,30 +99,27 @@ def _speed(rates: np.ndarray) -> np.ndarray:
     return np.maximum(np.abs(rates).max(axis=0), np.finfo(float).tiny)
 
 
-def _solved(
+def _solve(
     moving: Moving, starts: np.ndarray, method: str = "direct"
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where none is,
-    or one again."""
+    """Solutions from starts ``(n_start, 3, n_time)``, and signs ``(n_start, n_time)``: 0 where none
+    is found, or a repeated one."""
     count, n_time = starts.shape[0], starts.shape[2]
-    body, friction, angles, rates, delta, load = tiled = moving.at(
-        np.tile(np.arange(n_time), count)
+    tiled = moving.at(np.tile(np.arange(n_time), count))
+    start = np.concatenate(list(starts), axis=1)
+    solved = solve_balance(
+        *tiled[:5], load=tiled.load, start=start, tolerance=_TOLERANCE, method=method
     )
-    at, start = (body, friction, angles, rates, delta), np.concatenate(list(starts), axis=1)
-    solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, method=method)
-    z, found = (
-        np.stack(np.split(solved.z, count, axis=1)),
-        (solved.residual <= _ACCEPTED) | solved.converged,
-    )
-    new = found.reshape(count, -1) & ~_repeated(
-        np.where(found.reshape(count, 1, -1), z, np.nan), _speed(moving.rates)
-    )
-    return z, np.sign(_determinant(tiled, solved, np.flatnonzero(new))).reshape(count, -1)
+    z = np.stack(np.split(solved.z, count, axis=1))
+    found = ((solved.residual <= _ACCEPTED) | solved.converged).reshape(count, -1)
+    repeated = _repeated(np.where(found[:, None], z, np.nan), _speed(moving.rates))
+    new = np.flatnonzero(found & ~repeated)
+    return z, np.sign(_determinant(tiled, solved, new)).reshape(count, -1)
 
 
 def _determinant(moving: Moving, solved: BalanceSolution, where: np.ndarray) -> np.ndarray:
-    """Of `balance_jacobian`, ``(n_time,)``, else 0; the reference does not matter, but the slowest
-    link loses no digits."""
+    """Determinant of `balance_jacobian`, ``(n_time,)``, else 0; seen from the slowest link, which
+    loses no digits."""
     result = np.zeros(solved.anchor.size)
     for link, chosen in groups(solved.anchor[where]):
         at = where[chosen]
@@ -134,7 +128,6 @@ def _determinant(moving: Moving, solved: BalanceSolution, where: np.ndarray) -> 
 
 
 def _jacobian(moving: Moving, z: np.ndarray, reference: int | None = TAIL) -> np.ndarray:
-    """`balance_jacobian` at velocities z of a reference."""
     body, friction, angles, rates, delta, _ = moving
     now = instant(body, friction, angles, rates, z, delta, reference)
     return balance_jacobian(
@@ -143,8 +136,8 @@ def _jacobian(moving: Moving, z: np.ndarray, reference: int | None = TAIL) -> np
 
 
 def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
-    """Starts ``(n_start, 3, n_time)``: on the way between some velocities, and along the softest
-    direction of each."""
+    """Starts ``(n_start, 3, n_time)`` between velocities, and along the softest direction of
+    each."""
     starts = [
         z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN
     ]
@@ -155,8 +148,7 @@ def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
 
 
 def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
-    """Solutions less their repetitions, those that remain in their order, and no longer than
-    needed."""
+    """Solutions without repetitions, in their order, and no longer than needed."""
     z = np.where(sign[:, None] == 0, np.nan, z)
     again = _repeated(z, speed)
     z, sign = np.where(again[:, None], np.nan, z), np.where(again, 0.0, sign)
@@ -167,20 +159,17 @@ def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
 
 
 def _repeated(z: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Which of velocities ``(n, 3, n_time)`` one before is already, ``(n, n_time)``; NaN is
-    none."""
+    """Velocities ``(n, 3, n_time)`` that equal one before, ``(n, n_time)``; NaN equals none."""
     return np.stack(
         [(np.abs(z[:i] - z[i]).max(axis=1) < DISTINCT * speed).any(axis=0) for i in range(len(z))]
     )
 
 
-def _merged(everywhere: Branches, chosen: np.ndarray, there: Branches) -> Branches:
-    """The branches `everywhere`, with those at the `chosen` instants replaced."""
+def _replace(everywhere: Branches, chosen: np.ndarray, there: Branches) -> Branches:
+    """Branches with those at the chosen time points replaced."""
     most = max(len(everywhere.z), len(there.z))
-    z, sign = (
-        np.full((most, *everywhere.z.shape[1:]), np.nan),
-        np.zeros((most, everywhere.sign.shape[1])),
-    )
+    z = np.full((most, *everywhere.z.shape[1:]), np.nan)
+    sign = np.zeros((most, everywhere.sign.shape[1]))
     z[: len(everywhere.z)], sign[: len(everywhere.z)] = everywhere
     z[:, :, chosen], sign[:, chosen] = np.nan, 0.0
     z[: len(there.z), :, chosen], sign[: len(there.z), chosen] = there.z, there.sign

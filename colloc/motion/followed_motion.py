@@ -14,11 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance_results import Branches
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
+from colloc.mechanics.links import Links
+from colloc.mechanics.solution_branches import Branches, all_balanced_velocities
 from colloc.system.errors import NotConvergedError
 
 FORWARDS, BACKWARDS = 1, -1
@@ -66,9 +67,9 @@ def followed_motion(
     joint_map : JointMap, optional
         From the motors, of which quantities speak, to the joints.
     """
-    found = body.all_velocities(friction, angles, rates, delta)
-    if found is None:
+    if not isinstance(body, Links):
         return None
+    found = all_balanced_velocities(body, friction, angles, rates, delta)
     if not found.number.all():
         lost = int((found.number == 0).sum())
         raise NotConvergedError(
@@ -104,7 +105,7 @@ def on_one_branch(
     Each is solved for again from the one before, round the period, until none changes; of those
     that change, the nearest stable solution is taken. Where none changes, z itself is returned.
     """
-    if friction.associated or not body.looks_for_all_velocities:
+    if friction.associated or not isinstance(body, Links):
         return z
     followed, at, moves = z.copy(), np.arange(z.shape[1]), np.zeros(z.shape[1], dtype=bool)
     for _ in range(2 * z.shape[1]):
@@ -122,8 +123,7 @@ def on_one_branch(
     # a step from a branch that ends may come to a motion that does not last
     chosen = np.flatnonzero(moves)
     chosen = np.roll(chosen, -int(np.searchsorted(chosen, np.argmin(moves))))
-    all_of = body.all_velocities(friction, angles[:, chosen], rates[:, chosen], delta)
-    assert all_of is not None
+    all_of = all_balanced_velocities(body, friction, angles[:, chosen], rates[:, chosen], delta)
     for k, now in enumerate(chosen):
         if all_of.number[k]:
             followed[:, now] = _nearest(all_of.z[:, :, k], all_of.sign[:, k], followed[:, now - 1])

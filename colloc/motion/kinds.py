@@ -28,8 +28,8 @@ from colloc.gaits.regime import Regime
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import ANTIPODAL, fraction
 from colloc.mechanics.balance import Moving
-from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
-from colloc.mechanics.bodies import Body
+from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Body
+from colloc.mechanics.chain_motion import motion_derivatives
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
@@ -220,8 +220,8 @@ class SlowOnLevel:
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         assert along.solved is not None
-        found = self.body.slopes(
-            self.friction, shapes.angles, shapes.rates, shapes.delta, along.solved
+        found = motion_derivatives(
+            self.body, self.friction, shapes.angles, shapes.rates, shapes.delta, along.solved
         )
         return found, found[:, :0]
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.gaits.sloped import Slope
-from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
+from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import chain_slopes
+from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 
@@ -51,7 +51,8 @@ def balance_on_slope(
     """
     load = slope.pull(theta[None])
     solved = solve_balance(body, friction, *shapes, load=load, **settings)  # type: ignore[arg-type]
-    now, slopes = chain_slopes(body, friction, *shapes, solved, load)
+    now = chain_motion(body, friction, *shapes, solved, load)
+    slopes = motion_derivatives(body, friction, *shapes, solved, load)
     on_load = slopes[:, _LOAD]
     # the pull turns against theta
     return OnSlope(

@@ -15,6 +15,7 @@ from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from colloc.gaits.gait_fields import fields
+from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import rate_independent
 from colloc.pictures.robot_model import FORMATS, floor_of, note_of
@@ -170,8 +171,8 @@ def _approach(
         most = np.maximum(stated, speeds.max(axis=1)) if stated.size else speeds.max()
     way = approach(trajectory, rate, one_each(most, problem.n_motor, "joint speed limit"))
     angles, _ = problem.joint_path(way.angles, way.speeds)
-    crossing = float(problem.body.crossing_depth(angles).max())
-    if max(crossing, problem.body.passing_depth(angles)) > _CROSSES:
+    crossing = float(crossing_depth(problem.body, angles).max())
+    if max(crossing, passing_depth(problem.body, angles)) > _CROSSES:
         raise ProblemError(
             "the body crosses itself on the way from straight into the gait: leave it out "
             "(ramp=False, --no-ramp), and bring the robot to the first sample by hand."

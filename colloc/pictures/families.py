@@ -37,7 +37,7 @@ def front_figure(front: ParetoFront) -> Figure:
                 # a mirror image is the same gait
                 mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
                 panel.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
-            what = front.problem.body.quantity
+            what = front.problem.body.defaults.quantity
             panel.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]", aspect="equal")
     return figure
 

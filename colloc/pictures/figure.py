@@ -14,7 +14,8 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.feet import FOOT, WHEEL
+from colloc.mechanics.contact import crossing_depth, link_width
+from colloc.mechanics.floor_contact import FOOT, WHEEL
 from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
 from colloc.pictures.style import (
     BLUE,
@@ -28,6 +29,7 @@ from colloc.pictures.style import (
     VERMILION,
     snapshot_colours,
 )
+from colloc.results.body_marks import hinges, part_speeds
 from colloc.results.solution import Solution
 
 _GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08  # around snapshots [body lengths]
@@ -42,7 +44,7 @@ _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 class FootMarks:
     """Marks of given sizes [points] for feet (squares), wheels and pads (bars), hollow while they
-    slide; kinds as `colloc.mechanics.feet.Foot.kind`."""
+    slide; kinds as `colloc.mechanics.floor_contact.Foot.kind`."""
 
     def __init__(self, axes: Axes, kinds: Sequence[str], size: float) -> None:
         self._kinds, self._marks = np.array(kinds), {}
@@ -116,12 +118,12 @@ def strips(ends: np.ndarray, width: float) -> np.ndarray:
 
 def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body) -> None:
     """A body with an outline ``(2, n_point)``: hollow joints, the head a disc."""
-    if body.drawn_width:
-        links = list(strips(ends, body.drawn_width))
+    if width := link_width(body):
+        links = list(strips(ends, width))
         axes.add_collection(PolyCollection(links, facecolors=[colour], edgecolors="white", lw=0.2))
     else:
         axes.plot(*ends, "-", color=colour, lw=2.4, solid_capstyle="round", solid_joinstyle="round")
-    axes.plot(*ends[:, body.hinges], "o", color="white", mec=colour, ms=3.5)
+    axes.plot(*ends[:, hinges(body)], "o", color="white", mec=colour, ms=3.5)
     axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
 
 
@@ -165,10 +167,14 @@ def forbidden(
     shapes[[first, second]] = a.ravel(), b.ravel()
     stretched, limit = under_one_limit(shapes, joint_limit)
     if body.n_joint == 2:
-        excess = np.maximum(body.largest_angles(stretched) - limit, body.crossing_depth(shapes))
+        beyond = body.bounded_angles.largest(stretched) - limit
+        excess = np.maximum(beyond, crossing_depth(body, shapes))
     else:
-        by_others = np.delete(body.limited, [first, second], axis=1).any(axis=1)
-        excess = np.abs(body.limited[~by_others] @ stretched).max(axis=0, initial=0.0) - limit
+        by_others = np.delete(body.bounded_angles.rows, [first, second], axis=1).any(axis=1)
+        excess = (
+            np.abs(body.bounded_angles.rows[~by_others] @ stretched).max(axis=0, initial=0.0)
+            - limit
+        )
     return grid, np.maximum(excess, 0.0).reshape(a.shape)
 
 
@@ -182,8 +188,8 @@ def draw_allowed(
 
 def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> None:
     draw_series(axes, t, angles)
-    axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{body.quantity}  [rad]")
-    draw_key(axes, body.coordinate)
+    axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{body.defaults.quantity}  [rad]")
+    draw_key(axes, body.defaults.coordinate)
 
 
 def draw_shape_path(
@@ -212,14 +218,14 @@ def draw_shape_path(
         axes.set_yticks(ticks, labels)
     (x, y) = middle
     axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
-    what = problem.body.quantity
+    what = problem.body.defaults.quantity
     axes.set(xlabel=f"{what} {first + 1}  [rad]", ylabel=f"{what} {second + 1}  [rad]")
 
 
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
     """Sliding speeds over a period on a logarithmic scale, with delta: below it, sticking."""
     problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
-    part, speed = problem.body.speeds(motion.angles, motion.rates, motion.z)
+    part, speed = part_speeds(problem.body, motion.angles, motion.rates, motion.z)
     speed = np.maximum(speed, 0.1 * delta)
     draw_series(axes, t, speed)
     axes.axhline(delta, color=GREY, lw=1, ls=":")

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.bodies import ARROWS, Body
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.feet import FOOT, PAD, WHEEL
+from colloc.mechanics.floor_contact import FOOT, PAD, WHEEL
+from colloc.results.body_marks import ARROWS, footprints, friction_arrows
 from colloc.results.motion import RigidMotion, SampledMotion, turned
 from colloc.results.solution import Solution
 
@@ -50,10 +51,8 @@ class Frames:
 
 
 def foot_kinds(body: Body) -> tuple[str, ...]:
-    """Kinds of the feet of a body (`colloc.mechanics.feet.Foot.kind`)."""
-    if isinstance(body, Chain):
-        return tuple(foot.kind for foot in body.standing_on)
-    return (FOOT,) * body.footprints(np.zeros((body.n_joint, 1))).shape[2]
+    """Kinds of the feet of a body (`colloc.mechanics.floor_contact.Foot.kind`)."""
+    return tuple(foot.kind for foot in body.standing_on) if isinstance(body, Chain) else ()
 
 
 def foot_words(kinds: Sequence[str]) -> str:
@@ -69,7 +68,7 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
 
 def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
     """Both ends of the feet in the lab, ``(2, 2, n_foot, n_time)``."""
-    return tail[:, None, None] + turned(body.footprints(angles, _WHEEL), theta)
+    return tail[:, None, None] + turned(footprints(body, angles, _WHEEL), theta)
 
 
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
@@ -83,8 +82,8 @@ def frames_of(
     """Frames of any motion of a solution's gait, repeated so many times."""
     body, delta = solution.problem.body, solution.delta_per_period
     at = (body, motion.angles, motion.theta, motion.tail)
-    places, forces = body.rubbing(
-        solution.problem.law, motion.angles, motion.rates, delta, motion.z, arrows
+    places, forces = friction_arrows(
+        body, solution.problem.law, motion.angles, motion.rates, delta, motion.z, arrows
     )
     way = motion.centre[:, -1] - motion.centre[:, 0]
     period = RigidMotion(float(motion.theta[-1] - motion.theta[0]), complex(*way))

@@ -14,9 +14,11 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from colloc.mechanics.contact import link_width
 from colloc.pictures.figure import FootMarks, draw_shape_path
 from colloc.pictures.motion_frames import Frames, foot_kinds, frames, frames_of
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
+from colloc.results.body_marks import hinges
 from colloc.results.motion import turned
 from colloc.results.solution import Solution
 from colloc.system.arguments import checked_arguments
@@ -54,7 +56,7 @@ class _Scene:
 
     def __init__(self, solution: Solution, shown: Frames, arrows: bool, width: int) -> None:
         problem, body = solution.problem, solution.problem.body
-        self.shown, self.hinges = shown, body.hinges
+        self.shown, self.hinges = shown, hinges(body)
         low, high = shown.window
         planar = problem.gait.free and body.n_joint >= 2
         share, span = 0.68 if planar else 0.97, high - low
@@ -82,7 +84,7 @@ class _Scene:
             return axes.plot([], [], *look, **more)[0]
 
         self.trails = [line(color=colour, lw=1) for colour in (SKY, ORANGE, VERMILION)]
-        thickness = 0.72 * body.drawn_width / scale or 4  # a pixel is 0.72 points
+        thickness = 0.72 * link_width(body) / scale or 4  # a pixel is 0.72 points
         round_ends: Any = {"solid_capstyle": "round", "solid_joinstyle": "round"}
         self.body = line("-", color=INK, lw=thickness, **round_ends)
         self.joints = line("o", color="white", mec=INK, ms=5)

@@ -15,12 +15,14 @@ from markupsafe import Markup, escape
 from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.contact import link_width
 from colloc.mechanics.inertia import GRAVITY
 from colloc.pictures.families import robot_panels
 from colloc.pictures.motion_frames import Frames, foot_kinds, foot_words, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.style import INK, styled
 from colloc.pictures.templates import render
+from colloc.results.body_marks import hinges
 from colloc.results.robot import SLOW_ENOUGH, Robot
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.arguments import checked_arguments
@@ -56,7 +58,7 @@ def report_page(
     }
     planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
     captions = {
-        "angles": f"{body.quantity}s",
+        "angles": f"{body.defaults.quantity}s",
         "speeds": "sliding speeds (near δ: sticking)",
         "power": "power against friction; ticks: mesh",
     }
@@ -81,7 +83,9 @@ def report_page(
         errors=float(errors.sum()),
         gait_pictures=[
             *(
-                _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", (j, j + 1))
+                _picture(
+                    drawn[name], f"{body.defaults.coordinate}s {j + 1} and {j + 2}", (j, j + 1)
+                )
                 for j, name in enumerate(planes)
             ),
             *(_picture(drawn[name], text, has_phase=True) for name, text in captions.items()),
@@ -200,8 +204,8 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
         "feet": np.round(shown.feet, 4).tolist(),
         "footKinds": kinds,
         "footWords": foot_words(kinds),
-        "hinges": body.hinges.indices(len(x))[:2],
-        "width": body.drawn_width,
+        "hinges": hinges(body).indices(len(x))[:2],
+        "width": link_width(body),
         "before": [each.round(6).tolist() for each in before],
         "arrowScale": shown.arrow_scale,
         "grid": next(step for step in steps if max(wide, tall) / step < 16),

@@ -22,7 +22,7 @@ import numpy as np
 from colloc.gaits.limits import range_of
 from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.feet import whole_links
+from colloc.mechanics.floor_contact import whole_links
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.pictures.templates import render

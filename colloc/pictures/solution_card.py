@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
+from colloc.mechanics.contact import link_width
 from colloc.pictures.motion_frames import foot_kinds, foot_words, frames
 from colloc.pictures.templates import render
 from colloc.results.solution import Solution
@@ -52,7 +53,7 @@ def _film(solution: Solution) -> dict[str, Any]:
     slides = (~shown.holding[:, :-1]).astype(int)
     return {
         "size": np.ceil(scale * (high - low)).astype(int),
-        "width": max(scale * body.drawn_width, 4.0),
+        "width": max(scale * link_width(body), 4.0),
         "spine": _texts(spine),
         "track": _texts(track[..., None])[0],
         "head": [[f"{x:.1f}" for x in row] for row in spine[:, -1]],

@@ -11,7 +11,7 @@ import numpy as np
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import widest
-from colloc.mechanics.bodies import Pairs
+from colloc.mechanics.contact import Pairs
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.sqp import remembered
 from colloc.reduced.constraints import Constraints, Function

@@ -6,7 +6,7 @@ import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.bodies import Pairs
+from colloc.mechanics.contact import Pairs
 from colloc.reduced.constraints import Constraints
 
 _NONE = np.empty(0)

@@ -11,7 +11,7 @@ from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import Objective
 from colloc.gaits.symmetry import NONE
-from colloc.mechanics.bodies import Pairs
+from colloc.mechanics.contact import Pairs
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.actuator_rows import ActuatorRows

@@ -12,7 +12,8 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
 from colloc.mechanics.balance import load_wrench
-from colloc.mechanics.balance_results import Sliding
+from colloc.mechanics.bodies import Sliding
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.inertia import about_tail, checked_mass, turning
 from colloc.motion.collocated import CollocatedPose
 from colloc.motion.heading import whole_turns
@@ -98,7 +99,7 @@ class CollocatedMotion:
         solved, second = reduced(symmetry, phase)
         z, theta, centre, end = self._interpolated(solved)
         angles, rates = self.gait(phase)
-        if symmetry == BILATERAL:
+        if symmetry == BILATERAL and isinstance(body, Chain):
             # seen from the head the body repeats itself with reversed rates
             head, heading = body.seen_from_head(
                 self.gait.angles(solved), self.gait.rates(solved), z

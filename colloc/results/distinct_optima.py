@@ -48,14 +48,14 @@ def reversed_in_time(gait: Fourier) -> Fourier:
 
 def swapped(gait: Fourier, body: Body) -> Fourier:
     """Gait with tail and head exchanged: -q_(n+1-j)(t) for chains."""
-    return Fourier(*(body.swapped(rows) for rows in (gait.mean, gait.cos, gait.sin)))
+    return Fourier(*(body.reversal @ rows for rows in (gait.mean, gait.cos, gait.sin)))
 
 
 def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
     """All symmetry images of a gait, up to the start phase."""
     result = []
     for mirror, reversal, swap in product((False, True), repeat=3):
-        if (swap and not body.symmetric) or (reversal != swap and not friction.reversible):
+        if (swap and body.reversal is None) or (reversal != swap and not friction.reversible):
             continue
         image = gait.mirrored if mirror else gait
         image = reversed_in_time(image) if reversal else image

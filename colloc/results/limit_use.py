@@ -28,13 +28,13 @@ UNITS = {
 def shares(solution: Solution) -> dict[str, float]:
     """Largest utilisation of every limit over a period, by name; empty for default limits."""
     problem, body, limits = solution.problem, solution.problem.body, solution.problem.path_limits
-    limited = problem.joint_limit != body.usual.limit or limits.each or problem.largest_speeds
+    limited = problem.joint_limit != body.defaults.limit or limits.each or problem.largest_speeds
     if not (problem.gait.free and limited):
         return {}
     motion = solution.sample(_INSTANTS)
     stretched, limit = under_one_limit(motion.angles, problem.joint_limit)
-    name = body.usual.limit_name.replace("limits", "angles")
-    used = {name: float(body.largest_angles(stretched).max()) / limit}
+    name = body.defaults.limit_name.replace("limits", "angles")
+    used = {name: float(body.bounded_angles.largest(stretched).max()) / limit}
     if problem.largest_speeds:
         fastest = np.abs(solution.gait.driven.rates(_INSTANTS)).max(axis=1)
         used["joint speed"] = float((fastest / problem.largest_speeds).max())
@@ -70,7 +70,7 @@ def _beyond_any_gait(problem: Problem) -> Iterator[str]:
     torque, speed = np.full(n, np.inf), np.full(n, np.inf)
     if isinstance(problem.body, Chain) and rate_independent(problem.law):
         torque = largest_moments(problem.body, problem.friction, problem.grade)
-    if isinstance(gait.level, Harmonic) and problem.body.limited.shape == (n, n):
+    if isinstance(gait.level, Harmonic) and problem.body.bounded_angles.rows.shape == (n, n):
         speed = 2 * math.pi * gait.harmonics * _half_ranges(problem)
     power = torque * np.minimum(speed, problem.largest_speeds or np.inf)
     for (field, unit), bound in zip(UNITS.values(), (speed, torque, power), strict=True):

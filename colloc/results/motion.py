@@ -92,12 +92,12 @@ class Column(NamedTuple):
 
 def motion_columns(motion: SampledMotion, power: np.ndarray, body: Body) -> dict[str, Column]:
     """Columns by name, with the power against friction ``(n_time,)``."""
-    shape = body.coordinate, "t"
+    shape = body.defaults.coordinate, "t"
     velocity_units = "length/period, length/period, rad/period"
     return {
         "t": Column(motion.t, "period", ("t",)),
-        f"{body.quantity.replace(' ', '_')}s": Column(motion.angles, "rad", shape),
-        f"{body.coordinate}_rates": Column(motion.rates, "rad/period", shape),
+        f"{body.defaults.quantity.replace(' ', '_')}s": Column(motion.angles, "rad", shape),
+        f"{body.defaults.coordinate}_rates": Column(motion.rates, "rad/period", shape),
         "tail_velocity": Column(motion.z, velocity_units, ("velocity", "t")),
         "theta": Column(motion.theta, "rad", ("t",)),
         "centre": Column(motion.centre, "length", ("axis", "t")),

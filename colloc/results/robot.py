@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import (
     GRAVITY,
@@ -57,7 +58,7 @@ def joint_torques(
     """Motor torques [weight x body length] at phases t, ``(n_joint, n_time)``: of the result, or of
     another `motion` at these phases with its Froude number."""
     problem = solution.problem
-    if not problem.body.force_names:
+    if not isinstance(problem.body, Chain):
         raise ProblemError(
             f"{problem.name} is a smooth body: joint torques are not defined for it."
         )

@@ -14,12 +14,13 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.mechanics.balance_results import Sliding
+from colloc.mechanics.bodies import Sliding
 from colloc.mechanics.inertia import checked_mass, tail_velocity
 from colloc.motion.slow_enough import slow_enough
 from colloc.numerics.mesh import Mesh
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.arc import PHASES, Arc, arc
+from colloc.results.body_marks import footprints, part_speeds
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import (
@@ -280,7 +281,7 @@ class Solution:
 
     @property
     def gait(self) -> AnyGait:
-        return self.answer.gait.named(self.problem.body.coordinate)
+        return self.answer.gait.named(self.problem.body.defaults.coordinate)
 
     @property
     def delta_per_period(self) -> float:
@@ -348,16 +349,15 @@ class Solution:
         """Which feet of the body hold at instants of its motion, slower than 3 delta, ``(n_foot,
         n_time)``; no rows for a body that has none."""
         body = self.problem.body
-        if not body.footprints(motion.angles).size:
+        if not footprints(body, motion.angles).size:
             return np.zeros((0, motion.t.size), dtype=bool)
-        return (
-            body.speeds(motion.angles, motion.rates, motion.z)[1] < _HOLDS * self.delta_per_period
-        )
+        speeds = part_speeds(body, motion.angles, motion.rates, motion.z)[1]
+        return speeds < _HOLDS * self.delta_per_period
 
     @property
     def share_held(self) -> np.ndarray:
         """Of a period, for which each foot holds, ``(n_foot,)``, from the tail."""
-        stands = self.problem.body.footprints(self.gait.angles(_INSTANTS[:1])).size
+        stands = footprints(self.problem.body, self.gait.angles(_INSTANTS[:1])).size
         return self.holding(self.sample(_INSTANTS)).mean(axis=1) if stands else np.empty(0)
 
     @property

@@ -27,6 +27,7 @@ from colloc.numerics.schemes import scheme
 from colloc.results.answer import Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
 from colloc.results.solution import Solution
+from colloc.smooth.panel_body import on_panels, panels_of
 from colloc.system.errors import ProblemError, StoreError
 from colloc.system.store_file import (
     BETWEEN_DIMS,
@@ -145,7 +146,7 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
     for field in dataclasses.fields(answer):
         if field.name not in _SEPARATE:
             put_attribute(group, field.name, getattr(answer, field.name))
-    put_attribute(group, "panels", answer.problem.body.panels)
+    put_attribute(group, "panels", panels_of(answer.problem.body))
     put_attribute(group, "smallest_shape_speed", answer.problem.smallest_shape_speed)
     put(group, "guess", json.dumps(fields(answer.problem.guess)))
     for field in dataclasses.fields(SecondOrder):
@@ -162,7 +163,7 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     plain = {name: attribute(group, name) for name in names}
     panels = int(attribute(group, "panels"))
     if panels:
-        problem = problem.with_(body=problem.body.on_panels(panels))
+        problem = problem.with_(body=on_panels(problem.body, panels))
     if plain["delta"] < problem.delta:  # lowered for a small gait
         problem = problem.with_(delta=plain["delta"])
     if "guess" in group:  # the least speed was raised for a gait that would shrink
@@ -195,7 +196,7 @@ def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
 
 
 def _write_motion(file: h5py.File, solution: Solution) -> None:
-    _write_gait(file.create_group("gait"), solution.gait, solution.problem.body.coordinate)
+    _write_gait(file.create_group("gait"), solution.gait, solution.problem.body.defaults.coordinate)
     group = file.create_group("motion")
     for name, column in solution.columns().items():
         put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))

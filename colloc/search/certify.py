@@ -7,7 +7,8 @@ import numpy as np
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
-from colloc.mechanics.chain import BALANCED
+from colloc.mechanics.chain import BALANCED, Chain
+from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import Certificate, Check
 from colloc.results.measured import astray, measured
@@ -63,7 +64,7 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     """
     problem, gait = answer.problem, answer.gait
     if instants is None:
-        usual = problem.body.usual
+        usual = problem.body.defaults
         each = 0.5 * usual.instants_a_point / problem.gait.fraction
         instants = max(usual.instants, 2 * int(np.ceil(each * answer.mesh.n_point)))
     is_optimum = answer.program != EVALUATED
@@ -129,7 +130,7 @@ def gait_certificate(
     influence = Check(
         "delta influence",
         value.limit.value / fine.value - 1,
-        problem.body.usual.delta_influence,
+        problem.body.defaults.delta_influence,
         "same gait at delta -> 0, relative change",
     )
     return Certificate(
@@ -209,8 +210,8 @@ def _motion(
     body, ends = problem.body, path(np.array([0.0, 1.0]))[0]
     angles, rates = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))
     stretched, limit = under_one_limit(angles, problem.joint_limit)
-    excess = max(float(body.largest_angles(stretched).max()) - limit, 0.0)
-    depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
+    excess = max(float(body.bounded_angles.largest(stretched).max()) - limit, 0.0)
+    depth = max(float(crossing_depth(body, angles).max()), passing_depth(body, angles))
     balanced = "net force and torque at all replayed instants"
     if problem.froude:
         balanced = "what a period changes of the momenta"
@@ -220,10 +221,10 @@ def _motion(
             "closure",
             float(np.abs(ends[:, 1] - ends[:, 0]).max()),
             TOLERANCES.closure,
-            f"{body.quantity}s after one period [rad]",
+            f"{body.defaults.quantity}s after one period [rad]",
         ),
         *_rotation(problem, fine),
-        Check(body.usual.limit_name, excess, body.usual.excess, "excess between nodes [rad]"),
+        Check(body.defaults.limit_name, excess, body.defaults.excess, "excess between nodes [rad]"),
         Check(
             "self-contact",
             depth,
@@ -232,7 +233,8 @@ def _motion(
         ),
         *_speeds(problem, rates),
     ]
-    if (lean := float(body.imbalance(angles).max())) > BALANCED:
+    lean = float(body.imbalance(angles).max()) if isinstance(body, Chain) else 0.0
+    if lean > BALANCED:
         meaning = (
             "way from the centre of mass to where its weights press [body lengths]; "
             "reported, not judged"
@@ -281,7 +283,7 @@ def _speeds(problem: Problem, rates: np.ndarray) -> list[Check]:
     joints = problem.joint_map
     motors = rates if joints is None else joints.motor_rates(rates)
     share = np.abs(motors).max(axis=1) / np.array(problem.largest_speeds)
-    name = f"{'motor' if joints else problem.body.coordinate} {int(share.argmax()) + 1}"
+    name = f"{'motor' if joints else problem.body.defaults.coordinate} {int(share.argmax()) + 1}"
     return [
         Check(
             "joint speed",
@@ -327,13 +329,13 @@ def _one_motion(problem: Problem, fine: Replay) -> Check:
         meaning = f"between the motions {problem.regime.others}"
     elif problem.law.associated:
         meaning = "the law leaves one balanced motion"
-    elif not problem.body.looks_for_all_velocities:
+    elif not isinstance(problem.body, Chain):
         meaning = "other balanced motions of a smooth body are not looked for"
     elif fine.several == 0:
         meaning = f"no other balanced motion was found at {fine.instants} instants"
     else:
         meaning = f"several motions are balanced at {fine.several:.2g} of the period"
-    allowed = problem.body.usual.delta_influence
+    allowed = problem.body.defaults.delta_influence
     return Check("one motion", fine.ambiguity, allowed, f"relative; {meaning}")
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from colloc.mechanics.contact import far_pairs
 from colloc.numerics.sqp import Stationarity, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
@@ -195,7 +196,7 @@ def second_order(space: SearchSpace, v: np.ndarray, delta: float, value: float) 
     apart."""
     if v.size > OPTIONS.max_curvature_parameters:
         return replace(NOT_MEASURED, why_not=f"not measured, for {v.size} parameters")
-    program = ReducedProgram(with_far(space, space.control.dynamics.body.far_pairs), delta)
+    program = ReducedProgram(with_far(space, far_pairs(space.control.dynamics.body)), delta)
     program.place_rows(v)
     here, size = curvature(program, v), abs(value / program.stated(-1.0))
     if not here.kkt_error < MEDIUM * size:  # elsewhere a curvature means nothing

@@ -16,8 +16,7 @@ import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.bodies import Pairs
-from colloc.mechanics.contact import overlapping_pairs
+from colloc.mechanics.contact import Pairs, far_pairs, link_width, overlapping_pairs
 from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
@@ -177,7 +176,7 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     admissible = space.control.admissible
     body, t = admissible.body, np.linspace(0.0, admissible.gait.fraction, PHASES)
     ends = np.stack(body.outline(space.member(v).angles(t)))
-    return overlapping_pairs(ends, body.far_pairs, body.drawn_width, TOLERANCES.violation)
+    return overlapping_pairs(ends, far_pairs(body), link_width(body), TOLERANCES.violation)
 
 
 def last_free(space: Members, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:

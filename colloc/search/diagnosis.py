@@ -54,10 +54,10 @@ def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
         return named[name], 0.0
     if name in program.cells:
         what = "contact of" if name.startswith("links") else "the limit of"
-        what = what if name.startswith("links") or name in body.limit_names else "the"
+        what = what if name.startswith("links") or name in body.bounded_angles.names else "the"
         return f"{what} {name}", float(mesh.edges[program.cells[name][index]])
     if name in ("angles", "rates"):
-        joint = f"{body.coordinate} {index // mesh.n_point + 1}"
+        joint = f"{body.defaults.coordinate} {index // mesh.n_point + 1}"
         return f"the {name[:-1]} of {joint} against its gait", _phase(mesh, index)
     if name.startswith("force law"):
         return "the law of friction", _phase(mesh, index)

@@ -17,6 +17,7 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.joint_map import JointMap
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
@@ -30,6 +31,7 @@ from colloc.search.certify import certify, goes_nowhere
 from colloc.search.confirm import unconfirmed
 from colloc.search.iterate import evaluate_at
 from colloc.search.options import OPTIONS, TOLERANCES
+from colloc.smooth.prescribed_body import schedule
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.refinement import planned_mesh
 
@@ -89,7 +91,7 @@ def evaluate(
         raise ProblemError(
             "on a slope a gait goes where its body points: follow it with colloc.slope_motion."
         )
-    if problem.body.schedule:
+    if schedule(problem.body):
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")
     fitted = fitted_gait(
         getattr(gait, "driven", gait),
@@ -111,7 +113,7 @@ def _check_centre(problem: Problem, fitted: FittedGait, given: Given) -> None:
     """Refuse servo angles about a right angle: all joints bent alike, and links that cross."""
     phases = np.arange(_PHASES) / _PHASES
     angles, _ = problem.joint_path(*fitted.gait(phases))
-    if float(problem.body.crossing_depth(angles).max()) > TOLERANCES.kkt:
+    if float(crossing_depth(problem.body, angles).max()) > TOLERANCES.kkt:
         raise ProblemError(
             f"{given}: all joints move about {fitted.centre}°, where links cross: if servos stand "
             f"so when the body is "

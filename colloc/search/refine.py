@@ -18,6 +18,7 @@ from colloc.search.converge import optimise
 from colloc.search.iterate import Iterate
 from colloc.search.options import FINE, MEDIUM, OPTIONS, TOLERANCES
 from colloc.search.spaces import remeshed, space_of
+from colloc.smooth.panel_body import on_panels, panels_of
 from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
@@ -105,12 +106,12 @@ def on_more_panels(iterate: Iterate) -> tuple[SearchSpace, np.ndarray] | None:
     """The space with a smooth body on as many panels as the gait needs, and its parameters; None if
     half as many panels change the objective by less than six times the mesh tolerance."""
     space, v, here, problem = iterate.space, iterate.v, iterate.objective, iterate.problem
-    panels = problem.body.panels
+    panels = panels_of(problem.body)
     if panels == 0:
         return None
 
     def on(count: int) -> tuple[SearchSpace, np.ndarray, float]:
-        body = problem.body.on_panels(count)
+        body = on_panels(problem.body, count)
         old = iterate.space
         space = space_of(problem.with_(body=body), None, old.edges, old.scheme, old.far)
         v = space.parameters(iterate.gait)

@@ -23,6 +23,7 @@ from colloc.gaits.gait import delta_per_period
 from colloc.gaits.parameters import Parameter, parameters
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
+from colloc.mechanics.contact import far_pairs
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import EVALUATED, Answer
@@ -321,7 +322,7 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
     """Lagrangians at the optima of several meshes, the finest first."""
     edges = answer.edges
     space, v = space_near(answer.problem, answer.gait, edges, answer.scheme)
-    far = answer.problem.body.far_pairs
+    far = far_pairs(answer.problem.body)
     solved = _Lagrangian.at_optimum(with_far(space, far), v, answer.delta)
 
     def on(parts: int, later: float = 0.0) -> _Lagrangian:

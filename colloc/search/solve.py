@@ -226,7 +226,7 @@ def _certificate(answer: Answer) -> Certificate:
     if answer.optimal:
         return certify(answer)
     # an exact replay may take minutes, for what is no optimum
-    instants = answer.problem.body.usual.instants
+    instants = answer.problem.body.defaults.instants
     return certify(answer, tolerance=TOLERANCES.replay_gap, instants=instants)
 
 

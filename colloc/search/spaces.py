@@ -11,7 +11,7 @@ from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.gaits.serpenoid import Serpenoid
 from colloc.gaits.symmetry import ANTIPODAL
-from colloc.mechanics.bodies import Pairs
+from colloc.mechanics.contact import Pairs
 from colloc.motion.heading import whole_turns
 from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
 from colloc.reduced.one_gait import OneGait

@@ -1,13 +1,12 @@
-"""The balance of smooth bodies on panels: on fixed ones by `colloc.smooth.panel_body`, on such that
-adapt to the solution by `solve_smooth`.
+"""The balance of smooth bodies on Gauss panels.
 
-The velocity of the body at stick changes over lengths ~ delta / (rotation rate), and shapes may be
-sharp. So after every solve each panel's integrals are compared with those over its two halves;
-panels that differ by more than the tolerance are halved and the instant is solved again. The
-iteration itself is that of `colloc.mechanics.damped_newton`; its references are the panel edges.
+At stick the velocity changes over lengths ~ delta / (rotation rate), and shapes may be sharp. So
+`solve_smooth` compares each panel's integrals with those over its halves, halves panels that differ
+by more than the tolerance and solves again. The iteration is that of
+`colloc.mechanics.damped_newton`; its references are the panel edges.
 
 Velocities ``z = (u, v, omega)``, ``(3, n_time)``, are those of the tail, in the axes in which Theta
-is measured, and the rotation rate of those axes. A batch's omega, and that of an anchor, is the
+is measured, and the rotation rate of those axes. In a batch, and at an anchor, omega is the
 rotation rate of the tangent there.
 """
 
@@ -19,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.mechanics.balance import pull_back
 from colloc.mechanics.damped_newton import (
     Evaluated,
     MakeBatch,
@@ -36,7 +36,6 @@ from colloc.smooth.curve import (
     curve,
     mean_velocity,
     node_velocity,
-    pulled_back,
     resultant,
 )
 from colloc.smooth.motion import Motion
@@ -45,7 +44,7 @@ from colloc.system.errors import NotConvergedError, ProblemError
 
 TAIL, ANCHOR_MOVES = 0, 5
 _MOST_PANELS, _REFINEMENTS = 600, 40
-"""Of an instant, and halvings of a panel."""
+"""Panels of a time point, and halvings of a panel."""
 _ROUNDING = 1e-15
 
 
@@ -58,39 +57,35 @@ class PanelFields(NamedTuple):
     rate: np.ndarray
     edge_rate: np.ndarray
 
-    def take(self, members: np.ndarray) -> PanelFields:
-        panels = PanelGrid(self.panels.edges[:, members], self.panels.order)
-        return PanelFields(panels, *(row[:, members] for row in self[1:]))
-
 
 class PanelBatch:
-    """Instants that share a reference edge, as `colloc.mechanics.damped_newton.Batch`."""
+    """Time points that share a reference edge, as `colloc.mechanics.damped_newton.Batch`."""
 
     def __init__(
         self, fields: PanelFields, friction: Law, members: np.ndarray, reference: int
     ) -> None:
-        self.fields, self.friction, self.reference = fields.take(members), friction, reference
-        panels, angle, rate, edge_rate = self.fields
-        self.curve = np.stack(
-            curve(panels, angle, rate, reference, edge_rate[reference : reference + 1])
-        )
+        grid, *rows = fields
+        self.panels = PanelGrid(grid.edges[:, members], grid.order)
+        self.angle, self.rate, self.edge_rate = (row[:, members] for row in rows)
+        self.friction, self.reference = friction, reference
+        anchor_rate = self.edge_rate[reference : reference + 1]
+        self.curve = curve(self.panels, self.angle, self.rate, reference, anchor_rate)
 
     def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
         """Nodes ``(9, n_node, n)``, curve, then velocity; net force and potential at z."""
-        body, friction = Curve(*self.curve[:, :, select]), self.friction
+        body, potential = Curve(*(row[:, select] for row in self.curve)), None
         vs, vn = node_velocity(body, z)
-        force = resultant(body, *friction.density(vs, vn, delta))
-        potential = (
-            (body.weight * friction.density_potential(vs, vn, delta)).sum(axis=0)
-            if friction.associated
-            else None
-        )
+        force = resultant(body, *self.friction.density(vs, vn, delta))
+        if self.friction.associated:
+            density = self.friction.density_potential(vs, vn, delta)
+            potential = (body.weight * density).sum(axis=0)
         return np.stack([*body, vs, vn]), force, potential
 
     def matrix(self, nodes: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
-        vs, vn = nodes[7:]
+        c, s, arm_s, arm_n, *_, weight, vs, vn = nodes
         law = self.friction.density_jacobian if newton else self.friction.density_secant
-        return pulled_back(Curve(*nodes[:7]), law(vs, vn, delta))
+        G = np.array(((c, s, arm_s), (-s, c, arm_n)))
+        return pull_back(G, weight * np.array(law(vs, vn, delta)))
 
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         anchor = np.argmin(self.panel_speed(z), axis=0)
@@ -98,72 +93,67 @@ class PanelBatch:
 
     def edge_velocity(self, z: np.ndarray) -> np.ndarray:
         """Velocity and rotation rate of every edge, ``(3, n_edge, n)``, in the axes of Theta."""
-        panels, angle, rate, edge_rate = self.fields
-        path, anchor_rate = panels.edge_path(self.reference), edge_rate[self.reference]
-        turning = panels.widths * (rate - anchor_rate + z[2])
+        path, anchor_rate = self.panels.edge_path(self.reference), self.edge_rate[self.reference]
+        turning = self.panels.widths * (self.rate - anchor_rate + z[2])
         return np.stack(
             [
-                z[0] - path @ (turning * np.sin(angle)),
-                z[1] + path @ (turning * np.cos(angle)),
-                z[2] + edge_rate - anchor_rate,
+                z[0] - path @ (turning * np.sin(self.angle)),
+                z[1] + path @ (turning * np.cos(self.angle)),
+                z[2] + self.edge_rate - anchor_rate,
             ]
         )
 
     def tail_velocity(self, z: np.ndarray) -> np.ndarray:
         tail = self.edge_velocity(z)[:, TAIL]
-        tail[2] -= self.fields.edge_rate[TAIL]
+        tail[2] -= self.edge_rate[TAIL]
         return tail
 
     def node_speed(self, z: np.ndarray) -> np.ndarray:
-        return np.hypot(*node_velocity(Curve(*self.curve), z))
+        return np.hypot(*node_velocity(self.curve, z))
 
     def panel_speed(self, z: np.ndarray) -> np.ndarray:
         """Largest speed of a node in each panel, ``(n_panel, n)``; infinite for panels of width
         zero."""
-        panels = self.fields.panels
-        speed = self.node_speed(z).reshape(panels.n, -1, z.shape[1]).max(axis=1)
-        return np.where(np.diff(panels.edges, axis=0) > 0, speed, np.inf)
+        speed = self.node_speed(z).reshape(self.panels.n, -1, z.shape[1]).max(axis=1)
+        return np.where(np.diff(self.panels.edges, axis=0) > 0, speed, np.inf)
 
     def forces(self, z: np.ndarray, delta: np.ndarray | float) -> tuple[np.ndarray, ...]:
         """Tangential and normal velocity of the nodes, and force per length there."""
-        vs, vn = node_velocity(Curve(*self.curve), z)
+        vs, vn = node_velocity(self.curve, z)
         return vs, vn, *self.friction.density(vs, vn, delta)
 
     def panel_sums(
         self, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray, fn: np.ndarray
     ) -> np.ndarray:
         """Force, torque about the reference and power of every panel, ``(4, n_panel, n)``."""
-        body = Curve(*self.curve)
+        body = self.curve
         densities = (
             fs * body.cos - fn * body.sin,
             fs * body.sin + fn * body.cos,
             fs * body.arm_s + fn * body.arm_n,
             -(fs * vs + fn * vn),
         )
-        return np.stack([self.fields.panels.panel_sums(density) for density in densities])
+        return np.stack([self.panels.panel_sums(density) for density in densities])
+
+    def motion(self, z: np.ndarray, delta: np.ndarray | float) -> tuple[np.ndarray, ...]:
+        """Velocity of the centre ``(2, n)``, `panel_sums`, and power of what bends the body
+        ``(n,)``."""
+        vs, vn, fs, fn = self.forces(z, delta)
+        bending = bending_power(self.panels, self.curve, fs, fn, self.rate)
+        return mean_velocity(self.curve, vs, vn), self.panel_sums(vs, vn, fs, fn), bending
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothSolution:
-    """A smooth body in balance, instant by instant; arrays of length n_time unless stated.
+    """A smooth body in balance; arrays of length n_time unless stated.
 
-    Attributes
-    ----------
-    t : phases
-    z : (3, n_time)
-    power : rate of work against friction
-    centre : (2, n_time)
-        Velocity of the centre of mass, in the same axes.
-    force : (3, n_time)
-        Net force and torque about the tail or, where the velocities were solved for, about the part
-        at rest.
-    bending_power : power of what bends the body; equals `power` in balance
-    power_inside : the part of it done on the arcs `regions`
-    slowest : smallest speed of a whole panel: how fast the part at stick creeps
-    residual : largest net force or torque, in units as in `colloc.mechanics.damped_newton.State`
-    quadrature_error : largest panel's difference from its halves, in force or power
-    panels : panels used
-    iterations : steps taken, over all refinements
+    t: phases. z: tail velocities ``(3, n_time)``. power: dissipated by friction. centre: velocity
+    of the centre of mass ``(2, n_time)``. force: net force and torque about the tail or, where the
+    velocities were solved for, about the part at rest ``(3, n_time)``. bending_power: of what bends
+    the body; equals `power` in balance. power_inside: the part of it done on the arcs `regions`.
+    slowest: smallest speed of a whole panel. residual: as of `BalanceSolution`. quadrature_error:
+    largest panel's difference from its halves, in force or power. panels: number used. iterations:
+    steps over all refinements.
     """
 
     t: np.ndarray
@@ -181,7 +171,7 @@ class SmoothSolution:
     tolerance: float
 
     def require(self) -> SmoothSolution:
-        """This solution, or a `NotConvergedError` naming the instants that failed."""
+        """This solution, or a `NotConvergedError` naming the time points that failed."""
         bad = np.flatnonzero(self.residual > self.tolerance)
         if bad.size:
             raise NotConvergedError(
@@ -208,35 +198,13 @@ def solve_smooth(
     method: str = "auto",
     slide: np.ndarray | None = None,
 ) -> SmoothSolution:
-    """Velocities that put a smooth body in force and torque balance at phases t.
+    """Velocities that put a smooth body in force and torque balance at phases t ``(n_time,)``.
 
-    Parameters
-    ----------
-    motion : Motion
-    friction : Law
-    t : (n_time,)
-    delta : float
-        Regularisation speed [body lengths per period], > 0.
-    panels, order : int
-        Equal panels to start from (besides the motion's breaks), and Gauss nodes a panel.
-    quadrature_tolerance : float
-        Largest difference in force, torque or power between a panel and its halves; 0 keeps the
-        first panels.
-    tolerance : float
-        Largest net force or torque over the largest coefficient at which an instant counts as
-        converged.
-    max_iterations : int
-        As in `colloc.mechanics.fixed_point.solve_balance`.
-    regions : tuple of (float, float)
-        Arcs whose power is reported separately; their ends should be breaks of the motion.
-    method : {"auto", "newton", "fixed_point"}
-    slide : (3, n_time), optional
-        Tail velocities to slide with, in the place of those that balance.
-
-    Raises
-    ------
-    ProblemError
-        If delta is not positive or the tangent angle is not finite.
+    panels, order: equal panels to start from, besides the motion's breaks, and Gauss nodes a panel.
+    quadrature_tolerance: largest difference in force, torque or power between a panel and its
+    halves; 0 keeps the first panels. regions: arcs whose power is reported separately; their ends
+    should be breaks. method: "auto", "newton" or "fixed_point". slide: tail velocities ``(3,
+    n_time)`` to slide with, instead of those that balance. Others as of `solve_balance`.
     """
     check_finite(positive=True, delta=delta)
     t = np.atleast_1d(np.asarray(t, dtype=float))
@@ -244,10 +212,6 @@ def solve_smooth(
     z, centre, force = np.zeros((3, n)), np.zeros((2, n)), np.zeros((3, n))
     power, bending, inside, slowest, residual, error = np.zeros((6, n))
     used, steps = np.zeros((2, n), dtype=int)
-    found = SmoothSolution(
-        t, z, power, centre, force, bending, inside, slowest, residual, error, used, steps,
-        tolerance,
-    )  # fmt: skip
     active, edges = np.arange(n), motion.first_edges(t, panels)
     anchor, velocity = np.full(n, len(edges) // 2), np.zeros((3, n))
     if slide is not None:
@@ -268,47 +232,56 @@ def solve_smooth(
         velocity, split = state.velocity * speed, np.zeros((len(edges) - 1, active.size), bool)
         for reference, members in groups(state.anchor):
             batch, moved = make(members, reference), state.velocity[:, members]
-            chosen, dry, fast = active[members], d[:, members], speed[members]
-            _record(found, chosen, batch, moved, dry, fast, regions)
-            missed = _panel_error(motion, t[chosen], batch, moved, dry, fast)
-            error[chosen] = missed.max(axis=0)
+            at, dry, fast = active[members], d[:, members], speed[members]
+            spent = fast ** (1.0 + (friction.degree or 0.0))
+            middle = 0.5 * (batch.panels.edges[1:] + batch.panels.edges[:-1])
+            is_inside = np.zeros(middle.shape, dtype=bool)
+            for low, high in regions:
+                is_inside |= (middle > low) & (middle < high)
+            mean, sums, bent = batch.motion(moved, dry)
+            z[:, at], centre[:, at] = batch.tail_velocity(moved) * fast, mean * fast
+            force[:, at], power[at] = sums[:3].sum(axis=1) * spent / fast, sums[3].sum(0) * spent
+            inside[at], bending[at] = (sums[3] * is_inside).sum(axis=0) * spent, bent * spent
+            slow = batch.panel_speed(moved).min(axis=0)
+            slowest[at] = slow * fast
+            missed = _panel_error(motion, t[at], batch, moved, dry, fast)
+            error[at] = missed.max(axis=0)
             # two stretches at rest know each other's velocity to rounding only: no refinement
             # beats that
-            slow = dry[0] + batch.panel_speed(moved).min(axis=0)
-            floor = _ROUNDING * batch.node_speed(moved).max(axis=0) / slow
+            floor = _ROUNDING * batch.node_speed(moved).max(axis=0) / (dry[0] + slow)
             split[:, members] = missed > quadrature_tolerance + floor
         steps[active] += state.iterations
         residual[active] = state.residual
         used[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
 
-        more = split.any(axis=0) & (used[active] < _MOST_PANELS)
-        more &= state.residual <= tolerance
+        more = split.any(axis=0) & (used[active] < _MOST_PANELS) & (state.residual <= tolerance)
         if quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
             break
         anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
         active, velocity = active[more], velocity[:, more]
         edges = _split(edges[:, more], split[:, more])
         anchor = np.argmax(edges == anchor_at, axis=0)
-    return found
+    return SmoothSolution(
+        t, z, power, centre, force, bending, inside, slowest, residual, error, used, steps,
+        tolerance,
+    )  # fmt: skip
 
 
 def _with_slowest_anchors(
     state: State, make: MakeBatch, delta: np.ndarray, max_iterations: int, method: str
 ) -> State:
-    """One cheap pass finds what rests, so that the anchor is right before anything is judged."""
+    """A cheap pass finds what rests, so that the anchor is right before anything is judged."""
     solve(state, make, 1, np.maximum(delta, 1e-3), 1e-6, max_iterations, method)
-    for reference, members in groups(state.anchor):
-        state.anchor[members], state.velocity[:, members] = make(members, reference).slowest(
-            state.velocity[:, members], delta[:, members]
-        )
+    for reference, at in groups(state.anchor):
+        batch = make(at, reference)
+        state.anchor[at], state.velocity[:, at] = batch.slowest(state.velocity[:, at], delta[:, at])
     return starting_state(state.anchor, state.velocity)
 
 
 def _motion_fields(
     motion: Motion, t: np.ndarray, panels: PanelGrid, speed: np.ndarray | None = None
 ) -> tuple[PanelFields, np.ndarray]:
-    """Theta and its rate on the panels of some instants, rates in units of the returned `speed`
-    ``(n_time,)``."""
+    """Theta and its rate on panels, rates in units of the returned `speed` ``(n_time,)``."""
     nodes = panels.nodes
     angle, rate = motion.angle(nodes, t), motion.rate(nodes, t)
     if not (np.isfinite(rate).all() and np.isfinite(angle).all()):
@@ -328,33 +301,6 @@ def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     return fine[:keep]
 
 
-def _record(
-    found: SmoothSolution,
-    chosen: np.ndarray,
-    batch: PanelBatch,
-    z: np.ndarray,
-    delta: np.ndarray,
-    speed: np.ndarray,
-    regions: tuple[tuple[float, float], ...],
-) -> None:
-    """Write what follows from velocities z, in units of `speed`, at the chosen instants."""
-    now, fields = Curve(*batch.curve), batch.fields
-    spent = speed ** (1.0 + (batch.friction.degree or 0.0))
-    vs, vn, fs, fn = batch.forces(z, delta)
-    sums = batch.panel_sums(vs, vn, fs, fn)
-    middle = 0.5 * (fields.panels.edges[1:] + fields.panels.edges[:-1])
-    inside = np.zeros(middle.shape, dtype=bool)
-    for low, high in regions:
-        inside |= (middle > low) & (middle < high)
-    found.z[:, chosen] = batch.tail_velocity(z) * speed
-    found.centre[:, chosen] = mean_velocity(now, vs, vn) * speed
-    found.force[:, chosen] = sums[:3].sum(axis=1) * spent / speed
-    found.power[chosen] = sums[3].sum(axis=0) * spent
-    found.power_inside[chosen] = (sums[3] * inside).sum(axis=0) * spent
-    found.bending_power[chosen] = bending_power(fields.panels, now, fs, fn, fields.rate) * spent
-    found.slowest[chosen] = batch.panel_speed(z).min(axis=0) * speed
-
-
 def _panel_error(
     motion: Motion,
     t: np.ndarray,
@@ -363,25 +309,23 @@ def _panel_error(
     delta: np.ndarray,
     speed: np.ndarray,
 ) -> np.ndarray:
-    """How far each panel is from its two halves, ``(n_panel, n_time)``.
+    """Difference of each panel from its two halves, ``(n_panel, n_time)``.
 
-    Every panel is taken as a body of its own that moves with its left end, so that an error is
-    charged to the panel that makes it. Compared are force, torque and power, and the velocity
-    handed on to the right end in units of the speed of the slowest panel, because that is what
-    decides the friction there.
+    Every panel is taken as a body that moves with its left end, so that an error is charged to the
+    panel that makes it. Compared are force, torque and power, and the velocity of the right end in
+    units of the speed of the slowest panel, which decides the friction there.
     """
-    friction, edges = batch.friction, batch.fields.panels.edges
+    friction, edges = batch.friction, batch.panels.edges
     left, right = edges[:-1].ravel(), edges[1:].ravel()
     slow = delta[0] + batch.panel_speed(z).min(axis=0)
     t, speed, dry, slow = (np.tile(a, len(edges) - 1) for a in (t, speed, delta[0], slow))
     start = batch.edge_velocity(z)[:, :-1].reshape(3, -1)
     results = []
     for cuts in ([left, right], [left, 0.5 * (left + right), right]):
-        grid = PanelGrid(np.stack(cuts), batch.fields.panels.order)
+        grid = PanelGrid(np.stack(cuts), batch.panels.order)
         fields, _ = _motion_fields(motion, t, grid, speed)
         one = PanelBatch(fields, friction, np.arange(t.size), 0)
         sums = one.panel_sums(*one.forces(start, dry)).sum(axis=1)
-        results.append(
-            np.concatenate([sums / friction.largest, one.edge_velocity(start)[:2, -1] / slow])
-        )
+        end = one.edge_velocity(start)[:2, -1] / slow
+        results.append(np.concatenate([sums / friction.largest, end]))
     return np.abs(results[1] - results[0]).max(axis=0).reshape(len(edges) - 1, -1)

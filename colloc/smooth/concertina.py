@@ -1,37 +1,24 @@
-r"""Concertina crawlers: a straight body with one or two travelling bumps of half-width epsilon
-(paper, section VI).
+r"""Concertina crawlers: a straight body with one or two travelling bumps (paper, section VI).
 
-Shape. On a bump of arc length ``w`` centred at ``c`` the tangent angle is, with ``x = 2 (s - c)/w``
-in [-1, 1],
+On a bump of arc length ``w`` centred at ``c``, with ``x = 2 (s - c)/w`` in [-1, 1], the tangent
+angle is ``Theta = a odd(x) + b even(x)``, zero elsewhere,
 
-    Theta = a odd(x) + b even(x),    odd = -k x (1 - x^2)^3,   k = 7^(7/2)/6^3 (so that max odd = 1),    even = (1 - x^2)^3
+    odd = -k x (1 - x^2)^3,    k = 7^(7/2)/6^3 (so that max odd = 1),    even = (1 - x^2)^3.
 
-and zero elsewhere: twice continuously differentiable, with the end tangents those of the straight
-body. The odd part shortens the body by ``w (1 - mean cos Theta)``, the even part shifts it
-sideways. A bump that travels without changing keeps its chord, so both straight parts can rest.
+The odd part shortens the body by ``w (1 - mean cos Theta)``, the even part shifts it sideways. A
+bump that travels without changing keeps its chord, so both straight parts can rest.
 
-One bump (figure 13A to D), in the region ``|s - 1/2| <= epsilon``, half a period:
+One bump (figure 13A to D), in the region ``|s - 1/2| <= epsilon``: a grows from 0 to `amplitude` at
+the rear end, the front half at rest; the bump travels to the front end; a falls to 0, the rear at
+rest; then the mirror image, Theta(s, t + 1/2) = -Theta(s, t).
 
-1. a grows from 0 to `amplitude`, bump at the rear end of the region: the front half rests, the rear
-  is pulled along;
-2. the bump travels to the front end of the region: both straight parts rest;
-3. a falls to 0: the rear rests, the front is pushed on;
+Two bumps (figure 13E), in regions around 1/4 and 3/4, Theta(1 - s) = -Theta(s): the body lies
+across its path. ``(a, b) = A(phi) (sin phi, cos phi)`` with A(0) = `amplitude` and A(phi) such that
+the chord along the body stays constant. phi goes from 0 to pi, bumps at the inner ends, the outer
+parts at rest; the bumps travel outwards; phi returns, the middle at rest; the bumps travel back.
 
-then the mirror image, Theta(s, t + 1/2) = -Theta(s, t).
-
-Two bumps (figure 13E), in the regions around 1/4 and 3/4, antisymmetric about the middle, Theta(1 -
-s) = -Theta(s): the body lies across its path. ``(a, b) = A(phi) (sin phi, cos phi)`` with A(0) =
-`amplitude` and A(phi) such that the chord along the body stays constant. In a period
-
-1. phi goes from 0 to pi, bumps at the inner ends of their regions: the middle part slides on, the
-  outer parts rest;
-2. the bumps travel to the outer ends of their regions: all straight parts rest;
-3. phi returns to 0: the outer parts slide on, the middle rests;
-4. the bumps travel back.
-
-In the limit epsilon -> 0 the efficiency is 1/mu_f (one bump; 1/mu_b if it runs backwards), or
-1/mu_t (two bumps).
-"""  # noqa: E501
+For epsilon -> 0 the efficiency is 1/mu_f (one bump; 1/mu_b backwards), or 1/mu_t (two bumps).
+"""
 
 from __future__ import annotations
 
@@ -46,28 +33,23 @@ from colloc.system.arguments import check_finite, named_arguments
 from colloc.system.errors import ProblemError
 
 ODD_SCALE = 7**3.5 / 6**3
-"""By which the largest value of `odd_profile` is 1."""
 _CHORD_NODES, _CHORD_WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
 def odd_profile(x: np.ndarray) -> np.ndarray:
-    """``-k x (1 - x^2)^3`` on [-1, 1], zero outside; its largest value is 1."""
     return -ODD_SCALE * x * np.clip(1 - x * x, 0.0, None) ** 3
 
 
 def odd_slope(x: np.ndarray) -> np.ndarray:
-    """Derivative of `odd_profile`."""
     y = np.clip(1 - x * x, 0.0, None)
     return -ODD_SCALE * (y**3 - 6 * x * x * y**2)
 
 
 def even_profile(x: np.ndarray) -> np.ndarray:
-    """``(1 - x^2)^3`` on [-1, 1], zero outside."""
     return np.clip(1 - x * x, 0.0, None) ** 3
 
 
 def even_slope(x: np.ndarray) -> np.ndarray:
-    """Derivative of `even_profile`."""
     return -6 * x * np.clip(1 - x * x, 0.0, None) ** 2
 
 
@@ -86,8 +68,9 @@ class Concertina(PrescribedBody):
         Arc length of a bump over that of its region, 2 epsilon; the paper's is 1/2. The rest is the
         margin by which the resting part is longer than the sliding one.
     bumps : {1, 2}
+        Number of bumps.
     backwards : bool
-        One bump: run from head to tail, towards the tail (for mu_b < mu_f).
+        One bump: run from head to tail (for mu_b < mu_f).
 
     Examples
     --------
@@ -124,19 +107,19 @@ class Concertina(PrescribedBody):
 
     @property
     def regions(self) -> tuple[tuple[float, float], ...]:
-        """The arcs within which bumps form and travel."""
+        """Arcs within which bumps form and travel."""
         centres = (0.5,) if self.bumps == 1 else (0.25, 0.75)
         return tuple((c - self.epsilon, c + self.epsilon) for c in centres)
 
     @property
     def stroke(self) -> float:
         """Distance per period if nothing slips that should rest."""
-        x, weight = _CHORD_NODES, 0.5 * _CHORD_WEIGHTS
+        x, weight, amplitude = _CHORD_NODES, 0.5 * _CHORD_WEIGHTS, self.amplitude
         if self.bumps == 1:
-            return float(
-                2 * self.width * np.sum(weight * (1 - np.cos(self.amplitude * odd_profile(x))))
-            )
-        return float(2 * self.width * np.sum(weight * np.sin(self.amplitude * even_profile(x))))
+            shortening = 1 - np.cos(amplitude * odd_profile(x))
+        else:
+            shortening = np.sin(amplitude * even_profile(x))
+        return float(2 * self.width * np.sum(weight * shortening))
 
     def describe(self) -> str:
         bumps = "one bump" if self.bumps == 1 else "two bumps"
@@ -146,11 +129,11 @@ class Concertina(PrescribedBody):
         )
 
     def prescribed(self) -> Motion:
+        """Return the motion."""
         w, (low, high), one = self.width, self.regions[0], self.bumps == 1
         bump = self._one_bump if one else self._two_bumps
 
         def mirrored(s: np.ndarray, rear: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-            """The rear half's function of arc length, and minus that of its image in the front."""
             value = rear(np.minimum(s, 1 - s))
             return np.where(s > 0.5, -value, value)
 
@@ -183,7 +166,7 @@ class Concertina(PrescribedBody):
         return Motion(angle, rate, breaks, stages, antipodal=one)
 
     def _one_bump(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Coefficients a, b and centre of the bump, and their rates."""
+        """Coefficients a, b and centre of the bump, and their rates, ``(n_time,)``."""
         travel = (2 * self.epsilon - self.width) * (-1 if self.backwards else 1)
         scale = np.where(t < 0.5, self.amplitude, -self.amplitude)
         t = np.where(t < 0.5, t, t - 0.5)
@@ -195,7 +178,7 @@ class Concertina(PrescribedBody):
         return scale * (up - down), none, centre, scale * (up_rate - down_rate), none, centre_rate
 
     def _two_bumps(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The same of the rear bump."""
+        """Coefficients a, b and centre of the rear bump, and their rates, ``(n_time,)``."""
         travel = 2 * self.epsilon - self.width
         # a solver asks for the same phases panel by panel
         t, places = np.unique(t, return_inverse=True)
@@ -211,7 +194,7 @@ class Concertina(PrescribedBody):
 
 
 def _ramp(t: np.ndarray, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
-    """Goes from 0 to 1 between start and stop; its value and rate."""
+    """A ramp from 0 to 1 between start and stop, and its rate."""
     inside = (t >= start) & (t < stop)
     return np.clip((t - start) / (stop - start), 0.0, 1.0), inside / (stop - start)
 

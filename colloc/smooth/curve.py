@@ -1,17 +1,16 @@
-"""Smooth bodies: a curve given by its tangent angle, integrated on composite Gauss panels.
+"""A smooth body by its tangent angle, integrated on composite Gauss panels.
 
-The tangent angle ``Theta(s, t)`` and its rate are prescribed at the panels' nodes; positions are
-integrals of its cosine and sine with the panels' own integration matrices (paper, eqs. x0, y0), so
-the body is inextensible to rounding. The rigid velocity ``z = (u, v, omega)`` is that of a
-*reference*, one of the panels' edges: velocity of the point and rotation rate of the tangent there.
-Path integrals start at the reference and rates are taken relative to it, so a stretch that keeps
-its shape moves with relative precision, however slow it is.
+Positions are integrals of cos and sin of ``Theta(s, t)`` with the panels' integration matrices
+(paper, eqs. x0, y0), so the body is inextensible to rounding. The rigid velocity ``z = (u, v,
+omega)`` is that of a *reference*, one of the panels' edges: velocity of the point and rotation rate
+of the tangent there. Path integrals start at the reference and rates are relative to it, so a
+stretch that keeps its shape moves with relative precision, however slow it is.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,18 +20,13 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.schemes import Scheme, scheme
 
 
-@cache
-def _gauss(order: int) -> Scheme:
-    return scheme(f"gauss-{order}")
-
-
 @lru_cache(maxsize=1024)
 def _panel_matrices(
     n: int, order: int
 ) -> tuple[sparse.csc_matrix, sparse.csc_matrix, sparse.csc_matrix]:
     """Nodes to whole panels, panels to their nodes, and the integrals from a panel's left end to
     its nodes."""
-    each, unit = sparse.identity(n, format="csc"), _gauss(order)
+    each, unit = sparse.identity(n, format="csc"), scheme(f"gauss-{order}")
     return (
         sparse.kron(each, unit.b, "csc"),
         sparse.kron(each, np.ones((order, 1)), "csc"),
@@ -42,13 +36,14 @@ def _panel_matrices(
 
 @dataclass(frozen=True, eq=False)
 class PanelGrid:
-    """Gauss panels on the arc length, one column per instant (or a single column for all)."""
+    """Gauss panels on the arc length, one column a time point (or a single column for all).
+
+    edges: ascending from 0 to 1, ``(n_panel + 1, n_time)``; panels of width zero fill up columns
+    that need fewer. order: Gauss nodes a panel.
+    """
 
     edges: np.ndarray
-    """``(n_panel + 1, n_time)``: ascending from 0 to 1; panels of width zero are allowed (they fill
-    up columns that need fewer)."""
     order: int = 8
-    """Gauss nodes a panel."""
 
     @property
     def n(self) -> int:
@@ -56,7 +51,7 @@ class PanelGrid:
 
     @property
     def gauss(self) -> Scheme:
-        return _gauss(self.order)
+        return scheme(f"gauss-{self.order}")
 
     @property
     def widths(self) -> np.ndarray:
@@ -66,10 +61,8 @@ class PanelGrid:
     @property
     def nodes(self) -> np.ndarray:
         """Arc length of the nodes, ``(n_panel * order, n_time)``."""
-        return (
-            np.repeat(self.edges[:-1], self.order, axis=0)
-            + np.tile(self.gauss.c, self.n)[:, None] * self.widths
-        )
+        left = np.repeat(self.edges[:-1], self.order, axis=0)
+        return left + np.tile(self.gauss.c, self.n)[:, None] * self.widths
 
     @property
     def weights(self) -> np.ndarray:
@@ -79,23 +72,18 @@ class PanelGrid:
     def integrate(self, integrand: Array, reference: int) -> Array:
         """Integrals from edge `reference` to the nodes; the integrand ``(n_node, n_time)`` is times
         the panel widths."""
-        xp = namespace(integrand)
-        whole, spread, own = _panel_matrices(self.n, self.order)
-        ahead = np.arange(self.n) >= reference
-        panel_by_panel = (
-            np.tril(np.ones((self.n, self.n)), -1) * ahead
-            - np.triu(np.ones((self.n, self.n))) * ~ahead
-        )
-        start = xp.matmul(panel_by_panel, xp.matmul(whole, integrand))
-        return xp.matmul(spread, start) + xp.matmul(own, integrand)
+        matmul = namespace(integrand).matmul
+        whole, spread, inside = _panel_matrices(self.n, self.order)
+        ahead, ones = np.arange(self.n) >= reference, np.ones((self.n, self.n))
+        panel_by_panel = np.tril(ones, -1) * ahead - np.triu(ones) * ~ahead
+        start = matmul(panel_by_panel, matmul(whole, integrand))
+        return matmul(spread, start) + matmul(inside, integrand)
 
     def edge_path(self, reference: int) -> np.ndarray:
-        """``(n_panel + 1, n_node)``: the same integrals up to the edges."""
+        """The same integrals up to the edges, ``(n_panel + 1, n_node)``."""
         edge, panel = np.arange(self.n + 1)[:, None], np.arange(self.n)[None, :]
-        sign = (panel >= reference).astype(float) * (panel < edge) - (panel < reference) * (
-            panel >= edge
-        )
-        return np.kron(sign, self.gauss.b)
+        ahead = (panel >= reference).astype(float) * (panel < edge)
+        return np.kron(ahead - (panel < reference) * (panel >= edge), self.gauss.b)
 
     def panel_sums(self, density: np.ndarray) -> np.ndarray:
         """Integral of a density ``(n_node, n_time)`` over each panel, ``(n_panel, n_time)``."""
@@ -103,12 +91,9 @@ class PanelGrid:
 
 
 class Curve(NamedTuple):
-    """A body at given instants, seen from a reference; each ``(n_node, n_time)``.
-
-    Direction cosines of the tangent; how a rotation about the reference moves a node tangentially
-    and normally; the tangential and normal velocity of the nodes while the reference is held;
-    quadrature weights.
-    """
+    """A body seen from a reference; each ``(n_node, n_time)``: direction cosines of the tangent;
+    tangential and normal motion of the nodes per rotation about the reference; their velocity while
+    the reference is held; quadrature weights."""
 
     cos: Array
     sin: Array
@@ -122,11 +107,9 @@ class Curve(NamedTuple):
 def curve(
     panels: PanelGrid, angle: Array, rate: Array, reference: int, reference_rate: Array
 ) -> Curve:
-    """The curve of tangent angles [rad] and rates [rad/time] at the nodes, ``(n_node, n_time)``,
-    seen from the panel edge number `reference`, where Theta has the rate ``(1, n_time)`` (paper,
-    eqs. x0, y0 and dtz0)."""
-    xp = namespace(angle, rate)
-    width = panels.widths
+    """The curve of tangent angles and rates at the nodes, ``(n_node, n_time)``, seen from edge
+    number `reference`, where Theta has the rate ``(1, n_time)`` (paper, eqs. x0, y0 and dtz0)."""
+    xp, width = namespace(angle, rate), panels.widths
     c, s = xp.cos(angle), xp.sin(angle)
     x, y = panels.integrate(width * c, reference), panels.integrate(width * s, reference)
     turning = width * (rate - reference_rate)
@@ -160,30 +143,9 @@ def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
     )
 
 
-def pulled_back(body: Curve, blocks: tuple[tuple[np.ndarray, np.ndarray], ...]) -> np.ndarray:
-    """``integral of G^T K G``, ``(n_time, 3, 3)``, with G = d(vs, vn)/dz and K the given 2 x 2 of
-    densities."""
-    row_s, row_n = (body.cos, body.sin, body.arm_s), (-body.sin, body.cos, body.arm_n)
-    right = [
-        [body.weight * (block[0] * row_s[j] + block[1] * row_n[j]) for j in range(3)]
-        for block in blocks
-    ]
-    columns = [
-        [(row_s[i] * right[0][j] + row_n[i] * right[1][j]).sum(axis=0) for j in range(3)]
-        for i in range(3)
-    ]
-    return np.array(columns).transpose(2, 0, 1)
-
-
 def mean_velocity(body: Curve, vs: Array, vn: Array) -> Array:
     """Velocity of the centre of mass, ``(2, n_time)``, from that of the nodes."""
-    xp = namespace(body.cos, vs)
-    return xp.stack(
-        [
-            xp.sum_rows(body.weight * (vs * body.cos - vn * body.sin)),
-            xp.sum_rows(body.weight * (vs * body.sin + vn * body.cos)),
-        ]
-    )
+    return resultant(body, vs, vn)[:2, :]
 
 
 def bending_power(
@@ -192,9 +154,8 @@ def bending_power(
     """Power of what bends the body against a force per length, ``(n_time,)``; `rate` is that of
     Theta at the nodes.
 
-    The moment of all force ahead of s has the derivative ``-t x F(s)``, with F the force ahead; its
-    work on the curvature is, by parts, ``-int (n . F) dTheta/dt ds``. In balance that is the power
-    dissipated.
+    The moment of all force F ahead of s has the derivative ``-t x F(s)``; its work on the curvature
+    is, by parts, ``-int (n . F) dTheta/dt ds``. In balance that is the power dissipated.
     """
     fx, fy = tangential * body.cos - normal * body.sin, tangential * body.sin + normal * body.cos
     ahead_x, ahead_y = (-panels.integrate(panels.widths * f, panels.n) for f in (fx, fy))

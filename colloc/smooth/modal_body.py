@@ -1,9 +1,6 @@
-"""The smooth body of a few modes as a `colloc.mechanics.bodies.Body`: ``Theta(s, t) = sum_m q_m(t)
-phi_m(s)``, s from 0 to 1.
+"""The smooth body of a few modes: ``Theta(s, t) = sum_m q_m(t) phi_m(s)``, s from 0 to 1.
 
-Modes have zero mean, so that Theta is measured from the mean direction of the body and the
-orientation of that direction is the rigid rotation. The shape coordinates q take the place of joint
-angles [rad].
+Modes have zero mean, so that Theta is measured from the mean direction of the body.
 """
 
 from __future__ import annotations
@@ -14,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from colloc.mechanics.bodies import Stretch
+from colloc.mechanics.bodies import BoundedAngles, Stretch
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
@@ -22,10 +19,10 @@ from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 LEGENDRE, FOURIER = "legendre", "fourier"
-
+_FINE = PanelGrid(np.linspace(0.0, 1.0, 41)[:, None], 8)
 _PLACES_A_MODE = 4
-"""Where on the body |Theta| is bounded, with all that lies nearer to each place than to others;
-they lie denser towards the ends, where polynomials change fast."""
+"""Chebyshev places a mode where |Theta| is bounded, with all that is nearer to each than to others:
+polynomials change fast towards the ends."""
 
 
 @named_arguments
@@ -59,9 +56,6 @@ class ModalBody(PanelBody):
     panels: int = 8
     order: int = 6
 
-    coordinate, quantity = "mode", "mode"
-    symmetric = True
-
     def __post_init__(self) -> None:
         if self.basis not in (LEGENDRE, FOURIER):
             raise ProblemError(f"basis must be {LEGENDRE!r} or {FOURIER!r}, not {self.basis!r}.")
@@ -75,6 +69,10 @@ class ModalBody(PanelBody):
             raise ProblemError(
                 f"fourier modes come in pairs (sine and cosine); {self.modes} is odd."
             )
+
+    @property
+    def n_joint(self) -> int:
+        return self.modes
 
     @property
     def grid(self) -> PanelGrid:
@@ -93,17 +91,9 @@ class ModalBody(PanelBody):
         return xp.columns([wave(x) for x in waves for wave in (xp.sin, xp.cos)])
 
     @property
-    def parities(self) -> np.ndarray:
-        """``(modes,)``: 1 for modes that are even about the middle of the body, -1 for odd ones."""
-        return np.resize([-1.0, 1.0], self.modes)
-
-    @property
-    def n_joint(self) -> int:
-        return self.modes
-
-    def swapped(self, shape: np.ndarray) -> np.ndarray:
-        """Theta(1 - s), in axes turned by half a turn."""
-        return (self.parities * shape.T).T
+    def reversal(self) -> np.ndarray:
+        """Theta(1 - s), in axes turned by half a turn: odd modes change their sign."""
+        return np.diag(np.resize([-1.0, 1.0], self.modes))
 
     def describe(self) -> str:
         return f"smooth, {self.modes} {self.basis} modes of its tangent angle, {self.panels} panels"
@@ -116,39 +106,22 @@ class ModalBody(PanelBody):
     def turning(self, s: np.ndarray, angles: Array, rates: Array) -> Array:
         return self.tangent(s, rates)
 
-    def angle_slopes(
-        self, s: np.ndarray, q: np.ndarray, rates: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        modes = self.modes_at(s[:, 0])[..., None]
-        none = np.zeros_like(modes)
-        return np.concatenate([modes, none], axis=1), np.concatenate([none, modes], axis=1)
-
     @property
-    def limited(self) -> np.ndarray:
-        return self.modes_at(self._places)
+    def bounded_angles(self) -> BoundedAngles:
+        count = _PLACES_A_MODE * self.modes
 
-    @property
-    def _places(self) -> np.ndarray:
-        return self._chebyshev(np.arange(_PLACES_A_MODE * self.modes + 1.0))
+        def chebyshev(k: np.ndarray) -> np.ndarray:
+            return 0.5 - 0.5 * np.cos(np.clip(k * np.pi / count, 0.0, np.pi))
 
-    def _chebyshev(self, k: np.ndarray) -> np.ndarray:
-        """Places on the body, by their number; a half lies in the middle."""
-        return 0.5 - 0.5 * np.cos(np.clip(k * np.pi / (_PLACES_A_MODE * self.modes), 0.0, np.pi))
+        places, ends = chebyshev(np.arange(count + 1.0)), chebyshev(np.arange(count + 2) - 0.5)
+        return BoundedAngles(
+            self.modes_at(places),
+            tuple(f"tangent at {s:.3f}" for s in places),
+            tuple(Stretch(*each, self.modes_at) for each in pairwise(ends.tolist())),
+            super().bounded_angles.fine,
+        )
 
-    @property
-    def stretches(self) -> tuple[Stretch, ...]:
-        ends = self._chebyshev(np.arange(_PLACES_A_MODE * self.modes + 2) - 0.5)
-        return tuple(Stretch(*each, self.modes_at) for each in pairwise(ends.tolist()))
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        return tuple(f"tangent at {s:.3f}" for s in self._places)
-
-    def largest_angles(self, angles: np.ndarray) -> np.ndarray:
-        """The same modes at all instants, which is faster."""
-        return np.abs(self.modes_at(np.linspace(0.0, 1.0, 401)) @ angles).max(axis=0)
-
-    def laid(self, lengths: np.ndarray) -> np.ndarray:
+    def from_chain(self, lengths: np.ndarray) -> np.ndarray:
         """Nearest in the mean square to the chain's staircase of a tangent angle, whose mean
         direction, a rigid rotation, is left out."""
         lengths = np.asarray(lengths, dtype=float)
@@ -162,14 +135,10 @@ class ModalBody(PanelBody):
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         """``sin(2 pi t - 2 pi waves (s - 1/2))`` as nearly as the modes can."""
-        grid = _FINE
-        s, w = grid.nodes[:, 0], grid.weights[:, 0]
+        s, w = _FINE.nodes[:, 0], _FINE.weights[:, 0]
         project = np.linalg.solve(_gram(self), self.modes_at(s).T * w)
         phase = 2 * np.pi * waves * (s - 0.5)
         return -project @ np.sin(phase), project @ np.cos(phase)
-
-
-_FINE = PanelGrid(np.linspace(0.0, 1.0, 41)[:, None], 8)
 
 
 @cache

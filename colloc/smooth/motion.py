@@ -1,5 +1,5 @@
-"""Prescribed motions of a smooth body: the tangent angle and its rate as functions of arc length
-and phase."""
+"""Prescribed motions of a smooth body: tangent angle and rate as functions of arc length and
+phase."""
 
 from __future__ import annotations
 
@@ -11,27 +11,17 @@ import numpy as np
 from colloc.system.errors import ProblemError
 
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""A function of arc length ``(n_body, n_time)`` and phase ``(n_time,)``, with values ``(n_body,
-n_time)``."""
+"""Arc length ``(n_body, n_time)`` and phase ``(n_time,)`` to values ``(n_body, n_time)``."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A periodic motion Theta(s, t) of a smooth body.
+    """A periodic motion Theta(s, t).
 
-    Parameters
-    ----------
-    angle, rate : Field
-        Theta [rad] and its time derivative [rad/period]. Theta need not vanish at the tail: the
-        frame then turns with the difference, which changes neither distance nor work.
-    breaks : callable, optional
-        Phase ``(n_time,)`` to arc lengths ``(n_break, n_time)`` where Theta is not smooth; panels
-        end there.
-    stages : tuple of float
-        Phases from 0 to `fraction` between which the motion is smooth in time.
-    antipodal : bool
-        Theta(s, t + 1/2) = -Theta(s, t): the second half period is the mirror image of the first
-        (paper, section VI).
+    angle, rate: Theta [rad] and its time derivative [rad/period]. breaks: phase ``(n_time,)`` to
+    arc lengths ``(n_break, n_time)`` where Theta is not smooth; panels end there. stages: phases
+    from 0 to `fraction` between which the motion is smooth in time. antipodal: Theta(s, t + 1/2) =
+    -Theta(s, t), the second half period mirrors the first (paper, section VI).
     """
 
     angle: Field
@@ -41,11 +31,8 @@ class Motion:
     antipodal: bool = False
 
     def __post_init__(self) -> None:
-        if (
-            self.stages[0] != 0.0
-            or self.stages[-1] != self.fraction
-            or min(np.diff(self.stages)) <= 0
-        ):
+        first, last, steps = self.stages[0], self.stages[-1], np.diff(self.stages)
+        if first != 0.0 or last != self.fraction or min(steps) <= 0:
             raise ProblemError(
                 f"motion.stages must ascend from 0 to {self.fraction:g}, not {self.stages}."
             )
@@ -56,22 +43,18 @@ class Motion:
         return 0.5 if self.antipodal else 1.0
 
     def first_edges(self, t: np.ndarray, n_panel: int) -> np.ndarray:
-        """Panel edges ``(n_edge, n_time)``: the breaks, and at most `n_panel` + 1 equal parts of
-        the body besides."""
+        """Panel edges ``(n_edge, n_time)``: the breaks, and `n_panel` + 1 equal parts besides."""
         even = np.repeat(np.linspace(0.0, 1.0, n_panel + 1)[:, None], t.size, axis=1)
         if self.breaks is None:
             return even
         return np.sort(np.concatenate([even, np.clip(self.breaks(t), 0.0, 1.0)]), axis=0)
 
 
-def travelling_wave(
+def _travelling_wave(
     profile: Callable, slope: Callable, waves: float, direction: float = -1.0
 ) -> Motion:
-    """Theta = profile(2 pi (waves s + direction t)), with `slope` the derivative of the 2
-    pi-periodic, half-wave antisymmetric profile.
-
-    ``direction`` -1 runs from tail to head (paper, figure 5A), +1 from head to tail (figure 5B).
-    """
+    """Theta = profile(2 pi (waves s + direction t)) of a 2 pi-periodic, half-wave antisymmetric
+    profile; direction -1 runs from tail to head (paper, figure 5A), +1 back (figure 5B)."""
 
     def phase(s: np.ndarray, t: np.ndarray) -> np.ndarray:
         return 2 * np.pi * (waves * s + direction * t)
@@ -88,22 +71,19 @@ def tanh_wave(amplitude: float = 1.3, steepness: float = 20.0, waves: float = 2.
     """Smoothed triangular wave ``amplitude tanh(steepness sin(2 pi (waves s - t)))`` (paper, figure
     5A)."""
 
-    def slope(phase: np.ndarray) -> np.ndarray:
-        return (
-            amplitude
-            * steepness
-            * np.cos(phase)
-            / np.cosh(np.clip(steepness * np.sin(phase), -300, 300)) ** 2
-        )
+    def profile(phase: np.ndarray) -> np.ndarray:
+        return amplitude * np.tanh(steepness * np.sin(phase))
 
-    return travelling_wave(
-        lambda phase: amplitude * np.tanh(steepness * np.sin(phase)), slope, waves
-    )
+    def slope(phase: np.ndarray) -> np.ndarray:
+        inner = np.clip(steepness * np.sin(phase), -300, 300)
+        return amplitude * steepness * np.cos(phase) / np.cosh(inner) ** 2
+
+    return _travelling_wave(profile, slope, waves)
 
 
 def sine_wave(amplitude: float = 1.0, waves: float = 1.0) -> Motion:
     """``amplitude sin(2 pi (waves s + t))`` (paper, figure 5B)."""
-    return travelling_wave(
+    return _travelling_wave(
         lambda phase: amplitude * np.sin(phase), lambda phase: amplitude * np.cos(phase), waves, 1.0
     )
 

@@ -1,10 +1,5 @@
-"""Smooth bodies whose motion is prescribed, as bodies of a problem: what they achieve is asked for,
-nothing is free.
-
-Their shape coordinates are the phase, as a point on a circle (`colloc.gaits.prescribed`).
-Everything is solved on panels that adapt, since prescribed shapes may be as sharp, and delta as
-small, as one likes.
-"""
+"""Smooth bodies whose motion is prescribed: their shape coordinates are the phase, as a point on a
+circle (`colloc.gaits.prescribed`)."""
 
 from __future__ import annotations
 
@@ -12,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Sliding
-from colloc.mechanics.bodies import Usual
+from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Body, Defaults, Sliding
 from colloc.mechanics.law import Law
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.smooth.smooth_body import SmoothBody
@@ -24,31 +18,25 @@ _TURN = 2 * np.pi
 
 
 class PrescribedBody(SmoothBody):
-    """A smooth body that runs through a `colloc.smooth.motion.Motion`."""
+    """A smooth body that runs through a `Motion`, always solved on panels that adapt: its shapes
+    may be as sharp, and delta as small, as one likes."""
 
     n_joint = 2
-    coordinate, quantity = "coordinate", "phase coordinate"
-    usual = Usual(
+    # nobody optimised the motion: a replay need not look at it ten times as closely as the mesh
+    defaults = Defaults(
+        coordinate="coordinate", quantity="phase coordinate",
         delta=1e-4, delta_start=1e-4, limit=0.5 * np.pi, largest_limit=np.pi,
-        limit_name="tangent angle", excess=1e-9,
-        delta_influence=2e-2, instants=96, instants_a_point=2,
+        limit_name="tangent angle", excess=1e-9, delta_influence=2e-2, instants=96,
+        instants_a_point=2,
     )  # fmt: skip
-    """Nobody optimised the motion, so a replay need not look at it ten times as closely as the
-    mesh; it adapts anyway."""
-    limited = np.empty((0, 2))
-    bending = np.empty((0, 2))
 
     def prescribed(self) -> Motion:
-        """The motion."""
+        """Return the motion."""
         raise NotImplementedError
 
     @property
     def symmetries(self) -> tuple[str, ...]:
         return ("antipodal",) if self.prescribed().antipodal else ("none",)
-
-    @property
-    def schedule(self) -> tuple[float, ...]:
-        return self.prescribed().stages
 
     def tangent(self, s: np.ndarray, angles: np.ndarray) -> np.ndarray:
         return self.prescribed().angle(s, _phase(angles))
@@ -58,8 +46,8 @@ class PrescribedBody(SmoothBody):
         return self.prescribed().rate(s, _phase(angles)) * pace
 
     def breaks(self, angles: np.ndarray) -> np.ndarray:
-        found = self.prescribed().breaks
-        return super().breaks(angles) if found is None else found(_phase(angles))
+        breaks = self.prescribed().breaks
+        return super().breaks(angles) if breaks is None else breaks(_phase(angles))
 
     def sliding(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray
@@ -69,42 +57,29 @@ class PrescribedBody(SmoothBody):
 
     def solve(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *,
-        start: np.ndarray | None = None,
-        tolerance: float = 1e-11,
+        start: np.ndarray | None = None, tolerance: float = 1e-11,
     ) -> BalanceSolution:  # fmt: skip
         s = self.on_adaptive_panels(friction, angles, rates, delta, tolerance=tolerance)
+        tail = np.zeros(s.t.size, dtype=int)
         return BalanceSolution(
-            s.z,
-            s.residual,
-            s.iterations,
-            s.residual <= tolerance,
-            np.zeros(s.t.size, dtype=int),
-            s.z,
-        )
+            s.z, s.residual, s.iterations, s.residual <= tolerance, tail, s.z
+        )  # fmt: skip
 
     def motion(
-        self,
-        friction: Law,
-        angles: np.ndarray,
-        rates: np.ndarray,
-        delta: float,
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float,
         solved: BalanceSolution,
-    ) -> BalancedMotion:
+    ) -> BalancedMotion:  # fmt: skip
         slid = self.on_adaptive_panels(friction, angles, rates, delta, slide=solved.z)
         return BalancedMotion(solved.z, slid.centre, slid.power, slid.bending_power)
 
-    def slopes(
-        self,
-        friction: Law,
-        angles: np.ndarray,
-        rates: np.ndarray,
-        delta: float,
-        solved: BalanceSolution,
-    ) -> np.ndarray:
-        raise NotImplementedError("a prescribed motion has nothing to differentiate by.")
-
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         return np.array([1.0, 0.0]), np.array([0.0, 1.0])
+
+
+def schedule(body: Body) -> tuple[float, ...]:
+    """Phases from 0 to the solved part of a period between which a prescribed motion is smooth in
+    time; none for a body that is free to move."""
+    return body.prescribed().stages if isinstance(body, PrescribedBody) else ()
 
 
 def _phase(angles: np.ndarray) -> np.ndarray:
@@ -119,12 +94,12 @@ class Wave(PrescribedBody):
     Parameters
     ----------
     profile : {"sine", "tanh", "standing"}
-        See `colloc.smooth.motion`: ``sin(2 pi (waves s + t))``, ``tanh(steepness sin(2 pi (waves s
-        - t)))`` and ``sin(2 pi s) sin(2 pi t)``, times the amplitude.
+        ``sin(2 pi (waves s + t))``, ``tanh(steepness sin(2 pi (waves s - t)))`` or ``sin(2 pi s)
+        sin(2 pi t)``, times the amplitude.
     amplitude : float
         Largest tangent angle [rad].
     waves : float
-        Along the body; a standing wave has one.
+        Number along the body; a standing wave has one.
     steepness : float
         Of "tanh" only.
 
@@ -149,6 +124,7 @@ class Wave(PrescribedBody):
         check_positive(self, "amplitude", "waves", "steepness")
 
     def prescribed(self) -> Motion:
+        """Return the motion."""
         if self.profile == "sine":
             return sine_wave(self.amplitude, self.waves)
         if self.profile == "standing":

@@ -1,51 +1,47 @@
-"""What all smooth bodies answer alike, from their tangent angle alone
-(`colloc.mechanics.bodies.Body`)."""
+"""Smooth bodies by their tangent angle alone, as `colloc.mechanics.bodies.Body`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from colloc.mechanics.balance_results import BalancedMotion
-from colloc.mechanics.bodies import ARROWS, Body
+from colloc.mechanics.bodies import BalancedMotion, Body, BoundedAngles
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.balance import TAIL, SmoothSolution, solve_smooth
-from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity
+from colloc.smooth.curve import Curve, PanelGrid, curve
 from colloc.smooth.motion import Motion
 
-_OUTLINE, _NODES = 96, 3
-_SHOWN = 5
-"""Places along the body whose speeds are drawn."""
-_FINE_PLACES = 401
-_REPLAYED = 1e-8
-"""Largest difference of a panel's force, torque or power from those of its halves, where a motion
-is replayed."""
+_OUTLINE = PanelGrid(np.linspace(0.0, 1.0, 97)[:, None], 3)
+_FINE = np.linspace(0.0, 1.0, 401)[:, None]
+_REPLAY_TOLERANCE = 1e-8
+"""Largest difference of a panel's force, torque or power from its halves in a replay."""
 
 
 class SmoothBody(Body):
-    """A curve of unit length by its tangent angle. Below pi/2 it cannot cross itself, and a point
-    at rest moves along it and makes no kinks; forces on all nodes as variables would be too many
-    for a full program."""
+    """A curve of unit length. Below pi/2 it cannot cross itself; a point at rest moves along it and
+    makes no kinks; forces on all nodes would be too many variables for a full program."""
 
     def tangent(self, s: np.ndarray, angles: Array) -> Array:
-        """Theta ``(n_node, n_time)`` at arc lengths s ``(n_node, 1 or n_time)`` of shapes
-        ``(n_joint, n_time)``."""
+        """Theta ``(n_node, n_time)`` at arc lengths s ``(n_node, 1 or n_time)``."""
         raise NotImplementedError
 
     def turning(self, s: np.ndarray, angles: Array, rates: Array) -> Array:
-        """Its rate."""
+        """Rate of Theta."""
         raise NotImplementedError
 
     def breaks(self, angles: np.ndarray) -> np.ndarray:
-        """Arc lengths ``(n_break, n_time)`` at which Theta is not smooth; none unless a body says
-        so."""
+        """Arc lengths ``(n_break, n_time)`` at which Theta is not smooth."""
         return np.empty((0, angles.shape[1]))
+
+    @property
+    def bounded_angles(self) -> BoundedAngles:
+        none = np.empty((0, self.n_joint))
+        return BoundedAngles(none, (), fine=lambda angles: self.tangent(_FINE, angles))
 
     def on_adaptive_panels(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, **settings
     ) -> SmoothSolution:
-        """The balance on panels that are halved until they resolve it; settings as for
-        `solve_smooth`."""
+        """The balance on panels that adapt; settings as of `solve_smooth`."""
 
         def at(t: np.ndarray) -> np.ndarray:  # the phase counts the shapes
             return t.astype(int)
@@ -55,78 +51,36 @@ class SmoothBody(Body):
             lambda s, t: self.turning(s, angles[:, at(t)], rates[:, at(t)]),
             lambda t: self.breaks(angles[:, at(t)]),
         )
-        settings = {"quadrature_tolerance": _REPLAYED} | settings
+        settings = {"quadrature_tolerance": _REPLAY_TOLERANCE} | settings
         return solve_smooth(motion, friction, np.arange(angles.shape[1]), delta, **settings)
 
-    def replayed(
-        self,
-        friction: Law,
-        angles: np.ndarray,
-        rates: np.ndarray,
-        delta: float,
-        start: np.ndarray | None,
-    ) -> tuple[BalancedMotion, np.ndarray]:
-        """On panels that adapt, whatever those of a search."""
-        solved = self.on_adaptive_panels(friction, angles, rates, delta).require()
-        return BalancedMotion(
-            solved.z, solved.centre, solved.power, solved.bending_power
-        ), solved.residual
-
-    def largest_angles(self, angles: np.ndarray) -> np.ndarray:
-        places = np.linspace(0.0, 1.0, _FINE_PLACES)[:, None]
-        return np.asarray(np.abs(self.tangent(places, angles)).max(axis=0))
-
-    def _curve(
-        self, n: int, order: int, angles: np.ndarray, rates: np.ndarray
-    ) -> tuple[PanelGrid, Curve]:
-        """The body on n equal panels."""
-        panels = PanelGrid(
-            np.repeat(np.linspace(0.0, 1.0, n + 1)[:, None], angles.shape[1], axis=1), order
-        )
-        s = panels.nodes
-        return panels, curve(
-            panels, self.tangent(s, angles), self.turning(s, angles, rates), TAIL, np.zeros((1, 1))
-        )
-
-    def _at_equal_steps(self, count: int, angles: np.ndarray, rates: np.ndarray) -> Curve:
-        """The middles of so many equal parts of the body, integrated on no fewer than `_OUTLINE`
-        panels."""
-        # an odd number, so that one of them lies in the middle
-        each = 1 + 2 * (_OUTLINE // (2 * count))
-        _, now = self._curve(count * each, _NODES, angles, rates)
-        return Curve(*(row[_NODES * each // 2 :: _NODES * each] for row in now))
+    def _curve(self, angles: np.ndarray) -> Curve:
+        zero = np.zeros((1, 1))
+        return curve(_OUTLINE, self.tangent(_OUTLINE.nodes, angles), zero, TAIL, zero)
 
     def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        panels, now = self._curve(_OUTLINE, _NODES, angles, np.zeros_like(angles))
-        path = panels.edge_path(TAIL)
-        return path @ (panels.widths * now.cos), path @ (panels.widths * now.sin)
+        path, now = _OUTLINE.edge_path(TAIL) * _OUTLINE.widths[:, 0], self._curve(angles)
+        return path @ now.cos, path @ now.sin
 
     def centre(self, angles: np.ndarray) -> np.ndarray:
-        _, now = self._curve(_OUTLINE, _NODES, angles, np.zeros_like(angles))
-        return np.stack([(now.weight * axis).sum(axis=0) for axis in _places(now)])
-
-    def rubbing(
-        self,
-        friction: Law,
-        angles: np.ndarray,
-        rates: np.ndarray,
-        delta: float,
-        z: np.ndarray,
-        count: int = ARROWS,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        now = self._at_equal_steps(count, angles, rates)
-        fs, fn = friction.density(*node_velocity(now, z), delta)
-        return np.stack(_places(now)), np.stack(
-            [fs * now.cos - fn * now.sin, fs * now.sin + fn * now.cos]
-        )
-
-    def speeds(
-        self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray
-    ) -> tuple[str, np.ndarray]:
-        """At equal steps from tail to head."""
-        return "part", np.hypot(*node_velocity(self._at_equal_steps(_SHOWN, angles, rates), z))
+        now = self._curve(angles)
+        x, y = now.arm_s * now.sin + now.arm_n * now.cos, now.arm_n * now.sin - now.arm_s * now.cos
+        return np.stack([(now.weight * axis).sum(axis=0) for axis in (x, y)])
 
 
-def _places(now: Curve) -> tuple[np.ndarray, np.ndarray]:
-    """Where the nodes are, seen from the reference: their arms turned back into the axes."""
-    return now.arm_s * now.sin + now.arm_n * now.cos, now.arm_n * now.sin - now.arm_s * now.cos
+def accurate_motion(
+    body: Body,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    start: np.ndarray | None,
+) -> tuple[BalancedMotion, np.ndarray]:
+    """The motion for a certificate, and its residual ``(n_time,)``: of smooth bodies on panels that
+    adapt, whatever those of a search."""
+    if isinstance(body, SmoothBody):
+        slid = body.on_adaptive_panels(friction, angles, rates, delta).require()
+        motion = BalancedMotion(slid.z, slid.centre, slid.power, slid.bending_power)
+        return motion, slid.residual
+    solved = body.solve(friction, angles, rates, delta, start=start).require()
+    return body.motion(friction, angles, rates, delta, solved), solved.residual

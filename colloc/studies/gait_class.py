@@ -14,6 +14,7 @@ from colloc.motion.collocated import CollocatedPose
 from colloc.numerics.mesh import uniform_mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.distinct_optima import phase_distance, reversed_in_time, swapped
+from colloc.smooth.smooth_body import SmoothBody
 
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
 _SAME, _STANDING = 0.02, 0.05  # relative distance of a symmetric gait to its image; standing |wave|
@@ -80,11 +81,18 @@ def forward_share(gait: Fourier, body: Body, friction: Law) -> float:
     return float((displacement * np.conj(axis)).real / size) if size > 0 else 0.0
 
 
+def _bending(body: Body) -> np.ndarray:
+    """How far the body bends at places from tail to head, ``(n_place, n_joint)``."""
+    if isinstance(body, SmoothBody):
+        return np.diff(body.bounded_angles.rows, axis=0)
+    return np.eye(body.n_joint)
+
+
 def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     """Classify a gait of a body with at least two joints or modes."""
     amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
     close = _SAME * max(amplitude, 1e-12)
-    image = reversed_in_time(swapped(gait, body)) if body.symmetric else None
+    image = reversed_in_time(swapped(gait, body)) if body.reversal is not None else None
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
     retraced = phase_distance(gait, reversed_in_time(gait)) < close
     return GaitClass(
@@ -92,6 +100,6 @@ def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
         bool(np.linalg.norm(even) < close),
         retraced,
         0 if retraced else winding(gait),
-        wave_direction(gait.mapped(body.bending)),
+        wave_direction(gait.mapped(_bending(body))),
         forward_share(gait, body, friction),
     )

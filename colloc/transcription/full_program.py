@@ -44,8 +44,9 @@ from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import widest
 from colloc.gaits.period import chord_per_way
-from colloc.mechanics.bodies import FULL, Pairs
+from colloc.mechanics.bodies import FULL
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.inertia import STATES, turning
 from colloc.mechanics.line_integrals import line_integrals
@@ -198,8 +199,8 @@ def full_program(
 
     lower, upper = np.full(program.n, -np.inf), np.full(program.n, np.inf)
     lower[p], upper[p] = gaits.bounds(admissible.body, widest(admissible.joint_limit))
-    if lifted:
-        most = control.dynamics.body.largest_forces(control.dynamics.law)
+    if isinstance(body := control.dynamics.body, Chain) and lifted:
+        most = body.contact.largest_forces(control.dynamics.law)
         lower[layout.friction], upper[layout.friction] = -most, most
     for total in (layout.distance, layout.work):
         lower[total[0, 0]] = upper[total[0, 0]] = 0.0

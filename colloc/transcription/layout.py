@@ -13,6 +13,7 @@ from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
+from colloc.mechanics.links import Links
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 
@@ -85,6 +86,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
     body, gait, dynamics = control.dynamics.body, control.admissible.gait, control.dynamics
     n_joint, inertial = body.n_joint, bool(dynamics.regime.froude)
     lifted = mesh.n_point * (control.formulation == FULL)
+    contacts = len(body.contact.force_names) if isinstance(body, Links) else 0
     balanced, moved = (0, lifted) if inertial else (lifted, 0)
     mapped = mesh.n_point - lifted
     sizes = {
@@ -95,7 +97,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
         "totals": (len(control.aims.integrals), 1),
         "momenta": (len(STATES) * inertial, mesh.n_site),
         **dict.fromkeys(("directions", "spins", "vx", "vy"), (n_joint + 1, lifted)),
-        "friction": (len(body.force_names), lifted),
+        "friction": (contacts, lifted),
         "speed": (1, lifted * gait.relative_delta),
         **dict.fromkeys(("joint_fx", "joint_fy", "moments"), (n_joint, balanced)),
         **dict.fromkeys(("x", "y"), (n_joint + 1, moved)),

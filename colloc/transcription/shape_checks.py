@@ -12,8 +12,8 @@ import casadi as ca
 import numpy as np
 
 from colloc.gaits.limits import Limit, range_of
-from colloc.mechanics.bodies import Body, Pairs, Stretch
-from colloc.mechanics.contact import Contact, smooth_minimum, tangent_of_minimum
+from colloc.mechanics.bodies import Body, Stretch
+from colloc.mechanics.contact import Contact, Pairs, smooth_minimum, tangent_of_minimum
 from colloc.mechanics.joint_map import JointMap
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.peaks import vertex
@@ -118,7 +118,8 @@ def shape_checks(
     """Angles within the limit, then contacts of near pairs and of pairs `far`, then rates over the
     largest allowed, `speeds` [rad per period]."""
     angles = ca.SX.sym("q", body.n_joint)
-    names, stretches = enumerate(body.limit_names), body.stretches
+    bounded = body.bounded_angles
+    names, stretches = enumerate(bounded.names), bounded.stretches
     if stretches:
         checks = [
             _stretch_check(name, angles, stretch, k)
@@ -127,7 +128,7 @@ def shape_checks(
     else:
         checks = [
             _angle_check(name, angles, row, k)
-            for (k, name), row in zip(names, body.limited, strict=True)
+            for (k, name), row in zip(names, bounded.rows, strict=True)
         ]
     known = _contact_checks(body)
     checks += [
@@ -135,7 +136,9 @@ def shape_checks(
         for each in body.contacts(far)
     ]
     each, name = (
-        (joint_map.inverse, "motor") if joint_map else (np.eye(body.n_joint), body.coordinate)
+        (joint_map.inverse, "motor")
+        if joint_map
+        else (np.eye(body.n_joint), body.defaults.coordinate)
     )
     rates = (
         _angle_check(f"speed of {name} {j + 1}", angles, each[j] / most, -1)

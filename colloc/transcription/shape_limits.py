@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.gaits.control_problem import ControlProblem
-from colloc.mechanics.bodies import Pairs
+from colloc.mechanics.contact import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.repeated import Rows
 from colloc.transcription.layout import Layout

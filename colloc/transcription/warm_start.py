@@ -6,7 +6,7 @@ import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.links import Links
+from colloc.mechanics.chain import Chain
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights, sums
 from colloc.motion.kinds import OMEGA, Passed, Shapes, begin_of, first_theta, kind_of_motion
 from colloc.numerics.mesh import Mesh
@@ -90,7 +90,7 @@ def _lift(
     angles, rates, z = motion
     dynamics = control.dynamics.in_speeds_of(RADIANS)
     body, law, pull = dynamics.body, dynamics.law, dynamics.regime.pull(theta[None])
-    assert isinstance(body, Links)
+    assert isinstance(body, Chain)
     posture = body.posture(angles)
     link = body.velocity(posture, rates, z)
     axes = np.exp(1j * theta)

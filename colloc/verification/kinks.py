@@ -12,6 +12,7 @@ import numpy as np
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.mechanics.links import Links
 from colloc.verification.adaptive_motion import FineMotion, rates_at
 from colloc.verification.played import Path
 
@@ -27,7 +28,7 @@ def kink_phases(
     """Phases of kinks and jumps inside the solved part of a gait, ascending, to 1e-3 of the spacing
     of the panels there; delta is per period."""
     t, velocity = fine.nodes.ravel(), fine.rates.z.reshape(3, -1)
-    speed = body.slowness(friction, *path(t), delta, velocity)  # vanishes at a kink
+    speed = _slowness(body, friction, *path(t), velocity)  # vanishes at a kink
     inner = speed[:, 1:-1]
     link, index = np.nonzero((inner <= speed[:, :-2]) & (inner <= speed[:, 2:]))
     centre, least = t[index + 1], inner[link, index]
@@ -35,7 +36,7 @@ def kink_phases(
     for _ in range(_ZOOMS if centre.size else 0):
         near = centre[:, None] + radius[:, None] * np.linspace(-1, 1, _SAMPLES)
         z = rates_at(body, friction, path, delta, near, near=fine.velocity(near)).z.reshape(3, -1)
-        sampled = body.slowness(friction, *path(near.ravel()), delta, z)
+        sampled = _slowness(body, friction, *path(near.ravel()), z)
         sampled = sampled[np.repeat(link, _SAMPLES), np.arange(near.size)].reshape(near.shape)
         best = sampled.argmin(axis=1)
         centre, least = near[rows, best], sampled[rows, best]
@@ -44,3 +45,13 @@ def kink_phases(
     kinks = np.sort(np.concatenate([centre[least < SLOW * delta], 0.5 * (t[1:] + t[:-1])[jumps]]))
     kinks = kinks[(kinks > fine.edges[0] + _SEPARATE) & (kinks < fine.edges[-1] - _SEPARATE)]
     return kinks[np.diff(kinks, prepend=-np.inf) > _SEPARATE]
+
+
+def _slowness(
+    body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray
+) -> np.ndarray:
+    """Speeds that vanish at kinks, ``(n_part, n_time)``; smooth bodies, and drag, make none."""
+    if not (isinstance(body, Links) and body.law(friction).regularised):
+        return np.empty((0, z.shape[1]))
+    velocity = body.velocity(body.posture(angles), rates, z)
+    return body.contact.sticking_speeds(friction, velocity)

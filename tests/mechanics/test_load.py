@@ -19,7 +19,7 @@ from colloc import (
     Wheel,
     solve_balance,
 )
-from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
@@ -102,12 +102,14 @@ def test_slopes_along_shapes_rates_and_load_are_the_limit_of_differences(law, bo
     def moved(y):
         q, r, load = np.split(y, 3)
         solved = solve_balance(body, law, q, r, delta, load=load, tolerance=1e-13)
-        return chain_slopes(body, law, q, r, delta, solved, load)
+        at = body, law, q, r, delta, solved, load
+        return chain_motion(*at), motion_derivatives(*at)
 
     motion, slopes = moved(y)
     assert slopes.shape == (6, 6, 40)
     # where a link changes its sense of sliding within the step, a directional law has no derivative
-    smooth = (body.slowness(law, angles, rates, delta, motion.z) > 1e-3).all(axis=0)
+    velocity = body.velocity(body.posture(angles), rates, motion.z)
+    smooth = (body.contact.sticking_speeds(law, velocity) > 1e-3).all(axis=0)
     assert smooth.mean() > 0.7
     for k in range(6):
         there, back = (
@@ -126,10 +128,13 @@ def test_compiled_balances_and_slopes_are_those_of_numpy(body, law):
         load = random_loads(100, size * HELD[body])
         at = body, law, angles, rates, delta
         solved = solve_balance(*at, load=load).require()
-        motion, slopes = chain_slopes(*at, solved, load)
+        motion, slopes = chain_motion(*at, solved, load), motion_derivatives(*at, solved, load)
         with numpy_instead():
             same = solve_balance(*at, load=load).require()
-            known, reference = chain_slopes(*at, solved, load)
+            known, reference = (
+                chain_motion(*at, solved, load),
+                motion_derivatives(*at, solved, load),
+            )
         np.testing.assert_allclose(same.z, solved.z, atol=1e-9)
         np.testing.assert_allclose(motion.actuator_power, known.actuator_power, atol=1e-12)
         np.testing.assert_allclose(rows(motion), rows(known), atol=1e-12)

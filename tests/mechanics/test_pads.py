@@ -23,6 +23,7 @@ from colloc import (
 )
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.native_kernel import native_kernel
+from colloc.results.body_marks import footprints
 
 LENGTHS = (0.3, 0.45, 0.25)
 WEIGHTS = (0.2, 0.5, 0.3)
@@ -117,7 +118,9 @@ def test_pads_from_end_to_end_are_the_line(law, weights):
     for own, known in zip(pads.sliding(*at, 0.1), line.sliding(*at, 0.1), strict=True):
         np.testing.assert_allclose(own, known, rtol=1e-14, atol=1e-15)
     np.testing.assert_allclose(pads.forces(*at, 0.1), line.forces(*at, 0.1), rtol=1e-14, atol=1e-15)
-    np.testing.assert_allclose(pads.largest_forces(law), line.largest_forces(law), rtol=1e-14)
+    np.testing.assert_allclose(
+        pads.contact.largest_forces(law), line.contact.largest_forces(law), rtol=1e-14
+    )
     np.testing.assert_allclose(
         solve_balance(pads, law, angles, rates, 1e-3).z,
         solve_balance(line, law, angles, rates, 1e-3).z,
@@ -168,7 +171,7 @@ def test_casadi_says_the_same_of_pads(law, feet):
         angles,
         rates,
         rng.normal(size=(3, 1)),
-        rng.normal(size=(len(body.force_names), 1)),
+        rng.normal(size=(len(body.contact.force_names), 1)),
         np.array([[0.01]]),
     )
     symbols = [ca.SX.sym("x", len(part)) for part in given]
@@ -240,4 +243,4 @@ def test_prints_of_pads_lie_where_they_press():
     np.testing.assert_allclose(np.hypot(x1 - x0, y1 - y0).T, [[0.15, 0.0, 0.25]] * 4, atol=1e-15)
     ends = np.stack(body.outline(angles))
     np.testing.assert_allclose([x1[2], y1[2]], ends[:, -1], atol=1e-14)
-    assert Chain().footprints(angles).size == 0
+    assert footprints(Chain(), angles).size == 0

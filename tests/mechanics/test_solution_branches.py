@@ -127,8 +127,8 @@ def test_where_no_start_at_rest_leads_to_a_balance_the_long_way_is_gone(monkeypa
         z, sign = solved(moving, starts, method)
         return z, sign if method == "auto" else 0.0 * sign
 
-    solved, at = solution_branches._solved, ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 5))
+    solved, at = solution_branches._solve, ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 5))
     friction = Friction(mu_t=1.0, mu_f=0.5, mu_b=2.0)
-    monkeypatch.setattr(solution_branches, "_solved", direct_fails)
+    monkeypatch.setattr(solution_branches, "_solve", direct_fails)
     found = all_balanced_velocities(Chain(), friction, *at, 1e-2)
     np.testing.assert_allclose(found.z[0], solve_balance(Chain(), friction, *at, 1e-2).z, atol=1e-9)

@@ -23,7 +23,7 @@ from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.search.solve import solve
 from research.guarantee.guaranteed import certify
@@ -96,7 +96,7 @@ def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced(
     )
     solved = solve_balance(body, law, angles, rates, 1e-3)
     forces = body.forces(law, angles, rates, solved.z, 1e-3)
-    assert (np.abs(forces) <= body.largest_forces(law)).all()
+    assert (np.abs(forces) <= body.contact.largest_forces(law)).all()
     now = instant(body, law, angles, rates, solved.z, 1e-3)
     np.testing.assert_allclose(net_force(now.posture, now.force), 0.0, atol=1e-10)
 
@@ -113,7 +113,7 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_them
         np.zeros((2, 3)),
         1e-9,
     )
-    most = body.largest_forces(law).ravel()
+    most = body.contact.largest_forces(law).ravel()
     along, across, couples = np.split(most, 3)
     ways = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
     found = np.abs(body.forces(law, straight, np.zeros((2, 3)), ways, delta))
@@ -238,9 +238,15 @@ def test_the_weight_of_a_mass_pulls_where_it_is():
     force = net_force(posture, instant(body, law, angles, rates, solved.z, 1e-3).force)
     x, y = (np.array(MASSES) @ part for part in (posture.x, posture.y))
     np.testing.assert_allclose(force, -np.stack([*load, x * load[1] - y * load[0]]), atol=1e-8)
-    motion, slopes = chain_slopes(body, law, angles, rates, 1e-3, solved, load)
+    motion, slopes = (
+        chain_motion(body, law, angles, rates, 1e-3, solved, load),
+        motion_derivatives(body, law, angles, rates, 1e-3, solved, load),
+    )
     with numpy_instead():
-        known, reference = chain_slopes(body, law, angles, rates, 1e-3, solved, load)
+        known, reference = (
+            chain_motion(body, law, angles, rates, 1e-3, solved, load),
+            motion_derivatives(body, law, angles, rates, 1e-3, solved, load),
+        )
     np.testing.assert_allclose(motion.actuator_power, known.actuator_power, atol=1e-9)
     np.testing.assert_allclose(
         slopes / np.abs(reference).max(), reference / np.abs(reference).max(), atol=1e-9

@@ -11,7 +11,6 @@ from colloc.mechanics.contact import (
     ends_and_links,
     excess,
     gap,
-    overlap,
     square_distance,
 )
 
@@ -30,7 +29,7 @@ def nearest(body, angles, first, second, points=301):
 def test_links_that_are_not_neighbours_keep_the_width_where_nothing_overlaps(lengths):
     body = Chain(lengths, width=0.05)
     angles = np.random.default_rng(4).uniform(-np.pi, np.pi, (body.n_joint, 400))
-    apart = overlap(body, angles) == 0
+    apart = crossing_depth(body, angles) == 0
     assert 0.3 < apart.mean() < 0.95
     for first in range(body.n_link):
         for second in range(first + 2, body.n_link):
@@ -70,14 +69,14 @@ def test_a_joint_folds_until_the_free_end_lies_beside_its_neighbour(width):
     folded = np.array([[last - 1e-6, last + 1e-6], [0.0, 0.0]])
     for shapes in (folded, -folded, folded[::-1]):
         assert np.array_equal(admissible(body, shapes), [True, False])
-        assert np.array_equal(overlap(body, shapes) > 0, [False, True])
+        assert np.array_equal(crossing_depth(body, shapes) > 0, [False, True])
     # of unequal neighbours the shorter decides
     uneven = Chain((0.5, 0.3, 0.2), width=width * 0.9)
     last = np.pi - np.arcsin(uneven.width / 0.3)
     assert (
-        overlap(uneven, np.array([[last - 1e-6], [0.0]]))[0]
+        crossing_depth(uneven, np.array([[last - 1e-6], [0.0]]))[0]
         == 0
-        < overlap(uneven, np.array([[last + 1e-6], [0.0]]))[0]
+        < crossing_depth(uneven, np.array([[last + 1e-6], [0.0]]))[0]
     )
 
 
@@ -86,7 +85,7 @@ def test_without_a_width_nothing_is_different():
     assert Problem("lines", body=Chain(width=0.0)).hash == Problem("lines").hash
     assert "width" not in Problem("lines").to_dict()["body"]
     assert len(line.contacts()) == 2
-    assert np.array_equal(line.crossing_depth(angles), crossing_depth(line, angles))
+    assert np.array_equal(crossing_depth(line, angles), crossing_depth(line, angles))
     wide = Problem("strips", body=Chain(width=0.02))
     assert wide.hash != Problem("strips").hash
     assert Problem.from_dict(wide.to_dict()).body == Chain(width=0.02)

