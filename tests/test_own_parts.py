@@ -237,22 +237,3 @@ def test_limits_stated_anew_are_those_that_are_known():
     known, found = solve(fast, starts=1), solve(own, starts=1)
     assert known.status == found.status == "solved"
     assert found.value == pytest.approx(known.value, rel=1e-6)
-
-
-def test_limits_that_cannot_be_kept_or_read_are_refused():
-    for most, why in [(-1.0, "must be positive"), ("x", "must be positive")]:
-        with pytest.raises(ProblemError, match=why):
-            PathLimit("heat", "moment**2", most)
-    with pytest.raises(ProblemError, match="has 3 values; give one, or 2"):
-        WEAK.with_(limits=[PathLimit("heat", "moment**2", (1.0, 1.0, 1.0))])
-    with pytest.raises(ProblemError, match="the speed is limited"):
-        WEAK.with_(
-            torque_limit=None,
-            gait=Polygon(4, "bilateral"),
-            limits=[PathLimit("speed", "rate", 9.0)],
-        )
-    for none in (["moment < 1"], 3):
-        with pytest.raises(ProblemError, match="PathLimit"):
-            WEAK.with_(limits=none)
-    alone = PathLimit("heat", "moment**2", 1.0)
-    assert WEAK.with_(limits=alone).limits == (alone,)

@@ -4,7 +4,7 @@ certified, or refused in words."""
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, replay
+from colloc import Chain, Friction, Harmonic, Problem, ellipse, replay
 from colloc.mechanics.contact import crossing_depth
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED
 from colloc.search.solve import solve
@@ -64,15 +64,6 @@ def test_an_optimum_in_the_viscous_regime_is_not_called_solved():
         assert speed > 1e3 * problem.delta
     else:
         assert len(solution.message) > 30
-
-
-def test_touching_is_admissible_and_crossing_is_not():
-    """Up to 1e-6, as in a certificate: results of one solve are guesses of the next."""
-    Problem("touching", ellipse(0.0, 1.0, TOUCHING), gait=BILATERAL)
-    with pytest.raises(ProblemError, match="cross"):
-        Problem("crossing", ellipse(0.0, 1.0, TOUCHING + 1e-5), gait=BILATERAL)
-    with pytest.raises(ProblemError, match="beyond the limit"):
-        Problem("folded", ellipse(np.pi - 1, 1.0 + 1e-5, 0.1), gait=BILATERAL)
 
 
 def test_from_a_gait_that_touches_itself_the_answer_does_not_cross_or_is_refused():

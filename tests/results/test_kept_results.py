@@ -11,11 +11,10 @@ from dataclasses import replace
 import pytest
 
 from colloc.commands.main import main as colloc
-from colloc.gaits.problem import Problem
 from colloc.results import kept
 from colloc.results.kept import save_result
 from colloc.results.store import load
-from colloc.system.errors import ProblemError, StoreError
+from colloc.system.errors import StoreError
 
 FILE = """
 from colloc import *
@@ -149,31 +148,6 @@ def test_of_many_problems_that_are_saved_at_once_none_is_lost(three_link, tmp_pa
         children.append(child)
     assert [os.waitpid(child, 0)[1] for child in children] == [0] * count
     assert sorted(values(tmp_path).values()) == [0.1 + 0.01 * k for k in range(count)]
-
-
-RESERVED = [
-    "tiny.interrupted",
-    "tiny.FAILED",
-    "tiny.starts",
-    "tiny.run",
-    "tiny.shrunk",
-    "x.front",
-    "x.start-7",
-    "x.former-2",
-]
-
-
-@pytest.mark.parametrize("name", [*RESERVED, ".", "..", ".hidden", "--help", "-x"])
-def test_names_of_files_that_colloc_makes_beside_results_are_refused(name):
-    with pytest.raises(ProblemError, match=r"name must (not end|begin)"):
-        Problem(name)
-
-
-@pytest.mark.parametrize(
-    "name", ["tiny.failed.2", "partial", "finite", "x.start", "x.former", "_", "3.5", "a--help"]
-)
-def test_other_names_are_taken(name):
-    assert Problem(name).name == name
 
 
 def test_solve_says_where_the_result_of_another_problem_of_this_name_went(tmp_path, capsys):

@@ -10,11 +10,8 @@ from colloc import (
     Chain,
     Friction,
     Harmonic,
-    ModalBody,
-    Polygon,
     PowerLaw,
     Problem,
-    ProblemError,
     Viscous,
     ellipse,
     replay,
@@ -205,28 +202,3 @@ def test_where_no_start_keeps_the_limits_the_search_ends_soon_and_says_what_is_m
     assert found.status == "not converged"
     assert re.search(f"the limit on the {words}.* allow the joints more", found.message)
     assert "None of 8 starts led to a gait of the class that keeps the limits" in found.message
-
-
-SIZED = ("guess", "joint_limit", "delta", "delta_start", "intervals", "formulation")
-"""What has another usual value for another body."""
-REFUSED = {
-    "pace open": (
-        {"power_limit": 1.0, "gait": Polygon(4)},
-        "leaves the pace open, but the joints' power is limited",
-    ),
-    "smooth": (
-        {"torque_limit": 1.0, "body": ModalBody(2), **dict.fromkeys(SIZED)},
-        "needs the forces",
-    ),
-    "sign": ({"torque_limit": -1.0}, "torque_limit must be positive"),
-    "text": ({"power_limit": "much"}, "power_limit must be positive"),
-    "number": ({"power_limit": (1.0, 2.0, 3.0)}, "power_limit has 3 values"),
-    "mirrored": ({"torque_limit": (1.0, 2.0)}, "give them the same torque_limit"),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_limits_that_have_no_meaning_are_refused(case):
-    changes, words = REFUSED[case]
-    with pytest.raises(ProblemError, match=words):
-        USUAL.with_(**changes)

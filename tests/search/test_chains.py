@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from colloc.gaits.bspline import Polygon
-from colloc.gaits.columns import Basis
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
@@ -21,7 +19,6 @@ from colloc.mechanics.contact import (
 from colloc.mechanics.friction import Friction
 from colloc.search.converge import crossing_pairs, last_free
 from colloc.search.spaces import program_of
-from colloc.system.errors import ProblemError
 from colloc.transcription.full_program import full_program
 from colloc.verification.replay import replay
 
@@ -152,25 +149,6 @@ def test_scallop_theorem(lengths, friction):
     )
     assert dry < 3e-3
     assert dry < viscous / 3
-
-
-def test_two_links_without_directional_friction_are_refused_in_words():
-    with pytest.raises(ProblemError, match="scallop"):
-        Problem(
-            "two",
-            Fourier([0.0], [[1.0]], [[0.0]]),
-            body=Chain((0.5, 0.5)),
-            gait=Harmonic(1, "antipodal"),
-        )
-
-
-@pytest.mark.parametrize("kind", [Polygon(2), Basis([np.sin(2 * np.pi * np.arange(50) / 50)])])
-def test_classes_whose_gaits_all_go_back_the_way_they_came_are_refused_unless_that_leads_somewhere(
-    kind,
-):
-    with pytest.raises(ProblemError, match="it retraces its path, and reversed rates"):
-        Problem("back", gait=kind)
-    assert Problem("forth", gait=kind, friction=Friction(mu_t=1, mu_f=1, mu_b=2)).gait is kind
 
 
 def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_friction_gives(solved):

@@ -13,7 +13,6 @@ from colloc import (
     Elliptic,
     Foot,
     Friction,
-    Harmonic,
     Problem,
     ProblemError,
     Wheel,
@@ -161,10 +160,6 @@ def test_what_feet_cannot_do_yet_is_refused():
         Problem("bound", body=Chain(feet=1), friction=Friction(mu_t=2, mu_f=1, mu_b=1))
     )
     assert refusal(Problem("bound", body=Chain(feet=1))) == ""
-    with pytest.raises(ProblemError, match="read the same from both ends"):
-        Problem(
-            "half", body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=Harmonic(1, "bilateral")
-        )
 
 
 def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, three_link):

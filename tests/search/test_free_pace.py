@@ -134,24 +134,6 @@ def test_speed_under_a_limit_of_power_takes_all_of_it():
     assert 0.001 < played(limited) < 1.0
 
 
-@pytest.mark.parametrize(
-    ("fields", "said"),
-    [
-        ({"froude": (1.0, 0.1)}, "the smaller one first"),
-        ({"froude": (-1.0, 0.1)}, "above 0"),
-        ({"froude": (0.1, np.inf)}, "two numbers"),
-        ({"froude": (0.1, 1.0), "objective": "1 / length"}, "depends on it"),
-        ({"froude": (0.1, 1.0), "gait": colloc.Polygon(4)}, "of a class Harmonic"),
-        ({"froude": (0.1, 1.0, 2.0)}, "two numbers"),
-    ],
-)
-def test_what_cannot_be_asked_is_refused_in_a_sentence(fields, said):
-    with pytest.raises(colloc.ProblemError, match=said):
-        problem(**fields)
-
-
 def test_a_period_has_a_length_with_inertia_alone():
-    with pytest.raises(colloc.ProblemError, match="state the pace"):
-        problem(0.0)
     with pytest.raises(colloc.ProblemError, match="does not say its pace"):
         colloc.evaluate(problem(colloc.Free(0.1, 1.0)), ROUND)

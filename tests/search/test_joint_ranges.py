@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, ProblemError
+from colloc import Fourier, Friction, Harmonic, Polygon, Problem
 from colloc.results.store import load, save
 from colloc.search.solve import solve
 
@@ -57,25 +57,3 @@ def test_polygons_keep_both_sides_use_them_and_mirror():
 def test_a_range_that_is_even_is_a_limit_and_one_may_go_to_half_a_turn():
     assert problem(((-1, 1), 2.0)).joint_limit == problem((1.0, 2.0)).joint_limit
     assert problem(((-np.pi, 1), (-1, np.pi))).joint_limit == ((-np.pi, 1), (-1, np.pi))
-
-
-@pytest.mark.parametrize(
-    ("limit", "gait", "words"),
-    [
-        (((0.0, 1.0), 1.0), Harmonic(1), "straight body"),
-        (((-1.0, 0.0), 1.0), Harmonic(1), "straight body"),
-        (((-1.0, 3.142), 1.0), Harmonic(1), "neither beyond 3.142"),
-        (((-3.142, 1.0), 1.0), Harmonic(1), "neither beyond 3.142"),
-        (((-30, 60), 1.0), Harmonic(1), "radians"),
-        (3.142, Harmonic(1), r"lie in \(0, pi\], not 3.142"),
-        ((1.0, 0.0), Harmonic(1), r"lie in \(0, pi\], not 0"),
-        ("wide", Harmonic(1), "not 'wide'"),
-        (((-1, 1, 2), 1.0), Harmonic(1), "least and its largest"),
-        (((-1, 2),), Harmonic(1), "give one for all joints"),
-        (((-1, 2), (-1, 2)), Harmonic(1, "bilateral"), "mirrored joints"),
-        (((-1, 2), (-1, 2)), Harmonic(1, "antipodal"), "both sides"),
-    ],
-)
-def test_ranges_that_cannot_be_kept_are_refused(limit, gait, words):
-    with pytest.raises(ProblemError, match=words):
-        problem(limit, gait, body=Chain())

@@ -9,11 +9,8 @@ from colloc import (
     Chain,
     Friction,
     Harmonic,
-    Polygon,
     Problem,
-    ProblemError,
     Serpenoid,
-    Wave,
 )
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
@@ -102,20 +99,3 @@ def test_a_certificate_fails_a_gait_that_is_too_fast(slow):
     check = next(c for c in tighter.certificate.checks if c.name == "joint speed")
     assert check.value == pytest.approx(12 / 11.9 - 1, rel=1e-3)
     assert not check.passed
-
-
-@pytest.mark.parametrize(
-    ("stated", "words"),
-    [
-        ({"gait": Polygon(3)}, "leaves the pace open, but the joints' speed is limited"),
-        ({"speed_limit": 0.2}, "leaves no gait"),
-        ({"speed_limit": 0.5}, "with speed_limit the usual first gait"),
-        ({"body": Wave(), "gait": None}, "nothing is free in a prescribed motion"),
-        ({"speed_limit": (5.0, 8.0)}, "give them the same speed_limit"),
-        ({"speed_limit": (5.0, 8.0, 5.0)}, "has 3 values"),
-        ({"speed_limit": -1.0}, "positive and finite"),
-    ],
-)
-def test_what_cannot_be_is_refused_in_a_sentence(stated, words):
-    with pytest.raises(ProblemError, match=words):
-        Problem("refused", **({"gait": Harmonic(1, "bilateral"), "speed_limit": 5.0} | stated))

@@ -11,7 +11,6 @@ from colloc import (
     Objective,
     Polygon,
     Problem,
-    ProblemError,
     ellipse,
     load,
     replay,
@@ -203,11 +202,6 @@ def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
     assert solution.value >= replay(
         problem.body, problem.friction, usual.gait, 1e-3, objective=problem.objective
     ).value * (1 - 1e-6)
-
-
-def test_driven_work_needs_the_forces_on_the_parts():
-    with pytest.raises(ProblemError, match="formulation 'full'"):
-        Problem("x", objective="driven efficiency", formulation="implicit velocity")
 
 
 def test_every_joint_has_a_limit_of_its_own():

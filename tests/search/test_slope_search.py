@@ -6,13 +6,11 @@ import pytest
 
 from colloc import (
     Chain,
-    CrawlerBody,
     Fourier,
     Friction,
     Harmonic,
     Polygon,
     Problem,
-    ProblemError,
     ellipse,
     load,
     save,
@@ -177,33 +175,6 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
     literal = solve(PROBLEM, search="full")
     assert literal.status == "solved", literal.message
     assert literal.certificate.value == pytest.approx(uphill.certificate.value, rel=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        (
-            {"gait": Polygon(symmetry="bilateral")},
-            "no part of a period follows from another: take Polygon",
-        ),
-        ({"body": CrawlerBody(), "gait": None, "guess": None}, "only a Chain"),
-        ({"objective": "turning"}, "the objective speaks of the rotation"),
-        (
-            {"gait": Harmonic(1), "rotation": 0.1},
-            "a body that a period turns has no gait that repeats",
-        ),
-        ({"formulation": "implicit velocity"}, "only the formulation 'full'"),
-        ({"scheme": "trapezoid"}, "a gauss-N or radau-N scheme is needed"),
-        ({"grade": 1.0}, "slides down for ever"),
-        ({"grade": -1.0}, "grade must be"),
-        ({"grade": "steep"}, "grade must be"),
-        ({"towards": "up"}, "towards must be a finite angle"),
-        ({"grade": 0.0, "towards": 1.0}, "towards is a direction on a slope"),
-    ],
-)
-def test_what_cannot_be_asked_is_named(changed, said):
-    with pytest.raises(ProblemError, match=said):
-        PROBLEM.with_(**changed)
 
 
 def test_a_slope_that_is_not_climbed_is_said_so():
