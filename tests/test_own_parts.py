@@ -1,7 +1,6 @@
 """A body and a class of gaits that the library does not know, as the documentation writes them: one
 file each."""
 
-import pickle
 import re
 import sys
 import types
@@ -106,29 +105,6 @@ def test_a_class_that_is_no_fourier_series_is_one_file_too(monkeypatch, tmp_path
     assert found.status == "solved", found.message
     read = load(save(found, tmp_path / "pulses.h5"))
     assert (type(read.problem.gait), read.problem.hash) == (own.Pulses, found.problem.hash)
-
-
-@pytest.mark.slow
-def test_a_class_of_your_own_can_be_put_on_a_slope_and_taken_off_it(monkeypatch, capsys):
-    own = run("own_gait_class.md", monkeypatch)
-    level, uphill = (
-        own.problem,
-        own.problem.with_(grade=0.02, friction=Friction(mu_t=10, mu_f=1, mu_b=1.5), delta=1e-2),
-    )
-    assert isinstance(uphill.gait, own.OwnHarmonics)
-    assert uphill.gait.describe() == level.gait.describe()
-    assert uphill.gait.size(2) == level.gait.size(2) + 1  # where it points
-    assert uphill.with_(grade=0.0).gait == level.gait
-    assert Problem.from_dict(uphill.to_dict()).hash == uphill.hash
-    assert pickle.loads(
-        pickle.dumps(Problem("up", gait=Harmonic(1), grade=0.1).gait)
-    ).level == Harmonic(1)
-    found = solve(uphill, starts=1)
-    assert found.status == "solved", found.message
-    np.testing.assert_array_equal(
-        [*found.gait.cos[[0, 1], [1, 0]], *found.gait.sin[[0, 1], [1, 0]]], 0.0
-    )
-    assert found.distance > 0
 
 
 def moments_at(solution, t):

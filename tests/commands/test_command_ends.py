@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from colloc import Chain, Harmonic, Problem, ProblemError
+from colloc import Chain, Harmonic, Problem, ProblemError, StoreError, load, save
 from colloc.bounds.optimality_gap import upper_bound
 from colloc.commands import ending
 from colloc.commands.ending import exit_code
@@ -25,8 +25,6 @@ from colloc.commands.summary import summary_lines
 from colloc.gaits import gait_fields
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.kept import save_result
-from colloc.results.store import load, save
-from colloc.system.errors import StoreError
 from colloc.system.row_file import CACHE, put_rows
 
 QUICK = """

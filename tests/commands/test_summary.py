@@ -1,25 +1,16 @@
 """What a solve ends with: a few lines that a person reads, and numbers that mean the same as
 everywhere else."""
 
-import json
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, Harmonic, PathLimit, Problem, ellipse, evaluate, replay
-from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_dict, summary_lines
 from colloc.results import limit_use
 from colloc.results.checks import Check
 from colloc.results.robot import joint_torques
-from colloc.results.store import load
-
-QUICK = """
-from colloc import *
-PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=1e-2, delta_start=1e-2, intervals=12)
-"""
 
 
 def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
@@ -115,38 +106,6 @@ def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_pa
     for name in ("value", "efficiency", "distance", "work"):
         assert facts[name] == facts["certificate"][name] == getattr(three_link.certificate, name)
     assert facts["shrunk"] == three_link.certificate.value
-
-
-def test_what_solve_prints_is_what_the_file_and_verify_say(tmp_path, capsys):
-    (tmp_path / "quick.py").write_text(QUICK)
-    words = [
-        "solve",
-        str(tmp_path / "quick.py"),
-        "--starts",
-        "1",
-        "--no-figure",
-        "--output",
-        f"{tmp_path}/",
-        "--json",
-    ]
-    assert colloc(words) == 0
-    facts = json.loads(capsys.readouterr().out)
-    certificate = load(tmp_path / "quick.h5").certificate
-    assert [facts[name] for name in ("value", "distance", "work")] == [
-        certificate.value,
-        certificate.distance,
-        certificate.work,
-    ]
-    assert colloc(words[:-1]) == 0
-    printed = capsys.readouterr().out
-    assert f"{facts['efficiency']:.6f} +- " in printed
-    assert re.search(r"\d+ checks passed \(tightest: ", printed)
-    assert "cos 2πt" not in printed
-    assert colloc([*words[:-1], "--verbose"]) == 0
-    assert "cos 2πt" in capsys.readouterr().out
-    assert facts["value"] == pytest.approx(
-        facts["certificate"]["efficiency_at_zero_delta"], rel=1e-2
-    )
 
 
 @pytest.mark.parametrize("harmonics", [1, 3])

@@ -106,20 +106,6 @@ def check_point(body, friction, angles, rates, delta, formulation, *, rng=None, 
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
-@pytest.mark.parametrize(
-    ("body", "law"), [(THREE, (1, 1, 1)), (THREE, (1.7, 1, 1.3)), (FOUR, (10, 1, 3))], ids=str
-)
-def test_point_function_at_random_points(formulation, body, law):
-    rng = np.random.default_rng(6)
-    for delta in (0.3, 1e-2):
-        for _ in range(2):
-            angles, rates = rng.uniform(-2, 2, body.n_joint), rng.normal(size=body.n_joint)
-            step = 2e-3 * delta if formulation == "full" else 1e-2 * min(delta, 0.1)
-            at = body, coulomb(*law), angles, rates, delta, formulation
-            check_point(*at, rng=rng, step=step, tolerance=2e-5)
-
-
-@pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
 @pytest.mark.parametrize("names", [STICK, FOLDS, STRAIGHT], ids=["stick", "folds", "straight"])
 def test_point_function_at_hard_points(formulation, names):
     for k, (law, delta) in enumerate((((1, 1, 1), 1e-3), ((1.7, 1, 1), 1e-4))):
@@ -152,18 +138,3 @@ def test_contact_at_its_corners(angles):
     value, slope = ca.Function("c", [q], [bounds]), ca.Function("d", [q], [ca.jacobian(bounds, q)])
     found = derivative(lambda at: np.array(value(at)).ravel(), np.array(angles), 1e-5)
     np.testing.assert_allclose(found, np.array(slope(np.array(angles))), atol=1e-8)
-
-
-@pytest.mark.parametrize("vs", [0.0, 0.3])
-def test_second_derivative_where_a_link_does_not_turn(vs):
-    """I0 in the rotation rate at w = 0: -l^3 (a^2 - 2 vn^2) / (12 r^5), by expanding the integrand;
-    an even function."""
-    from colloc.mechanics.link_friction import link_moments
-
-    w = ca.SX.sym("w")
-    length, vn, delta = 0.4, 0.05, 0.1
-    I0 = link_moments(ca.SX(vs), ca.SX(vn), w, length, delta).I0
-    second = float(ca.Function("s", [w], [ca.hessian(I0, w)[0]])(0.0))
-    a2 = vs**2 + delta**2
-    r = np.sqrt(a2 + vn**2)
-    assert second == pytest.approx(-(length**3) * (a2 - 2 * vn**2) / (12 * r**5), rel=1e-12)

@@ -15,7 +15,7 @@ import pytest
 from cases import COEFFICIENTS, DELTAS, HARD
 
 from benchmarks.reference import balanced_velocity
-from colloc.mechanics.balance import instant, net_force, total_power
+from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
@@ -115,20 +115,6 @@ def test_the_answer_does_not_depend_on_a_start_1e6_away(coefficients):
         assert far.converged.all()
         ratio = friction.largest / friction.smallest
         np.testing.assert_allclose(far.z, near.z, atol=2e-10 * ratio)
-
-
-@pytest.mark.parametrize("lengths", [(1 / 3, 1 / 3, 1 / 3), (0.1, 0.6, 0.3), (0.001, 0.998, 0.001)])
-def test_a_straight_body_sliding_along_itself_meets_coulomb_friction_exactly(lengths):
-    body, friction = Chain(lengths), Friction(mu_t=7.0, mu_f=2.0, mu_b=5.0)
-    still = np.zeros((2, 2))
-    z = np.array([[3.0, -3.0], [0.0, 0.0], [0.0, 0.0]])
-    for delta in (1e-3, 1e-9, 1e-14):
-        now = instant(body, friction, still, still, z, delta)
-        expected = np.array([[-2.0, 5.0], [0.0, 0.0], [0.0, 0.0]]) * 3 / np.hypot(3, delta)
-        np.testing.assert_allclose(net_force(now.posture, now.force), expected, atol=1e-14)
-        np.testing.assert_allclose(
-            total_power(now.velocity, now.force)[0], 3 * np.abs(expected[0]), rtol=1e-14
-        )
 
 
 def test_rates_below_delta_are_solved_to_their_own_scale():

@@ -5,15 +5,12 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse, replay
-from colloc.mechanics.contact import crossing_depth
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED
 from colloc.search.solve import solve
 from tests.shared.laws import coulomb
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")
-FINE = np.arange(4000) / 4000
-TOUCHING = 2 * np.pi / 3
 
 
 def replayed(gait, delta, **settings):
@@ -47,40 +44,6 @@ def test_gaits_slower_than_delta_are_viscous_and_go_nowhere():
     assert dry.distance == pytest.approx(3.503e-14, rel=1e-3)
     for run, size in zip(runs, (1e-6, 1e-7, 1e-8), strict=True):
         assert run.distance < 1e-3 * dry.distance * (size / 1e-6) ** 2
-
-
-def test_an_optimum_in_the_viscous_regime_is_not_called_solved():
-    problem = Problem(
-        "small",
-        ellipse(1.0, 1e-6, 0.7e-6),
-        gait=BILATERAL,
-        intervals=12,
-        smallest_shape_speed=1e-9,
-        delta_start=1e-4,
-    )
-    solution = solve(problem, 1)
-    if solution.status == SOLVED:  # only if it left the viscous regime altogether
-        speed = np.abs(solution.gait.rates(FINE)).max()
-        assert speed > 1e3 * problem.delta
-    else:
-        assert len(solution.message) > 30
-
-
-def test_from_a_gait_that_touches_itself_the_answer_does_not_cross_or_is_refused():
-    problem = Problem(
-        "touching",
-        ellipse(0.0, 1.0, TOUCHING),
-        gait=BILATERAL,
-        intervals=12,
-        delta_start=1e-2,
-        delta=1e-3,
-    )
-    solution = solve(problem, 1)
-    depth = crossing_depth(BODY, solution.gait.angles(FINE)).max()
-    if solution.status == SOLVED:
-        assert depth < 1e-6
-    else:
-        assert len(solution.message) > 30
 
 
 @pytest.mark.parametrize(("intervals", "delta"), [(2, 1e-4), (3, 1e-6), (5, 1e-8), (10, 1e-10)])

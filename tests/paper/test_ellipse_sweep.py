@@ -7,7 +7,6 @@ import pytest
 from colloc.gaits.harmonic import ellipse
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 from scripts.models.ellipses import gait_grid, largest_amplitude
 from scripts.models.sweep import Route, distinct_maxima, performance, refined_maximum
@@ -109,16 +108,3 @@ def test_three_printed_maxima_come_out_of_the_sweep(known, direct):
     )
     assert second.replay.distance / first.replay.distance == pytest.approx(0.37, abs=0.012)
     assert second.replay.work / first.replay.work == pytest.approx(0.47, abs=0.012)
-
-
-def test_sweeps_that_mean_nothing_are_refused(known):
-    with pytest.raises(ProblemError, match="mu_b = mu_f"):
-        Route(BODY, Friction(mu_b=2.0), DELTA)
-    with pytest.raises(ProblemError, match="symmetric"):
-        Route(Chain((0.2, 0.3, 0.5)), ISOTROPIC, DELTA)
-    with pytest.raises(ProblemError, match="another body"):
-        Route(BODY, Friction(mu_t=2.0), DELTA, known)
-    with pytest.raises(ProblemError, match="needs a velocity_map"):
-        Route(BODY, ISOTROPIC, DELTA, direct=False)
-    with pytest.raises(ProblemError, match="even"):
-        performance(Route(BODY, ISOTROPIC, DELTA), BEST, instants=7)

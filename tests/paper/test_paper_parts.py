@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from colloc.system.errors import ProblemError, StoreError
+from colloc.system.errors import ProblemError
 from scripts import reproduce_paper
 from scripts.models.motion_record import third_slowest_dips
 from scripts.paper import figures as figures_paper
 from scripts.paper import table as paper_table
-from scripts.paper.array_store import read_arrays, read_attribute, write_arrays
 from scripts.paper.parallel import parallel_map
 from scripts.paper.rows import number_row, statement_row
 from scripts.paper.study import Context, PaperStudy, Part, source_closure
@@ -58,21 +57,6 @@ def test_source_closure_follows_imports():
         not {"scripts.paper.figures", "scripts.paper.parallel", "scripts.paper.study"}
         & found.keys()
     )
-
-
-def test_files_are_replaced_whole_or_not_at_all(tmp_path):
-    path = tmp_path / "a.h5"
-    write_arrays(path, {"x": np.arange(3.0), "names": np.array(["d", "W"])}, units={"x": "rad"})
-    with pytest.raises(TypeError):
-        write_arrays(path, {"x": np.arange(4.0), "bad": object()})
-    again = read_arrays(path)
-    np.testing.assert_array_equal(again["x"], np.arange(3.0))
-    assert list(again["names"]) == ["d", "W"]
-    assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
-    assert "Frames" in str(read_attribute(path, "conventions"))
-    (tmp_path / "b.h5").write_bytes(b"not hdf5")
-    with pytest.raises(StoreError, match="not a readable"):
-        read_arrays(tmp_path / "b.h5")
 
 
 def test_parallel_map_keeps_order():

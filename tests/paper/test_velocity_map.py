@@ -6,7 +6,6 @@ import pytest
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.system.errors import ProblemError
 from scripts.models.velocity_map import STENCILS, VelocityMap, map_error, velocity_map
 
 DELTA = 1e-3
@@ -94,14 +93,3 @@ def test_kink_where_a_joint_rests():
     assert abs(jumps[2]) > 0.05
     assert jumps[1] == pytest.approx(jumps[2], rel=0.1)  # a smooth function's would fall with h
     assert 0.0 in velocity_map(Chain(), Friction(), DELTA, n_angle=4, n_ratio=5).ratios
-
-
-def test_unusable_requests_are_refused(isotropic):
-    with pytest.raises(ProblemError, match="three links"):
-        velocity_map(Chain((0.5, 0.5)), Friction(), DELTA)
-    with pytest.raises(ProblemError, match="odd"):
-        velocity_map(Chain(), Friction(), DELTA, n_ratio=16)
-    with pytest.raises(ProblemError, match="shape"):
-        VelocityMap(Chain(), Friction(mu_b=2.0), DELTA, isotropic.values)
-    with pytest.raises(ProblemError, match="method"):
-        isotropic.tail_velocity(np.zeros((2, 1)), np.ones((2, 1)), method="spline")

@@ -9,29 +9,10 @@ import pytest
 from PIL import Image
 
 from colloc.commands.results import animate as main
-from colloc.gaits.harmonic import Fourier
-from colloc.gaits.problem import Problem
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames, lab_outline
 from colloc.pictures.movie import pictures, write_movie
 from colloc.pictures.publication import save_panels
 from colloc.results.store import save
-
-
-def crawler(n_link):
-    j = np.arange(n_link - 1)
-    guess = Fourier(
-        np.zeros(n_link - 1), 0.6 * np.cos(0.9 * j)[:, None], 0.6 * np.sin(0.9 * j)[:, None] + 0.1
-    )
-    return Problem(
-        "crawler",
-        guess,
-        Chain((1 / n_link,) * n_link),
-        Friction(mu_t=1.0, mu_f=1.0, mu_b=2.0),
-        delta=1e-2,
-        intervals=8,
-    )
 
 
 def dark(picture):
@@ -63,19 +44,6 @@ def test_every_picture_shows_the_body_where_it_is_then(three_link):
     np.testing.assert_allclose(middle_y, rows, atol=3.0)  # the head is a disc
     for seen, extent in ((across, np.ptp(x, axis=0)), (upwards, np.ptp(y, axis=0))):
         assert np.all(np.abs(seen - scale * extent - 8.0) < 4.0)  # pixels, of the lines
-
-
-def test_links_are_drawn_of_their_width(unsolved):
-    def dark_pixels(width):
-        problem = crawler(3).with_(body=Chain(width=width))
-        picture = next(pictures(unsolved(problem), 2, 1, width=300, arrows=False))
-        return (picture[40:, : int(0.68 * picture.shape[1])].max(axis=2) < 80).sum()
-
-    thin, thick = dark_pixels(0.08), dark_pixels(0.16)
-    # a strip of length 1 and two round ends; joints, head and centre are drawn over it
-    assert thick / thin == pytest.approx(
-        (0.16 + np.pi * 0.08**2) / (0.08 + np.pi * 0.04**2), rel=0.15
-    )
 
 
 def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsys):

@@ -3,7 +3,6 @@ the full program."""
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from colloc import (
     BSpline,
@@ -11,7 +10,6 @@ from colloc import (
     Fourier,
     Friction,
     Harmonic,
-    ModalBody,
     Polygon,
     Problem,
     ellipse,
@@ -54,21 +52,6 @@ def near_start(case, shake=1e-2):
     return space, v, program
 
 
-def test_least_values_and_the_rotation_are_asked_for_as_they_are_stated():
-    stated = Problem(
-        "p",
-        ellipse(0.1, 1.6, 1.1),
-        gait=Harmonic(1),
-        rotation=0.3,
-        at_least={"distance": 0.21, "-work": -0.4},
-    )
-    space, v = space_near(stated, stated.guess)
-    program = ReducedProgram(space, DELTA)
-    program.place_rows(v)
-    np.testing.assert_array_equal(program.row_lower[:3], [0.3, 0.21, -0.4])
-    np.testing.assert_array_equal(program.row_upper[:3], [0.3, np.inf, np.inf])
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_gradients_are_those_of_differences(case):
     space, v, program = near_start(case)
@@ -108,17 +91,3 @@ def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
     assert answer.value == pytest.approx(found.value, rel=1e-7)
     assert answer.layout.friction.size == 9 * answer.mesh.n_point
     assert answer.message == ""
-
-
-def test_amplitudes_of_modes_may_exceed_the_bound_on_the_tangent():
-    """Steep sides are large coefficients: within 1.5 rad everywhere, a Legendre mode may have an
-    amplitude of 2.5."""
-    body = ModalBody(4)
-    rows = np.vstack([body.bounded_angles.rows, -body.bounded_angles.rows])
-    largest = [
-        -linprog(-e, rows, np.full(len(rows), 1.5), bounds=[(None, None)] * 4).fun
-        for e in np.eye(4)
-    ]
-    problem = Problem("p", body=body, gait=Harmonic(1, "antipodal"))
-    space, _ = space_near(problem, problem.guess)
-    assert 2.5 < max(largest) < space.upper.min()

@@ -204,17 +204,6 @@ def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
             swimmer.robot(**SIZE, **{name: 1.0})
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"length": 0}, {"period": -5}, {"mass": float("nan")}, {"max_speed": [1, 2, 3]}]
-)
-def test_unusable_numbers_are_refused_by_name(three_link, wrong):
-    with pytest.raises(
-        colloc.ProblemError,
-        match=r"must be a positive finite number|3 joint speed limits for 2 joints",
-    ):
-        three_link.robot(**(SIZE | wrong))
-
-
 def test_a_smooth_body_has_no_torques_to_tell(unsolved):
     guess = colloc.Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
     soft = colloc.ModalBody(2, panels=4)

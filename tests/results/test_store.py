@@ -40,17 +40,6 @@ def test_an_answer_met_among_gaits_larger_than_the_problems_own_guess_is_read_ba
     assert again.problem.hash == small.hash
 
 
-def test_plain_h5py_reads_the_motion_with_units(three_link, tmp_path):
-    with h5py.File(save(three_link, tmp_path / "x.h5")) as file:
-        angles = file["motion/joint_angles"]
-        assert angles.attrs["units"] == b"rad"
-        assert angles.shape == (2, file["motion/t"].size)
-        assert file.attrs["status"].decode() == "solved"
-        assert "PROBLEM" in file["source"].asstr()[()]
-        assert file["answer"].attrs["delta"] == three_link.answer.delta
-        assert file["history/delta"][0] == three_link.history[0].delta
-
-
 @pytest.mark.parametrize("name", ["distance", "work_error", "value_at_zero_delta", "value"])
 def test_a_certificate_without_one_of_its_numbers_or_with_several_for_one_is_refused(
     name, three_link, tmp_path

@@ -48,23 +48,6 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
     assert len({step.intervals for step in solution.history}) <= 4
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("start", [0, 3])
-def test_refinement_ends_where_an_optimum_is_flat(start):
-    """Every new mesh moved these gaits by 0.01 rad, away from where it was fine: after eight the
-    error was 8e-5 and 1.1e-4."""
-    problem = Problem(
-        "flat",
-        body=Chain((0.2, 0.5, 0.3)),
-        friction=Friction(mu_t=3, mu_f=1, mu_b=1),
-        gait=Harmonic(3, "none"),
-    )
-    solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, start)), 1)
-    assert solution.status == "solved", solution.message
-    checks = {check.name: check for check in solution.certificate.checks}
-    assert checks["mesh error"].value < 3e-5
-
-
 def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     """Nearest to it, no gradient is below 1e-3; those of both sides cancel."""
     problem = Problem(

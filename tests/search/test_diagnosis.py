@@ -82,16 +82,6 @@ def test_the_search_for_redundant_equations_takes_time_in_proportion_to_the_mesh
     assert time.process_time() - begin < 5.0  # 0.4 s; 20 s with factors that fill
 
 
-def test_running_out_of_iterations_says_so():
-    problem = stated(delta=0.05, delta_start=0.05)
-    program = program_of(problem)
-    x = program.feasible(problem.gait.parameters(problem.guess), 0.05)
-    result = Solver(program, {"max_iter": 2}).solve_within(x, 0.05, None, np.inf)
-    text = explanation(program, result, 0.05)
-    assert "after 2 iterations" in text
-    assert np.char.find(text, "Maximum_Iterations") >= 0
-
-
 def test_a_delta_that_rounding_hides_is_named():
     """At delta = 1e-10 the flagship's gradient is noise of 2e-6; at 1e-9 it is still told from
     zero."""

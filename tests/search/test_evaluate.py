@@ -110,15 +110,6 @@ def test_a_retraced_gait_goes_nowhere_and_that_is_said():
     assert "It goes nowhere for its work" in there_and_back.message
 
 
-@pytest.mark.slow
-def test_links_that_cross_fail_their_check_and_no_other():
-    crossing = colloc.Fourier([2.0, 2.0], [[0.9], [0.0]], [[0.0], [0.9]])
-    found = colloc.evaluate(PROBLEM, crossing)
-    assert found.status == "certificate failed"
-    assert [check.name for check in found.certificate.failures] == ["self-contact"]
-    assert "It fails: self-contact" in found.message
-
-
 def test_kept_and_loaded_it_is_the_same(evaluated, tmp_path):
     loaded = colloc.load(colloc.save(evaluated, tmp_path / "x.h5"))
     assert loaded.message == evaluated.message

@@ -4,7 +4,7 @@ certificates alike."""
 import numpy as np
 import pytest
 
-from colloc.gaits.control_problem import control_problem, friction_unit
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.densities import PathLimit
@@ -23,14 +23,6 @@ def stated(*mu, **changes):
         "mesh_tolerance": 1e-4,
     } | changes
     return Problem("unit", ellipse(0.3, 1.0, 0.5), friction=coulomb(*mu), **settings)
-
-
-def test_friction_of_usual_size_is_left_alone():
-    for mu in ((1.0, 1.0, 1.0), (1.7, 1.0, 1.3), (0.5, 1.0, 5.0), (10.0, 1.0, 1.0)):
-        problem = stated(*mu)
-        control = control_problem(problem)
-        assert (control.unit, control.dynamics.law) == (1.0, problem.law)
-    assert friction_unit(Friction(mu_t=2e-6, mu_f=1e-6, mu_b=3e-6)) == pytest.approx(1e-6)
 
 
 def test_every_limit_follows_friction_by_its_own_power():

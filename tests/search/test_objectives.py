@@ -103,14 +103,6 @@ def fast():
     )
 
 
-def test_an_expression_that_equals_the_efficiency_has_its_optimum(usual):
-    same = solve(usual.problem.with_(objective="1 / (work / distance)"), 1)
-    assert same.success
-    assert same.value == pytest.approx(usual.value, rel=1e-9)
-    assert same.certificate.value == pytest.approx(usual.certificate.efficiency, rel=1e-7)
-    np.testing.assert_allclose(same.gait.cos, usual.gait.cos, atol=1e-4)
-
-
 def test_the_fastest_gait_is_faster_and_less_efficient_and_the_replay_says_so(usual, fast):
     assert fast.success
     best, known = fast.certificate, usual.certificate

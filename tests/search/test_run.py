@@ -377,26 +377,6 @@ def test_time_that_is_over_gives_the_best_gait_so_far(thread):
     assert solution.sample(0.3).angles.shape == (links - 1, 1)
 
 
-def test_progress_is_told_from_the_first_moment_on_stage_by_stage():
-    begin, seen = time.monotonic(), []
-    solution = solve(QUICK, 4, progress=seen.append)
-    told = [news.seconds for news in seen]
-    assert told == sorted(told)
-    assert 0 <= told[0] < told[-1] < time.monotonic() - begin
-    assert (seen[0].stage, seen[0].done, seen[0].count) == ("explore", 0, 4)
-    assert seen[0].best.value > 0
-    tried = [news for news in seen if news.stage == "explore" and news.count == 4]
-    assert list(dict.fromkeys(news.stage for news in seen)) == [
-        "explore",
-        "follow",
-        "refine",
-        "confirm",
-        "certify",
-    ]
-    assert str(tried[-1]).startswith("explore, 4 of 4; best d/W = 0.")
-    assert solution.certificate.replayed
-
-
 def test_the_best_gait_told_of_is_one_of_finite_size_and_stages_come_in_their_order():
     """Here small loops are better from the first start on, and one of the gaits that lead the
     sketches shrinks on its way."""

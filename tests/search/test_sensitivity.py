@@ -8,7 +8,7 @@ import pytest
 
 import colloc
 from colloc.gaits.parameters import parameters
-from colloc.search.sensitivity import Effect, Sensitivity, sensitivity
+from colloc.search.sensitivity import sensitivity
 
 WAYS = ("sideways", "forwards", "backwards")
 MIRRORED = (colloc.Foot(0, 0.2), colloc.Foot(1), colloc.Foot(2, 0.8))
@@ -55,12 +55,6 @@ def test_only_what_holds_the_gait_back_has_a_price(found, three_link):
         np.pi, abs=1e-4
     )
     assert found["joint limit"].slope > 10 * found["joint limit"].error
-
-
-def test_a_table_says_the_value_where_a_number_is_a_tenth_smaller_and_where_it_is_a_tenth_larger():
-    both, less = Effect("mu", 1.0, True, -0.5, 0.0), Effect("limit", 3.0, True, 0.2, 0.0, (-1,))
-    table = Sensitivity("x", "d/W", 1.0, 0.0, (both, less))
-    assert (table.beside(both), table.beside(less)) == (["1.0500", "0.9500"], ["0.9800", "-"])
 
 
 def differences(solution, parameter, step):
@@ -230,15 +224,6 @@ def test_formulas_of_a_law_of_ones_own_are_no_numbers(stated):
     names = [each.name for each in parameters(colloc.Problem("x", **stated))]
     assert "delta" in names
     assert not any("friction" in name or "drag" in name for name in names)
-
-
-@pytest.mark.parametrize("extent", [1.0, 1 - 3e-5])
-def test_a_pad_as_long_as_its_link_has_no_place_to_move_to(extent):
-    feet = tuple(colloc.Foot(link, extent=extent) for link in range(3))
-    problem = colloc.Problem("x", body=colloc.Chain(feet=feet), gait=colloc.Harmonic(1), delta=1e-2)
-    names = [effect.name for effect in colloc.solve(problem, starts=1).sensitivity().effects]
-    assert "weight of foot 1" in names
-    assert not any(name.startswith("place") for name in names)
 
 
 @pytest.mark.parametrize(

@@ -158,19 +158,6 @@ def test_what_joints_give_back_and_can_do_counts_on_slopes(uphill):
 
 
 @pytest.mark.slow
-def test_a_gait_without_symmetry_does_not_turn_in_a_period():
-    free = PROBLEM.with_(
-        gait=Harmonic(1),
-        guess=Fourier([0.2, 0.3], [[1.3], [0.1]], [[0.1], [1.2]]),
-        friction=Friction(mu_t=3, mu_f=1, mu_b=2),
-        delta=1e-3,
-    )
-    found = solve(free, 1)
-    assert found.status == "solved", found.message
-    assert abs(found.certificate.rotation) < 1e-5
-
-
-@pytest.mark.slow
 def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
     literal = solve(PROBLEM, search="full")
     assert literal.status == "solved", literal.message

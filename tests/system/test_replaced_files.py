@@ -165,32 +165,6 @@ def test_a_lock_keeps_other_processes_out_until_its_holder_lets_go(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["lock"]
 
 
-@pytest.mark.skipif(
-    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="two users need the superuser"
-)
-def test_two_users_go_on_from_each_other_in_a_folder_of_their_group(tmp_path, tmp_path_factory):
-    folder, group = tmp_path / "shared", 60_000
-    folder.mkdir()
-    os.chown(folder, 0, group)
-    folder.chmod(0o2775)
-
-    def as_user(number):
-        os.setgroups([group])
-        os.setgid(number)
-        os.setuid(number)
-        os.umask(0o002)
-        with locked(folder / "x.study" / "lock"):
-            append_visits(folder / "x.study", [record(number)])
-        open_archive(problem(), folder / "a.h5").add(
-            {StartName("sobol", 1, number): outcome(number, 0.1)}
-        )
-
-    with open_to_others(folder.parent, tmp_path_factory.getbasetemp()):
-        assert [in_child(as_user, number) for number in (61_001, 61_002)] == [0, 0]
-    assert len(read_journal(folder / "x.study")) == 2
-    assert len(open_archive(problem(), folder / "a.h5").outcomes) == 2
-
-
 @pytest.mark.parametrize("failure", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
 @pytest.mark.filterwarnings("ignore:flock not supported")
 def test_a_file_system_without_locks_stops_nobody(tmp_path, monkeypatch, failure):
