@@ -10,14 +10,9 @@ import h5py
 import numpy as np
 import pytest
 
+from colloc import Chain, Fourier, Friction, Problem, Solution, save
 from colloc.commands import verify as recheck
-from colloc.gaits.harmonic import Fourier
-from colloc.gaits.problem import Problem
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from colloc.results import checks
-from colloc.results.solution import Solution
-from colloc.results.store import save
 
 
 def changed(solution, certificate=None, answer=None):

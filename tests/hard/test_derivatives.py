@@ -12,11 +12,8 @@ import numpy as np
 import pytest
 from cases import HARD
 
-from colloc.gaits.problem import Problem
+from colloc import Chain, Friction, Problem, solve_balance
 from colloc.mechanics.balance import instant
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
 from colloc.search.spaces import program_of
 from tests.shared.laws import coulomb
 

@@ -15,10 +15,8 @@ import pytest
 from cases import COEFFICIENTS, DELTAS, HARD
 
 from benchmarks.reference import balanced_velocity
+from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
 from scripts.models.static_friction import SYMMETRIC_CASES, WORKED_CASES
 from tests.shared.laws import coulomb
 

@@ -5,12 +5,8 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from colloc.gaits.harmonic import Fourier
+from colloc import Chain, Fourier, Friction, replay, solve_balance
 from colloc.mechanics.balance import balance_jacobian, instant, total_power
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
-from colloc.verification.replay import replay
 
 tried = settings(derandomize=True, max_examples=60, deadline=None, database=None)
 PI = np.pi

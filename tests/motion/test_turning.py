@@ -4,10 +4,9 @@ every way to it agrees."""
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Polygon, Problem, evaluate, replay
+from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, evaluate, replay
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
-from colloc.gaits.harmonic import Fourier
 from colloc.reduced.program import ReducedProgram
 from colloc.results.arc import arc
 from colloc.search.spaces import space_near

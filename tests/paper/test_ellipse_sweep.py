@@ -4,10 +4,7 @@ independent replay."""
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import ellipse
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
-from colloc.verification.replay import replay
+from colloc import Chain, Friction, ellipse, replay
 from scripts.models.ellipses import gait_grid, largest_amplitude
 from scripts.models.sweep import Route, distinct_maxima, performance, refined_maximum
 from scripts.models.velocity_map import velocity_map

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
+from colloc import Chain, Friction, solve_balance
 from scripts.models.velocity_map import STENCILS, VelocityMap, map_error, velocity_map
 
 DELTA = 1e-3

@@ -4,16 +4,7 @@ the full program."""
 import numpy as np
 import pytest
 
-from colloc import (
-    BSpline,
-    Chain,
-    Fourier,
-    Friction,
-    Harmonic,
-    Polygon,
-    Problem,
-    ellipse,
-)
+from colloc import BSpline, Chain, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.search.spaces import space_near
 from tests.shared.stages import answer_near

@@ -10,11 +10,10 @@ from dataclasses import replace
 
 import pytest
 
+from colloc import StoreError, load
 from colloc.commands.main import main as colloc
 from colloc.results import kept
 from colloc.results.kept import save_result
-from colloc.results.store import load
-from colloc.system.errors import StoreError
 
 FILE = """
 from colloc import *

@@ -8,16 +8,7 @@ import numpy as np
 import pandas
 import pytest
 
-from colloc import (
-    Fourier,
-    Friction,
-    Harmonic,
-    Problem,
-    ProblemError,
-    evaluate,
-    slope_motion,
-    solve,
-)
+from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate, slope_motion, solve
 from colloc.results.arc import Arc, arc
 
 LENGTH, MASS, FROUDE = 1.2, 3.0, 1.0

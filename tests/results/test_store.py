@@ -6,8 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from colloc.results.store import load, save
-from colloc.system.errors import StoreError
+from colloc import StoreError, load, save
 
 
 def test_round_trip_keeps_everything(three_link, tmp_path):

@@ -6,16 +6,7 @@ import numpy as np
 import pytest
 from shared.instants import random_instants
 
-from colloc import (
-    Chain,
-    Friction,
-    Harmonic,
-    PowerLaw,
-    Problem,
-    Viscous,
-    ellipse,
-    replay,
-)
+from colloc import Chain, Friction, Harmonic, PowerLaw, Problem, Viscous, ellipse, replay
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import instant
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, replay
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.problem import Problem
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     crossing_depth,
@@ -16,11 +14,9 @@ from colloc.mechanics.contact import (
     passing_depth,
     smooth_minimum,
 )
-from colloc.mechanics.friction import Friction
 from colloc.search.converge import crossing_pairs, last_free
 from colloc.search.spaces import program_of
 from colloc.transcription.full_program import full_program
-from colloc.verification.replay import replay
 
 BODIES = [Chain((0.25,) * 4), Chain((0.1, 0.4, 0.2, 0.3)), Chain((0.2,) * 5), Chain((1 / 8,) * 8)]
 

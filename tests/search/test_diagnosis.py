@@ -7,13 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Harmonic, ellipse
-from colloc.gaits.problem import Problem
+from colloc import Harmonic, ModalBody, Problem, ellipse
 from colloc.mechanics.bodies import FORMULATIONS
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
 from colloc.search.ipopt import Solver
 from colloc.search.spaces import program_of
-from colloc.smooth.modal_body import ModalBody
 
 
 def stated(**changes):

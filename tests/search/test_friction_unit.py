@@ -4,11 +4,8 @@ certificates alike."""
 import numpy as np
 import pytest
 
+from colloc import Friction, Harmonic, PathLimit, Problem, ellipse
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.harmonic import Harmonic, ellipse
-from colloc.gaits.problem import Problem
-from colloc.mechanics.densities import PathLimit
-from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near

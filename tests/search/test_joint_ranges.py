@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Fourier, Friction, Harmonic, Polygon, Problem
-from colloc.results.store import load, save
+from colloc import Fourier, Friction, Harmonic, Polygon, Problem, load, save
 from colloc.search.solve import solve
 
 LAW = Friction(mu_t=3, mu_f=1, mu_b=1)

@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import (
-    BSpline,
-    Chain,
-    Friction,
-    Harmonic,
-    Problem,
-    Serpenoid,
-)
+from colloc import BSpline, Chain, Friction, Harmonic, Problem, Serpenoid
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near

@@ -4,12 +4,9 @@ solver."""
 import numpy as np
 import pytest
 
-from colloc import Harmonic, Problem, solve
+from colloc import Chain, Friction, Harmonic, Problem, solve, solve_balance
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
 
 DELTA = 1e-4
 BODY, FRICTION = Chain(), Friction()

@@ -3,23 +3,20 @@
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.problem import Problem
-from colloc.mechanics.friction import Friction
+from colloc import Fourier, Friction, Harmonic, ModalBody, Problem, Solution, load, replay, save
 from colloc.reduced.program import ReducedProgram
-from colloc.results.solution import Solution
-from colloc.results.store import load, save
 from colloc.search.iterate import evaluate_at
 from colloc.search.refine import on_more_panels
 from colloc.search.spaces import space_near
-from colloc.smooth.modal_body import ModalBody
-from colloc.verification.replay import replay
 from tests.shared.stages import answer_near
 
 GAIT = Fourier([0.0, 0.0], [[0.4562], [0.0]], [[0.0], [-1.429]])
 
 
-def found(panels, friction=Friction(), delta=1e-2, **changes):
+EQUAL = Friction()
+
+
+def found(panels, friction=EQUAL, delta=1e-2, **changes):
     stated = Problem(
         "two-modes",
         GAIT,

@@ -16,12 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from colloc import Chain, Friction, ProblemError, solve_balance
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import Motion
-from colloc.system.errors import ProblemError
 
 
 def chain_period(

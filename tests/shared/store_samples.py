@@ -5,14 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.problem import Problem
+from colloc import Axis, Fourier, Harmonic, Problem, Study, ellipse, load, save
 from colloc.results.archive import Archive, StartName, open_archive
 from colloc.results.outcome import Outcome
-from colloc.results.store import load, save
 from colloc.studies.journal import NAME, Attempt, Visit, append_visits, read_journal
 from colloc.studies.run import StudyRun
-from colloc.studies.study import Axis, Study
 from colloc.studies.table import load_study, save_study, study_table
 from colloc.system.row_file import CACHE, put_rows, read_rows
 from scripts.paper.array_store import read_arrays, write_arrays

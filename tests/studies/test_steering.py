@@ -8,18 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from colloc import (
-    Chain,
-    Coupled,
-    Friction,
-    Harmonic,
-    Problem,
-    ProblemError,
-    replay,
-    steer,
-)
+from colloc import Chain, Coupled, Fourier, Friction, Harmonic, Problem, ProblemError, replay, steer
 from colloc.gaits.fitted_gait import fitted_gait
-from colloc.gaits.harmonic import Fourier
 from colloc.pictures.families import steering_figure
 from colloc.studies.steering import Steering
 

@@ -10,8 +10,7 @@ import weakref
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Harmonic, ellipse
-from colloc.gaits.problem import Problem
+from colloc import Harmonic, Problem, ellipse
 from colloc.search.ipopt import Solver
 from colloc.search.spaces import program_of
 from colloc.system.interruption import clear_interrupt, interrupted, interruptible, time_limit
