@@ -18,7 +18,6 @@ from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import DRIVEN_WORK
-from colloc.mechanics.friction import Friction
 from colloc.results.store import load, save
 from colloc.search.solve import solve
 
