@@ -1,10 +1,9 @@
-"""Balanced motions of a chain at vanishing delta: samples of the map from shape and joint rates to
-velocity and power.
+"""Balanced motions of a chain at vanishing delta: samples of velocity and power over shapes and
+rates.
 
-Velocities are those of the *middle* of the body, in its own axes: the midpoint of the middle link,
-or for an even number of links the middle joint, in axes along the mean heading of the links that
-meet there. Turning the body end for end then negates them. On feet it is the centre of pressure:
-its speed times min(mu) is at most the power.
+Velocities are those of the midpoint of the middle link in its axes, or of the middle joint in axes
+along the mean heading of its links; turning the body end for end negates them. On feet it is the
+centre of pressure, whose speed times min(mu) is at most the power.
 """
 
 from __future__ import annotations
@@ -21,17 +20,15 @@ from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
 
 DELTA = 1e-9
-"""At unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""
+"""At unit shape speed: Coulomb friction to 1e-8, and within reach of the solver."""
 MOST_LINKS = 5
-"""Samples fill all of shape space, which has a dimension a joint."""
+"""Samples fill all of shape space."""
 _MAX_ITERATIONS = 300  # the few motions that need more are left out
 _SINGULAR = 1e-9  # singular value of relative motions along which two links do not move
 _BISECTIONS = 30
 
 
 class CoulombMotion(NamedTuple):
-    """Balanced motions, one a column."""
-
     angles: np.ndarray  # (n_joint, n)
     rates: np.ndarray  # unit directions, (n_joint, n)
     velocity: np.ndarray  # of the middle, or on feet of the centre of pressure, (2, n)
@@ -54,7 +51,7 @@ class CoulombMotion(NamedTuple):
 def balanced_motion(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
 ) -> CoulombMotion:
-    """One motion for each of shapes and joint rates ``(n_joint, n)``, without those that do not
+    """One motion for each of shapes and rates ``(n_joint, n)``, without those that do not
     converge."""
     return _one_motion(body, friction, angles, rates, delta)[0]
 
@@ -71,8 +68,8 @@ def _one_motion(
 def all_motions(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
 ) -> tuple[CoulombMotion, np.ndarray]:
-    """All balanced motions for shapes and joint rates ``(n_joint, n)``, and the column that each
-    belongs to ``(n_motion,)``."""
+    """All balanced motions for shapes and rates ``(n_joint, n)``, and the column each belongs
+    to."""
     if body.law(friction).associated:
         return _one_motion(body, friction, angles, rates, delta)
     roots = all_balanced_velocities(body, friction, angles, rates, delta)
@@ -105,8 +102,8 @@ def _motion(
 
 
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:
-    """Mask ``(n,)`` of shapes whose links i and i + 2 do not cross (to within an angle `margin`)
-    and all keep their width."""
+    """Mask ``(n,)`` of shapes whose links i, i + 2 do not cross (to within `margin`) and keep their
+    width."""
     bounds = crossing_bounds(body, angles)
     if bounds is None:
         return np.ones(angles.shape[1], dtype=bool)
@@ -128,18 +125,14 @@ def drawn_in(
 
 
 def fundamental(body: Chain, angles: np.ndarray) -> np.ndarray:
-    """Mask ``(n,)`` that keeps at least one of all shapes that mirror and end swap make
-    equivalent."""
+    """Mask ``(n,)`` that keeps one of all shapes that mirror and end swap make equivalent."""
     mask = angles.sum(axis=0) >= -1e-12
     return mask & (angles[0] >= angles[-1] - 1e-12) if body.symmetric else mask
 
 
 def one_joint(n_joint: int, half: bool) -> np.ndarray:
-    """Rates ``(n_joint, count)`` of each joint turning alone, forwards and unless `half` backwards.
-
-    The other links may stick then, and the ratio of gain to power has a peak with a kink there, so
-    steep (3 a radian and more) that no lattice of directions sees it.
-    """
+    """Rates ``(n_joint, count)`` of each joint alone: where the other links stick the ratio of gain
+    to power has a peak with a kink, so steep that no lattice of directions sees it."""
     return np.eye(n_joint) if half else np.concatenate([np.eye(n_joint), -np.eye(n_joint)], axis=1)
 
 
@@ -147,10 +140,10 @@ def two_resting(
     body: Chain, angles: np.ndarray, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """Shapes and rates ``(n_joint, count)`` at which two links with others between them may both
-    rest, from those of some shapes where the links between can move.
+    rest.
 
-    Two links between can if they are parallel (they buckle), three always. The joints outside rest
-    or turn at random. As with one joint, the ratio has peaks with kinks there.
+    Two links between can move if they are parallel (they buckle), three always; the joints outside
+    rest or turn at random. The ratio has peaks with kinks there too.
     """
     samples = [(angles[:, :0], angles[:, :0])]
     for i in range(body.n_link):
@@ -178,8 +171,7 @@ def _relative_motion(body: Chain, angles: np.ndarray, i: int, j: int) -> np.ndar
 
 
 def random_directions(n_joint: int, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Random directions ``(n_joint, count)`` of three or more joint rates; in every other one some
-    joints rest, where links may stick together and the ratio has creases."""
+    """Random directions ``(n_joint, count)``; in every other one some joints rest."""
     points = rng.standard_normal((n_joint, count))
     resting = np.where(np.arange(count) % 2, rng.integers(1, n_joint - 1, count), 0)
     points[rng.random((n_joint, count)).argsort(axis=0) < resting] = 0.0
@@ -187,8 +179,8 @@ def random_directions(n_joint: int, count: int, rng: np.random.Generator) -> np.
 
 
 def unit_directions(n_joint: int, count: int, half: bool, shift: float = 0.0) -> np.ndarray:
-    """About `count` directions of joint rates ``(n_joint, count)`` spread over the sphere, or half
-    of it; of two joints moved by the part `shift` of their spacing."""
+    """About `count` directions ``(n_joint, count)`` spread over the sphere, or half of it; of two
+    joints moved by the part `shift` of their spacing."""
     if n_joint == 1:
         return np.array([[1.0]]) if half else np.array([[1.0, -1.0]])
     if n_joint == 2:

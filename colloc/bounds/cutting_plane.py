@@ -1,9 +1,7 @@
-"""Exchange of samples for the upper bound: a small program on few samples, checked on many, and
-climbed between them.
+"""Exchange of samples for the upper bound: a small program on few samples, checked on many.
 
-Narrow ridges, where a link changes between stick and slip, escape any lattice; so the optimum of
-the samples held so far is climbed from a fresh lattice every round, the summits join the samples,
-and the round is repeated until none rises above.
+Narrow ridges, where a link changes between stick and slip, escape any lattice; so the optimum is
+climbed from a fresh lattice every round, and the summits join the samples until none rises above.
 """
 
 from __future__ import annotations
@@ -33,14 +31,12 @@ _WEIGHTY = 1e-7
 closes too badly to tell what knots are worth."""
 _NEAR = 0.005
 _PATIENCE = 3
-"""An inequality that is more than `_NEAR` below the program's value, so many programs in a row,
-goes. Dropped at once it is missed soon after: the exchange then goes in circles, and samples may
-exceed the value tenfold while that creeps."""
+"""Programs in a row after which an inequality more than `_NEAR` below the value goes. Dropped at
+once it is missed soon after, and the exchange goes in circles."""
 _RIPE = 5e-3  # surprise at which the multipliers say where knots are wanted
 _UNKNOWN = 0.1  # surprise expected of a program that no climbs have tried
 _SIDES = (0.0, 0.08, -0.08)
-"""A motion enters with the heading of its largest gain and these [rad] to the sides of it, as the
-best heading will move."""
+"""A motion enters with the heading of its largest gain and these [rad] beside it."""
 _HOPELESS = 0.005
 _CLIMB_STEPS = 14
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
@@ -48,8 +44,7 @@ _TOLERANCE, _TINY = 1e-7, 1e-10  # of the interior-point solver, and of its pena
 
 
 class Minimax(NamedTuple):
-    """Optimum of a minimax program: unknowns x ``(n,)``, the largest function there, and
-    multipliers ``(m,)``, >= 0, of sum 1."""
+    """Unknowns x ``(n,)``, the largest function there, and multipliers ``(m,)`` of sum 1."""
 
     x: np.ndarray
     value: float
@@ -59,12 +54,8 @@ class Minimax(NamedTuple):
 def smallest_maximum(
     rows: sparse.csr_matrix, constants: np.ndarray, penalty: sparse.spmatrix
 ) -> Minimax:
-    """Minimise ``max_i (rows x + constants)_i + x.penalty.x / 2`` by the interior-point solver
-    Clarabel; rows ``(m, n)``, penalty ``(n, n)`` positive semidefinite.
-
-    The penalty picks the smoothest of nearly equal optima: at a vertex unknowns that few functions
-    see take wild values, and an exchange of functions wanders.
-    """
+    """Minimise ``max_i (rows x + constants)_i + x.penalty.x / 2`` by Clarabel; the penalty picks
+    the smoothest of nearly equal optima, as the exchange wanders between vertices."""
     m, n = rows.shape
     left = sparse.hstack([rows, -np.ones((m, 1))], format="csc")
     quadratic = sparse.block_diag([penalty + _TINY * sparse.eye(n), sparse.csc_matrix((1, 1))])
@@ -89,12 +80,8 @@ def smallest_maximum(
 
 
 class Optimum(NamedTuple):
-    """The best potential of a space.
-
-    `floor` is the value of the program, which no potential of the space undercuts by more than the
-    smoothing on the samples held; `converged`: the last climbs stayed within the tolerance, and
-    those of a check that knows nothing of the samples (`summits_met`) within twice of it.
-    """
+    """The best potential of a space; `converged`: the last climbs stayed within the tolerance, and
+    those of a check that knows nothing of the samples within twice of it."""
 
     space: PotentialSpace
     free: np.ndarray  # coefficients
@@ -108,8 +95,6 @@ class Optimum(NamedTuple):
 
 
 class _Program:
-    """The inequalities in use, and their optimum."""
-
     def __init__(
         self,
         samples: Samples,
@@ -139,7 +124,7 @@ class _Program:
     def _solve(
         self, added: list[tuple[np.ndarray, np.ndarray]], kept: np.ndarray | slice = slice(None)
     ) -> None:
-        """Keep some inequalities, add those of more samples at given headings, and solve."""
+        """Keep some inequalities, add those of samples at given headings, and solve."""
         new = [self.samples.rows(*each) for each in added]
         self.rows = sparse.vstack([self.rows[kept], *(rows for rows, _ in new)], format="csr")
         self.constants = np.concatenate([self.constants[kept], *(each for _, each in new)])
@@ -158,7 +143,7 @@ class _Program:
 
     def settle(self, excess: float) -> float:
         """Exchange until no sample exceeds the program's value by more than `excess`; the largest
-        ratio over the samples."""
+        ratio."""
         for _ in range(_INNER_ROUNDS):
             ratio, heading = self.samples.ratio(self.best.x)
             if ratio.max() <= self.best.value + excess:
@@ -191,13 +176,12 @@ def exchanged_optimum(
     smoothing: float = 1e-5,
     seed: int = 0,
 ) -> Optimum:
-    """The potential of `space`, or of one with more knots (up to `intervals`, where the multipliers
-    ask for them), whose largest ratio over `domain` is smallest.
+    """The potential whose largest ratio over `domain` is smallest, with knots inserted up to
+    `intervals`.
 
     `shapes` and `directions` are those of the first lattice; `rounds` of climbs from `starts`
-    motions each, thrice as many in the final check, end when summits exceed the program's value by
-    less than `tolerance`. `smoothing` weighs the potential's roughness, which is about 0.2: 1e-5
-    costs 1e-6 of the bound; coarse lattices need more.
+    motions, thrice as many in the final check, end when summits exceed the value by less than
+    `tolerance`. `smoothing` weighs the roughness, about 0.2: 1e-5 costs 1e-6 of the bound.
     """
     rng = np.random.default_rng(seed)
     program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng, smoothing)

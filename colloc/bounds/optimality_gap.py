@@ -44,11 +44,10 @@ def refusal(problem: Problem) -> str:
 
 
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
-    """The upper bound for a problem's body, friction and joint limit: from the cache, or computed
-    if asked for.
+    """The bound for a problem's body, friction and joint limit: from the cache, or computed.
 
     None where there can be none (`refusal`), unless it is asked for: a `ProblemError`. A cache that
-    cannot be read or written costs a `ReadOnlyRunWarning`: no result depends on it.
+    cannot be read or written costs a `ReadOnlyRunWarning`.
     """
     if why := refusal(problem):
         if compute:
@@ -76,8 +75,7 @@ def _bounded(problem: Problem) -> bool:
 def gap_line(
     problem: Problem, efficiency: float, bound: Bound | None, *, asked: bool = False
 ) -> str:
-    """Efficiency, upper bound and gap; without a computed bound, 1/min(mu) with the hint to ask for
-    one, unless one was `asked` for in vain."""
+    """Efficiency, upper bound and gap; without a bound 1/min(mu), with the hint to ask for one."""
     if bound is not None:
         return f"  {bound.report(efficiency)}"
     if not _bounded(problem):

@@ -31,11 +31,9 @@ _SINGULAR = 1e-10  # added to the roughness, of its mean diagonal: affine functi
 
 @dataclass(frozen=True)
 class PotentialSpace:
-    """Potentials with given harmonics in the heading and splines in the angles.
-
-    Odd harmonics suffice where mu_b = mu_f; `end_swap`: the body is the same turned end for end;
-    `together`: only sums of functions of so many joint angles each.
-    """
+    """Potentials with given harmonics in the heading (odd ones suffice where mu_b = mu_f) and
+    splines in the angles, `together`: sums of functions of so many angles; `end_swap`: of a
+    symmetric body."""
 
     spline: TensorSpline
     harmonics: tuple[int, ...]
@@ -65,8 +63,7 @@ class PotentialSpace:
 
     @cached_property
     def roughness(self) -> sparse.csr_matrix:
-        """Quadratic form of the free coefficients: integral of the squared second derivatives,
-        harmonic k weighted by k^2."""
+        """Integral of the squared second derivatives, harmonic k weighted by k^2."""
         table = self.spline.roughness
         blocks = [
             max(k, 1) ** 2 * (self.bases[part].T @ table @ self.bases[part])
@@ -75,7 +72,7 @@ class PotentialSpace:
         return sparse.block_diag(blocks, format="csr")
 
     def coefficients(self, free: np.ndarray) -> dict[int, np.ndarray]:
-        """Complex spline coefficients ``(spline.size,)`` of every c_k."""
+        """Complex spline coefficients of every c_k."""
         full = {k: np.zeros(self.spline.size, dtype=complex) for k in self.harmonics}
         for k, part, where in self.layout:
             full[k] += (1, 1j)[part] * (self.bases[part] @ free[where])
@@ -113,7 +110,7 @@ class Samples:
         return gain / self.motion.power, heading
 
     def rows(self, chosen: np.ndarray, heading: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
-        """Gain over power of chosen samples at given headings: ``matrix @ free + constant``."""
+        """Gain over power of chosen samples at headings: ``matrix @ free + constant``."""
         motion = self.motion.take(chosen)
         u, v = motion.velocity
         constant = (np.cos(heading) * u - np.sin(heading) * v) / motion.power
@@ -128,15 +125,14 @@ class Samples:
 
 
 def largest_ratios(space: PotentialSpace, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
-    """Largest (gain over heading) / power of each motion ``(n,)``; `Samples` of a part at a time,
-    as they are large."""
+    """Largest (gain over heading) / power of each motion; `Samples` of a part at a time are
+    large."""
     parts = np.array_split(np.arange(motion.size), motion.size // _AT_ONCE + 1)
     return np.concatenate([Samples(space, motion.take(part)).ratio(free)[0] for part in parts])
 
 
 def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Maximum over theta of ``Re sum_k e^{i k theta} a_k`` and its place, ``(n,)`` each: in closed
-    form for k = 0 and 1, else the best of a grid of headings, polished by Newton steps."""
+    """Maximum over theta of ``Re sum_k e^{i k theta} a_k`` and its place, ``(n,)`` each."""
     if set(amplitudes) <= {0, 1}:
         first = amplitudes[1]
         return np.abs(first) + np.real(amplitudes.get(0, 0.0)), -np.angle(first)
@@ -162,26 +158,23 @@ def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndar
 
 
 class Measure(NamedTuple):
-    """Multipliers of the bound's program: of all ways to share out work among motions so that they
-    close in the mean, the one that travels farthest, along heading 0."""
+    """Multipliers of the program: of all ways to share out work among motions so that they close in
+    the mean, the one that travels farthest, along heading 0."""
 
     motion: CoulombMotion
     heading: np.ndarray  # of the middle link [rad], (n,)
     weight: np.ndarray  # share of the work, of sum 1, (n,)
 
     def efficiency(self) -> float:
-        """Distance over work; up to smoothing and tolerances the value of the program."""
+        """Distance over work: up to smoothing and tolerances the value of the program."""
         u, v = self.motion.velocity
         way = np.cos(self.heading) * u - np.sin(self.heading) * v
         return float(self.weight / self.motion.power @ way)
 
 
 def worth(space: PotentialSpace, measure: Measure) -> float:
-    """What the functions of a space can gain over those that the measure closes for, up to a
-    factor: ``g.R^-1.g``, g being their mean rates and R the roughness.
-
-    The measure's own weight is no guide: it may close well where it is heavy.
-    """
+    """What the functions of a space gain over those that the measure closes for, up to a factor:
+    ``g.R^-1.g``, g being their mean rates and R the roughness."""
     rows, _ = Samples(space, measure.motion).rows(np.arange(measure.weight.size), measure.heading)
     slope, size = rows.T @ measure.weight, space.roughness.diagonal().mean()
     roughness = space.roughness + _SINGULAR * size * sparse.eye(space.size)
@@ -189,7 +182,6 @@ def worth(space: PotentialSpace, measure: Measure) -> float:
 
 
 def with_knots(space: PotentialSpace, added: np.ndarray) -> PotentialSpace:
-    """The potentials with more knots, at the angles `added` and their opposites."""
     old = space.spline
     inner = np.unique(np.concatenate([old.knots[1:-1], added, -added]).round(12) + 0.0)
     spline = TensorSpline(old.n_joint, old.limit, inner.size + 1, tuple(inner.tolist()))
@@ -197,8 +189,7 @@ def with_knots(space: PotentialSpace, added: np.ndarray) -> PotentialSpace:
 
 
 def with_more_knots(space: PotentialSpace, measure: Measure, intervals: int) -> PotentialSpace:
-    """The potentials with knots in the middle of those intervals where they are worth most, at most
-    `intervals` in all."""
+    """The potentials with knots in the middle of those intervals where they are worth most."""
     knots = space.spline.knots
     middle = 0.5 * (knots[1:] + knots[:-1])
     places = middle[middle > -1e-12]

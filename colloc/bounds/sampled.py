@@ -1,8 +1,8 @@
 """An upper bound on the efficiency of every gait of a body: derivation in docs/bound.md.
 
-A convex program chooses the potential (`bounds.potential`) whose largest (gain / power) over all
-shapes, headings and rate directions is smallest, by exchange of samples (`bounds.cutting_plane`).
-The result is a *sampled* bound; `research/guarantee` guarantees one for associated friction.
+A convex program chooses the potential whose largest (gain / power) over all shapes, headings and
+rate directions is smallest, on samples; `research/guarantee` guarantees one for associated
+friction.
 """
 
 from __future__ import annotations
@@ -34,47 +34,23 @@ VERSION = 6
 
 @dataclass(frozen=True)
 class Budget:
-    """Effort of a bound.
-
-    Parameters
-    ----------
-    intervals : int
-        Knot intervals of the splines in every joint angle, at most.
-    harmonics : tuple of int, optional
-        Harmonics in the heading; by default (1, 3), of more than three links (1,), or (0, 1) where
-        mu_b differs from mu_f.
-    shapes, directions : int
-        The first lattice: steps of every joint angle, and rate directions.
-    rounds, starts : int
-        Largest number of rounds of climbs between the samples, and climbs a round.
-    tolerance : float
-        Excess of the summits over the program's value at which a bound counts as converged.
-    first : int
-        Even intervals to begin with; more knots are inserted where they are worth most.
-    smoothing : float
-        Weight of the roughness of the potential.
-    together : int, optional
-        Only potentials that are sums of functions of so many joint angles each.
-    """
-
-    intervals: int = 12
-    harmonics: tuple[int, ...] | None = None
-    shapes: int = 20
+    intervals: int = 12  # knot intervals of the splines in every joint angle, at most
+    harmonics: tuple[int, ...] | None = None  # in the heading; by default `usual_harmonics`
+    shapes: int = 20  # steps of every joint angle, and rate directions, of the first lattice
     directions: int = 48
-    rounds: int = 60
-    starts: int = 250
-    tolerance: float = 5e-4
-    first: int = 6
-    smoothing: float = 1e-5
-    together: int | None = None
+    rounds: int = 60  # of climbs, at most
+    starts: int = 250  # climbs a round
+    tolerance: float = 5e-4  # excess of the summits over the program's value that counts as none
+    first: int = 6  # even intervals to begin with; more knots go where they are worth most
+    smoothing: float = 1e-5  # weight of the roughness of the potential
+    together: int | None = None  # potentials are sums of functions of so many joint angles
 
 
 QUICK = Budget()
 FOUR_LINKS = Budget(
     5, None, 6, 40, 80, starts=400, tolerance=1e-3, first=5, smoothing=1e-4, together=2
 )
-"""Functions of two joint angles at a time: 81 unknowns do better than 108 that are products of
-three."""
+"""Functions of two joint angles at a time: 81 unknowns do better than 108 products of three."""
 FIVE_LINKS = replace(FOUR_LINKS, intervals=3, first=3, tolerance=3e-3)
 
 
@@ -90,51 +66,25 @@ def usual_harmonics(body: Chain, friction: Law) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Bound:
-    """An upper bound on the efficiency of every gait, and how well it is known.
-
-    Attributes
-    ----------
-    sampled : float
-        Largest ratio on any sample; between samples it may be exceeded. Or 1/min(mu), if less.
-    floor : float
-        Value of the last program: no potential of this space does better on the samples held, up to
-        the smoothing (1e-5).
-    converged : bool
-        Whether the last climbs between the samples stayed within the budget's tolerance of `floor`,
-        and those of an independent check (`bounds.sampling.summits_met`) within twice of it.
-    guaranteed : float or None
-        Value certified between samples too (`research/guarantee`).
-    missing : str
-        What keeps the sampled value from being a theorem; empty if `guaranteed` is set.
-    angles, rates : tuple of float
-        Shape and rate direction where the sampled value is taken.
-    coefficients : tuple of float
-        Free coefficients of the potential (see `potential_space`).
-    samples : int
-    seconds : float
-        Processor time.
-    graded : tuple of float
-        Inner knots, if they are not evenly spaced.
-    """
-
-    sampled: float
+    sampled: float  # largest ratio on any sample, or 1/min(mu) if less
     floor: float
+    """Value of the last program: no potential of the space does better on the samples held."""
     converged: bool
-    guaranteed: float | None
-    missing: str
-    angles: tuple[float, ...]
+    """Last climbs within the budget's tolerance of `floor`, those of a check within twice of it."""
+    guaranteed: float | None  # certified between samples too (`research/guarantee`)
+    missing: str  # what keeps the sampled value from being a theorem
+    angles: tuple[float, ...]  # shape and rates where the sampled value is taken
     rates: tuple[float, ...]
     joint_limit: float
     intervals: int
     harmonics: tuple[int, ...]
-    coefficients: tuple[float, ...]
+    coefficients: tuple[float, ...]  # free ones of the potential, in `potential_space`
     samples: int
-    seconds: float
-    graded: tuple[float, ...] = ()
+    seconds: float  # processor time
+    graded: tuple[float, ...] = ()  # inner knots, if they are not evenly spaced
     together: int | None = None
 
     def potential_space(self, body: Chain) -> PotentialSpace:
-        """Space of the `coefficients`."""
         spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals, self.graded)
         return PotentialSpace(spline, self.harmonics, body.symmetric, self.together)
 
@@ -203,7 +153,7 @@ def known_bound(
     budget: Budget | None = None,
     cache: str | os.PathLike,
 ) -> Bound | None:
-    """The bound of an earlier run in the cache, or None; arguments as for `efficiency_bound`."""
+    """The bound of an earlier run in the cache, or None."""
     key = bound_key(Domain(body, friction, float(joint_limit)), budget or usual_budget(body))
     entry = read_rows(Path(cache), CACHE).get(key)
     if entry is None:
@@ -225,30 +175,9 @@ def efficiency_bound(
     budget: Budget | None = None,
     cache: str | os.PathLike | None = None,
 ) -> Bound:
-    """An upper bound on d/W over all gaits with |joint angles| <= joint_limit and links i, i + 2
-    not crossing.
-
-    Parameters
-    ----------
-    body : Chain
-        Two to five links.
-    friction : Friction
-        Coulomb friction or the elliptic law, delta -> 0 (finite delta: docs/bound.md).
-    joint_limit : float
-        At most pi.
-    budget : Budget, optional
-        By default `usual_budget`: coarse for four links and more.
-    cache : path, optional
-        An SQLite file where bounds are kept by the hash of all inputs.
-
-    Raises
-    ------
-    ProblemError
-        For a joint limit outside (0, pi], more than five links, even harmonics with mu_b = mu_f, or
-        feet under a law that is not associated.
-    StoreError
-        If the cache cannot be read. One that cannot be written costs a `ReadOnlyRunWarning`.
-    """
+    """An upper bound on d/W over all gaits with |joint angles| <= joint_limit whose links do not
+    cross, for delta -> 0; kept in an SQLite file `cache`, which if it cannot be written costs a
+    warning."""
     if not 0 < joint_limit <= np.pi + 1e-12:
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
     if body.n_link > MOST_LINKS:

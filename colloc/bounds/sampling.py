@@ -1,5 +1,4 @@
-"""Samples of a bound: lattices of shapes and rate directions, and climbs to the summits between
-them."""
+"""Samples of a bound: lattices of shapes and rate directions, and climbs between them."""
 
 from __future__ import annotations
 
@@ -26,11 +25,10 @@ from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 
 _DELTA = 1e-6
-"""At unit shape speed: costs half of what it does at 1e-9; the best small gait loses 1.5e-5."""
+"""At unit shape speed: half the cost of 1e-9; the best small gait loses 1.5e-5."""
 _EDGE = 1e-9
 _FRAMES, _STEADY = 4, 2
-"""Directions, and their opposites, that a climb tries at a step; and in how many of them the rates
-stay as they are."""
+"""Directions, and their opposites, that a climb tries at a step; and those in which rates stay."""
 _FINER = 3  # lattice of shapes for motions of one joint alone: their peaks are hardest to meet
 _SPECIAL = 0.5  # share of joints straight or at their limit in every other random shape
 _TRIAL_STEPS = 4
@@ -41,7 +39,7 @@ _STEPS = 30
 
 @dataclass(frozen=True)
 class Domain:
-    """The gaits of a bound: those of a body under friction with |joint angles| <= joint_limit."""
+    """The gaits of a bound: |joint angles| <= joint_limit."""
 
     body: Chain
     friction: Friction
@@ -56,7 +54,6 @@ class Domain:
 
     @property
     def law(self) -> Law:
-        """Law of all that touches the floor."""
         return self.body.law(self.friction)
 
     def holds(self, angles: np.ndarray) -> np.ndarray:
@@ -65,23 +62,19 @@ class Domain:
         return inside & admissible(self.body, angles, _EDGE)
 
     def solved(self, angles: np.ndarray, rates: np.ndarray) -> tuple[CoulombMotion, np.ndarray]:
-        """All balanced motions, and the column of shapes and rates that each belongs to.
-
-        Those in which all feet stick are left out: they pay nothing, and those beside them say what
-        a potential may gain there.
-        """
+        """All balanced motions, and the column each belongs to; not those in which all feet stick,
+        which pay nothing: those beside them say what a potential may gain there."""
         motion, source = all_motions(self.body, self.friction, angles, rates, _DELTA)
         slides = np.flatnonzero(motion.power > self.law.smallest * _DELTA)
         return motion.take(slides), source[slides]
 
     def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> CoulombMotion:
         """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions`
-        rate directions; and on a finer one of each joint turning alone, and where two links rest.
+        rates; on a finer one of each joint alone, and where two links rest.
 
-        One of each class of mirror images; with directed friction the end swap reverses time, so
-        both senses of every rate are sampled. `shift` in [0, 1) moves the lattice by that part of
-        its spacing (then without its last value). More than two joints have random directions,
-        others at every shape and for every shift.
+        One of each class of mirror images; with directed friction both senses of every rate.
+        `shift` in [0, 1) moves the lattice by that part of its spacing. More than two joints have
+        random directions.
         """
         n_joint, half = self.body.n_joint, self.law.reversible
         angles, finer = (self._shapes(n * shapes, shift) for n in (1, _FINER))
@@ -98,12 +91,8 @@ class Domain:
         return motion if half else motion.joined(self.solved(resting, -rates)[0])
 
     def _shapes(self, steps: int, shift: float) -> np.ndarray:
-        """Shapes ``(n_joint, n)`` of a lattice without mirror images, with those where a joint is
-        at its limit, and where on its lines links touch.
-
-        The ratio has peaks in corners between limit and contact. More than two joints have as many
-        random shapes as a lattice of three.
-        """
+        """Shapes ``(n_joint, n)`` without mirror images, with those where a joint is at its limit,
+        and where on its lines links touch, as the ratio has peaks in corners between these."""
         n_joint, limit = self.body.n_joint, self.joint_limit
         if n_joint > 2:
             rng = np.random.default_rng(round(1e9 * shift) + steps)
@@ -124,8 +113,8 @@ class Domain:
         return angles[:, fundamental(self.body, angles)]
 
     def _random_shapes(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """`count` shapes, in every other of which some joints are straight or at their limit; where
-        links would cross, the last shape before that on the way from the straight body."""
+        """`count` shapes, in every other of which some joints are straight or at their limit; none
+        beyond where links cross on the way from the straight body."""
         angles = rng.uniform(-1.0, 1.0, (self.body.n_joint, count))
         special = (rng.random(angles.shape) < _SPECIAL) & (np.arange(count) % 2 == 1)
         angles = self.joint_limit * np.where(special, np.rint(angles), angles)
@@ -141,11 +130,11 @@ class Domain:
         rng: np.random.Generator,
         hopeless: float = -np.inf,
     ) -> CoulombMotion:
-        """Climb `value` from every motion of `start` by pattern search in random directions.
+        """Climb `value` from every motion of `start` by pattern search in random directions, as
+        ridges of stick and slip are creases at any angle to the axes.
 
-        Ridges where a link changes between stick and slip are creases, at any angle to the axes.
         Steps begin at `spacing` [rad] for shapes and `turn` [rad] for directions, and adapt. Climbs
-        below `hopeless` after a few steps are given up, and not returned.
+        below `hopeless` after a few steps are given up.
         """
         n_joint, top = len(start.angles), start
         best, size = value(start), np.ones(start.size)
@@ -178,8 +167,8 @@ class Domain:
 
     @staticmethod
     def _moves(at: CoulombMotion, rng: np.random.Generator) -> np.ndarray:
-        """Random unit directions of angles and rates, and their opposites, ``(2 n_joint, n, 2
-        _FRAMES)``; rates do not move along themselves."""
+        """Random unit directions of angles and rates, and opposites, ``(2 n_joint, n, 2
+        _FRAMES)``."""
         n_joint, n = at.angles.shape
         move = rng.standard_normal((2 * n_joint, n, _FRAMES))
         # along a crease that holds for the same rates at many shapes, as where one joint turns
@@ -195,15 +184,14 @@ class Domain:
 
 
 def _pairs(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every shape with all rates, ``(n_joint, n)`` each."""
     return np.repeat(angles, rates.shape[1], axis=1), np.tile(rates, angles.shape[1])
 
 
 def near_the_top(
     motion: CoulombMotion, ratio: np.ndarray, level: float, spacing: float, count: int
 ) -> np.ndarray:
-    """Indices of up to `count` of the largest that come near `level`, one for each cell of shapes
-    and directions."""
+    """Indices of up to `count` of the largest near `level`, one for each cell of shapes and
+    directions."""
     near = np.flatnonzero(ratio > level - _WINDOW)
     near = near[np.argsort(-ratio[near])]
     angles, rates = motion.angles[:, near] / spacing, motion.rates[:, near] * 4.0
@@ -223,12 +211,8 @@ def summits_met(
     seed: int = 0,
     level: float = np.inf,
 ) -> tuple[np.ndarray, CoulombMotion]:
-    """Ratios of gain to power ``(n,)`` of a potential where climbs from the best of a lattice end,
-    and the motions.
-
-    They know nothing of how the potential was found. Climbs begin near `level` and above, or near
-    the largest ratio on the lattice if that is less.
-    """
+    """Ratios of a potential where climbs from the best of a lattice end, near `level` or above, and
+    the motions; they know nothing of how the potential was found."""
     rng = np.random.default_rng(seed)
 
     def ratio(motion: CoulombMotion) -> np.ndarray:

@@ -1,8 +1,7 @@
 """Tensor-product cubic B-splines over the joint angles, with the symmetries of a body.
 
-All joints have the same knots on [-limit, limit], and N = intervals + 3 functions; a function of
-the angles is a vector of N^n_joint coefficients, last joint fastest. Symmetries permute these, so a
-function with given parities has fewer free ones: ``full = E @ free``.
+A function is a vector of (intervals + 3)^n_joint coefficients, last joint fastest. Symmetries
+permute these, so a function with given parities has fewer free ones: ``full = E @ free``.
 """
 
 from __future__ import annotations
@@ -30,8 +29,7 @@ class TensorSpline:
     limit: float
     intervals: int
     graded: tuple[float, ...] = ()
-    """The ``intervals - 1`` inner knots, ascending and symmetric about 0; evenly spaced if
-    empty."""
+    """Inner knots, ascending and symmetric about 0; evenly spaced if empty."""
 
     def __post_init__(self) -> None:
         if self.intervals < 1 or self.n_joint < 1 or not self.limit > 0:
@@ -51,14 +49,12 @@ class TensorSpline:
 
     @cached_property
     def knots(self) -> np.ndarray:
-        """Ends of the knot intervals, ``(intervals + 1,)``."""
         if not self.graded:
             return np.linspace(-self.limit, self.limit, self.intervals + 1)
         return np.array([-self.limit, *self.graded, self.limit])
 
     @cached_property
     def extended(self) -> np.ndarray:
-        """The knots and `DEGREE` more beyond either end, spaced as at that end."""
         beyond = np.arange(1, DEGREE + 1) * (self.knots[1] - self.knots[0])
         return np.concatenate([self.knots[0] - beyond[::-1], self.knots, self.knots[-1] + beyond])
 
@@ -71,23 +67,21 @@ class TensorSpline:
         return self.per_joint**self.n_joint
 
     def cell(self, angle: np.ndarray) -> np.ndarray:
-        """The knot interval that holds each angle."""
         return np.clip(np.searchsorted(self.knots, angle, side="right") - 1, 0, self.intervals - 1)
 
     def _local(self, angle: np.ndarray) -> np.ndarray:
-        """Indices ``(n, 4)`` of the functions of one joint that live where it is."""
+        """Indices ``(n, 4)`` of the functions of one joint that live at an angle."""
         return self.cell(angle)[:, None] + np.arange(DEGREE + 1)
 
     def _pieces(self, angle: np.ndarray, order: int) -> np.ndarray:
-        """Values ``(n, 4)`` of these, or of a derivative."""
         every = BSpline(self.extended, np.eye(self.per_joint), DEGREE)(angle, nu=order)
         return np.take_along_axis(every, self._local(angle), axis=1)
 
     def matrix(
         self, angles: np.ndarray, orders: tuple[int, ...] | None = None
     ) -> sparse.csr_matrix:
-        """Values of all functions at angles ``(n_joint, n)``, or of their partial derivatives of
-        the given orders in every joint angle, ``(n, size)``."""
+        """Functions, or partial derivatives of given orders, at angles ``(n_joint, n)``, ``(n,
+        size)``."""
         value = np.ones((angles.shape[1], 1))
         for angle, order in zip(angles, orders or (0,) * self.n_joint, strict=True):
             value = _products(value, self._pieces(angle, order))
@@ -103,8 +97,7 @@ class TensorSpline:
         return self._columns(angles, change)
 
     def _columns(self, angles: np.ndarray, value: np.ndarray) -> sparse.csr_matrix:
-        """Put values ``(n, 4^n_joint)`` of the functions that live at the angles into their
-        columns."""
+        """Put values ``(n, 4^n_joint)`` into the columns of their functions."""
         n, width = value.shape
         column = np.zeros((n, 1), dtype=np.int32)
         for angle in angles:
@@ -117,8 +110,8 @@ class TensorSpline:
 
     @cached_property
     def roughness(self) -> sparse.csr_matrix:
-        """Gram matrix ``(size, size)`` of the second derivatives: ``c.roughness.c`` is about the
-        integral of |D^2 f|^2."""
+        """Gram matrix of the second derivatives: ``c.roughness.c`` is about the integral of |D^2
+        f|^2."""
         half = 0.5 * np.diff(self.knots)
         axis = (self.knots[:-1, None] + half[:, None] * np.array([0.5, 1.5])).ravel()
         angles, widths = (
@@ -137,8 +130,8 @@ class TensorSpline:
     def symmetric_basis(
         self, mirror: int, swap: int | None, together: int | None = None
     ) -> sparse.csr_matrix:
-        """Basis ``(size, n_free)`` of the functions with f(-q) = mirror f(q), and f(-reversed q) =
-        swap f(q) unless swap is None; with `together`, of sums of functions of so many joints."""
+        """Basis ``(size, n_free)`` of functions with f(-q) = mirror f(q), f(-reversed q) = swap
+        f(q); with `together`, of sums of functions of so many joints."""
         index = np.arange(self.size).reshape((self.per_joint,) * self.n_joint)
         flipped = index[(slice(None, None, -1),) * self.n_joint]
         group = [(index.ravel(), 1), (flipped.ravel(), mirror)]
@@ -162,7 +155,7 @@ class TensorSpline:
         return (basis @ sparse.diags(1.0 / abs(basis).max(axis=0).toarray().ravel())).tocsr()
 
     def _functions_of(self, together: int) -> sparse.csc_matrix:
-        """Functions ``(size, n)`` of so many joints, constant in the others, for every choice."""
+        """Functions ``(size, n)`` of so many joints, for every choice."""
         constant = sparse.csc_matrix(np.ones((self.per_joint, 1)))
         free = sparse.eye(self.per_joint, format="csc")
         return sparse.hstack(
@@ -175,5 +168,4 @@ class TensorSpline:
 
 
 def _products(values: np.ndarray, more: np.ndarray) -> np.ndarray:
-    """Products ``(n, m k)`` of every value ``(n, m)`` with every other ``(n, k)``."""
     return (values[:, :, None] * more[:, None]).reshape(len(values), -1)

@@ -1,7 +1,6 @@
 """Array namespaces: one statement of the physics serves NumPy and CasADi.
 
-Arrays are two-dimensional, ``(n_body, n_time)``, and columns never mix. With CasADi a kernel is
-built for one instant, ``(n_body, 1)``, and mapped over the mesh by the caller.
+Arrays are ``(n_body, n_time)``, and columns never mix; with CasADi there is one column.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ def _casadi() -> SimpleNamespace:
 def namespace(*arrays: Array) -> SimpleNamespace:
     """CasADi's functions if any of the arrays is a CasADi matrix, else NumPy's.
 
-    ``matmul(a, b)`` takes a constant NumPy or SciPy sparse matrix on the left. ``where`` evaluates
-    both sides, so the side that is not taken must be finite, with finite derivatives.
+    ``matmul`` takes a constant matrix on the left. ``where`` evaluates both sides, so the side that
+    is not taken must be finite, with finite derivatives.
     """
     return _casadi() if any(type(a).__module__.startswith("casadi") for a in arrays) else _NUMPY

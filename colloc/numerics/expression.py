@@ -1,5 +1,5 @@
-"""Formulas as text, which files can hold: evaluated on floats, NumPy arrays or CasADi symbols, and
-differentiated in forward mode. Nothing but arithmetic of known variables is ever evaluated."""
+"""Formulas as text: evaluated on floats, NumPy arrays or CasADi symbols, and differentiated in
+forward mode. Nothing but arithmetic of known variables is ever evaluated."""
 
 from __future__ import annotations
 
@@ -149,11 +149,8 @@ class _Floats(ast.NodeTransformer):
 def formula(
     text: str, variables: tuple[str, ...], functions: tuple[str, ...] = FUNCTIONS
 ) -> Formula:
-    """Parse a formula; `functions` may have ``sum`` besides, over the rows of arrays.
-
-    Objects hold the text, as code cannot be pickled. `ProblemError` if it is no formula or has
-    anything in it but the variables, numbers and functions.
-    """
+    """Parse a formula; `functions` may have ``sum`` besides. Objects hold the text, as code cannot
+    be pickled. `ProblemError` for anything but the variables, numbers and functions."""
     if not isinstance(text, str):
         raise ProblemError(f"a formula must be text, not {text!r}.")
     if len(text) > _LONGEST:

@@ -1,9 +1,8 @@
 """First-order conditions at a kink: some mean of the gradients around a point vanishes.
 
-A point where smooth pieces meet is stationary in the sense of Clarke and Goldstein if 0 is a convex
-combination of gradients near it (Goldstein, Math. Program. 13, 1977); gradients are sampled within
-a small radius (Burke, Lewis and Overton, SIAM J. Optim. 15, 2005), and where several kinks meet
-also a step down the mean that is nearest to 0, as chance misses sides.
+Stationarity in the sense of Clarke and Goldstein (Math. Program. 13, 1977) by gradient sampling
+(Burke, Lewis and Overton, SIAM J. Optim. 15, 2005); where several kinks meet chance misses sides,
+and steps down the mean that is nearest to 0 find them.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ import numpy as np
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, binding, nonnegative
 
 _LOWER = 0.1
-"""A kink that bends down has the same gradients. There, points are lower by more than this part of
-what they would be higher by where it bends up."""
+"""A kink that bends down has the same gradients; there points are lower by more than this part of
+what they would be higher by."""
 _STEPS_DOWN = 4  # steps down the nearest mean, per variable, at most
 
 
@@ -30,17 +29,14 @@ def stationarity_around(
     points: int = 4,
     seed: int = 0,
 ) -> Stationarity:
-    """Replace the KKT error at v by that of the best mean of the gradients within `radius`.
-
-    `points` are drawn per variable; sampling stops at a mean within `enough` of 0. Returns `at`
-    itself if no mean is closer to 0, or if some point around is clearly lower.
-    """
+    """Replace the KKT error at v by that of the best mean of the gradients within `radius`; `at`
+    itself if none is closer to 0, or some point around is clearly lower. `points` are drawn per
+    variable, until a mean is within `enough` of 0."""
     rows, slopes, columns = program.rows(v), program.row_slopes(v), binding(program, v)[2]
     rng = np.random.default_rng(seed)
 
     def lagrangian(u: np.ndarray) -> np.ndarray:
-        """Gradient and value ``(n + 1,)``; rows count by what is not linear in them, as they have
-        kinks too."""
+        """Gradient and value ``(n + 1,)``; rows count by what is not linear in them."""
         bent = program.rows(u) - rows - slopes @ (u - v)
         gradient = program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes)
         return np.append(gradient, program.objective(u) + at.on_rows @ bent)
@@ -77,8 +73,8 @@ def stationarity_around(
 def _nearest_mean(
     gradients: np.ndarray, columns: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Weights of the mean of gradients ``(m, n)`` and multipliers of the columns ``(n, k)`` of what
-    binds, with the sum nearest to 0."""
+    """Weights of gradients ``(m, n)`` and multipliers of columns ``(n, k)`` with the sum nearest to
+    0."""
     m, k = len(gradients), columns.shape[1]
     # the last row's size does not matter: all is divided by the sum of the weights
     matrix = np.vstack([np.hstack([gradients.T, columns]), np.repeat([size, 0.0], [m, k])])

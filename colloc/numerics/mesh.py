@@ -1,8 +1,5 @@
-"""The time grid of a collocation scheme.
-
-*Points* are the stages, where the equations hold; schemes whose first stage is the left end of an
-interval share it with the neighbour. *Sites* carry a state: every edge and every interior stage.
-"""
+"""The time grid of a collocation scheme: *points* are the stages, which neighbours share where the
+first is the left end of an interval; *sites* are every edge and every interior stage."""
 
 from __future__ import annotations
 
@@ -28,12 +25,11 @@ class Mesh:
 
     @cached_property
     def h(self) -> np.ndarray:
-        """Interval lengths, ``(n,)``."""
         return np.diff(self.edges)
 
     @cached_property
     def points(self) -> np.ndarray:
-        """``(n, s)``: index of each interval's stages among the points."""
+        """Index of each interval's stages among the points, ``(n, s)``."""
         stride = self.scheme.s - self.scheme.left
         return np.arange(self.n)[:, None] * stride + np.arange(self.scheme.s)
 
@@ -54,7 +50,7 @@ class Mesh:
 
     @property
     def sites(self) -> np.ndarray:
-        """``(n, s)``: index of each interval's stages among the sites."""
+        """Index of each interval's stages among the sites, ``(n, s)``."""
         return (
             np.arange(self.n)[:, None] * self._stride
             + np.arange(self.scheme.s)
@@ -63,7 +59,7 @@ class Mesh:
 
     @property
     def edge_sites(self) -> np.ndarray:
-        """``(n + 1,)``: index of the edges among the sites."""
+        """Index of the edges among the sites, ``(n + 1,)``."""
         return np.arange(self.n + 1) * self._stride
 
     @property
@@ -72,8 +68,8 @@ class Mesh:
 
     def integration(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Matrices (L, Q) of the equations ``L X - Q X' = 0`` of a state at the sites, from its
-        rate at the points: one row per stage that is not a left end, and one per right edge that is
-        not a stage."""
+        rate at the points: one row per stage that is not a left end, and per right edge that is not
+        a stage."""
         s = self.scheme
         targets = [(self.sites[:, i], s.A[i]) for i in range(s.s) if not (s.left and i == 0)]
         if not s.right:
@@ -88,8 +84,7 @@ class Mesh:
     def _defects(
         self, targets: list[tuple[np.ndarray, np.ndarray]], left: np.ndarray, n_state: int
     ) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """Rows ``X_target - X_left - h weights . X'``, from targets (states ``(n,)``, weights
-        ``(s,)``)."""
+        """Rows ``X_target - X_left - h weights . X'``, from targets (states, weights)."""
         row = np.arange(self.n)[:, None] * len(targets) + np.arange(len(targets))
         to = np.stack([target for target, _ in targets], axis=1)
         weights = self.h[:, None, None] * np.stack([weight for _, weight in targets])

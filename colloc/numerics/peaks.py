@@ -1,8 +1,5 @@
-"""Peaks of functions of time, and what they add to second derivatives.
-
-A constraint that holds at every instant is put on the instants closest to its bound (exchange
-method; Hettich and Kortanek, SIAM Review 35, 1993), which move with what the function depends on.
-"""
+"""Peaks of functions of time (exchange method; Hettich and Kortanek, SIAM Review 35, 1993), and
+what they add to second derivatives as they move."""
 
 from __future__ import annotations
 
@@ -15,8 +12,8 @@ SAMPLES = 16
 
 
 def vertex(low: np.ndarray, here: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Maximum of the parabola through three equally spaced values, from the middle one in spacings;
-    0 where there is none."""
+    """Maximum of the parabola through three equally spaced values, from the middle one in
+    spacings."""
     bend = low - 2 * here + high
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(bend < 0, 0.5 * (low - high) / bend, 0.0)
@@ -28,12 +25,8 @@ def peaks(
     width: np.ndarray,
     zooms: int = 3,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Instant in each of n stretches at which a function of its own is largest ``(n,)``, and the
-    largest sample ``(n,)``.
-
-    The function takes instants ``(n, k)``. It is sampled finer and finer around the highest sample,
-    since peaks may have kinks; one parabola places a smooth maximum to fourth order.
-    """
+    """Instant in each of n stretches at which a function of its own, of instants ``(n, k)``, is
+    largest, and the largest sample: sampled finer and finer, since peaks may have kinks."""
     rows, fine = np.arange(left.size), np.linspace(0.0, 1.0, SAMPLES + 1)
     for zoom in range(zooms + 1):
         times = left[:, None] + width[:, None] * fine
@@ -54,8 +47,7 @@ def curvature_of_moving(
     held at their peaks in time: ``max_t c`` has c_vv - c_tv c_tv' / c_tt.
 
     values ``(3, n_function)``, slopes by v ``(3, n_function, n)``: a little before the peaks, at
-    them, and as much after. A peak on an edge, where the parabola has no vertex beside the middle,
-    stays there.
+    them, and as much after. A peak on an edge stays there.
     """
     low, here, high = values
     bend = low - 2 * here + high

@@ -38,9 +38,8 @@ def quadratic_step(
     low: np.ndarray,
     high: np.ndarray,
 ) -> QuadraticStep | None:
-    """Minimise the model with b ``(n, n)`` positive definite and row gradients `slopes` ``(m, n)``;
-    where rows contradict each other, their violations are removed in part. None if there is no
-    step, or no finite model."""
+    """Minimise the model with b positive definite and row gradients `slopes` ``(m, n)``; where rows
+    contradict each other, their violations are removed in part. None if there is no step."""
     if not (np.isfinite(gradient).all() and np.isfinite(slopes).all() and np.isfinite(b).all()):
         return None
     rows = {"lba": row_low, "uba": row_high}
@@ -65,8 +64,7 @@ def quadratic_step(
 
 
 class _Solver:
-    """DAQP for m rows and n variables, in memory of its own: CasADi's arrays take five times as
-    long as a small step."""
+    """DAQP in memory of its own: CasADi's arrays take five times as long as a small step."""
 
     def __init__(self, m: int, n: int) -> None:
         shapes = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(m, n)}
@@ -82,7 +80,6 @@ class _Solver:
         self._buffer.set_res(function.index_out("lam_a"), self._on_rows.data)
 
     def minimum(self, program: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
-        """The step and the multipliers of the rows; None where there is no step."""
         for name, memory in self._inputs.items():
             memory[:] = program[name].T
         self._d.fill(np.nan)

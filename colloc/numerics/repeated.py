@@ -1,8 +1,7 @@
 """Nonlinear programs linear in small functions that are repeated over a mesh, with derivatives.
 
-With y the outputs of all functions at all their instances, rows and objective are ``R [x; y; 1]``
-with constant sparse R. Each function is differentiated once, for one instance: CasADi's own
-Hessian of the whole takes three times as long to build and to evaluate.
+With y the outputs of all functions, rows and objective are ``R [x; y; 1]`` with constant sparse R.
+Each function is differentiated once: CasADi's own Hessian of the whole takes three times as long.
 """
 
 from __future__ import annotations
@@ -19,12 +18,8 @@ from scipy import sparse
 
 @dataclass(frozen=True, eq=False)
 class LocalFunction:
-    """A function `out` of `local` variables, `given` numbers and `delta`, all columns, with its
-    derivatives.
-
-    It may also depend on `solved`, which solves `equations`: derivatives are then those of the
-    implicit function theorem.
-    """
+    """A function `out` of `local` variables, `given` numbers and `delta`, all columns; and of what
+    is `solved` by `equations`, by the implicit function theorem."""
 
     local: ca.SX
     given: ca.SX
@@ -74,12 +69,9 @@ class LocalFunction:
 
 @dataclass(frozen=True, eq=False)
 class Repeated:
-    """A local function at many instances.
-
-    `gather` ``(n_local, n_instance)``: indices of each instance's local variables among those of
-    the program; `values` ``(n_given, n_instance)``. `solve` takes local variables
-    ``(n_local, n_instance)`` and delta, MX both, to what the function is solved for.
-    """
+    """A local function at instances; `gather` ``(n_local, n_instance)``: indices of the local
+    variables among those of the program. `solve` takes local variables and delta, MX both, to what
+    is solved."""
 
     function: LocalFunction
     gather: np.ndarray
@@ -156,8 +148,8 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Nlp:
-    """A nonlinear program in x ``(n,)`` and the parameter delta, as `casadi.nlpsol` takes it:
-    expressions x, p, f, g; functions grad_f, jac_g, hess_lag."""
+    """A nonlinear program in x and the parameter delta: expressions x, p, f, g; functions grad_f,
+    jac_g, hess_lag."""
 
     expressions: dict[str, ca.MX]
     functions: dict[str, ca.Function]
@@ -166,8 +158,6 @@ class Nlp:
 def nonlinear_program(
     n: int, repeated: Sequence[Repeated], rows: sparse.spmatrix, objective: sparse.spmatrix
 ) -> Nlp:
-    """The program of n variables with rows ``rows @ [x; y; 1]`` and objective
-    ``objective @ [x; y; 1]``."""
     x, delta = ca.MX.sym("x", n), ca.MX.sym("delta")
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows.shape[0])
     every = sparse.csr_matrix(sparse.vstack([objective, rows]))
@@ -226,8 +216,8 @@ def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
 
 
 def _matrix(shape: tuple[int, int], places: list, values: ca.MX) -> ca.MX:
-    """Sparse matrix with entries at places (row, column, factor), each ``(n_entry, n_instance)``;
-    values at one place add up."""
+    """Sparse matrix with entries at places (row, column, factor), each ``(n_entry,
+    n_instance)``."""
     row, column, factor = (
         np.concatenate([part[k].ravel(order="F") for part in places]) for k in range(3)
     )

@@ -35,7 +35,6 @@ class Scheme:
 
     @property
     def s(self) -> int:
-        """Number of nodes."""
         return len(self.c)
 
     @property
@@ -49,7 +48,7 @@ class Scheme:
         return bool(self.c[-1] == 1.0)
 
     def lagrange(self, tau: np.ndarray) -> np.ndarray:
-        """Lagrange polynomials of the nodes at tau ``(k,)``, as ``(k, s)``."""
+        """Lagrange polynomials at tau ``(k,)``, as ``(k, s)``."""
         tau = np.asarray(tau, dtype=float)
         values = np.ones((tau.size, self.s))
         for j in range(self.s):
@@ -69,7 +68,6 @@ class Scheme:
 
 @lru_cache
 def _gauss_rule(s: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights on [-1, 1]."""
     return np.polynomial.legendre.leggauss(s)
 
 

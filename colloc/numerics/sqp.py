@@ -1,8 +1,7 @@
 """Sequential quadratic programming for small dense programs with bounds and rows.
 
-Second derivatives of a reduced gait program jump where narrow bands of stick cross a mesh point, so
-damped BFGS updates (Powell, 1978) build them from gradients. SciPy's SLSQP takes the same steps
-(150 to 600 ms each with 250 variables, where this takes 12), but begins anew at every call.
+Second derivatives of a reduced gait program jump, so damped BFGS updates (Powell, 1978) build them
+from gradients. SciPy's SLSQP takes 150 to 600 ms a step with 250 variables, where this takes 12.
 """
 
 from __future__ import annotations
@@ -19,15 +18,14 @@ from colloc.system.interruption import interrupted, interruptible
 Value = TypeVar("Value")
 _NOWHERE = 1e3  # objective where the balance cannot be solved: a line search steps back from it
 _ACTIVE = 1e-6
-"""Slack below which an inequality may carry a multiplier; its product with the slack is measured
-too."""
+"""Slack below which an inequality may carry a multiplier; their product is measured too."""
 _EDGE = 1e-9
 _FEASIBLE = 1e-10  # sum of the violations that no accuracy asks to be below
 _MOST_TRIALS = 12  # points along a step
 _DAMPING = 0.2  # least curvature along a step, as a share of the model's (Powell)
 _FEW = 8
-"""Columns up to which `nonnegative` does without SciPy's optimize, which takes a sixth of a second
-to load."""
+"""Columns up to which `nonnegative` does without SciPy's optimize, which loads for a sixth of a
+second."""
 
 
 class NonlinearProgram(Protocol):
@@ -57,8 +55,6 @@ class NonlinearProgram(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Stationarity:
-    """First-order conditions at a point, by the multipliers that come closest to them."""
-
     kkt_error: float  # largest component of the Lagrangian's gradient
     violation: float  # largest, of a row or bound
     complementarity: float  # largest product of a multiplier and its slack
@@ -67,8 +63,8 @@ class Stationarity:
 
 
 def binding(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Indices of rows and bounds, counted on, that may carry a multiplier at their upper and at
-    their lower ends; and their gradients ``(n, n_binding)``, those at lower ends negated."""
+    """Indices of rows and bounds, counted on, that may carry a multiplier at their upper and lower
+    ends; and their gradients ``(n, n_binding)``, those at lower ends negated."""
     values, lower, upper = _rows_and_bounds(program, v)
     unit = np.vstack([program.row_slopes(v), np.eye(v.size)])
     high, low = np.flatnonzero(values > upper - _ACTIVE), np.flatnonzero(values < lower + _ACTIVE)
@@ -76,7 +72,6 @@ def binding(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _rows_and_bounds(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Values, lower and upper ends of rows and variables."""
     return (
         np.concatenate([program.rows(v), v]),
         np.concatenate([program.row_lower, program.lower]),
@@ -85,8 +80,8 @@ def _rows_and_bounds(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarr
 
 
 def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
-    """Measure the first-order conditions at v, with the non-negative multipliers that minimise the
-    Lagrangian's gradient; without variables they hold."""
+    """First-order conditions at v, with the non-negative multipliers that minimise the Lagrangian's
+    gradient."""
     if not v.size:
         return Stationarity(0.0, 0.0, 0.0, np.zeros(program.row_lower.size), np.empty(0))
     gradient, (values, lower, upper) = program.gradient(v), _rows_and_bounds(program, v)
@@ -111,8 +106,7 @@ def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
 
 
 def nonnegative(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The x >= 0 ``(n,)`` that minimises ``|matrix @ x - right|`` (Lawson and Hanson, Solving Least
-    Squares Problems, 1974)."""
+    """The x >= 0 that minimises ``|matrix @ x - right|`` (Lawson and Hanson, 1974)."""
     n = matrix.shape[1]
     if n > _FEW:
         from scipy.optimize import nnls
@@ -144,8 +138,6 @@ def nonnegative(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class SqpResult:
-    """End of an SQP run."""
-
     v: np.ndarray  # (n,)
     objective: float
     iterations: int
@@ -156,8 +148,7 @@ class SqpResult:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A point with its objective, rows and their violations; what cannot be evaluated is far too
-    large."""
+    """A point; what cannot be evaluated is far too large."""
 
     v: np.ndarray
     objective: float
@@ -180,11 +171,11 @@ def minimised(
     iterations: int = 150,
     curvature: np.ndarray | None = None,
 ) -> SqpResult:
-    """Minimise from v within a box of the given radius around it, to an accuracy of the objective.
+    """Minimise from v within a box of the given radius, to an accuracy of the objective.
 
-    Every step minimises a quadratic model within the box and the linear models of the rows, and is
+    Steps minimise a quadratic model within the box and the linear models of the rows, and are
     shortened until the objective and the violations, each at its price, fall together (Han, 1977;
-    Powell, 1978). Where a model of the given curvature leads nowhere, that of curvature 1 follows.
+    Powell, 1978).
     """
     if not v.size:
         return SqpResult(v, program.objective(v), 0, 1, False, np.empty((0, 0)))
@@ -229,8 +220,8 @@ def minimised(
 def _line_search(
     program: NonlinearProgram, here: _Point, d: np.ndarray, price: np.ndarray, model: float
 ) -> tuple[_Point | None, int]:
-    """First point along a step with a tenth of the model's decrease, if there is one; and the
-    number of trials."""
+    """First point along a step with a tenth of the model's decrease, if any; and the number of
+    trials."""
     merit, size = here.objective + price @ here.outside, 1.0
     for trial in range(1, _MOST_TRIALS + 1):
         there = _Point.at(program, here.v + size * d)
@@ -242,8 +233,7 @@ def _line_search(
 
 
 def _bfgs(b: np.ndarray, s: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Curvature after a step s that changed the Lagrangian's gradient by y, damped so that it stays
-    positive definite."""
+    """Damped BFGS update for a step s that changed the Lagrangian's gradient by y."""
     bs = b @ s
     sbs, sy = s @ bs, s @ y
     if not np.isfinite(sy) or sbs <= 0:

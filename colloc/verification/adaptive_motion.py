@@ -1,8 +1,7 @@
-"""A gait's motion by adaptive Gauss quadrature: orientation, displacement and work at any phase.
+"""A gait's motion by adaptive Gauss quadrature, at any phase.
 
-Panels are halved until their two halves agree with them; so they shrink towards the kinks of stick
-and slip, whose width is of order delta. They know nothing of a collocation mesh, and are what
-meshes are measured against.
+Panels are halved until both halves agree with them, so they shrink towards the kinks of stick and
+slip. Knowing nothing of a collocation mesh, they are what meshes are measured against.
 """
 
 from __future__ import annotations
@@ -27,24 +26,20 @@ _TO_HALVES = PANEL_RULE.lagrange(0.5 * np.concatenate([PANEL_RULE.c, 1.0 + PANEL
 _NARROWEST = 1e-9
 _MOST_PANELS = 20_000
 _PIECES = 400, 200
-"""Of a whole path, in which a quantity is summed up, and once more for the error."""
+"""Pieces of a path in which a quantity is summed up, and once more for the error."""
 
 Increments = tuple[np.ndarray, ...]
-"""Rotation, displacement in the initial body frame (complex), work and quantities of intervals,
-``(n,)`` each."""
+"""Rotation, displacement in the initial body frame (complex), work and quantities of intervals."""
 
 
 class Rates(NamedTuple):
-    """Velocities at instants of any shape."""
-
     z: np.ndarray  # tail velocity, (3, ...)
     centre: np.ndarray
-    """Velocity of the centre of mass in the body frame (complex), turned back evenly by the turn of
-    a period."""
+    """Velocity of the centre of mass in the body frame (complex), turned back evenly by the
+    turn."""
     gained: np.ndarray  # power and densities of k quantities, (1 + k, ...)
 
     def of(self, panels: np.ndarray) -> Rates:
-        """Rates at the nodes of some panels."""
         return Rates(*(each[..., panels, :] for each in self))
 
 
@@ -59,9 +54,8 @@ def rates_at(
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> Rates:
-    """Solve for the velocities of a path at phases t of any shape, from tail velocities `near`
-    ``(3, ...)``. Without them phases ascend, and one branch is followed in time where several
-    motions are balanced."""
+    """Solve for the velocities of a path at phases t, from tail velocities `near` ``(3, ...)``;
+    without them at ascending phases, on one branch in time where several motions are balanced."""
     angles, rates = path(t.ravel())
     at = body, friction, angles, rates, delta
     if near is None:
@@ -79,8 +73,7 @@ def rates_at(
 def totals_along(
     quantity: Quantity, path: Path, left: np.ndarray, right: np.ndarray, pieces: int
 ) -> np.ndarray:
-    """A quantity of shapes and their rates alone over intervals, ``(n,)``, by Gauss quadrature on
-    so many pieces of each."""
+    """A quantity of shapes and rates alone over intervals, ``(n,)``, by Gauss quadrature."""
     h = (right - left) / pieces
     starts = left[:, None] + h[:, None] * np.arange(pieces)
     t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
@@ -92,7 +85,7 @@ def totals_along(
 def whole_totals(
     quantities: Iterable[Quantity], path: Path
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Quantities of shapes and their rates alone over a period, and their errors."""
+    """Quantities of shapes and rates alone over a period, and their errors."""
     values, errors = {}, {}
     for each in quantities:
         value, rougher = (
@@ -106,8 +99,8 @@ def whole_totals(
 def increments(
     rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | None = None
 ) -> Increments:
-    """Increments of intervals of length h ``(n,)``, from rates at the nodes of the rule ``(n, s)``;
-    with the weights of an integral over a part of the interval, or the rule's own."""
+    """Increments of intervals of length h ``(n,)`` from rates at the nodes of the rule ``(n, s)``;
+    other weights are those of an integral over a part of the interval."""
     omega, b = rates.z[2], rule.b if weights is None else weights
     turn = np.exp(1j * h[:, None] * (omega @ rule.A.T))
     return h * (omega @ b), h * ((turn * rates.centre) @ b), *(h * (rates.gained @ b))
@@ -123,8 +116,8 @@ class FineMotion:
     path: np.ndarray  # displacement in the lab there (complex, starting with orientation 0)
     totals: np.ndarray  # work and quantities up to the edges, (1 + k, n + 1)
     unresolved: np.ndarray
-    """``(n,)``: relative error of the objective that a panel may still hold: what halving it last
-    changed, at its end and half way."""
+    """Relative error of the objective that a panel may still hold: what halving it last changed, at
+    its end and half way, ``(n,)``."""
 
     @property
     def work(self) -> np.ndarray:
@@ -132,7 +125,6 @@ class FineMotion:
 
     @property
     def nodes(self) -> np.ndarray:
-        """Phases of the panel nodes, ``(n, s)``."""
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
     def _locate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -142,14 +134,13 @@ class FineMotion:
         return k, (t - self.edges[k]) / h[k], h
 
     def velocity(self, t: np.ndarray) -> np.ndarray:
-        """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``."""
+        """Tail velocities ``(3, ...)`` at phases t by the panels' polynomials."""
         k, fraction, _ = self._locate(t)
         weights = PANEL_RULE.lagrange(fraction.ravel()).reshape(*t.shape, -1)
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
     def at(self, t: np.ndarray) -> Increments:
-        """Orientation, displacement, work and quantities at phases t ``(n_time,)``, by the panels'
-        polynomials."""
+        """Orientation, displacement, work and quantities at phases t ``(n_time,)``."""
         k, fraction, h = self._locate(t)
         weights = PANEL_RULE.integrals(fraction) * h[k][:, None]
         omega = self.rates.z[2]
@@ -173,12 +164,11 @@ def fine_motion(
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> FineMotion:
-    """Integrate a path between the first and the last of `edges`, those of the first panels, to a
-    relative error of the efficiency, or another objective.
+    """Integrate a path over panels that begin as those of `edges`, to a relative error of an
+    objective.
 
-    `shares` gives the relative change of the objective per unit of way, work, rotation and
-    quantities. The way is seen from axes that turn evenly, by `turn` a period.
-    `NotConvergedError` if the balance cannot be solved at some instant.
+    `shares` gives its relative change per unit of way, work, rotation and quantities; the way is
+    seen from axes that turn evenly, by `turn` a period. `NotConvergedError` without a balance.
     """
     names = "work", *(quantity.name for quantity in quantities)
     asked: Any = {"quantities": quantities, "turn": turn}
@@ -235,8 +225,7 @@ def _error_weights(
     names: tuple[str, ...],
     shares: Callable[[Mapping[str, float]], Mapping[str, float]],
 ) -> list[float]:
-    """Relative change of the objective per unit of rotation, displacement, work and quantities in a
-    panel."""
+    """Relative change of the objective per unit of rotation, displacement, work and quantities."""
     theta, path, totals = _cumulative(parts)
     period = dict(zip(names, totals[:, -1], strict=True))
     period |= {"distance": max(abs(path[-1]), 1e-300), "rotation": theta[-1]}
@@ -248,7 +237,7 @@ def _error_weights(
 
 
 def _cumulative(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Orientation, lab displacement, and work and quantities at the edges, from increments."""
+    """Orientation, lab displacement, and work and quantities at the edges."""
     theta, *totals = (np.append(0.0, np.cumsum(part)) for part in (parts[0], *parts[2:]))
     moved = np.exp(1j * theta[:-1]) * parts[1]
     return theta, np.append(0.0, np.cumsum(moved)), np.stack(totals)

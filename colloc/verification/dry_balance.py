@@ -28,8 +28,7 @@ from colloc.mechanics.law import Law, rate_independent
 from colloc.system.errors import ProblemError
 
 _SMOOTHED, _LEAST = 1e-8, 1e-17
-"""Delta of the friction, and of the dissipation, over the largest rate. What sticks gives forces to
-1e-16 over the first."""
+"""Delta of the friction, and of the dissipation, over the largest rate."""
 _ROUNDING = 64 * float(np.finfo(float).eps)  # relative: closed forms are known to a few units
 _NEWTON, _ROUNDS = 6, 4  # steps to a cut; rounds of all cuts, each with what the last one knew
 _CAP = 0.02  # the largest gradient, in units of the friction
@@ -37,19 +36,17 @@ _TOO_FAR = 0.1  # part of its goal that a gradient may miss; else the next goal 
 
 
 class DryBalance(NamedTuple):
-    """Instants of a body under dry friction."""
-
     least: np.ndarray  # bounds of the power, (n_time,)
     most: np.ndarray
     z: np.ndarray  # a tail velocity that dissipates no more than `most`, (3, n_time)
     apart: np.ndarray
-    """``(3, n_time)``: how far from it any balanced motion is at most: velocity of the centre of
-    mass in the body's axes, and rotation rate. Infinite where nothing bounds it."""
+    """How far from it any balanced motion is at most: velocity of the centre of mass in the body's
+    axes, and rotation rate ``(3, n_time)``; infinite where nothing bounds it."""
 
 
 class _Tangent(NamedTuple):
     """A lower bound of the dissipation, linear about velocities y ``(3, n_time)`` of the centre of
-    mass: value with all that rounding may take off, gradient, and its derivative."""
+    mass."""
 
     y: np.ndarray
     power: np.ndarray
@@ -63,17 +60,15 @@ class _Tangent(NamedTuple):
         return self.power - along.sum(axis=0) - _sums(self.gradient, apart) - rounding
 
     def where(self, better: np.ndarray, other: _Tangent) -> _Tangent:
-        """The other one at some instants."""
         masks = (better, better, better, better.reshape(-1, 1, 1))
         return _Tangent(*(np.where(m, b, a) for m, a, b in zip(masks, self, other, strict=True)))
 
     def missed(self, goal: np.ndarray) -> np.ndarray:
-        """Distance of the gradient from a goal."""
         return np.abs(self.gradient - goal).sum(axis=0)
 
 
 def _sums(gradient: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Sum of the magnitudes of products, ``(n_time,)``; 0 times infinity is 0."""
+    """Sum of the magnitudes of products; 0 times infinity is 0."""
     size = np.abs(gradient)
     return np.multiply(size, apart, where=size > 0, out=np.zeros_like(size)).sum(axis=0)
 
@@ -108,9 +103,8 @@ class _Body:
     def spread(self, most: np.ndarray) -> np.ndarray:
         """How far apart two motions are that dissipate no more than `most` each, ``(3, n_time)``.
 
-        The difference of their velocities is that of a rigid body, whose mean speed is at most b =
-        2 most / mu: so is the speed of the centre of pressure, and the spin times the mean square
-        distance from there over the largest.
+        Their difference is a rigid motion of mean speed b <= 2 most / mu: so is the speed of the
+        centre of pressure, and the spin times the mean square distance from there over the largest.
         """
         contact = self.body.contact
         cos, sin, x, y = (of_links[contact.links] for of_links in self.posture)
@@ -140,12 +134,8 @@ class _Body:
 
 
 def dry_balance(body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarray) -> DryBalance:
-    """Power and velocities of a chain at delta = 0, between bounds, for joint angles and rates
-    ``(n_joint, n_time)``; rounding is reckoned with as some units of each sum.
-
-    `ProblemError` for a law that is not associated, whose balance minimises nothing, or depends on
-    the speed.
-    """
+    """Bounds at delta = 0 for joint angles and rates ``(n_joint, n_time)``; rounding counts as some
+    units of each sum. `ProblemError` for a law that is not associated or depends on the speed."""
     law, largest = body.law(friction), np.abs(rates).max(axis=0)
     if not (law.associated and rate_independent(law)):
         raise ProblemError(

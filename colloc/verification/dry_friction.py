@@ -35,8 +35,7 @@ class DryFriction(NamedTuple):
     distance: Between
     work: Between
     open: float
-    """Part of the period at which velocities are not known to 1 % of the largest rate: several
-    motions may be balanced."""
+    """Part of the period at which velocities are not known to 1 % of the largest rate."""
     instants: int
 
     @property
@@ -65,11 +64,8 @@ def dry_friction(
     tolerance: float = 1e-6,
     turn: float = 0.0,
 ) -> DryFriction:
-    """Distance of the centre of mass and work of a path over a period at delta = 0, with the
-    arguments of `colloc.verification.replay.replay`.
-
-    `ProblemError` for bodies that are no chains, and laws that have no bounds.
-    """
+    """Distance of the centre of mass and work over a period at delta = 0, with the arguments of
+    `colloc.replay`. `ProblemError` for bodies that are no chains, and laws that have no bounds."""
     if not isinstance(body, Chain):
         raise ProblemError(
             f"bounds for delta = 0 are there for a Chain, not for a {type(body).__name__}."

@@ -1,8 +1,7 @@
-r"""Gaits with inertia by shooting: periods that leave the momenta as they are, by Adams' and Gear's
-methods and Newton's on the map of a period.
+"""Gaits with inertia by shooting: Adams' and Gear's methods, and Newton's on the map of a period.
 
 At the Froude number Fr = L/(g T^2) mass times acceleration counts against friction as Fr to mu; at
-0 this is `colloc.verification.replay.replay`. Nothing is shared with collocation but the forces.
+0 this is `colloc.replay`. Nothing is shared with collocation but the forces.
 """
 
 from __future__ import annotations
@@ -32,16 +31,15 @@ from colloc.verification.adaptive_motion import whole_totals
 from colloc.verification.played import Numbers, Path, Replay, lever, to_tolerance
 
 _ROUGH = 1e-4
-"""Error of the runs that give the derivatives of the period map, over the size of the momenta; less
-where friction is so dry that a step would err by more than a tenth of delta: then bodies that
-should rest are shaken to and fro."""
+"""Error of the runs that differentiate the period map; less where friction is so dry that a step
+would err by more than a tenth of delta: bodies that should rest are then shaken to and fro."""
 _APART = 1e-3  # distance between the starts of those runs
 _LEFT_OPEN = 10.0
-"""Gap between the momenta at start and end that is left open at most, over the error of a run:
-where steps close it no more."""
+"""Gap between the momenta that is left open, over the error of a run, where steps close it no
+more."""
 _USUAL = 0.125
-"""Difference between the ends of two runs, over the larger of the errors that were asked of their
-steps: at most, in 19 of 20."""
+"""Difference between the ends of two runs, over the error asked of their steps: at most, in 19 of
+20."""
 _MOST_STEPS = 30
 _OTHER = 1e-2  # momenta [body lengths per period] by which two motions differ that are not one
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
@@ -84,7 +82,7 @@ class InertialMotion(Period):
 
 
 class RoughPeriod(NamedTuple):
-    """A period that leaves the momenta as they are, but for the error of rough runs."""
+    """A period that leaves the momenta as they are, but for `_rough`."""
 
     momenta: np.ndarray  # at the start, (3,)
     ends: np.ndarray  # states at the start and the end, (7, 2)
@@ -96,20 +94,17 @@ class PeriodicRun(NamedTuple):
 
     course: Course
     momenta: np.ndarray
-    """At the start of one that would close the gap that is left, ``(3,)``: where a body glides far
-    they are much further away than the gap is wide."""
+    """At the start of one that would close the gap that is left: where a body glides far they are
+    much further away than the gap is wide."""
     aim: float
 
     @property
     def ends(self) -> np.ndarray:
-        """States at the start and the end, ``(7, 2)``."""
         return self.course.states[:, [0, -1]]
 
 
 class GaitWithInertia:
-    """A gait of a chain at a Froude number, asked for a turn [rad], with corners at `breaks`; in a
-    regime whose weight pulls orientations are from straight uphill. `ProblemError` if the body
-    cannot move with inertia."""
+    """A gait of a chain at a Froude number; on a slope orientations are from straight uphill."""
 
     def __init__(
         self,
@@ -131,8 +126,8 @@ class GaitWithInertia:
         self._momenta_of = lru_cache(partial(MomentaAt, self.body, friction, delta, self.froude))
 
     def momenta(self, z: np.ndarray | None = None) -> np.ndarray:
-        """Momenta at phase 0, ``(3,)``, for a velocity of the tail link ``(3, 1)``; by default that
-        of quasi-static motion on the level."""
+        """Momenta at phase 0 for a velocity of the tail link ``(3, 1)``; by default the
+        quasi-static one."""
         angles, rates = self.path(np.full(1, ONE_SIDED))
         if z is None:
             z = solve_balance(self.body, self.friction, angles, rates, self.delta).require().z
@@ -140,8 +135,8 @@ class GaitWithInertia:
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
     def run(self, start: np.ndarray, aim: float) -> Course:
-        """`InertialMotion.states` through a period from a state ``(7,)``, or from momenta ``(3,)``
-        at the origin."""
+        """`InertialMotion.states` through a period from a state ``(7,)``, or momenta ``(3,)`` at
+        the origin."""
         return self._run(np.append(start, [self.theta, 0.0, 0.0, 0.0][start.size - 3 :])[None], aim)
 
     def _run(self, begin: np.ndarray, aim: float) -> Course:
@@ -153,8 +148,7 @@ class GaitWithInertia:
         return followed(rates, begin.ravel(), aim, self.breaks)
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
-        """Outputs of `colloc.motion.compiled_momenta` for a phase and states ``(n, 7)``, with the
-        weight's pull, ``(n, 9)``."""
+        """Outputs of `colloc.motion.compiled_momenta`, with the weight's pull, ``(n, 9)``."""
         angles, rates = self.path(np.array([t]))
         now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
         if self.regime.slides:
@@ -204,8 +198,8 @@ class GaitWithInertia:
         )
 
     def find_period(self, near: np.ndarray | None = None) -> RoughPeriod:
-        """`rough_period` near some momenta; where these are not known or lead nowhere, near the
-        quasi-static ones, or none: a body that friction hardly brakes keeps what it begins with."""
+        """`rough_period` near some momenta; else near the quasi-static ones, or none: a body that
+        friction hardly brakes keeps what it begins with."""
         if near is not None:
             with suppress(NotConvergedError):
                 return self.rough_period(near)
@@ -214,8 +208,7 @@ class GaitWithInertia:
         return self.rough_period(np.zeros(3))
 
     def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
-        """A period that leaves the momenta as they are, to an error, from the momenta and
-        derivatives of a `RoughPeriod`."""
+        """A period that leaves the momenta as they are, to an error, from a `RoughPeriod`."""
         start, before = near, np.inf
         for _ in range(_MOST_STEPS):
             course = self.run(start, aim)
@@ -233,14 +226,13 @@ class GaitWithInertia:
     def errors(self, ran: PeriodicRun, before: PeriodicRun, slopes: np.ndarray) -> Numbers:
         """Errors of the `totals` of a run, seen from one whose steps might err more.
 
-        From a start s a run ends at F(s) + e, F being the exact map of a period, and e what its
-        steps err by. The true motion starts where the momenta are those at the end, s* = F(s*); so
+        From a start s a run ends at F(s) + e, F being the exact map of a period. The true motion
+        starts at s* = F(s*); so, M being the derivatives of the momenta, gap what is left open,
 
-            s* - s = (I - M)^-1 (gap - e),
+            s* - s = (I - M)^-1 (gap - e).
 
-        M being the derivatives of the momenta, and gap what is left open. A bound of e is the
-        difference of the ends of both runs, had they had one start, but the aim at least, as
-        differences vanish now and then.
+        A bound of e is the difference of the ends of both runs, had they had one start, but the aim
+        at least, as differences vanish now and then.
         """
         (first, last), (other, end) = (each.ends.T for each in (ran, before))
         steps = np.maximum(np.abs(end - last - slopes @ (other - first)[_MOMENTA]), ran.aim)
@@ -249,8 +241,8 @@ class GaitWithInertia:
     def changes(
         self, ends: np.ndarray, slopes: np.ndarray, steps: np.ndarray, gap: np.ndarray
     ) -> Numbers:
-        """Changes of `totals` between states ``(7, 2)``, where those at the end err by `steps`
-        ``(7,)``, and momenta do not close by a gap ``(3,)``."""
+        """Changes of `totals` where the end errs by `steps` ``(7,)`` and momenta do not close by a
+        gap."""
         off = np.column_stack([np.diag(steps), amplification(slopes) * (steps[_MOMENTA] + gap)])
         (start, end), totals = ends.T, self.totals(ends)
         changed = [self.totals(np.column_stack([start, end + each])) for each in off.T]
@@ -258,8 +250,7 @@ class GaitWithInertia:
 
 
 def amplification(slopes: np.ndarray) -> np.ndarray:
-    """Derivatives ``(7, 3)`` of the states at the end of a period by what every period adds to the
-    momenta."""
+    """Derivatives ``(7, 3)`` of the end of a period by what every period adds to the momenta."""
     return np.asarray(np.linalg.solve(np.eye(3) - slopes[_MOMENTA].T, slopes.T).T)
 
 
@@ -372,12 +363,10 @@ def inertial_replay(
     near: Replay | None = None,
     **_: object,
 ) -> Replay:
-    """`inertial_motion` with the arguments of `colloc.verification.replay.replay`, at the pace of
-    the regime.
+    """`inertial_motion` with the arguments of `colloc.replay`, at the pace of the regime.
 
-    A body from rest may come to another motion: then the gait has several. Near a replay that had
-    one, as at another delta, no other is looked for. The joints' work is that against friction and
-    what the body gains in kinetic energy.
+    A body from rest may come to another motion: then the gait has several. The joints' work is that
+    against friction and what the body gains in kinetic energy.
     """
     regime = regime.at(gait)
     how: Any = {"froude": regime.froude, "breaks": breaks, "turn": turn, "regime": regime}

@@ -1,9 +1,8 @@
 """Kinks of a gait's velocities: instants at which a point of a link comes to rest.
 
-The friction on a point turns around when its velocity passes through zero: the balance changes like
-x log|x| where a link slides on with its centre of rotation inside, like |x| when it comes to rest.
-Where mu_f and mu_b differ, also whenever the tangential velocity changes its sign; and where a
-balance ends in a fold, the body jumps.
+The balance changes like x log|x| where a link slides on with its centre of rotation inside, like
+|x| when it comes to rest; where mu_f and mu_b differ, also where the tangential velocity changes
+its sign; and where a balance ends in a fold, the body jumps.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ _SEPARATE = 1e-6
 def kink_phases(
     body: Body, friction: Law, path: Path, delta: float, fine: FineMotion
 ) -> np.ndarray:
-    """Phases of kinks and jumps inside the solved part of a gait, ascending, to 1e-3 of the spacing
-    of the panels there; delta is per period."""
+    """Phases of kinks and jumps inside the solved part of a gait, ascending; delta is per
+    period."""
     t, velocity = fine.nodes.ravel(), fine.rates.z.reshape(3, -1)
     speed = _slowness(body, friction, *path(t), velocity)  # vanishes at a kink
     inner = speed[:, 1:-1]

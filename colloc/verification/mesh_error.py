@@ -1,17 +1,13 @@
-"""Errors of a collocated gait, interval by interval: states, objective and constraints between the
-nodes.
+"""Errors of a collocated gait, interval by interval.
 
 On an interval the scheme takes the rate of a state to be the polynomial through its values at the
-nodes; the integral of the *defect*, that polynomial less the true rate, is what the interval adds
-to the error of the state. The truth is the motion on adaptive panels
-(`colloc.verification.adaptive_motion`).
+nodes; the integral of the *defect*, that polynomial less the true rate, is the error it adds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,17 +18,21 @@ from colloc.gaits.limits import under_one_limit
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import crossing_depth, far_pairs
-from colloc.motion.collocated import CollocatedPose
-from colloc.motion.heading import heading
-from colloc.motion.kinds import kind_of_motion
+from colloc.motion.collocated import CollocatedPose, stage_weights
+from colloc.motion.kinds import OMEGA, Passed, kind_of_motion, through_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, rates_at
-from colloc.verification.reference_motion import reference_motion, state_errors
+from colloc.verification.adaptive_motion import (
+    FineMotion,
+    Rates,
+    fine_motion,
+    rates_at,
+    totals_along,
+)
+from colloc.verification.reference_motion import collocated, period_of, reference_motion
 
 FINER = 0.05
-"""The panels are refined until what they may still miss is this fraction of the error they measure
-or of the tolerance."""
+"""What the panels may miss, over the error they measure or the tolerance."""
 _SAMPLES = 32
 
 
@@ -44,8 +44,8 @@ class MeshError:
     displacement: np.ndarray  # magnitude [body lengths]
     work: np.ndarray
     velocity: np.ndarray
-    """Largest error between the nodes of the interpolated velocity of the tail or, times a body
-    length, of its rotation rate [body lengths per period]."""
+    """Largest error between the nodes of the interpolated tail velocity [body lengths per
+    period]."""
     value: np.ndarray
     """Contribution to the relative error of the objective, signed, to first order."""
     violation: np.ndarray
@@ -54,12 +54,11 @@ class MeshError:
     unresolved: float  # what the panels may have missed of it
     turning: float
     """Rotation that collocation misses over a period, times half a length over the distance; 0
-    where a symmetry closes the rotation. It makes the distance of a closed gait ambiguous."""
+    where a symmetry closes it. It makes the distance of a closed gait ambiguous."""
 
     @property
     def estimate(self) -> float:
-        """Estimated relative error of the objective: the magnitudes of all intervals, as an
-        optimiser exploits cancellation, and what is unresolved."""
+        """Relative error of the objective: magnitudes, as an optimiser exploits cancellation."""
         return float(np.abs(self.value).sum() + self.unresolved)
 
 
@@ -76,27 +75,21 @@ def gait_motion(
     control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float
 ) -> Any:
     """The gait's motion: a `FineMotion`; where it has states, a `ReferenceMotion`."""
-    if kind_of_motion(control.dynamics).followed:
+    kind = kind_of_motion(control.dynamics)
+    if kind.followed:
         return reference_motion(control, gait, delta, mesh, tolerance)
-    shares, (body, friction, *_) = partial(_shares, control), control.dynamics
-    asked: Any = {"quantities": control.aims.integrals, "turn": control.dynamics.turn}
+
+    def shares(part: Mapping[str, float]) -> dict[str, float]:
+        """Relative change of the objective per unit of each quantity of the solved part."""
+        chords = kind.periods * chord_per_way(kind.turn)
+        counts = dict.fromkeys(part, kind.periods) | {"distance": chords, "rotation": 1.0}
+        period = {name: counts[name] * value for name, value in part.items()}
+        by_period = control.aims.objective.shares(period)
+        return {name: counts[name] * by_period[name] for name in part}
+
+    asked: Any = {"quantities": control.aims.integrals, "turn": kind.turn}
+    body, friction, *_ = control.dynamics
     return fine_motion(body, friction, gait, delta, mesh.edges, tolerance, shares, **asked)
-
-
-def _per_part(control: ControlProblem, name: str) -> float:
-    """What a quantity of the solved part counts in the whole period; of the way, the chord."""
-    chord = chord_per_way(control.dynamics.turn) if name == "distance" else 1.0
-    return 1.0 if name == "rotation" else chord / control.admissible.gait.fraction
-
-
-def _period(control: ControlProblem, part: Mapping[str, float]) -> dict[str, float]:
-    return {name: _per_part(control, name) * value for name, value in part.items()}
-
-
-def _shares(control: ControlProblem, part: Mapping[str, float]) -> dict[str, float]:
-    """Relative change of the objective per unit of each quantity of the solved part."""
-    shares = control.aims.objective.shares(_period(control, part))
-    return {name: share * _per_part(control, name) for name, share in shares.items()}
 
 
 def mesh_error(
@@ -108,19 +101,15 @@ def mesh_error(
     fine: Any = None,
 ) -> MeshError:
     """Errors of collocating a gait on a mesh, delta per period; relative ones below the tolerance
-    need not be exact. `fine` is the gait's motion, if known. `NotConvergedError` if the balance
-    cannot be solved at some instant."""
+    need not be exact. `NotConvergedError` without a balance."""
     if fine is None:
         fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
+    known, kind = Known(control, gait, delta, fine), kind_of_motion(control.dynamics)
     violation = constraint_violation(control.admissible, mesh, gait)
-    if kind_of_motion(control.dynamics).followed:
-        return MeshError(**state_errors(control, mesh, gait, delta, fine), violation=violation)
-    known = Known(control, gait, delta, fine)
-    cells = _collocated_cells(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])
-    seen = _part(control, cells.pose.place[-1], cells.pose.theta[-1], cells.totals)
-    collocated, exact = (
-        control.aims.objective(_period(control, part)) for part in (seen, _fine_part(known))
-    )
+    if kind.followed:
+        return MeshError(**_errors_with_states(known, mesh), violation=violation)
+    cells, objective = _collocated_cells(known, mesh.scheme, *_ends(mesh)), control.aims.objective
+    seen = _period(known, cells.pose.place[-1], cells.pose.theta[-1], cells.totals)[1]
     return MeshError(
         rotation=cells.rotation,
         displacement=np.abs(cells.displacement),
@@ -128,22 +117,45 @@ def mesh_error(
         velocity=_velocity_error(mesh, cells.rates, fine),
         value=cells.value,
         violation=violation,
-        total=collocated / exact - 1,
+        total=objective(seen) / objective(_exact(known)[1]) - 1,
         unresolved=float(fine.unresolved.sum()),
         turning=abs(float(_turning(known, cells).sum())),
     )
 
 
+def _ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    return mesh.edges[:-1], mesh.edges[1:]
+
+
+def _first_order(
+    control: ControlProblem,
+    passed: Passed,
+    period: Mapping[str, float],
+    rotation: np.ndarray,
+    displacement: np.ndarray,
+    work: np.ndarray,
+    integrals: Iterable[np.ndarray],
+) -> np.ndarray:
+    """Relative changes of the objective by errors of intervals; `displacement` at the end."""
+    kind, weights = kind_of_motion(control.dynamics), control.aims.objective.shares(period)
+    value = np.zeros(rotation.size)
+    for name, share in kind.shares(passed).items():
+        way = (np.conj(share.side) * displacement).real
+        value += weights.get(name, 0.0) * (way + share.rotation * rotation + share.work * work)
+    for each, error in zip(control.aims.integrals, integrals, strict=True):
+        value += weights[each.name] * kind.periods * error
+    return value
+
+
 def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """What collocating on each of the intervals adds to the relative error of the objective and to
-    `MeshError.turning`, magnitudes, ``(n,)``."""
+    """Magnitudes of what intervals add to the relative error of the objective and to the
+    turning."""
     cells = _collocated_cells(known, rule, left, right)
     return np.abs(cells.value) + np.abs(_turning(known, cells))
 
 
 class _Cells(NamedTuple):
-    """Intervals by a scheme: errors as in `MeshError`, those of work and integrals ``(1 + k, n)``,
-    rates at its nodes, its pose, and its work and integrals ``(1 + k,)``."""
+    """Intervals by a scheme, with their errors."""
 
     rotation: np.ndarray
     displacement: np.ndarray
@@ -166,17 +178,10 @@ def _collocated_cells(known: Known, rule: Scheme, left: np.ndarray, right: np.nd
     rotation = pose.rotations - (theta_right - theta)
     gained = totals - (np.array(after) - np.array(before))
     displacement = pose.displacements * np.exp(1j * theta) - (path_right - path)
-    # an error of rotation turns everything after it, and by half of it the direction that counts
-    pull = displacement + 1j * rotation * (0.5 * fine.path[-1] - path_right)
-    direction = _direction(control, fine.path[-1], fine.theta[-1])
-    shares = _shares(control, _fine_part(known))
-    value = shares["distance"] * (pull * np.conj(direction)).real + shares["rotation"] * rotation
-    value += sum(shares[name] * part for name, part in zip(_summed(control), gained, strict=True))
+    # an error of rotation turns everything after it
+    added = displacement + 1j * rotation * (fine.path[-1] - path_right)
+    value = _first_order(control, *_exact(known), rotation, added, gained[0], gained[1:])
     return _Cells(rotation, displacement, gained, value, rates, pose, totals.sum(axis=1))
-
-
-def _summed(control: ControlProblem) -> tuple[str, ...]:
-    return "work", *(quantity.name for quantity in control.aims.integrals)
 
 
 def _turning(known: Known, cells: _Cells) -> np.ndarray:
@@ -184,23 +189,72 @@ def _turning(known: Known, cells: _Cells) -> np.ndarray:
     return cells.rotation * (0.0 if closed else 0.5 / abs(known.fine.path[-1]))
 
 
-def _part(
-    control: ControlProblem, end: complex, rotation: float, totals: np.ndarray
-) -> dict[str, float]:
-    """Quantities of the solved part."""
-    distance = float((end * np.conj(_direction(control, end, rotation))).real)
-    sums = dict(zip(_summed(control), totals.tolist(), strict=True))
-    return {"distance": distance, "rotation": float(rotation)} | sums
+def _period(
+    known: Known, end: complex, rotation: float, totals: np.ndarray
+) -> tuple[Passed, dict[str, float]]:
+    """The solved part, and quantities of the period."""
+    kind = kind_of_motion(known.control.dynamics)
+    passed = Passed(complex(end), float(rotation) - kind.turn, float(totals[0]))
+    names = (each.name for each in known.control.aims.integrals)
+    return passed, period_of(kind, passed, dict(zip(names, totals[1:], strict=True)))
 
 
-def _fine_part(known: Known) -> dict[str, float]:
+def _exact(known: Known) -> tuple[Passed, dict[str, float]]:
     fine = known.fine
-    return _part(known.control, fine.path[-1], fine.theta[-1], fine.totals[:, -1])
+    return _period(known, fine.path[-1], fine.theta[-1], fine.totals[:, -1])
 
 
-def _direction(control: ControlProblem, end: complex, rotation: float) -> complex:
-    """Unit vector along which the solved part's displacement counts."""
-    return np.exp(1j * heading(control.dynamics.symmetry, end, rotation))
+def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
+    """`MeshError` but for the violation; the work is that against friction, velocities have no
+    error."""
+    (control, gait, delta, exact), kind = known, kind_of_motion(known.control.dynamics)
+    aims, seen = control.aims, collocated(control, mesh, gait, delta)
+    shapes, along, pose = seen[:3]
+    at_edges = exact.at(mesh.edges)
+    angle, *place = at_edges[-4:-1]
+    theta, x, y, work = np.diff(at_edges[-4:], axis=1)
+    passed = Passed(complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), along.begin)
+    with_forces = iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
+    integrals = {
+        each.name: next(with_forces)
+        if each.needs_forces
+        else totals_along(each, gait, *_ends(mesh), 4)
+        for each in aims.integrals
+    }
+    period = period_of(kind, passed, integrals)
+    weights = aims.objective.shares(period)
+    rotation, energy = pose.rotations - theta, seen.work - work
+    displacement = np.diff(pose.place) - (x + 1j * y)
+    turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
+    by_states: Any = 0.0
+    if exact.alone is not None:
+        # momenta, perhaps theta
+        states, near = (at[: len(kind.states)] for at in (at_edges, exact.at(mesh.times)))
+        out, ends, solved = exact.alone(mesh, shapes, along, states[:, :-1], near)
+        local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
+        rotation = local.rotations - theta
+        energy = (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1) - work
+        displacement = np.exp(1j * angle[:-1]) * local.displacements - (x + 1j * y)
+        if not kind.states[3:]:  # an error of rotation turns everything after it
+            path = place[0] + 1j * place[1]
+            displacement += 1j * rotation * (path[-1] - path[1:])
+        shares, (_, on_states) = kind.shares(passed), kind.slopes(shapes, along)
+        *_, on_ends = through_motion(kind, mesh, pose, shares.values(), on_states)
+        counts = np.array([weights.get(name, 0.0) for name in shares])
+        by_states = np.einsum("m,mkn,kn->n", counts, on_ends, ends - states[:, 1:])
+        by_states[~solved] = 1.0
+    off = [seen.integrals[name] - part for name, part in integrals.items()]
+    value = by_states + _first_order(control, passed, period, rotation, displacement, energy, off)
+    return {
+        "rotation": rotation,
+        "displacement": np.abs(displacement),
+        "work": energy,
+        "velocity": np.full(mesh.n, np.nan),
+        "value": value if along.held.all() else np.nan * value,
+        "total": float(aims.objective(seen.period) / aims.objective(period) - 1),
+        "unresolved": float(exact.error * sum(map(abs, weights.values()))),
+        "turning": turned if control.admissible.gait.symmetry == NONE else 0.0,
+    }
 
 
 def _velocity_error(mesh: Mesh, rates: Rates, fine: FineMotion) -> np.ndarray:
@@ -214,8 +268,7 @@ def _velocity_error(mesh: Mesh, rates: Rates, fine: FineMotion) -> np.ndarray:
 
 
 def constraint_violation(admissible: Admissible, mesh: Mesh, gait: AnyGait) -> np.ndarray:
-    """Largest excess over a joint limit or penetration of any two links inside each interval,
-    ``(n_interval,)``; 0 if none."""
+    """Largest excess over a joint limit or penetration of links in each interval; 0 if none."""
     t = (mesh.edges[:-1, None] + mesh.h[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)).ravel()
     angles, body = gait.angles(t), admissible.body
     stretched, limit = under_one_limit(angles, admissible.joint_limit)

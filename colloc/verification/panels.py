@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 HALF = np.array([[0.0, 0.0, 0.0], [5.0, 8.0, -1.0], [4.0, 16.0, 4.0]]) / 24
-"""Integrals from the first of three instants to each of them of the parabola through them, over
-unit distance of the outer."""
+"""Integrals from the first of three instants to each of the parabola through them, over the
+width."""
 WHOLE = np.zeros((5, 5))
 WHOLE[:3, :3] = 0.5 * HALF
 WHOLE[3:] = WHOLE[2]
@@ -23,11 +23,10 @@ _SMOOTH = 1 / (2 * 16 * 15)
 """What a rule of fourth order leaves of the change on the panel twice as wide in smooth motion."""
 _MARGIN = 1.25  # factor of safety where three grids tell the falloff (Roache, 1998)
 _KINK = 0.25
-"""What is left of the change when a panel with a kink is halved: the width, and how far the kink
-lifts the parabola."""
+"""What halving a panel with a kink leaves of its change: the width, and the lift of the
+parabola."""
 _BESIDE = 2
-"""Instants by which panels are moved at most: half of a panel, so that a kink lies in the middle of
-one of them."""
+"""Instants by which panels are moved at most: half of a panel."""
 _CORNER = 1e-6  # relative jump between neighbouring panels that is a corner or another branch
 
 
@@ -38,8 +37,8 @@ class Panels(NamedTuple):
     width: np.ndarray
     z: np.ndarray  # tail velocity, (n, 5, 3)
     rates: np.ndarray
-    """Rotation rate as seen from evenly turning axes, velocity of the centre of mass in the body
-    frame, power, densities: complex, ``(n, 5, 3 + k)``."""
+    """Rotation rate from evenly turning axes, velocity of the centre of mass in the body frame,
+    power, densities: complex, ``(n, 5, 3 + k)``."""
     joint_power: np.ndarray  # (n, 5)
     apart: np.ndarray  # `colloc.motion.followed_motion.FollowedMotion.apart`, (n, 5, 3 + k)
     wider: np.ndarray  # `changes` of the panel that each is half of, (n, 3 + k)
@@ -52,8 +51,8 @@ class Panels(NamedTuple):
         return both.take(np.argsort(both.left))
 
     def halves(self, between: tuple[np.ndarray, ...], changed: np.ndarray) -> Panels:
-        """Both halves of each, from values (z, rates, joint_power, apart) half way between the
-        instants ``(n, 4)``, and what halving changed."""
+        """Both halves of each, from values (z, rates, joint_power, apart) between the instants
+        ``(n, 4)``, and what halving changed."""
         fields = []
         for old, new in zip(self[2:-1], between, strict=True):
             merged = np.empty((len(old), 9, *old.shape[2:]), dtype=old.dtype)
@@ -73,15 +72,14 @@ def first_panels(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, 
 
 
 def poses(turn: np.ndarray, move: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heading and place (complex) before every panel and after the last ``(n + 1,)``, from
-    rotations and displacements."""
+    """Heading and place (complex) before every panel and after the last ``(n + 1,)``."""
     heading = np.concatenate([[0.0], np.cumsum(turn)])
     return heading, np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
 
 
 def increments(panels: Panels, rule: np.ndarray = WHOLE) -> tuple[np.ndarray, ...]:
     """Rotation, displacement in the axes at the panel's begin (complex), work and integrals of
-    panels, ``(n,)`` each."""
+    panels."""
     every = 4 // (len(rule) - 1)
     return _integrals(rule, panels.width, np.moveaxis(panels.rates[:, ::every], -1, 0))
 
@@ -95,8 +93,8 @@ def _integrals(rule: np.ndarray, h: np.ndarray, rates: np.ndarray) -> tuple[np.n
 
 def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Changes by halving each panel of the period's rotation, distance, work and integrals ``(n, 3
-    + k)``, and the most that it would change if the panel lay up to one, and up to two instants
-    beside; magnitudes."""
+    + k)``, and the largest if the panel lay up to one, and up to two instants beside;
+    magnitudes."""
     heading, place = poses(*increments(panels)[:2])
     rates, (index, seen) = np.moveaxis(panels.rates, -1, 0), _beside(panels)
     more = rates[:, :, :4].reshape(len(rates), -1)[:, index]
@@ -117,8 +115,8 @@ def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _beside(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
-    """Indices among all instants of the two before and the two after each panel, at its spacing
-    ``(n, 4)``; and whether there are such, with no corner between."""
+    """Indices among all instants of the two before and after each panel, at its spacing ``(n, 4)``;
+    and whether there are such, with no corner between."""
     left, width = panels.left[:, None], panels.width[:, None]
     instants = (left + 0.25 * width * np.arange(4)).ravel()
     state = np.concatenate([panels.z, panels.rates[:, :, 2:3].real], axis=2)
@@ -136,11 +134,8 @@ def _beside(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
 
 
 def remaining_error(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarray:
-    """Error of the halves of panels ``(n, 3 + k)``, from the changes up to one and two instants
-    beside them, and from those of the panels twice as wide.
-
-    The rest of a geometric series, which falls no faster than at a kink that lies anywhere; but no
-    less than smooth motion would leave of the change before, with a margin.
-    """
+    """Error of the halves of panels from the changes up to one and two instants beside them, and
+    from those of the panels twice as wide: the rest of a geometric series, which falls no faster
+    than at a kink, but no less than smooth motion would leave."""
     falloff = np.minimum(2 * far / np.maximum(np.maximum(wider, far), 1e-300), _KINK)
     return np.maximum(near * falloff / (1 - falloff), _MARGIN * _SMOOTH * wider)

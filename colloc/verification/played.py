@@ -73,7 +73,7 @@ class Replay(Period):
         )
 
     def tail_velocity(self, t: np.ndarray) -> np.ndarray:
-        """Tail velocities ``(3, n_time)`` interpolated at phases t, to start solves from."""
+        """Tail velocities ``(3, n_time)`` interpolated at phases t."""
         known, z = self.tail
         return np.stack([np.interp(t, known, row, period=1.0) for row in z])
 
@@ -102,13 +102,13 @@ def to_tolerance(
     known: tuple[Numbers, Numbers],
     errors_of: Callable[[Ran, Ran], Numbers] | None = None,
 ) -> tuple[Ran, Numbers, Numbers]:
-    """Solve a differential equation with ever smaller errors a step, from `first`, until these
-    change an objective by less than a relative error: the last run, its numbers and their errors.
+    """Solve a differential equation with ever smaller errors a step until these change an objective
+    by less than a relative error: the last run, its numbers and their errors.
 
-    `run` takes an error and gives the run and its numbers; `known` are other numbers, and their
-    errors; `errors_of` tells the errors of a run from one with ten times the error: by default
-    their difference, but half of the error asked for at least, as differences vanish now and then.
-    `NotConvergedError` if rounding hides the accuracy.
+    `run` takes an error, `first` to begin with; `known` are other numbers and their errors;
+    `errors_of` compares a run with one of ten times the error: by default their difference, but
+    half of the error at least, as differences vanish now and then. `NotConvergedError` if rounding
+    hides the accuracy.
     """
     aim, before = max(first, LEAST / _TENTH), None
     while aim > 0.5 * LEAST:

@@ -1,11 +1,8 @@
 """Mesh refinement to a requested error of the objective.
 
-A gait can be tried on any mesh without solving for it again (`verification.mesh_error`), so a mesh
-is planned as a whole. Knots of a coarse uniform mesh are *moved* onto the kinks where links begin
-to stick or slip, as any scheme is of low order on an interval with a kink inside; intervals with
-the largest errors are *split* until the sum of all magnitudes is below the request; both for
-schemes of the same family with *more nodes* too, of which the mesh with the fewest points wins,
-with a handicap. Intervals in which a shape constraint is violated between its instants are halved.
+A gait can be tried on any mesh (`verification.mesh_error`), so a mesh is planned as a whole: knots
+are *moved* onto the kinks where links begin to stick or slip, intervals with the largest errors are
+*split*, for schemes with *more nodes* too, of which the mesh with the fewest points wins.
 """
 
 from __future__ import annotations
@@ -33,28 +30,24 @@ from colloc.verification.mesh_error import (
 )
 
 VIOLATION = 5e-7
-"""Largest violation of a joint limit or of self-contact between nodes that needs no refinement
-[rad, body lengths]."""
+"""Violation of a joint limit or of self-contact that needs no refinement [rad, body lengths]."""
 TURNING = 5e-5
-"""Largest rotation that collocation may miss, times the body's reach over the distance: half of
-what a certificate allows."""
+"""Rotation that collocation may miss, times reach over distance: half of what certificates
+allow."""
 MOST_POINTS = 12_000
 AIM = 0.4
 """Planned error over the request: the gait, and its kinks with it, will still move."""
 _GOOD = 0.9
-"""A mesh is good already at this fraction of the request: the answer on it may still move the gait
-a little."""
+"""Error over the request of a mesh that is good already: the answer may still move the gait."""
 _MORE_NODES, _MOST_NODES = (0, 2, 4), 9
 _HANDICAP = 1.1  # of another order, which starts the optimiser anew
 _SNAP = 0.3
 _COARSE, _A_HARMONIC = 16, 2  # least intervals of a coarse mesh, a period and a harmonic
 GRADE = 0.2
-"""Where an interval with a kink at one end is cut, as a fraction of its length from there. Beside a
-kink velocities go like x log|x|; cutting in the middle costs schemes of high order twice the
-points."""
+"""Where an interval with a kink at one end is cut, over its length: velocities go like x log|x|,
+and cutting in the middle costs schemes of high order twice the points."""
 _ONE_KINK = 0.02 / 16
-"""Kinks nearer to each other than this part of the solved period share a knot: 2 % of the spacing
-of a first mesh."""
+"""Part of the solved period within which kinks share a knot: 2 % of a first mesh's spacing."""
 _LEFT = 0.2  # mean intervals by which a kink may have moved from the knot that it left
 _NARROWEST = 1e-7
 _WORST = 0.1  # of the largest error: with states, intervals below it are not cut
@@ -62,8 +55,6 @@ _WORST = 0.1  # of the largest error: with states, intervals below it are not cu
 
 @dataclass(frozen=True, eq=False)
 class MeshPlan:
-    """A mesh on which a gait is collocated as accurately as requested, or as the budget allows."""
-
     scheme: str
     edges: np.ndarray  # (n + 1,)
     estimate: float  # relative error of the gait's value
@@ -84,8 +75,8 @@ def kink_knots(
 
 
 def moved_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np.ndarray:
-    """Move the nearest inner knots onto the kinks; a kink farther than `snap` (in typical spacings)
-    from any knot gets a knot of its own."""
+    """Move the nearest inner knots onto the kinks; one farther than `snap` spacings gets its
+    own."""
     free, spacing = edges[1:-1].copy(), np.median(np.diff(edges))
     for kink in kinks:
         if free.size:
@@ -110,14 +101,11 @@ def planned_mesh(
     aim: float = AIM,
     most_points: int = MOST_POINTS,
 ) -> MeshPlan | None:
-    """A mesh for a gait that was found on `mesh`, delta per period, or None if that is good
-    already.
+    """A mesh for a gait that was found on `mesh`, or None if that is good already.
 
-    `tolerance` is the largest relative error of the objective, the planned one `aim` times that;
-    the phases `kept` have to be knots; `nested`: all knots of the mesh stay. Where an optimum is
-    flat, the gait moves far for what little it gains on the cells resolved least; with the knots
-    that were there it has nowhere to come back to. `NotConvergedError` if the balance cannot be
-    solved at some instant.
+    The planned error is `aim` times the tolerance; the phases `kept` have to be knots; `nested`:
+    all knots of the mesh stay, so that a flat optimum has nowhere to come back to.
+    `NotConvergedError` without a balance.
     """
     fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
     known = Known(control, gait, delta, fine)
@@ -155,14 +143,13 @@ def planned_mesh(
 
 
 def coarse_edges(control: ControlProblem, edges: np.ndarray) -> np.ndarray:
-    """The uniform mesh from which a finer one is grown."""
     gait = control.admissible.gait
     n = max(int(_COARSE * gait.fraction), _A_HARMONIC * gait.harmonics)
     return np.linspace(edges[0], edges[-1], n + 1)
 
 
 def _fewest(plans: Iterable[MeshPlan]) -> MeshPlan:
-    """The plan with the fewest points of those that reach the request; the first, if none does."""
+    """The plan with the fewest points of those that reach the request; else the first."""
     best, *others = plans
     for plan in others:
         if plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best)):
@@ -171,11 +158,8 @@ def _fewest(plans: Iterable[MeshPlan]) -> MeshPlan:
 
 
 def _knots_left(mesh: Mesh, kinks: np.ndarray) -> np.ndarray:
-    """Knots of a mesh that the kinks have just left.
-
-    There collocation errs in proportion to how far the kink went, and the optimiser takes what errs
-    in its favour: moving the knot after the kink repeats the chase; between both knots it ends.
-    """
+    """Knots that the kinks have just left: collocation errs there in the optimiser's favour, and
+    moving the knot after the kink repeats the chase."""
     if kinks.size == 0:
         return kinks
     nearest = mesh.edges[np.abs(mesh.edges[:, None] - kinks).argmin(axis=0)]
@@ -196,7 +180,7 @@ def _points(plan: MeshPlan) -> float:
 
 
 def _by_error(shares: np.ndarray, allowed: float) -> tuple[np.ndarray, int]:
-    """Intervals by falling error, and how many of them hold what the sum is above `allowed`."""
+    """Intervals by falling error, and how many of them hold the excess over `allowed`."""
     order = np.argsort(shares)[::-1]
     return order, int((np.cumsum(shares[order]) < shares.sum() - allowed).sum())
 
@@ -212,8 +196,7 @@ def _split(
     aim: float,
     budget: float,
 ) -> MeshPlan:
-    """Cut the intervals with the largest errors until all together are small enough, or the budget
-    is exhausted: in the middle, but near an end that is a kink."""
+    """Cut the intervals with the largest errors, in the middle or near an end that is a kink."""
     left, right = edges[:-1], edges[1:]
     shares = interval_shares(known, rule, left, right)
     unresolved = float(known.fine.unresolved.sum())
@@ -249,7 +232,7 @@ def _halved(
     aim: float,
     budget: float,
 ) -> MeshPlan:
-    """Halve the intervals with the largest errors of a motion with states, as `_split`."""
+    """Halve the intervals with the largest errors of a motion with states."""
     control, gait, delta, fine = known
     while True:
         error = mesh_error(control, Mesh(rule, edges), gait, delta, tolerance, fine)

@@ -1,11 +1,7 @@
-"""Independent replay of a gait: distance, work and rotation from the joint angles alone, by the
-NumPy solver.
+"""Independent replay of a gait: distance, work and rotation from the joint angles alone.
 
-It shares nothing with collocation but the friction law. Velocities are solved for at five instants
-of every panel of the period and integrated by Simpson's rule; panels are halved where the rule on
-the panel and on its halves differ (`colloc.verification.panels`).
-
-With unequal coefficients several velocities may balance an instant. The replay then follows one
+It shares nothing with collocation but the friction law: velocities by the NumPy solver at five
+instants of panels (`colloc.verification.panels`). Where several balance an instant, it follows one
 branch in time, and says how far the others would lead (`colloc.motion.followed_motion`).
 """
 
@@ -56,7 +52,7 @@ _NARROWEST = 1e-10
 
 
 class _Solver:
-    """Panels' values at instants, with the largest residual, lever and shares so far."""
+    """Values of panels at instants, with the largest residual, lever and shares so far."""
 
     def __init__(
         self,
@@ -78,12 +74,9 @@ class _Solver:
     def values(
         self, t: np.ndarray, near: np.ndarray | None, *, whole: bool = False
     ) -> tuple[np.ndarray, ...]:
-        """`Panels` z, rates, joint_power and apart at instants t ``(n, k)``; solves start from the
-        tail velocities `near`, ``(3, n k)``.
-
-        Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole`
-        period, the branch in time.
-        """
+        """`Panels` z, rates, joint_power and apart at instants t ``(n, k)``, from the tail
+        velocities `near` ``(3, n k)``; of several motions the nearest, or of a `whole` period the
+        branch in time."""
         angles, rates = self.path(t.ravel())
         at = self.body, self.friction, angles, rates, self.delta
         given: Any = {"quantities": self.quantities, "joint_map": self.joint_map}
@@ -262,7 +255,7 @@ def _grid(
     breaks: np.ndarray | tuple[float, ...],
     near: Replay | None,
 ) -> Panels:
-    """The first panels: equal ones between any two corners, where rates are one-sided."""
+    """Equal panels between any two corners, where rates are one-sided."""
     ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
     counts = [2 * max(1, round(instants * (b - a) / 8)) for a, b in pairwise(ends)]
     pieces = zip(pairwise(ends), counts, strict=True)
@@ -276,8 +269,7 @@ def _grid(
 
 
 def _with_wider_neighbours(chosen: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Add to panels to be halved those beside them that are not narrower: the halves are judged
-    with instants beside them."""
+    """Add neighbours that are not narrower: halves are judged with instants beside them."""
     narrow = np.full(width.size, np.inf)
     narrow[chosen] = width[chosen]
     beside = np.minimum(np.roll(narrow, 1), np.roll(narrow, -1))
@@ -286,10 +278,7 @@ def _with_wider_neighbours(chosen: np.ndarray, width: np.ndarray) -> np.ndarray:
 
 def _others(panels: Panels, reach: float) -> tuple[float, list[float]]:
     """Part of the period with several motions, and how far any others would lead at most: rotation,
-    distance, work, integrals.
-
-    Between two instants they count as at the worse; a rotation moves what is within `reach`.
-    """
+    distance, work, integrals; a rotation moves what is within `reach`."""
     worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
     speed, spin, *others = map(float, np.einsum("n,nki->i", 0.25 * panels.width, worse))
     several = 0.25 * panels.width @ worse.any(axis=2).sum(axis=1)

@@ -41,8 +41,7 @@ from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion, whole_t
 from colloc.verification.played import Path, Replay, lever, to_tolerance
 
 _UNITS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
-"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed
-less exactly."""
+"""Units of the errors of theta, place, works, and of the logarithm of the steering."""
 _OMEGA = 2
 _LOOSER = 30.0  # error of the run that states the error, over that of the run it is of
 _PANELS = 40
@@ -119,7 +118,7 @@ class SlopeMotion:
 
 
 class GaitOnSlope:
-    """A gait of a chain on a slope; `ProblemError` if the body cannot be there."""
+    """A gait of a chain on a slope."""
 
     def __init__(
         self,
@@ -159,8 +158,8 @@ class GaitOnSlope:
         return np.array([omega, moved.real, moved.imag, *works, steering]), solved.z
 
     def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
-        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the steps of
-        the solver."""
+        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the solver's
+        steps."""
         if not quantities:
             return np.empty((0, ends.size))
         edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
@@ -172,8 +171,7 @@ class GaitOnSlope:
         return sums[:, np.searchsorted(edges, ends)]
 
     def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
-        """What formulas see at phases and orientations ``(n,)``, and the residual of the balance
-        ``(n,)``."""
+        """Instants at phases and orientations ``(n,)``, and the residual of the balance."""
         at = (self.body, self.friction, *self.path(phases), self.delta)
         load = self.slope.pull(theta[None])
         solved = solve_balance(*at, load=load)
@@ -301,13 +299,8 @@ def slope_replay(
     limits: Iterable[PathLimit] | PathLimits = (),
     **_: object,
 ) -> Replay:
-    """A period of a gait that says where it points, with the arguments of
-    `colloc.verification.replay.replay`.
-
-    The distance is the way in the direction that counts, the work that of the joints; what other
-    balanced motions would change is not known. `NotConvergedError` if no balance is found at some
-    instant, or rounding hides the accuracy.
-    """
+    """A period of a gait that says where it points, with the arguments of `colloc.replay`: the
+    distance is the way in the direction that counts, the work that of the joints."""
     asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
     with_forces = [each for each in asked if each.needs_forces]
     totals = whole_totals([each for each in asked if not each.needs_forces], gait)

@@ -1,12 +1,10 @@
-"""A gait as joint angles over time for a machine: a period in seconds, within joint speed limits.
+"""Joint angles over time for a machine: a period in seconds, within joint speed limits.
 
-Distance and work under dry friction do not depend on pacing. With phase t and time tau in seconds,
-pacing is ``d tau/dt = p(t)``, and joint j moves at ``|dq_j/dt| / p``. Speed limits v_j ask for ``p
->= s(t) = max_j |dq_j/dt| / v_j``; the least change of an even pace that takes T seconds is
+Distance and work under dry friction do not depend on pacing. With phase t and time tau, pacing is
+``d tau/dt = p(t)``, and joint j moves at ``|dq_j/dt| / p``. Speed limits v_j ask for ``p >= s(t) =
+max_j |dq_j/dt| / v_j``; the least change of an even pace that takes T seconds is
 
-    p(t) = max(level, s(t)),   level such that  int p dt = T,
-
-and T = int s dt, with level = 0, is the fastest.
+    p(t) = max(level, s(t)),   level such that  int p dt = T.
 """
 
 from __future__ import annotations
@@ -45,13 +43,10 @@ def plan_trajectory(
     *,
     keep_pace: bool = False,
 ) -> Trajectory:
-    """Sample a path at `rate` samples a second, with a period in seconds and joint speed limits
-    [rad/s], ``(n_joint,)`` or one.
+    """Sample a path at `rate` samples a second, with speed limits [rad/s], ``(n_joint,)`` or one.
 
-    The period is rounded up to a whole number of samples; by default it is the shortest that the
-    limits allow. Where the pace has to remain that of the gait, limits make the period longer.
-    `ProblemError` if neither a period nor limits are given, a number is unusable, or the period is
-    too short for the limits.
+    The period [s] is rounded up to whole samples; by default it is the shortest within the limits.
+    To keep the gait's pace, limits make it longer. `ProblemError` for what cannot be.
     """
     if not np.isfinite(rate) or rate <= 0:
         raise ProblemError(f"the sample rate must be positive, not {rate:g}.")
@@ -101,20 +96,16 @@ def _within(
 
 
 class Approach(NamedTuple):
-    """From rest to a trajectory, at equal steps that end one step before it begins."""
-
     time: np.ndarray  # seconds, below 0, (n,)
     angles: np.ndarray
     speeds: np.ndarray
 
 
 def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approach:
-    """Joints from 0, at rest, into a trajectory, no faster than limits ``(n_joint,)`` [rad/s] that
-    this keeps.
+    """Grow a gait from the straight body at rest into a trajectory within limits ``(n_joint,)``.
 
-    Over a period the gait grows out of the straight body, ``a(t) q(t)``, where a rises from 0 to 1
-    and is flat at both ends: no joint bends farther than the gait bends it. Where a joint would be
-    too fast, the clock slows down.
+    Over a period joints are ``a(t) q(t)``, a rising from 0 to 1 and flat at both ends; where a
+    joint would be too fast, the clock slows down.
     """
     from scipy.interpolate import CubicHermiteSpline
 
@@ -136,20 +127,19 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
 
 
 def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) -> float:
-    """Least seconds of a path with joint speeds ``(n_joint,)`` [rad/s], at its own pace or at
-    any."""
+    """Least seconds of a path with joint speeds ``(n_joint,)`` [rad/s]."""
     return float(_slowest(path(_PHASES)[0], limits, keep_pace).mean())
 
 
 def _slowest(vertices: np.ndarray, limits: np.ndarray, keep_pace: bool) -> np.ndarray:
     """Seconds per phase that speed limits ask for, on every side of a path as a polygon, ``(n -
-    1,)``: it is off by less than 1e-6 rad, and limits hold exactly between the samples too."""
+    1,)``."""
     slowest = (np.abs(np.diff(vertices, axis=1)) * (_PHASES.size - 1) / limits[:, None]).max(axis=0)
     return np.full_like(slowest, slowest.max()) if keep_pace else slowest
 
 
 def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: str) -> np.ndarray:
-    """Positive limits ``(n_joint,)`` from one for all or one each; `what` one of them is called."""
+    """Positive limits ``(n_joint,)`` from one for all or one each."""
     try:
         given = np.asarray(limits, dtype=float).ravel()
     except (TypeError, ValueError):
