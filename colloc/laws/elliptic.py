@@ -1,14 +1,10 @@
-r"""The associated elliptic law: dry friction with unequal coefficients whose balance has exactly
-one solution.
+"""The associated elliptic law: dry friction with unequal coefficients and one balance.
 
-Its dissipation at velocity (vs, vn) is ``D = sqrt((mu_s vs)^2 + (mu_t vn)^2)``, with mu_s = mu_f or
-mu_b as vs > 0 or < 0: a convex function, since its level line, two half ellipses that share an
-axis, bounds a convex set. The force is minus its gradient (principle of maximal dissipation; Goyal,
-Ruina and Papadopoulos, Wear 143, 1991). Where the body slides straight along or across itself it is
-that of Coulomb friction with the same coefficients; oblique sliding differs.
-
-With the tangential velocity stretched by mu_s/mu_t, D is mu_t times a speed: so on links the closed
-forms of equal coefficients hold, at stretched velocities.
+Its dissipation ``D = sqrt((mu_s vs)^2 + (mu_t vn)^2)``, with mu_s = mu_f or mu_b as vs > 0 or < 0,
+is convex, and the force minus its gradient (principle of maximal dissipation; Goyal, Ruina and
+Papadopoulos, Wear 143, 1991). Along or across itself that is Coulomb friction; oblique sliding
+differs. With the tangential velocity stretched by mu_s/mu_t the closed forms of equal coefficients
+hold on links.
 """
 
 from __future__ import annotations
@@ -23,7 +19,7 @@ from colloc.system.arguments import named_arguments
 @named_arguments
 @dataclass(frozen=True)
 class Elliptic(Friction):
-    """Associated friction with an elliptic dissipation; a `colloc.mechanics.law.Law`.
+    """Associated friction with an elliptic dissipation; a law of friction.
 
     Parameters
     ----------
@@ -42,6 +38,7 @@ class Elliptic(Friction):
 
     @property
     def label(self) -> str:
+        """A short name with its numbers."""
         return f"elliptic {super().label}"
 
     def describe(self) -> str:

@@ -1,14 +1,11 @@
-r"""Friction that was measured, as a law: a smooth curve through coefficients at speeds, with the
-error of that stated.
-
-Along, across and backwards alike, each coefficient is a Stribeck curve of the speed,
+r"""Friction fitted to measured coefficients: a Stribeck curve of the speed in each direction,
 
     mu(v) = c_0 + c_1 exp(-v / v_S) + c_2 (1 - exp(-v / v_S)) + c_3 v,
 
-dry friction, what is lost or gained of it within the speed v_S, and drag. No c is negative: so
+dry friction, what is lost or gained of it within the speed v_S, and drag. No c is negative, so that
 friction takes energy at every speed (non-negative least squares). Of the curves of one to three
-terms the one is taken that the samples are worth, by Bayes' information criterion, with more
-samples left than numbers by two at least; v_S is one for all directions.
+terms Bayes' information criterion takes one, with at least two more samples than numbers; v_S is
+one for all directions.
 """
 
 from __future__ import annotations
@@ -29,39 +26,35 @@ from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 
 _FEWEST, _MOST = 3, 1e9
-"""Samples, at least, and the largest number that may be one."""
+"""Number of samples, at least, and the largest value of one."""
 _NAMES = {
     "speed": ("speed",),
     "along": ("along", "forward", "forwards"),
     "across": ("across", "sideways"),
     "back": ("back", "backward", "backwards"),
 }
-"""Of the columns, and what else they may be called."""
 _TERMS = "{}", "{}*exp(-speed/{})", "{}*(1 - exp(-speed/{}))", "{}*speed"
 _SETS = [(0,), (3,), (0, 1), (0, 2), (0, 3), (2, 3), (0, 1, 3), (0, 2, 3)]
-"""Which terms a curve may have."""
 _EXACT = 1e-6
-"""Root mean square, of the largest coefficient, that counts as none."""
+"""Root mean square, over the largest coefficient, that counts as none."""
 _ROUGH = 0.3
-"""Largest difference from a sample, of the largest coefficient, at which no curve stands for the
-samples."""
+"""Largest residual, over the largest coefficient, of an acceptable curve."""
 _SCAN, _BEYOND = 60, 4.0
-"""Speeds v_S that are tried, from the lowest over this to the highest times this."""
+"""Number of v_S tried, from the lowest speed over this factor to the highest times it."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedFriction:
-    """A law of friction near measured coefficients.
+    """A law of friction fitted to measured coefficients.
 
     Attributes
     ----------
     law : Friction or OwnLaw
         The first where no coefficient depends on the speed.
     rms, largest : float
-        Distance of the law's coefficients from those given: root mean square, and largest of any
-        sample.
+        Root mean square and largest residual of the coefficients.
     samples : int
-        How many there are of each direction.
+        Number of samples of each direction.
 
     Examples
     --------
@@ -86,15 +79,14 @@ def fitted_friction(
     length: float | None = None,
     period: float | None = None,
 ) -> FittedFriction:
-    """The law of friction that measured coefficients are samples of.
+    """Fit a law of friction to measured coefficients.
 
     Parameters
     ----------
     table : path of a CSV file, or array
-        A line, or row, for each speed: the speed, then the coefficient of friction (force over
-        weight) of a piece of the body that slides along itself, and across itself; a fourth column
-        if it slides backwards with another one. A file may name its columns ``speed, along, across,
-        back``.
+        A row for each speed: the speed, then the coefficient of friction (force over weight) of a
+        piece of the body that slides along itself, and across itself; a fourth column if it slides
+        backwards with another one. A file may name its columns ``speed, along, across, back``.
     length, period : float, optional
         Of the robot [m] and its gait [s], where speeds are in m/s. Without them they are in body
         lengths per period.
@@ -108,7 +100,7 @@ def fitted_friction(
     ------
     ProblemError
         If the table cannot be read, a coefficient is not positive, speeds are negative or too few,
-        or no curve is near.
+        or no curve fits.
 
     Examples
     --------
@@ -123,11 +115,18 @@ def fitted_friction(
     True
     """
     name, values = _read(table)
-    scale = _speed_unit(length, period)
     speed, coefficients = values[:, 0], values[:, 1:].T
     _check(name, speed, coefficients)
+    if (length is None) != (period is None):
+        raise ProblemError(
+            "speeds in m/s take both: the length of the robot [m] and the period of its gait [s]."
+        )
+    scale = 1.0
+    if length is not None and period is not None:
+        check_finite(positive=True, length=length, period=period)
+        scale = length / period
     v_s = _stribeck_speed(speed, coefficients)
-    fits = [_fitted(speed, mu, v_s)[1] for mu in coefficients]
+    fits = [_fit(speed, mu, v_s)[1] for mu in coefficients]
     off = np.array([_basis(speed, v_s) @ fit for fit in fits]) - coefficients
     largest = float(np.abs(off).max())
     if largest > _ROUGH * coefficients.max():
@@ -138,25 +137,30 @@ def fitted_friction(
             f"{coefficients[which, k]:g} by {largest:.2g}. Look at that sample, or state a law of "
             f"your own (OwnLaw)."
         )
-    return FittedFriction(
-        _law(fits, v_s, scale), float(np.sqrt((off**2).mean())), largest, speed.size
-    )
+    rms = float(np.sqrt((off**2).mean()))
+    return FittedFriction(_law(fits, v_s, scale), rms, largest, speed.size)
 
 
 def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
-    """Coulomb's, where no coefficient knows the speed; else one of formulas."""
-    forwards, sideways, backwards = fits[0], fits[1], fits[-1] if len(fits) > 2 else fits[0]
+    fits = [*fits, fits[0]][:3]  # along, across, and back
     if not any(fit[1:].any() for fit in fits):
-        return Friction(mu_t=sideways[0], mu_f=forwards[0], mu_b=backwards[0])
-    along, across, back = (_formula(fit, v_s) for fit in (forwards, sideways, backwards))
+        along, across, back = (fit[0] for fit in fits)
+        return Friction(mu_t=across, mu_f=along, mu_b=back)
+    along, across, back = (
+        " + ".join(
+            term.format(f"{c:.6g}", f"{v_s:.6g}")
+            for term, c in zip(_TERMS, fit, strict=True)
+            if c > 0
+        )
+        for fit in fits
+    )
     if back != along:
         along = f"where(vs > 0, {along}, {back})"
     return OwnLaw(f"-({along})*vs/speed", f"-({across})*vn/speed", speed_unit=scale)
 
 
 def _read(table: Any) -> tuple[str, np.ndarray]:
-    """Where the samples are from, and speed, along, across and, where it differs, back ``(n, 3 or
-    4)``."""
+    """The source, and speed, along, across and, where it differs, back ``(n, 3 or 4)``."""
     if not isinstance(table, (str, os.PathLike)):
         cells = np.array(table, dtype=object)
         if cells.ndim != 2 or len(cells) < _FEWEST or cells.shape[1] not in (3, 4):
@@ -183,7 +187,7 @@ def _read(table: Any) -> tuple[str, np.ndarray]:
         return str(table), values
     order = []
     for wanted, others in _NAMES.items():
-        found = [k for k, own in enumerate(names) if own in others]
+        found = [k for k, name in enumerate(names) if name in others]
         if not found and wanted != "back":
             raise ProblemError(
                 f"{table} has no column {wanted!r}: its columns are {', '.join(names)}."
@@ -193,7 +197,6 @@ def _read(table: Any) -> tuple[str, np.ndarray]:
 
 
 def _number(cell: Any) -> float:
-    """What a cell of a table says; NaN where that is no number."""
     try:
         return float(cell)
     except (TypeError, ValueError):
@@ -223,53 +226,34 @@ def _check(name: str, speed: np.ndarray, coefficients: np.ndarray) -> None:
         )
 
 
-def _speed_unit(length: float | None, period: float | None) -> float:
-    """Speed of a body length per period, in the table's unit."""
-    if length is None and period is None:
-        return 1.0
-    if length is None or period is None:
-        raise ProblemError(
-            "speeds in m/s take both: the length of the robot [m] and the period of its gait [s]."
-        )
-    check_finite(positive=True, length=length, period=period)
-    return length / period
-
-
 def _basis(speed: np.ndarray, v_s: float) -> np.ndarray:
-    """The terms ``(n, 4)`` at speeds."""
+    """The terms at speeds, ``(n, 4)``."""
     falls = np.exp(-speed / v_s)
     return np.stack([np.ones_like(speed), falls, 1 - falls, speed], axis=1)
 
 
-def _fitted(speed: np.ndarray, mu: np.ndarray, v_s: float) -> tuple[float, np.ndarray]:
-    """The best criterion of fits, and the coefficients of the terms ``(4,)`` that the samples are
-    worth."""
-    tried = [terms for terms in _SETS if _numbers(terms) < mu.size - 1]
-    return min((_of_terms(speed, mu, v_s, terms) for terms in tried), key=lambda found: found[0])
-
-
-def _numbers(terms: tuple[int, ...]) -> int:
-    """That a curve of some terms has: their coefficients, and v_S."""
-    return len(terms) + (1 in terms or 2 in terms)
-
-
-def _of_terms(
-    speed: np.ndarray, mu: np.ndarray, v_s: float, terms: tuple[int, ...]
-) -> tuple[float, np.ndarray]:
-    """Bayes' information criterion of a fit with some terms, and its coefficients ``(4,)``."""
-    basis, found = _basis(speed, v_s)[:, terms], np.zeros(4)
-    size = np.maximum(np.abs(basis).max(axis=0), 1e-300)
-    found[list(terms)], rest = nnls(basis / size, mu)
-    found[list(terms)] /= size
-    square = max(rest**2 / mu.size, (_EXACT * mu.max()) ** 2)
-    return mu.size * np.log(square) + _numbers(terms) * np.log(mu.size), found
+def _fit(speed: np.ndarray, mu: np.ndarray, v_s: float) -> tuple[float, np.ndarray]:
+    """The best criterion, and the coefficients of the terms ``(4,)``."""
+    best, coefficients, basis = np.inf, np.zeros(4), _basis(speed, v_s)
+    for terms in map(list, _SETS):
+        numbers = len(terms) + (1 in terms or 2 in terms)  # with v_S
+        if numbers >= mu.size - 1:
+            continue
+        size = np.maximum(np.abs(basis[:, terms]).max(axis=0), 1e-300)
+        fit, rest = nnls(basis[:, terms] / size, mu)
+        square = max(rest**2 / mu.size, (_EXACT * mu.max()) ** 2)
+        criterion = mu.size * np.log(square) + numbers * np.log(mu.size)
+        if criterion < best:
+            best, coefficients = criterion, np.zeros(4)
+            coefficients[terms] = fit / size
+    return best, coefficients
 
 
 def _stribeck_speed(speed: np.ndarray, coefficients: np.ndarray) -> float:
-    """The speed v_S with which the fits of all directions are best."""
+    """The v_S of the best fits in all directions."""
 
     def score(log_speed: float) -> float:
-        return sum(_fitted(speed, mu, np.exp(log_speed))[0] for mu in coefficients)
+        return sum(_fit(speed, mu, np.exp(log_speed))[0] for mu in coefficients)
 
     tried = np.log(np.geomspace(speed[speed > 0].min() / _BEYOND, speed.max() * _BEYOND, _SCAN))
     best = tried[np.argmin([score(s) for s in tried])]
@@ -278,10 +262,3 @@ def _stribeck_speed(speed: np.ndarray, coefficients: np.ndarray) -> float:
         score, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-10}
     )
     return float(np.exp(found.x if found.fun < score(best) else best))
-
-
-def _formula(fit: np.ndarray, v_s: float) -> str:
-    """The curve of coefficients of the terms, as text."""
-    return " + ".join(
-        term.format(f"{c:.6g}", f"{v_s:.6g}") for term, c in zip(_TERMS, fit, strict=True) if c > 0
-    )

@@ -1,24 +1,42 @@
-"""A law of friction of one's own, stated as two formulas; checked for what the solvers rely on."""
+"""A law of friction of one's own, by two formulas; checked for what the solvers rely on."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from colloc.laws.formula_law import DELTAS, FormulaLaw, same, samples
+from colloc.mechanics.friction import regularised_speed
+from colloc.mechanics.law import Matrix
+from colloc.numerics.arrays import Array
+from colloc.numerics.expression import Dual, Formula, formula
 from colloc.system.arguments import check_positive, named_arguments
 from colloc.system.errors import ProblemError
 
-_BESIDE, _JUMP = 1e-9, 1e-6
-"""Distance in delta, and change of the force over the largest, by which a jump is told from a slope
-of 1/delta."""
+VARIABLES = ("vs", "vn", "speed", "delta")
+_DIRECTIONS, _SPEEDS, _DELTAS = 48, np.geomspace(1e-4, 1e2, 13), (1e-6, 1e-2)
+_STEP, _JUMP = 1e-9, 1e-6
+"""Distance in delta, and change of the force over the largest, that tell a jump from a slope of
+1/delta."""
+_RTOL, _LEAST = 1e-10, 1e-12
+
+
+def _samples() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Velocities in all directions, over many speeds and two deltas, ``(1, n)`` each."""
+    angle = 2 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+    speed, angle, delta = (a.reshape(1, -1) for a in np.meshgrid(_SPEEDS, angle, _DELTAS))
+    return speed * np.cos(angle), speed * np.sin(angle), delta
+
+
+def _same(a: Array, b: Array) -> bool:
+    return bool(np.allclose(a, b, rtol=_RTOL, atol=0.0))
 
 
 @named_arguments
 @dataclass(frozen=True)
-class OwnLaw(FormulaLaw):
-    """Friction per length as formulas of the velocity of sliding; a `colloc.mechanics.law.Law`.
+class OwnLaw:
+    """Friction per length by formulas of the sliding velocity; a law of friction.
 
     Parameters
     ----------
@@ -29,8 +47,7 @@ class OwnLaw(FormulaLaw):
         ``where(condition, a, b)``. Where a dry law divides by the speed, let it be ``speed``: it is
         never zero.
     unit, speed_unit : float
-        Forces are divided by the first; velocities and delta multiplied by the second before the
-        formulas see them.
+        Divisor of forces; factor of velocities and delta before the formulas see them.
 
     Raises
     ------
@@ -54,11 +71,16 @@ class OwnLaw(FormulaLaw):
     unit: float = 1.0
     speed_unit: float = 1.0
 
+    kernel_numbers = ()
+    associated = False  # samples cannot tell: several motions are reckoned with
+
     def __post_init__(self) -> None:
         check_positive(self, "unit", "speed_unit", of="friction.")
-        vs, vn, delta = samples()
+        vs, vn, delta = _samples()
         with np.errstate(all="ignore"):  # what is not finite is refused
             fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))
+            zero = np.zeros((1, 1))
+            rest = np.abs(self.density(zero, zero, zero + _DELTAS[0])).max()
         if not (np.isfinite(fs).all() and np.isfinite(fn).all()):
             raise ProblemError(
                 "friction: a formula has no finite value somewhere; divide by speed, which is "
@@ -73,9 +95,6 @@ class OwnLaw(FormulaLaw):
                 "not oppose the motion, so friction would give energy to the body; look at the "
                 "signs."
             )
-        zero = np.zeros((1, 1))
-        with np.errstate(all="ignore"):
-            rest = np.abs(self.density(zero, zero, zero + DELTAS[0])).max()
         if np.isnan(rest):
             raise ProblemError(
                 "friction: a formula has no value at rest (vs = vn = 0); divide by speed, which is "
@@ -84,53 +103,114 @@ class OwnLaw(FormulaLaw):
         if rest > 0:
             raise ProblemError("friction: a formula does not vanish at rest (vs = vn = 0).")
         left = self.density(vs, -vn, delta)
-        if not (same(left[0], fs) and same(left[1], -fn)):
+        if not (_same(left[0], fs) and _same(left[1], -fn)):
             raise ProblemError(
                 "friction: the law differs between left and right (vn and -vn), which the "
                 "symmetries exclude."
             )
-
-        self._check_continuity()
-
-    def _check_continuity(self) -> None:
-        """A force that jumps has no balance where it does."""
-        vs, vn, delta = samples()
-        for what, across in (("vs", (1.0, 0.0)), ("vn", (0.0, 1.0))):
-            at, step = (vs * across[1], vn * across[0]), _BESIDE * delta
+        # a force that jumps has no balance where it does
+        for name, s, n in (("vs", 1.0, 0.0), ("vn", 0.0, 1.0)):
+            step = _STEP * delta
             sides = [
-                self.density(
-                    at[0] + sign * across[0] * step, at[1] + sign * across[1] * step, delta
-                )
+                self.density(vs * n + sign * s * step, vn * s + sign * n * step, delta)
                 for sign in (1, -1)
             ]
-            jump = (
-                np.hypot(*(a - b for a, b in zip(*sides, strict=True))) / np.hypot(*sides[0]).max()
-            )
-            if jump.max() > _JUMP:
+            jump = np.hypot(*(a - b for a, b in zip(*sides, strict=True)))
+            if (jump / np.hypot(*sides[0]).max()).max() > _JUMP:
                 raise ProblemError(
-                    f"friction: the force jumps where {what} changes its sign; let it vanish or "
+                    f"friction: the force jumps where {name} changes its sign; let it vanish or "
                     f"agree there."
                 )
 
     @property
     def formulas(self) -> tuple[str, ...]:
+        """Force along and across."""
         return self.tangential, self.normal
 
     @property
+    def _read(self) -> tuple[Formula, ...]:
+        return tuple(formula(text, VARIABLES) for text in self.formulas)
+
+    @property
     def label(self) -> str:
+        """A short name."""
         return "own law of friction"
 
     def describe(self) -> str:
         scale = "" if self.unit == 1 else f", over {self.unit:g}"
-        scale += (
-            ""
-            if self.speed_unit == 1
-            else f"; a body length per period is a speed of {self.speed_unit:g} (speed_unit)"
-        )
+        if self.speed_unit != 1:
+            scale += f"; a body length per period is a speed of {self.speed_unit:g} (speed_unit)"
         return f"{self.tangential} along, {self.normal} across the body{scale}"
+
+    @cached_property
+    def degree(self) -> float | None:
+        """Degree of homogeneity in velocity and delta; None if there is none."""
+        vs, vn, delta = _samples()
+        before, after = (np.hypot(*self.density(t * vs, t * vn, t * delta)) for t in (1.0, 2.0))
+        degrees = np.log2(after / before)
+        mean = float(np.round(degrees.mean(), 9)) + 0.0
+        return mean if np.abs(degrees - mean).max() < _RTOL else None
+
+    @cached_property
+    def reversible(self) -> bool:
+        """Whether reversing the velocity reverses the force."""
+        vs, vn, delta = _samples()
+        forward, backward = self.density(vs, vn, delta), self.density(-vs, -vn, delta)
+        return all(_same(-b, f) for f, b in zip(forward, backward, strict=True))
+
+    @cached_property
+    def regularised(self) -> bool:
+        """Whether it depends on delta."""
+        return any(name in each.names for each in self._read for name in ("speed", "delta"))
+
+    @cached_property
+    def _at_unit_speed(self) -> tuple[float, float]:
+        angle = np.linspace(0, 2 * np.pi, 721)[None]
+        fs, fn = self.density(np.cos(angle), np.sin(angle), np.array([[1e-9]]))
+        dissipation = -(fs * np.cos(angle) + fn * np.sin(angle))
+        return float(dissipation.min()), float(np.hypot(fs, fn).max())
+
+    @property
+    def smallest(self) -> float:
+        """Smallest dissipation at unit speed."""
+        return self._at_unit_speed[0]
+
+    @property
+    def largest(self) -> float:
+        """Largest force at unit speed."""
+        return self._at_unit_speed[1]
 
     def in_units_of(self, unit: float) -> OwnLaw:
         return replace(self, unit=self.unit * unit)
 
     def in_speeds_of(self, unit: float) -> OwnLaw:
         return replace(self, speed_unit=self.speed_unit * unit)
+
+    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
+        vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta + 0.0 * vs))
+        at = {"vs": vs, "vn": vn, "speed": regularised_speed(vs, vn, delta), "delta": delta}
+        fs, fn = (each(at) / self.unit for each in self._read)
+        return fs, fn
+
+    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta))
+        zero, r = 0.0 * (vs + vn), regularised_speed(vs, vn, delta)
+        at = {
+            "vs": Dual(vs, (1.0 + zero, zero)),
+            "vn": Dual(vn, (zero, 1.0 + zero)),
+            "speed": Dual(r, (vs / r, vn / r)),
+            "delta": Dual(delta + zero, (zero, zero)),
+        }
+        scale = self.speed_unit / self.unit
+        rows = [each.differentiated(at).slopes for each in self._read]
+        return tuple(tuple(zero - scale * slope for slope in row) for row in rows)
+
+    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        # the trace in every direction: no less than the secant of a law that grows with the speed
+        (ss, _), (_, nn) = self.density_jacobian(vs, vn, delta)
+        zero = 0.0 * ss
+        trace = regularised_speed(ss + nn, zero, _LEAST + zero)  # positive for any law
+        return (trace, zero), (zero, trace)
+
+    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
+        raise NotImplementedError("formulas need not be the gradient of a function.")

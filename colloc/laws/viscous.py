@@ -1,9 +1,7 @@
-"""Viscous drag: resistive-force theory of a slender body in a fluid so viscous that inertia does
-not count.
+"""Viscous drag: resistive-force theory of a slender body, ``f = -(tangential vs, normal vn)``.
 
-Force per length is linear in the velocity, ``f = -(tangential vs, normal vn)``. The balance is
-linear, and distance and rotation belong to the path of a gait whatever its pace; work does not: it
-is smallest at constant power. Purcell's swimmer is a chain of three links under this law.
+The balance is linear; distance and rotation belong to the path of a gait at any pace, work is
+smallest at constant power. Purcell's swimmer is a chain of three links under this law.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ from colloc.system.arguments import check_positive, named_arguments
 @named_arguments
 @dataclass(frozen=True)
 class Viscous:
-    """Drag per length and speed of a slender body; a `colloc.mechanics.law.Law`.
+    """Drag per length and speed of a slender body; a law of friction.
 
     Parameters
     ----------
@@ -50,14 +48,17 @@ class Viscous:
 
     @property
     def smallest(self) -> float:
+        """Smallest dissipation at unit speed."""
         return min(self.normal, self.tangential)
 
     @property
     def largest(self) -> float:
+        """Largest force at unit speed."""
         return max(self.normal, self.tangential)
 
     @property
     def label(self) -> str:
+        """A short name with its numbers."""
         return f"drag ({self.normal:g}, {self.tangential:g})"
 
     def describe(self) -> str:
@@ -84,7 +85,7 @@ class Viscous:
 
 @line_integrals.register(Viscous)
 class ClosedForm(LineIntegrals):
-    """Of drag on links."""
+    """Drag on links."""
 
     def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
         zero, along, across = 0.0 * vs, self.law.tangential * length, self.law.normal * length

@@ -15,7 +15,6 @@ from colloc.commands.summary import summary_lines
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.laws.viscous import Viscous
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.report_page import report_page
 from colloc.results.store import save
@@ -115,7 +114,7 @@ def test_torques_on_the_way_into_a_gait_come_to_be_those_of_the_gait(unsolved, t
 
 def test_a_way_on_which_the_body_crosses_itself_is_refused(three_link, tmp_path, monkeypatch):
     monkeypatch.setattr(
-        Chain, "crossing_depth", lambda body, angles: np.full(angles.shape[1], 0.01)
+        "colloc.pictures.export.crossing_depth", lambda body, angles: np.full(angles.shape[1], 0.01)
     )
     with pytest.raises(ProblemError, match="crosses itself on the way from straight"):
         three_link.export(tmp_path / "x.csv", period=4)

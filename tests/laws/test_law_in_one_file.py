@@ -1,7 +1,7 @@
 """A law of friction that the library does not know, in this file alone: solved, certified, kept and
 read like any other."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import pytest
 
@@ -18,16 +18,13 @@ from colloc import (
     solve,
 )
 from colloc.gaits import gait_fields
-from colloc.laws.formula_law import FormulaLaw
 
 
 @dataclass(frozen=True)
-class Greased(FormulaLaw):
+class Greased(OwnLaw):
     """Dry friction, twice as large sideways, and drag that grows with the speed."""
 
     drag: float = 0.02
-    unit: float = 1.0
-    speed_unit: float = 1.0
 
     @property
     def formulas(self):
@@ -40,26 +37,18 @@ class Greased(FormulaLaw):
     def describe(self):
         return f"dry friction (1, 2) and a drag of {self.drag:g} times the speed"
 
-    def in_units_of(self, unit):
-        return replace(self, unit=self.unit * unit)
-
-    def in_speeds_of(self, unit):
-        return replace(self, speed_unit=self.speed_unit * unit)
-
 
 @dataclass(frozen=True)
-class Short(FormulaLaw):
+class Short:
     """One that does not say everything."""
 
-    formulas = "-vs/speed", "-vn/speed"
     label = "short"
+    degree = 0.0
 
 
 def test_what_a_law_does_not_say_is_named(monkeypatch):
     monkeypatch.setattr(gait_fields, "LAWS", [*gait_fields.LAWS, Short])
-    with pytest.raises(
-        ProblemError, match="a Short does not say its describe, in_units_of, in_speeds_of"
-    ):
+    with pytest.raises(ProblemError, match="a Short does not say its reversible, associated"):
         Problem("short", friction=Short())
 
 
