@@ -6,7 +6,6 @@ import pytest
 
 import colloc
 from colloc import Basis, BSpline, Chain, Friction, Harmonic, ModalBody, Problem, ProblemError
-from colloc.gaits.control_problem import control_problem
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.gait_fields import class_from, fields, gait_from
 from colloc.gaits.guesses import initial_member
@@ -14,7 +13,6 @@ from colloc.gaits.linear import enclosed_area
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.reduced.program import ReducedProgram
 from colloc.search.spaces import space_near
-from colloc.verification.refinement import coarse_edges
 
 T = np.arange(200) / 200
 PHASES = np.arange(96) / 96
@@ -125,20 +123,6 @@ def test_a_symmetry_halves_the_parameters_and_starts_of_many_knots_have_three_ha
     assert Basis([np.stack([COS, np.ones(96)])]).size(2) == 1
     smooth = [Harmonic(n).dimension(2) for n in (2, 3, 3)]
     assert [BSpline(knots).dimension(2) for knots in (5, 12, 64)] == smooth
-
-
-@pytest.mark.parametrize(
-    "gait_class", [Harmonic(1), Harmonic(12), Harmonic(12, "bilateral"), SPLINES]
-)
-def test_a_mesh_grows_from_sixteen_intervals_a_period_or_two_a_wave_and_not_from_twice_as_many(
-    gait_class,
-):
-    last = gait_class.fraction
-    control = control_problem(Problem("p", gait=gait_class))
-    edges = coarse_edges(control, np.linspace(0.0, last, 200))
-    assert (edges[0], edges[-1]) == (0.0, last)
-    coarse = min(1 / 16, 0.5 / gait_class.harmonics)
-    assert np.all(np.abs(np.diff(edges) / coarse - 0.75) < 0.25 + 1e-12)
 
 
 def test_statements_read_back_as_what_they_were():

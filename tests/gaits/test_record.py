@@ -135,22 +135,17 @@ def test_what_is_no_record_or_several_is_refused_with_a_cure(kind, tmp_path):
 
 
 def test_radians_are_no_degrees_whatever_is_asked_for(tmp_path):
+    content = "t,joint_1_rad,joint_2_rad,joint_3_rad\n" + table(SECONDS, A, B, C)
     with pytest.raises(colloc.ProblemError, match="joint_1_rad holds radians"):
-        read(
-            tmp_path,
-            "t,joint_1_rad,joint_2_rad,joint_3_rad\n" + table(SECONDS, A, B, C),
-            degrees=True,
-        )
+        read(tmp_path, content, degrees=True)
 
 
 @pytest.mark.parametrize(
     ("periods", "noise"), [(3.0, 0.0), (3.32, 0.02), (1.2, 0.01), (17.3, 0.02)]
 )
 def test_the_period_of_a_record_that_holds_several_is_found(periods, noise, tmp_path):
-    rng = np.random.default_rng(0)
-    t = np.arange(0, periods, 1 / 60) + (
-        rng.uniform(-0.004, 0.004, int(np.ceil(periods * 60))) if periods > 4 else 0.0
-    )
+    rng, t = np.random.default_rng(0), np.arange(0, periods, 1 / 60)
+    t += rng.uniform(-0.004, 0.004, t.size) if periods > 4 else 0.0
     angles = GAIT.angles(t) + noise * rng.normal(size=(3, t.size))
     found = read(tmp_path, "t,q1,q2,q3\n" + table(4 * t, *angles))
     assert found.period == pytest.approx(4, rel=1e-7 if noise == 0 else 5e-3)
