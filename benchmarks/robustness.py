@@ -36,7 +36,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc import Chain, Friction, Harmonic, Problem
-from colloc.gaits.harmonic import Fourier, harmonics_within, shifted
+from colloc.gaits.harmonic import Fourier, harmonics_within, shift_phase
 from colloc.gaits.starts import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
 from colloc.results.distinct_optima import basins
@@ -158,7 +158,7 @@ def _complete(archive: Archive, most: int, run: Callable) -> None:
 def contradiction(problem: Problem, outcome: Outcome) -> float:
     """Relative difference of a certified efficiency from a replay on another grid, begun at another
     phase (paths: the same)."""
-    gait = shifted(outcome.gait, PHASE) if isinstance(outcome.gait, Fourier) else outcome.gait
+    gait = shift_phase(outcome.gait, PHASE) if isinstance(outcome.gait, Fourier) else outcome.gait
     again = replay(
         problem.body, problem.friction, gait, problem.delta,
         instants=REPLAY_INSTANTS, most_instants=REPLAY_INSTANTS,

@@ -159,7 +159,7 @@ def _trajectory_lines(solution: Solution, facts: dict[str, Any], periods: int) -
     fastest = ", ".join(f"{speed:.3g}" for speed in facts["largest_speed_rad_per_s"])
     lines = [
         f"saved {facts['file']}: {facts['samples']} samples, period {facts['period_s']:g} s",
-        f"  {solution.gait.driven.coordinate} speeds up to {fastest} rad/s; "
+        f"  {solution.gait.motor_gait.coordinate} speeds up to {fastest} rad/s; "
         f"{facts['distance_per_period_body_lengths']:.4g} body lengths a period",
     ]
     if "ramp_s" in facts:

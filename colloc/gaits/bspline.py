@@ -70,16 +70,16 @@ class Splines(LinearClass):
     def _smooth(self) -> Harmonic:
         return self.series(min(self.harmonics, _DRAWN))
 
-    def dimension(self, n_joint: int) -> int:
-        return self._smooth.dimension(n_joint)
+    def sample_dimension(self, n_joint: int) -> int:
+        return self._smooth.sample_dimension(n_joint)
 
-    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
-        return self._smooth.drawn(unit, n_joint)
+    def sample(self, unit: np.ndarray, n_joint: int) -> Any:
+        return self._smooth.sample(unit, n_joint)
 
-    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
+    def perturb(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
         """Add smooth random waves, which leave finer features as they are."""
         straight = self._smooth.member(np.zeros(self._smooth.size(gait.n_joint)), gait.n_joint)
-        by = self.parameters(self._smooth.moved(straight, step, fall, rng))
+        by = self.parameters(self._smooth.perturb(straight, step, fall, rng))
         return self.member(self.parameters(self.through(gait)) + by, gait.n_joint)
 
     # polygons

@@ -98,9 +98,9 @@ class Basis(LinearClass):
     def label(self, number: int) -> str:
         return super().label(number // len(self.columns[0]) if self._whole else number)
 
-    def allowed(self, n_joint: int) -> np.ndarray:
+    def table_basis(self, n_joint: int) -> np.ndarray:
         if not self._whole:
-            return super().allowed(n_joint)
+            return super().table_basis(n_joint)
         count = len(self.columns)
         table = np.zeros((n_joint, count, n_joint, count))
         for j in range(n_joint):

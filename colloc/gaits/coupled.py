@@ -118,7 +118,7 @@ class Coupled(LinearClass):
     def lines(self, gait: Any) -> list[str]:
         """A member as a formula of its motors, and the joints that are stuck."""
         stuck = [f"joint {j + 1}: {angle:+.4f}" for j, angle in self.stuck]
-        return [*self.driven(gait).lines(), *stuck]
+        return [*self.motor_gait(gait).lines(), *stuck]
 
     def _basis(self, n_joint: int) -> np.ndarray:
         joints = self.joint_map(n_joint)
@@ -133,8 +133,8 @@ class Coupled(LinearClass):
             return self.gait.member(self.nearest(gait), joints.n_motor)
         return self.gait.through(gait.mapped(joints.inverse))
 
-    def driven(self, gait: Any) -> Any:
-        return self._motors(gait).named("motor")
+    def motor_gait(self, gait: Any) -> Any:
+        return self._motors(gait).with_coordinate("motor")
 
     def driven_by(self, motors: Any, n_joint: int) -> Any:
         """The member, of so many joints, that is nearest to a gait of the motors."""
@@ -143,14 +143,14 @@ class Coupled(LinearClass):
     def parameters(self, gait: Any) -> np.ndarray:
         return self.gait.parameters(self._motors(gait))
 
-    def dimension(self, n_joint: int) -> int:
-        return self.gait.dimension(self.joint_map(n_joint).n_motor)
+    def sample_dimension(self, n_joint: int) -> int:
+        return self.gait.sample_dimension(self.joint_map(n_joint).n_motor)
 
-    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
-        return self.driven_by(self.gait.drawn(unit, self.joint_map(n_joint).n_motor), n_joint)
+    def sample(self, unit: np.ndarray, n_joint: int) -> Any:
+        return self.driven_by(self.gait.sample(unit, self.joint_map(n_joint).n_motor), n_joint)
 
-    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
-        return self.driven_by(self.gait.moved(self._motors(gait), step, fall, rng), gait.n_joint)
+    def perturb(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
+        return self.driven_by(self.gait.perturb(self._motors(gait), step, fall, rng), gait.n_joint)
 
 
 @lru_cache(maxsize=32)

@@ -53,7 +53,7 @@ class GaitFunction:
         raise NotImplementedError
 
     @property
-    def driven(self) -> Any:
+    def motor_gait(self) -> Any:
         """The gait of the motors."""
         return self
 
@@ -96,7 +96,7 @@ class GaitFunction:
             )
         return lines
 
-    def named(self, coordinate: str) -> Any:
+    def with_coordinate(self, coordinate: str) -> Any:
         """The gait with another name for its shape coordinates."""
         gait = copy.copy(self)
         object.__setattr__(gait, "coordinate", coordinate)
@@ -186,7 +186,7 @@ class ClassOfGaits:
         raise NotImplementedError
 
     @property
-    def seeds(self) -> Any:
+    def start_class(self) -> Any:
         """The class that starts of a search are drawn from."""
         return self.series(_SEED_HARMONICS)
 

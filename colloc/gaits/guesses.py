@@ -80,7 +80,7 @@ def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
     """Largest ratio of a gait's motor speeds to their limits [rad per period]; 0 without limits."""
     if not speeds:
         return 0.0
-    fastest = np.abs(gait.driven.rates(_PHASES)).max(axis=1)
+    fastest = np.abs(gait.motor_gait.rates(_PHASES)).max(axis=1)
     return float((fastest / np.array(speeds)).max())
 
 

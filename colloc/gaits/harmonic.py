@@ -242,7 +242,7 @@ class Harmonic(LinearClass):
         free."""
         gait = gait.resized(self.harmonics)
         if self.symmetry != BILATERAL:
-            gait = shifted(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
+            gait = shift_phase(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
         return self.nearest(gait)
 
     def nearest(self, gait: Fourier) -> np.ndarray:
@@ -271,16 +271,16 @@ class Harmonic(LinearClass):
         largest = np.full(self.size(body.n_joint), largest_coordinate(body) * 4 * limit / np.pi)
         return -largest, largest
 
-    def dimension(self, n_joint: int) -> int:
+    def sample_dimension(self, n_joint: int) -> int:
         return n_joint * (2 * self.harmonics + 1)
 
-    def drawn(self, unit: np.ndarray, n_joint: int) -> Fourier:
+    def sample(self, unit: np.ndarray, n_joint: int) -> Fourier:
         table = (2 * unit - 1).reshape(n_joint, -1)
         fall = 1.0 / np.arange(1, self.harmonics + 1)  # no harmonic dominates the rates
         cos, sin = np.split(table[:, 1:], 2, axis=1)
         return Fourier(table[:, 0], cos * fall, sin * fall)
 
-    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Fourier:
+    def perturb(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Fourier:
         series = self.through(gait).resized(self.harmonics)
         steps = step / np.arange(1, self.harmonics + 1) ** fall
         moved = Fourier(
@@ -302,7 +302,7 @@ def series_of(gait_class: ClassOfGaits, harmonics: int) -> Harmonic:
     return harmonics_within(harmonics, gait_class.symmetry)
 
 
-def shifted(gait: Fourier, phase: float) -> Fourier:
+def shift_phase(gait: Fourier, phase: float) -> Fourier:
     """The gait started `phase` later: angles(t) becomes angles(t + phase)."""
     k = 2 * np.pi * np.arange(1, gait.n_harmonic + 1) * phase
     cos, sin = np.cos(k), np.sin(k)

@@ -79,8 +79,8 @@ class Combination(GaitFunction):
         return joint_map
 
     @property
-    def driven(self) -> Any:
-        return self.basis.driven(self)
+    def motor_gait(self) -> Any:
+        return self.basis.motor_gait(self)
 
     def lines(self) -> list[str]:
         if self.joint_map is not None:
@@ -120,7 +120,7 @@ class LinearClass(ClassOfGaits):
         """Name of a function, counted from 0, in formulas."""
         return f"φ{number + 1}"
 
-    def allowed(self, n_joint: int) -> np.ndarray:
+    def table_basis(self, n_joint: int) -> np.ndarray:
         """Basis ``(n_joint * n_function, n_column)`` of the tables T allowed without a symmetry."""
         return np.eye(n_joint * self.functions(np.zeros(1)).shape[0])
 
@@ -135,8 +135,8 @@ class LinearClass(ClassOfGaits):
         return np.arange(n) / n
 
     @property
-    def seeds(self) -> Any:
-        return super().seeds if self.relative_delta else self.level
+    def start_class(self) -> Any:
+        return super().start_class if self.relative_delta else self.level
 
     def intervals(self, n_joint: int) -> int:
         # enough for the waves, and some for stick and slip
@@ -152,7 +152,7 @@ class LinearClass(ClassOfGaits):
         super().check_joints(n_joint)
         self._basis(n_joint)
 
-    def driven(self, gait: Any) -> Any:
+    def motor_gait(self, gait: Any) -> Any:
         """The gait of the motors, of a member."""
         return gait
 
@@ -213,15 +213,15 @@ class LinearClass(ClassOfGaits):
         return np.einsum("tjp,tjq->pq", rates, rates) / self.instants.size
 
     # where searches begin
-    def dimension(self, n_joint: int) -> int:
+    def sample_dimension(self, n_joint: int) -> int:
         """Dimension of the unit cube that starts are drawn from."""
         return self.size(n_joint)
 
-    def drawn(self, unit: np.ndarray, n_joint: int) -> Any:
+    def sample(self, unit: np.ndarray, n_joint: int) -> Any:
         """The gait of a point of the unit cube, up to its size."""
         return self.member((2 * unit - 1) / self._sizes(n_joint), n_joint)
 
-    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
+    def perturb(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
         """Perturb the coefficients of a gait by normals of ``step`` [rad]; those of harmonic k, if
         there are such, of ``step / k^fall``."""
         v = self.parameters(self.through(gait))
@@ -252,7 +252,7 @@ def enclosed_area(gait_class: LinearClass, n_joint: int) -> np.ndarray:
 @lru_cache(maxsize=64)
 def _symmetric_tables(kind: LinearClass, n_joint: int) -> np.ndarray:
     """A basis of the allowed tables that are their own image under the symmetry of a class."""
-    allowed, name = kind.allowed(n_joint), type(kind).__name__
+    allowed, name = kind.table_basis(n_joint), type(kind).__name__
     functions = kind.functions(kind.instants)
     angles = np.einsum("jwp,wt->jtp", allowed.reshape(n_joint, len(functions), -1), functions)
     matrix = angles.reshape(-1, allowed.shape[1])

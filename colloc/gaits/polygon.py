@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from colloc.gaits.gait import GaitFunction, finite_array
-from colloc.gaits.symmetry import NONE, SYMMETRIES, both_halves, fraction, imaged, reduced
+from colloc.gaits.symmetry import NONE, SYMMETRIES, both_halves, fraction, reduced, take_images
 from colloc.system.arguments import STATED_IF_SET, named_arguments
 from colloc.system.errors import ProblemError
 
@@ -104,12 +104,12 @@ class Corners(GaitFunction):
     def angles(self, t: np.ndarray) -> np.ndarray:
         phase, image = reduced(self.symmetry, t)
         start, rates, since = self._side(phase)
-        return imaged(self.symmetry, start + rates * since, image)
+        return take_images(self.symmetry, start + rates * since, image)
 
     def rates(self, t: np.ndarray) -> np.ndarray:
         """Joint rates ``(n_joint, n_time)`` per period; at a corner those of the side ahead."""
         phase, image = reduced(self.symmetry, t)
-        return imaged(self.symmetry, self._side(phase)[1], image, derivative=1)
+        return take_images(self.symmetry, self._side(phase)[1], image, derivative=1)
 
     def _side(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """First vertex of the side at each phase, rates on it, and phase since that vertex."""

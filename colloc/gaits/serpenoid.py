@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.harmonic import SAME_START, Fourier, Harmonic, shifted
+from colloc.gaits.harmonic import SAME_START, Fourier, Harmonic, shift_phase
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.mechanics.bodies import Body
 from colloc.numerics.arrays import Array, namespace
@@ -149,7 +149,7 @@ class Serpenoid(Harmonic):
         lag, start = self._lag_and_start(gait)
         gait = gait.resized(self.harmonics)
         if abs(start) > SAME_START:
-            gait = shifted(gait, -start / (2 * np.pi))
+            gait = shift_phase(gait, -start / (2 * np.pi))
         wave = _at_the_middle(gait, lag)
         offset = [gait.mean.mean()] if self.symmetry == NONE else []
         amplitudes = (-wave[k - 1].imag if sine else wave[k - 1].real for k, sine in self._waves)

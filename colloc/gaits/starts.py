@@ -73,14 +73,15 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
     """Start of a Latin hypercube over a problem's class of gaits that clearly moves, or the fastest
     of many. `ProblemError` if no admissible gait is as fast as ``smallest_shape_speed``."""
     block, row = divmod(start, BLOCK)
-    seeds, n_joint, least = problem.gait.seeds, problem.body.n_joint, problem.smallest_shape_speed
-    dimension = seeds.dimension(n_joint) + 1
+    seeds, n_joint = problem.gait.start_class, problem.body.n_joint
+    least = problem.smallest_shape_speed
+    dimension = seeds.sample_dimension(n_joint) + 1
     rng = np.random.default_rng([seed, block]).spawn(1)[0]  # as newer releases of SciPy do
     unit = latin_hypercube(BLOCK, dimension, rng)[row]
     again, fastest = np.random.default_rng([seed, block, row + 1]), None
     for _ in range(_ATTEMPTS + 1):
         fraction = _FRACTIONS[0] + unit[-1] * (_FRACTIONS[1] - _FRACTIONS[0])
-        gait = _with_amplitude(problem, seeds.drawn(unit[:-1], n_joint), fraction)
+        gait = _with_amplitude(problem, seeds.sample(unit[:-1], n_joint), fraction)
         if fastest is None or gait.shape_speed > fastest.shape_speed:
             fastest = gait
         if fastest.shape_speed > _CLEARLY_MOVING * least:
@@ -95,7 +96,7 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
 
 def _with_amplitude(problem: Problem, gait: AnyGait, fraction: float) -> AnyGait:
     """The class member nearest to a gait, at a fraction of the largest admissible amplitude."""
-    seeds = problem.gait.seeds
+    seeds = problem.gait.start_class
     member = seeds.member(seeds.parameters(gait), problem.body.n_joint)
     largest = largest_amplitude(problem, member)
     return member.scaled(fraction * largest) if np.isfinite(largest) else member
@@ -106,7 +107,7 @@ def perturbed_gait(problem: Problem, seed: int, start: int) -> AnyGait:
     shrinks until it is admissible."""
     rng = np.random.default_rng([seed, start])
     for _ in range(_ATTEMPTS):
-        member = problem.gait.seeds.moved(problem.guess, _SPREAD, 0, rng)
+        member = problem.gait.start_class.perturb(problem.guess, _SPREAD, 0, rng)
         gait = _with_amplitude(problem, member, min(1.0, 1.0 / largest_amplitude(problem, member)))
         if gait.shape_speed > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait
@@ -120,9 +121,7 @@ def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> AnyGait
     return (perturbed_gait if sampler == PERTURBED else latin_hypercube_gait)(problem, seed, start)
 
 
-def over_links(
-    gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(np.pi)
-) -> AnyGait:
+def to_body(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> AnyGait:
     """Transfer a gait of a chain to another body: every link gets the mean tangent angle of the
     part of the body it covers.
 
@@ -134,7 +133,7 @@ def over_links(
     return gait.mapped(matrix * min(1.0, largest_factor(other, joint_limit, angles)))
 
 
-def laid_into(
+def to_class(
     gait_class: AnyClass,
     gait: AnyGait,
     body: Body,
@@ -155,7 +154,7 @@ def laid_into(
     return near.scaled(min(1.0, largest_factor(body, joint_limit, near.angles(_PERIOD), near.rest)))
 
 
-def prolonged(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:
+def prolong(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:
     """The problem in another class of gaits, to be searched from a known optimum of any class.
 
     Delta stays what it is relative to the shape speed; other fields may be changed too
@@ -165,13 +164,13 @@ def prolonged(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: 
     --------
     >>> from colloc import Harmonic, Polygon, Problem, ellipse
     >>> best = ellipse(0, 2.86, 1.30)
-    >>> prolonged(Problem("loop", best, gait=Harmonic(1, "bilateral")), best, Polygon(5,
+    >>> prolong(Problem("loop", best, gait=Harmonic(1, "bilateral")), best, Polygon(5,
     ...     "bilateral")).gait
     Polygon(corners=5, symmetry='bilateral', axis='corner')
     """
     relative = problem.delta / (1.0 if problem.gait.relative_delta else problem.guess.length)
     delta = relative * (1.0 if gait_class.relative_delta else gait.length)
-    guess = laid_into(
+    guess = to_class(
         gait_class, gait, problem.body, problem.joint_limit, problem.smallest_shape_speed
     )
     stated = {"guess": guess, "gait": gait_class, "delta": delta, "delta_start": _NEAR * delta}

@@ -110,7 +110,7 @@ def write_export(
     if is_model:
         return _write_model(Robot(solution, length, mass, period, gravity), path)  # type: ignore[arg-type]
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
-    gait, own_pace = solution.gait.driven, bool(problem.paced_by)
+    gait, own_pace = solution.gait.motor_gait, bool(problem.paced_by)
     trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=own_pace)
     facts = _about(solution, trajectory, rate, limits) | _pace(solution, trajectory.period, gravity)
     way = _approach(solution, trajectory, rate, limits) if ramp else None

@@ -36,7 +36,7 @@ def shares(solution: Solution) -> dict[str, float]:
     name = body.defaults.limit_name.replace("limits", "angles")
     used = {name: float(body.bounded_angles.largest(stretched).max()) / limit}
     if problem.largest_speeds:
-        fastest = np.abs(solution.gait.driven.rates(_INSTANTS)).max(axis=1)
+        fastest = np.abs(solution.gait.motor_gait.rates(_INSTANTS)).max(axis=1)
         used["joint speed"] = float((fastest / problem.largest_speeds).max())
     if limits.each:
         forces = limits.needs_forces

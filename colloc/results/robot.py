@@ -254,7 +254,7 @@ class Robot:
         n = max(_INSTANTS, _A_SIDE * (len(self.solution.gait.corner_phases) + 1))
         t = np.arange(n + 1) / n
         motion = (self._with_inertia or self.solution).sample(t)
-        angles, rates = self.solution.gait.driven(t)
+        angles, rates = self.solution.gait.motor_gait(t)
         torques, speeds = self.torques(t), rates / self.period
         joint, axis = ("joint", "t"), ("axis", "t")
         return {
@@ -329,7 +329,7 @@ class Robot:
                     yield "slow_enough_period_s", math.sqrt(self.length / (self.gravity * froude))
 
     def _motor_facts(self, peak: np.ndarray) -> Iterator[tuple[str, Any]]:
-        solution, gait = self.solution, self.solution.gait.driven
+        solution, gait = self.solution, self.solution.gait.motor_gait
         if self.max_speed is not None:
             limits = np.asarray(self.max_speed)
             shortest = shortest_period(gait, limits, keep_pace=True)
@@ -350,7 +350,7 @@ class Robot:
 
     def lines(self) -> list[str]:
         """Return the data sheet as lines of text."""
-        f, coordinate = self.facts, self.solution.gait.driven.coordinate
+        f, coordinate = self.facts, self.solution.gait.motor_gait.coordinate
         names = (
             *("peak_torque_N_m", "rms_torque_N_m", "peak_speed_rad_per_s"),
             *("rms_speed_rad_per_s", "peak_joint_power_W"),

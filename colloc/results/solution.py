@@ -281,7 +281,7 @@ class Solution:
 
     @property
     def gait(self) -> AnyGait:
-        return self.answer.gait.named(self.problem.body.defaults.coordinate)
+        return self.answer.gait.with_coordinate(self.problem.body.defaults.coordinate)
 
     @property
     def delta_per_period(self) -> float:

@@ -66,7 +66,7 @@ def project_to_zero_rotation(
     Fourier series. Delta is in the units of the class, by default the problem's. SQP makes few
     steps: a start need not be perfect.
     """
-    seeds = problem.gait.seeds
+    seeds = problem.gait.start_class
     if (
         problem.gait.symmetry != NONE
         or problem.rotation is None

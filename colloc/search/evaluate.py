@@ -94,7 +94,7 @@ def evaluate(
     if schedule(problem.body):
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")
     fitted = fitted_gait(
-        getattr(gait, "driven", gait),
+        getattr(gait, "motor_gait", gait),
         problem.n_motor,
         period=period,
         harmonics=harmonics,

@@ -24,10 +24,10 @@ from colloc.gaits.harmonic import ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import (
     is_visible,
-    laid_into,
     latin_hypercube_gait,
     on_speed_floor,
-    over_links,
+    to_body,
+    to_class,
 )
 from colloc.mechanics.chain import Chain
 from colloc.reduced.program import ReducedProgram
@@ -242,12 +242,12 @@ def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
     """The guess, gaits known from three links and waves both ways, in turn with seeded Latin
     hypercubes, which have no end."""
     body, limit = problem.body, problem.joint_limit
-    ellipses = [over_links(ellipse(*ab), Chain(), body, limit) for ab in _THREE_LINK_ELLIPSES]
+    ellipses = [to_body(ellipse(*ab), Chain(), body, limit) for ab in _THREE_LINK_ELLIPSES]
     waves = [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
     first = [
         problem.guess,
         *(
-            laid_into(problem.gait.seeds, gait, body, limit, problem.smallest_shape_speed)
+            to_class(problem.gait.start_class, gait, body, limit, problem.smallest_shape_speed)
             for gait in (*ellipses, *waves)
         ),
     ]
@@ -366,7 +366,7 @@ class _Starts:
             best = min((c.iterate for c in self._candidates), key=lambda each: each.objective)
             size = OPTIONS.hop * 2.0 ** (start % 3 - 1)
             rng = np.random.default_rng([1, start])
-            return self._problem.gait.seeds.moved(best.gait, size, 1, rng), False
+            return self._problem.gait.start_class.perturb(best.gait, size, 1, rng), False
         while len(self._drawn) <= number:
             self._drawn.append(None)
             with suppress(CollocError):

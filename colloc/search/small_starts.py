@@ -18,7 +18,7 @@ from colloc.gaits.harmonic import Fourier
 from colloc.gaits.limits import widest
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import laid_into
+from colloc.gaits.starts import to_class
 from colloc.mechanics.law import rate_independent
 from colloc.search.checkpoint import checkpointed
 from colloc.system.errors import NotConvergedError
@@ -43,8 +43,8 @@ def small_loops(problem: Problem) -> list[AnyGait]:
         return []
     size = _SIZE * 2 * np.pi * problem.smallest_shape_speed
     return [
-        laid_into(
-            problem.gait.seeds,
+        to_class(
+            problem.gait.start_class,
             Corners(small.path(shape, size, back=back)),
             problem.body,
             problem.joint_limit,
@@ -92,7 +92,7 @@ def _shapes(problem: Problem) -> np.ndarray:
     """Distinct admissible mean shapes ``(n_joint, n)`` of gaits of the class."""
     body, seeds, limit, n_joint = (
         problem.body,
-        problem.gait.seeds,
+        problem.gait.start_class,
         problem.joint_limit,
         problem.body.n_joint,
     )

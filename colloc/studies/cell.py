@@ -9,7 +9,7 @@ import numpy as np
 from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
+from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait, to_class
 from colloc.results.distinct_optima import SAME_GAIT, distance, fourier_series, phase_distance
 from colloc.results.outcome import ERROR, Outcome
 from colloc.search.closure import project_to_zero_rotation
@@ -59,7 +59,7 @@ def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
     if gait.n_joint != body.n_joint or not gaits.free:
         return None
     try:
-        similar = laid_into(gaits, gait, body, problem.joint_limit, problem.smallest_shape_speed)
+        similar = to_class(gaits, gait, body, problem.joint_limit, problem.smallest_shape_speed)
         space, v = space_near(problem, project_to_zero_rotation(problem, similar))
         projection = space.member(v)
         problem.with_(guess=projection)

@@ -85,8 +85,8 @@ class Steering:
             "work_per_period_weight_times_length": [point.work for point in points],
             "status": [point.status for point in points],
             "phase": t.tolist(),
-            f"{points[0].gait.driven.coordinate}_angles_rad": [
-                point.gait.driven.angles(t + begin).T.tolist()
+            f"{points[0].gait.motor_gait.coordinate}_angles_rad": [
+                point.gait.motor_gait.angles(t + begin).T.tolist()
                 for point, begin in zip(points, self.begins, strict=True)
             ],
         }

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, harmonics_within, shifted
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, harmonics_within, shift_phase
 from colloc.gaits.starts import latin_hypercube
 from colloc.system.errors import ProblemError
 
@@ -46,7 +46,7 @@ def test_the_free_start_phase_is_removed_without_changing_the_path():
     member = Harmonic(2, "none").member(Harmonic(2, "none").parameters(gait), 2)
     phase = np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi)
     np.testing.assert_allclose(member.angles(T), gait.angles(T + phase), atol=1e-12)
-    np.testing.assert_allclose(shifted(gait, 0.3).angles(T), gait.angles(T + 0.3), atol=1e-12)
+    np.testing.assert_allclose(shift_phase(gait, 0.3).angles(T), gait.angles(T + 0.3), atol=1e-12)
 
 
 def test_the_paper_s_ellipse():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Corners, Fourier, Harmonic, Polygon, Problem, ellipse
-from colloc.gaits.starts import laid_into, over_links, prolonged
+from colloc.gaits.starts import prolong, to_body, to_class
 from colloc.mechanics.contact import crossing_depth
 from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
@@ -27,20 +27,20 @@ def test_links_cut_in_two_move_as_before(name):
     """New joints in the middles of links stay straight, old ones keep their angles; joining the
     halves undoes it."""
     gait = GAITS[name]
-    cut = over_links(gait, THREE, SIX)
+    cut = to_body(gait, THREE, SIX)
     np.testing.assert_allclose(cut.angles(PHASES)[1::2], gait.angles(PHASES), rtol=0, atol=1e-12)
     np.testing.assert_allclose(cut.angles(PHASES)[::2], 0, rtol=0, atol=1e-12)
     x, y = THREE.joints(gait.angles(PHASES))
     x6, y6 = SIX.joints(cut.angles(PHASES))
     np.testing.assert_allclose([x6[::2], y6[::2]], [x, y], rtol=0, atol=1e-12)
     np.testing.assert_allclose(
-        over_links(cut, SIX, THREE).angles(PHASES), gait.angles(PHASES), rtol=0, atol=1e-12
+        to_body(cut, SIX, THREE).angles(PHASES), gait.angles(PHASES), rtol=0, atol=1e-12
     )
 
 
 @pytest.mark.parametrize("lengths", [(0.25,) * 4, (0.2,) * 5, (0.1, 0.4, 0.4, 0.1)])
 def test_a_large_gait_is_admissible_in_any_chain(lengths):
-    laid = over_links(ellipse(0, 2.8, 1.3), THREE, Chain(lengths))
+    laid = to_body(ellipse(0, 2.8, 1.3), THREE, Chain(lengths))
     angles = laid.angles(np.linspace(0, 1, 2001))
     assert np.abs(angles).max() <= np.pi
     assert crossing_depth(Chain(lengths), angles).max() == 0
@@ -50,7 +50,7 @@ def test_a_large_gait_is_admissible_in_any_chain(lengths):
 def test_a_truncated_path_that_overshoots_its_limits_starts_a_search_all_the_same():
     square = Corners(np.array([[3.1, 3.1, -3.1, -3.1], [-0.6, 0.6, 0.6, -0.6]]))
     problem = Problem("square", square, gait=Polygon(4), intervals=16)
-    stated = prolonged(problem, square, Harmonic(3))
+    stated = prolong(problem, square, Harmonic(3))
     angles = stated.guess.angles(PHASES)
     assert 3.0 < np.abs(angles).max() <= np.pi
     assert crossing_depth(THREE, angles).max() == 0
@@ -66,7 +66,7 @@ def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class
         "bilateral": [[0.4, 0.5, 0.45], [-0.4, -0.42, -0.45]],
     }
     small = Corners(np.array(corners[symmetry]), symmetry)
-    laid = laid_into(gait_class(3, symmetry), small, THREE)
+    laid = to_class(gait_class(3, symmetry), small, THREE)
     assert laid.length == pytest.approx(0.2 * np.pi, rel=2e-3)
     np.testing.assert_allclose(
         laid.angles(PHASES[:-1]).mean(axis=1), small.angles(PHASES[:-1]).mean(axis=1), atol=1e-3
@@ -81,7 +81,7 @@ def test_a_richer_class_keeps_what_its_seed_had():
     problem = Problem(
         "five", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60
     )
-    near = prolonged(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"))
+    near = prolong(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"))
     from_afar = solve(near.with_(delta_start=100 * near.delta), 1)
     assert from_afar.status == "solved"
     assert from_afar.certificate.efficiency < 0.4003
@@ -96,6 +96,6 @@ def test_a_hexagon_is_an_octagon_with_corners_on_its_sides():
         "bilateral",
     )
     problem = Problem("six", hexagon, gait=Polygon(6, "bilateral"), intervals=60)
-    solution = solve(prolonged(problem, hexagon, Polygon(8, "bilateral"), intervals=80), 1)
+    solution = solve(prolong(problem, hexagon, Polygon(8, "bilateral"), intervals=80), 1)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4015

@@ -90,11 +90,11 @@ def test_what_a_class_says_of_its_parameters_is_true_of_its_gaits(gait_class, bo
 
 @pytest.mark.parametrize("gait_class", [Basis(FOUR, "antipodal"), Basis(ELLIPSES)])
 def test_random_combinations_of_columns_are_drawn_about_rest_each_up_to_a_radian(gait_class):
-    unit = np.random.default_rng(5).uniform(size=gait_class.dimension(2))
-    drawn, opposite = (gait_class.drawn(u, 2).angles(T) for u in (unit, 1 - unit))
+    unit = np.random.default_rng(5).uniform(size=gait_class.sample_dimension(2))
+    drawn, opposite = (gait_class.sample(u, 2).angles(T) for u in (unit, 1 - unit))
     np.testing.assert_allclose(drawn, -opposite, rtol=0, atol=1e-12)
     for one in 0.5 + 0.5 * np.eye(unit.size):
-        angles = gait_class.drawn(one, 2).angles(gait_class.instants)
+        angles = gait_class.sample(one, 2).angles(gait_class.instants)
         assert np.abs(angles).max() == pytest.approx(1.0)
 
 
@@ -102,7 +102,7 @@ def test_random_combinations_of_columns_are_drawn_about_rest_each_up_to_a_radian
 def test_a_hop_moves_angles_by_normals_of_its_step_whatever_the_units_of_a_column(unit):
     kind, rng = Basis([unit * np.stack([COS, 0.3 * SIN])]), np.random.default_rng(3)
     gait = kind.member(np.ones(1) / unit, 2)
-    hops = [kind.moved(gait, 0.2, 1, rng).angles(T)[0, 0] - 1.0 for _ in range(400)]
+    hops = [kind.perturb(gait, 0.2, 1, rng).angles(T)[0, 0] - 1.0 for _ in range(400)]
     assert (np.mean(hops), np.std(hops)) == pytest.approx((0.0, 0.2), abs=0.02)
 
 
@@ -121,8 +121,8 @@ def test_a_symmetry_halves_the_parameters_and_starts_of_many_knots_have_three_ha
     assert [Basis(FOUR, symmetry=s).size(2) for s in SYMMETRIES] == [8, 4, 4]
     # a joint may rest in a column
     assert Basis([np.stack([COS, np.ones(96)])]).size(2) == 1
-    smooth = [Harmonic(n).dimension(2) for n in (2, 3, 3)]
-    assert [BSpline(knots).dimension(2) for knots in (5, 12, 64)] == smooth
+    smooth = [Harmonic(n).sample_dimension(2) for n in (2, 3, 3)]
+    assert [BSpline(knots).sample_dimension(2) for knots in (5, 12, 64)] == smooth
 
 
 def test_statements_read_back_as_what_they_were():

@@ -16,8 +16,8 @@ from colloc import (
     ellipse,
 )
 from colloc.gaits.gait import GaitFunction
-from colloc.gaits.harmonic import shifted
-from colloc.gaits.starts import prolonged
+from colloc.gaits.harmonic import shift_phase
+from colloc.gaits.starts import prolong
 from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.system.errors import ProblemError
@@ -52,7 +52,7 @@ def test_harmonics_survive_the_way_through_points(symmetry):
 def test_a_symmetric_gait_is_recognised_whatever_phase_it_starts_at():
     turned = ellipse(0.2, 1.3, 0.8)
     for phase in (0.0, 0.13, 0.5, 0.61):
-        points = symmetric_samples(shifted(turned, phase), "bilateral")
+        points = symmetric_samples(shift_phase(turned, phase), "bilateral")
         np.testing.assert_allclose(points[:, 0], -points[::-1, 0], atol=1e-6)
         half = turned.length / 2
         assert np.linalg.norm(np.diff(points), axis=0).sum() == pytest.approx(half, rel=1e-5)
@@ -133,9 +133,9 @@ def test_replay_does_not_depend_on_the_pace_of_a_polygon():
 
 def test_delta_keeps_its_meaning_from_class_to_class():
     stated = Problem("p", ellipse(0, 1.5, 1.0), gait=Harmonic(1, "bilateral"), delta=1e-3)
-    path = prolonged(stated, stated.guess, Polygon(4, "bilateral"))
+    path = prolong(stated, stated.guess, Polygon(4, "bilateral"))
     assert path.delta * stated.guess.length == pytest.approx(1e-3)
-    back = prolonged(path, stated.guess, Harmonic(2, "bilateral"))
+    back = prolong(path, stated.guess, Harmonic(2, "bilateral"))
     assert back.delta == pytest.approx(1e-3)
 
 

@@ -58,7 +58,7 @@ def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_b
     gears = ((1, 0), (-0.5, 0), (0.3, -1), (0, 1))
     t, h = np.linspace(0.0, 1.0, 20), 1e-5
     joints = Coupled(Harmonic(1), gears=gears).driven_by(colloc.ellipse(0.1, 0.7, 0.6), 4)
-    motors = joints.driven
+    motors = joints.motor_gait
     slopes = (joints.angles(t + h) - joints.angles(t - h)) / (2 * h)
     np.testing.assert_allclose(joints.rates(t), slopes, atol=1e-7)
     np.testing.assert_allclose(joints.angles(t)[1], -0.5 * motors.angles(t)[0], atol=1e-12)
@@ -110,7 +110,7 @@ def test_torque_and_power_are_those_of_the_motors(broken):
     t = np.linspace(0, 1, 401)
     torque = np.abs(joint_torques(limited, t)).max(axis=1)
     assert (torque <= np.array([0.12, 0.1]) * (1 + 1e-4)).all()
-    assert np.abs(limited.gait.driven.rates(t)).max() <= 9.0 * (1 + 1e-6)
+    assert np.abs(limited.gait.motor_gait.rates(t)).max() <= 9.0 * (1 + 1e-6)
 
 
 def test_its_sensitivity_is_to_the_chain_that_it_moves(broken):

@@ -30,7 +30,7 @@ ALONE = Ahead(Problem("alone"))
 
 @pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
 def test_loops_are_admissible_members_of_the_class_hardly_longer_than_they_must_be(problem):
-    loops, own = small_loops(problem), problem.gait.seeds
+    loops, own = small_loops(problem), problem.gait.start_class
     assert 2 <= len(loops) <= 4
     for loop in loops:
         n_joint = problem.body.n_joint

@@ -26,7 +26,7 @@ from colloc import (
 )
 from colloc.commands.families import multistart, starts_summary
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.harmonic import shifted
+from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.contact import crossing_depth
@@ -110,9 +110,9 @@ def test_distance_does_not_see_start_phase_or_symmetry_but_sees_everything_else(
         return distinct_optima.distance(one, other, Chain(), friction)
 
     for phase in (0.1, 0.37, 0.9):
-        assert phase_distance(GAIT, shifted(GAIT, phase)) < 1e-7
+        assert phase_distance(GAIT, shift_phase(GAIT, phase)) < 1e-7
     for image in images(GAIT, Chain(), REVERSIBLE):
-        assert distance(shifted(image, 0.21), GAIT) < 1e-7
+        assert distance(shift_phase(image, 0.21), GAIT) < 1e-7
     moved = Fourier(GAIT.mean + np.array([0.1, 0.0]), GAIT.cos, GAIT.sin)
     assert phase_distance(GAIT, moved) == pytest.approx(0.1, rel=1e-6)
     assert distance(GAIT, reversed_in_time(GAIT), IRREVERSIBLE) > 0.1
@@ -174,7 +174,7 @@ def test_basins_join_images_of_one_gait_and_nothing_else():
         problem(friction=REVERSIBLE, gait=Harmonic(2)),
         images(GAIT, Chain(), REVERSIBLE),
     )
-    same = [outcome(k, shifted(image, 0.1 * k)) for k, image in enumerate(found)]
+    same = [outcome(k, shift_phase(image, 0.1 * k)) for k, image in enumerate(found)]
     other = outcome(20, Fourier(GAIT.mean + 0.3, GAIT.cos, GAIT.sin))
     better, failed = outcome(21, GAIT, 0.21), outcome(22, status=ERROR)
     found = basins(stated, [*same, other, better, failed])

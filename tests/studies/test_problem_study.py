@@ -18,7 +18,7 @@ from colloc import BSpline, Chain, Corners, Fourier, Friction, Harmonic, Polygon
 from colloc.commands.families import sweep as sweep_study
 from colloc.commands.families import sweep_summary
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.harmonic import shifted
+from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.linear import Combination
 from colloc.results.distinct_optima import reversed_in_time, swapped
 from colloc.results.outcome import CRASHED, PASSED_OVER, Outcome
@@ -246,7 +246,7 @@ def test_a_start_that_turns_as_it_should_is_worth_the_same_whatever_phase_it_beg
     turning = Fourier([1.2, 0.6], [[0.9], [0.1]], [[0.1], [0.9]])
     turned = replay(Chain(), Friction(), turning, 1e-2).rotation
     stated = Problem("turning", gait=Harmonic(1), delta=1e-2, rotation=turned)
-    values = [value_of(stated, shifted(turning, phase)) for phase in (0.0, 0.3, 0.6)]
+    values = [value_of(stated, shift_phase(turning, phase)) for phase in (0.0, 0.3, 0.6)]
     np.testing.assert_allclose(values, values[0], rtol=2e-3)
 
 
