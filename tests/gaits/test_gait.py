@@ -1,10 +1,9 @@
-"""Fourier series and their classes; starts of a search."""
+"""Fourier series and their classes."""
 
 import numpy as np
 import pytest
 
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, harmonics_within, shift_phase
-from colloc.gaits.starts import latin_hypercube
 from colloc.system.errors import ProblemError
 
 T = np.linspace(0, 1, 37)
@@ -71,11 +70,3 @@ def test_the_paper_s_ellipse():
 def test_unusable_classes_and_coefficients_are_refused_in_words(make, words):
     with pytest.raises(ProblemError, match=words):
         make()
-
-
-def test_a_latin_hypercube_has_a_point_in_every_part_of_a_coordinate_and_depends_on_its_seed():
-    first, second = (latin_hypercube(7, 4, np.random.default_rng(3)) for _ in range(2))
-    np.testing.assert_array_equal(first, second)
-    parts = np.sort(np.floor(7 * first), axis=0)
-    np.testing.assert_array_equal(parts, np.repeat(np.arange(7)[:, None], 4, axis=1))
-    assert len(np.unique(first)) == first.size

@@ -1,13 +1,13 @@
-"""From class to class and from chain to chain: what an optimum keeps on the way."""
+"""Initial gaits of a search: first guesses, random starts, optima of other classes and chains."""
 
 import numpy as np
 import pytest
 
-from colloc import Chain, Corners, Fourier, Harmonic, Polygon, Problem, ellipse
-from colloc.gaits.starts import prolong, to_body, to_class
+from colloc import Chain, Corners, Fourier, Harmonic, Polygon, Problem, ProblemError, ellipse
+from colloc.gaits.guesses import SAFE, checked_member, largest_factor
+from colloc.gaits.starts import latin_hypercube, latin_hypercube_gait, prolong, to_body, to_class
 from colloc.mechanics.contact import crossing_depth
 from colloc.search.solve import solve
-from colloc.system.errors import ProblemError
 
 THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
 PHASES = np.linspace(0.0, 1.0, 101)
@@ -20,6 +20,75 @@ GAITS = {
     "Corners": Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]])),
     "bilateral Corners": Corners(np.array([[2.0, 2.5, 2.2], [-2.0, -2.1, -2.2]]), "bilateral"),
 }
+
+
+def test_a_guess_on_the_bound_of_the_shape_speed_counts_as_moving():
+    """Sampling cuts the corners of an optimum that lies there, and makes it a little slower."""
+    guess = ellipse(0.0, 0.3, 0.2)
+    for share in (1.01, 0.995, 0.98):
+        stated = {"gait": Harmonic(1, "bilateral"), "smallest_shape_speed": guess.shape_speed}
+        stated["smallest_shape_speed"] /= share
+        if share > 0.99:
+            assert Problem("small", guess, **stated).guess is guess
+        else:
+            with pytest.raises(ProblemError, match="guess hardly moves"):
+                Problem("small", guess, **stated)
+
+
+@pytest.mark.parametrize(
+    ("width", "words"), [(0.0, "links cross each other"), (0.02, "links overlap")]
+)
+def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
+    """In the phases of its class, in which the first joint is bent most at 0."""
+    body, wave = Chain(width=width), Fourier([1.9, 1.9], [[0.2], [0.2]], [[0.0], [0.8]])
+    with pytest.raises(ProblemError, match=f"{words} at phase") as refused:
+        Problem("crossed", wave, body, gait=Harmonic(1))
+    phase = float(str(refused.value).rstrip(".").split()[-1])
+    phases = np.append(phase, np.arange(400) / 400)
+    depth = crossing_depth(body, checked_member(Harmonic(1), wave)[0].angles(phases))
+    assert 0.05 < phase < 0.4
+    assert depth[0] == pytest.approx(depth.max(), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"smallest_shape_speed": 1.6},
+        {"joint_limit": (0.1, 1.5)},
+        {"joint_limit": ((-0.1, 1.5), 1.5)},
+    ],
+)
+def test_without_a_guess_a_search_begins_where_the_body_moves_enough(asked):
+    """Larger than usual, and each joint as far as its own limit lets it."""
+    problem = Problem("fast", gait=Harmonic(1), **asked)
+    assert problem.guess.shape_speed > problem.smallest_shape_speed
+    assert latin_hypercube_gait(problem, 0, 0).shape_speed > problem.smallest_shape_speed
+
+
+def test_where_no_wave_moves_enough_the_limit_that_is_in_the_way_is_named():
+    with pytest.raises(ProblemError, match="with joint_limit the usual first gait"):
+        Problem("stiff", gait=Harmonic(1), joint_limit=0.05)
+
+
+@pytest.mark.parametrize(
+    ("shape", "limit", "factor"),
+    [
+        ([0.0, 0.0], np.pi, np.inf),
+        ([0.5, -0.25], 2.0, SAFE * 4.0),
+        ([0.5, 0.5], np.pi, SAFE * 4 * np.pi / 3),  # the ends meet as a triangle, at 2 pi/3
+    ],
+)
+def test_shapes_grow_to_the_joint_limit_or_to_where_links_touch(shape, limit, factor):
+    grown = largest_factor(Chain(), limit, np.array(shape)[:, None])
+    assert grown == pytest.approx(factor, rel=1e-6)
+
+
+def test_a_latin_hypercube_has_a_point_in_every_part_of_a_coordinate_and_depends_on_its_seed():
+    first, second = (latin_hypercube(7, 4, np.random.default_rng(3)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    parts = np.sort(np.floor(7 * first), axis=0)
+    np.testing.assert_array_equal(parts, np.repeat(np.arange(7)[:, None], 4, axis=1))
+    assert len(np.unique(first)) == first.size
 
 
 @pytest.mark.parametrize("name", GAITS)
