@@ -37,7 +37,7 @@ for slow noise the second, up to a share of the variance."""
 _DRIFTS, _OPEN = 1.3, 4.0
 """Ratio of the scores without and with a drift, at most: a part of a wave with noise looks like a
 drift; and the second if the record would not close else."""
-_TOLD = 0.5  # share of a record beyond which a period is told without a drift
+_LONG = 0.5  # share of a record beyond which a period is told without a drift
 _ROUGH = 6  # harmonics by which the period is told
 SEVERAL = 1.1  # periods from which a record holds more than one
 _STEP = 1e-5  # relative, of differences by the period
@@ -96,7 +96,7 @@ def _shown(angle: float, degrees: bool, digits: str = ".3g") -> str:
 
 
 def fitted_gait(
-    given: Given,
+    source: Given,
     n_joint: int,
     *,
     period: float | None = None,
@@ -110,24 +110,24 @@ def fitted_gait(
     where it does not name a unit.
     """
     name, record = "the gait", None
-    if isinstance(given, Fourier):
-        _check_joints(name, given.n_joint, n_joint)
-        return FittedGait(given)
-    if isinstance(given, (str, os.PathLike)):
-        name = str(given)
-        record = read_record(Path(given), n_joint, degrees=degrees)
+    if isinstance(source, Fourier):
+        _check_joints(name, source.n_joint, n_joint)
+        return FittedGait(source)
+    if isinstance(source, (str, os.PathLike)):
+        name = str(source)
+        record = read_record(Path(source), n_joint, degrees=degrees)
         time, angles = record.time, record.angles
         period, degrees = period or record.period, record.degrees
-    elif callable(given):
+    elif callable(source):
         time, period = np.arange(_PHASES) / _PHASES, 1.0
-        function = given.angles if isinstance(given, GaitFunction) else given
+        function = source.angles if isinstance(source, GaitFunction) else source
         angles = _numbers(name, function(time))
-    elif {"joint"} < set(getattr(given, "dims", ())):  # labelled, as `Solution.to_xarray` has them
-        labelled = cast(Any, given).transpose("joint", ...)
+    elif {"joint"} < set(getattr(source, "dims", ())):  # labelled, as `Solution.to_xarray` has them
+        labelled = cast(Any, source).transpose("joint", ...)
         angles = _numbers(name, labelled)
         time = np.asarray(labelled[labelled.dims[-1]], dtype=float)
     else:
-        angles = _numbers(name, given)
+        angles = _numbers(name, source)
         time = np.arange(angles.shape[1], dtype=float)
     _check_joints(name, len(angles), n_joint)
     if record is None and degrees:
@@ -149,13 +149,13 @@ def _check_joints(name: str, count: int, n_joint: int) -> None:
         )
 
 
-def _numbers(name: str, given: object) -> np.ndarray:
+def _numbers(name: str, source: object) -> np.ndarray:
     try:
-        angles = np.array(given, dtype=float)
+        angles = np.array(source, dtype=float)
     except (TypeError, ValueError):
         raise ProblemError(
             f"{name} must be joint angles, a number for each joint and time, not "
-            f"{type(given).__name__}."
+            f"{type(source).__name__}."
         ) from None
     if angles.ndim != 2 or angles.shape[1] < FEWEST:
         raise ProblemError(
@@ -266,23 +266,23 @@ class _Samples(NamedTuple):
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
             return float(minimize_scalar(smallest_score, bounds=(low, high), **how).x)
 
-        found = both(period, 0) if period else both(time[-1], 0) + both(time[-1] + step, 0)
+        candidates = both(period, 0) if period else both(time[-1], 0) + both(time[-1] + step, 0)
         if period is None:
             grid = time[-1] + step * np.linspace(0.0, _GAP, _GAPS)
-            near, width = min(grid, key=smallest_score), grid[1] - grid[0]
-            found += both(best_period(max(near - width, grid[0]), near + width), 1)
+            gap, width = min(grid, key=smallest_score), grid[1] - grid[0]
+            candidates += both(best_period(max(gap - width, grid[0]), gap + width), 1)
             repeats = sorted(best_period(low, high) for low, high in self.find_repeats())
             for each in repeats:
-                found += fits(each, 1) if each > _TOLD * time[-1] else []
-            several = [both(each, 1) for each in repeats if each <= _TOLD * time[-1]]
-            best = min(map(_best, (found, *several)))
+                candidates += fits(each, 1) if each > _LONG * time[-1] else []
+            several = [both(each, 1) for each in repeats if each <= _LONG * time[-1]]
+            best = min(map(_best, (candidates, *several)))
             slow = min(_SLOW * best, _SMALL * float(self.angles.var(axis=1).mean()))
             enough = max(_REPEATED * best, slow) + _EXACT
-            found = next((each for each in several if _best(each) <= enough), found)
-        closed = [fit for fit in found if not fit.drifts]
-        if _best(closed) <= _DRIFTS * _best(found) + _EXACT:
-            found = closed
-        fit = _cheapest(found)
+            candidates = next((each for each in several if _best(each) <= enough), candidates)
+        closed = [fit for fit in candidates if not fit.drifts]
+        if _best(closed) <= _DRIFTS * _best(candidates) + _EXACT:
+            candidates = closed
+        fit = _cheapest(candidates)
         if fit.drifts and not _closes(*self.drift_and_ranges(fit)):
             return _cheapest(closed) if _best(closed) <= _OPEN * fit.score else fit
         return fit
@@ -348,13 +348,13 @@ class _Samples(NamedTuple):
         time, first = self.time, int(fit.drifts)
         most = min(time.size - first, round(fit.period / self.step))
         most = min(max((most - 1) // 2, fit.harmonics), _HIGHEST)
-        near, far = (fit._replace(harmonics=min(most, k * fit.harmonics + 1)) for k in (2, 4))
+        twice, far = (fit._replace(harmonics=min(most, k * fit.harmonics + 1)) for k in (2, 4))
         richer, used = self.richer(fit, table, far), table
         residuals = self.angles - table @ fit.columns(time).T
         if richer is not None and richer.shape[1] < time.size:
             # what is left of the residuals is noise; where nothing is left, all of them may be
             residuals, used = self.angles - richer @ far.columns(time).T, richer
-        columns, left = near.columns(time), (residuals**2).sum(axis=1)
+        columns, left = twice.columns(time), (residuals**2).sum(axis=1)
         freedom = max(time.size - used.shape[1], 1)
         u, s, v = np.linalg.svd(columns, full_matrices=False)
         seen = ((residuals @ u) ** 2).sum() / (left.sum() + 1e-300)
@@ -369,8 +369,8 @@ class _Samples(NamedTuple):
             )
             by_period = table @ (longer - shorter).T / (2 * _STEP)
             along = by_period @ u
-            beside = ((by_period - along @ u.T) / deviation[:, None]) ** 2
-            change = -((along / s) @ v)[None, :, first:] / np.sqrt(beside.sum() + 1e-300)
+            orthogonal = ((by_period - along @ u.T) / deviation[:, None]) ** 2
+            change = -((along / s) @ v)[None, :, first:] / np.sqrt(orthogonal.sum() + 1e-300)
             directions = np.concatenate([directions, change])
         series = None if richer is None else Fourier.from_table(richer[:, first:])
         return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), series)

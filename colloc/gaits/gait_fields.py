@@ -67,12 +67,12 @@ def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None
 
 def fields(value: Any) -> dict[str, Any]:
     """The kind of a part of a problem, and its fields as numbers, strings and lists."""
-    found = {KIND: type(value).__name__}
+    plain = {KIND: type(value).__name__}
     for f in dataclasses.fields(value):
-        own = getattr(value, f.name)
-        if f.metadata != STATED_IF_SET or own != f.default:
-            found[f.name] = _plain(own)
-    return found
+        part = getattr(value, f.name)
+        if f.metadata != STATED_IF_SET or part != f.default:
+            plain[f.name] = _plain(part)
+    return plain
 
 
 def _plain(value: Any) -> Any:

@@ -90,18 +90,18 @@ def initial_member(gait_class: Any, wave: Fourier) -> Any:
     by_path = gait_class.relative_delta or not isinstance(gait_class, LinearClass)
     if by_path or isinstance(gait_class, Harmonic):
         return wave
-    near = gait_class.through(wave)
-    if near.shape_speed <= _MOVES * wave.shape_speed:
-        near = gait_class.member(np.ones(gait_class.size(wave.n_joint)), wave.n_joint)
-    return near.scaled(wave.shape_speed / near.shape_speed)
+    member = gait_class.through(wave)
+    if member.shape_speed <= _MOVES * wave.shape_speed:
+        member = gait_class.member(np.ones(gait_class.size(wave.n_joint)), wave.n_joint)
+    return member.scaled(wave.shape_speed / member.shape_speed)
 
 
 def checked_member(gait_class: Any, gait: Any) -> tuple[Any, float]:
     """The gait of a class that a guess stands for, a path itself, and its shape speed [rad per
     radian of phase]."""
     if isinstance(gait_class, LinearClass) and not gait_class.relative_delta:
-        near = gait_class.member(gait_class.parameters(gait_class.through(gait)), gait.n_joint)
-        return near, near.shape_speed
+        member = gait_class.member(gait_class.parameters(gait_class.through(gait)), gait.n_joint)
+        return member, member.shape_speed
     points = symmetric_samples(gait, gait_class.symmetry)
     length = np.linalg.norm(np.diff(points), axis=0).sum()
     return gait, float(length / (2 * np.pi * gait_class.fraction))

@@ -275,10 +275,10 @@ def _symmetric_tables(kind: LinearClass, n_joint: int) -> np.ndarray:
             f"the class {name} has no symmetry {kind.symmetry!r} for {n_joint} joints: its "
             f"functions {how} are no combinations of its functions. Take symmetry 'none'."
         )
-    own = np.eye(len(turned)) + turned
-    _, r, order = qr(own, mode="economic", pivoting=True)
+    symmetric = np.eye(len(turned)) + turned
+    _, r, order = qr(symmetric, mode="economic", pivoting=True)
     first = abs(r[0, 0])
     rank = int((np.abs(np.diag(r)) > _CLOSED * first).sum()) if first > _CLOSED else 0
     if rank == 0:
         raise ProblemError(f"the class {name} has no gait of symmetry {kind.symmetry!r} but rest.")
-    return allowed @ own[:, np.sort(order[:rank])]
+    return allowed @ symmetric[:, np.sort(order[:rank])]

@@ -158,8 +158,8 @@ class Objective:
                 scaled = {k: v * factor ** degrees.get(k, 0.0) for k, v in sample.items()}  # type: ignore[operator]
                 ratio = self(scaled) / self(sample) if self(sample) else np.nan
                 powers.append(np.log(ratio) / np.log(factor) if ratio > 0 else np.nan)
-        near = float(np.round(powers[0], 6))
-        return near if np.allclose(powers, near, rtol=0, atol=1e-9) else None
+        degree = float(np.round(powers[0], 6))
+        return degree if np.allclose(powers, degree, rtol=0, atol=1e-9) else None
 
     def gradient(
         self, period: Mapping[str, float], slopes: Mapping[str, np.ndarray]
@@ -198,19 +198,21 @@ class Objective:
 
     def fields(self) -> dict[str, Any]:
         """As plain text (JSON)."""
-        own = {"quantities": [each.fields() for each in self.quantities]} if self.quantities else {}
-        return {"expression": self.expression, "name": self.name} | own
+        more = (
+            {"quantities": [each.fields() for each in self.quantities]} if self.quantities else {}
+        )
+        return {"expression": self.expression, "name": self.name} | more
 
 
 def integrals_of(aims: Iterable[Objective]) -> tuple[Quantity, ...]:
     """The integrals of objectives. `ProblemError` if two of them have one name."""
-    found: dict[str, Quantity] = {}
+    by_name: dict[str, Quantity] = {}
     for each in (quantity for aim in aims for quantity in aim.integrals):
-        if found.setdefault(each.name, each) != each:
+        if by_name.setdefault(each.name, each) != each:
             raise ProblemError(
                 f"two quantities are called {each.name}: give one of them another name."
             )
-    return tuple(found.values())
+    return tuple(by_name.values())
 
 
 NAMED = {
@@ -255,9 +257,9 @@ def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
             f"at_least names what must be reached with its value, as {{'distance': 0.3}}, not "
             f"{shown(stated)}."
         )
-    found = []
+    values = []
     for what, least in pairs:
         if not is_number(least):
             raise ProblemError(f"at_least needs a finite number for {what!r}, not {least!r}.")
-        found.append((objective_from(what), float(least)))
-    return tuple(found)
+        values.append((objective_from(what), float(least)))
+    return tuple(values)

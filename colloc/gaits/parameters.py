@@ -64,13 +64,13 @@ def parameters(problem: Problem) -> list[Parameter]:
     length of links 1 and 3 0.333
     """
     chain = problem.body if isinstance(problem.body, Chain) else None
-    found = []
+    numbers = []
 
     def add(name: str, value: float, field: str, new: Callable[[float], Any], **how: bool) -> None:
         def changed(by: float) -> Problem:
             return problem.with_(**{"guess": None, field: new(by)})  # a guess need not fit
 
-        found.append(Parameter(name, value, changed, **how))
+        numbers.append(Parameter(name, value, changed, **how))
 
     def add_of_body(
         name: str, value: float, field: str, new: Callable[[float], Any], **how: bool
@@ -100,7 +100,7 @@ def parameters(problem: Problem) -> list[Parameter]:
             add(f"least {aim.name}", least, "at_least", partial(_scale_least, problem.at_least, k))
     if problem.rotation:
         add("net rotation", problem.rotation, "rotation", partial(_scale, problem.rotation))
-    return found
+    return numbers
 
 
 def _coefficients(law: Law) -> list[tuple[str, float]]:

@@ -384,6 +384,6 @@ def _radians(
 def _centre(angles: np.ndarray) -> int:
     """The right angle about which all joints are centred, as servos are [degrees], or 0."""
     centres = 0.5 * (angles.max(axis=1) + angles.min(axis=1))
-    near = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
-    centred = centres.size > 1 and np.abs(centres - near).max() < _CENTRED
-    return int(np.degrees(near).round()) if centred else 0
+    right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
+    centred = centres.size > 1 and np.abs(centres - right).max() < _CENTRED
+    return int(np.degrees(right).round()) if centred else 0

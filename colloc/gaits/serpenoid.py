@@ -103,11 +103,11 @@ class Serpenoid(Harmonic):
         """Number of parameters of the wave; the Fourier coefficients follow them."""
         return 1 + int(self.symmetry == NONE) + len(self._waves)
 
-    def coefficients(self, own: Array, n_joint: int) -> list[list[Array]]:
+    def coefficients(self, wave: Array, n_joint: int) -> list[list[Array]]:
         """(mean, cos 1, sin 1, cos 2, ...) of every joint, of a wave; NumPy or CasADi."""
-        xp, lag = namespace(own), own[0]
-        offset = own[1] if self.symmetry == NONE else 0 * lag
-        amplitudes = [own[i] for i in range(self.n_own - len(self._waves), self.n_own)]
+        xp, lag = namespace(wave), wave[0]
+        offset = wave[1] if self.symmetry == NONE else 0 * lag
+        amplitudes = [wave[i] for i in range(self.n_own - len(self._waves), self.n_own)]
         table = []
         for place in _places(n_joint):
             row = [offset, *[0 * lag] * (2 * self.harmonics)]
@@ -118,21 +118,21 @@ class Serpenoid(Harmonic):
             table.append(row)
         return table
 
-    def coefficient_slopes(self, own: np.ndarray, n_joint: int) -> np.ndarray:
+    def coefficient_slopes(self, wave: np.ndarray, n_joint: int) -> np.ndarray:
         """Derivatives of `coefficients`, ``(n_joint * (2 K + 1), n_own)``."""
         k = np.arange(1, self.harmonics + 1) * _places(n_joint)[:, None]
-        table = np.array(self.coefficients(own, n_joint), dtype=float)
+        table = np.array(self.coefficients(wave, n_joint), dtype=float)
         by_lag = np.zeros_like(table)
         by_lag[:, 1::2], by_lag[:, 2::2] = -k * table[:, 2::2], k * table[:, 1::2]
         columns = [by_lag]
         for unit in np.eye(self.n_own)[1:]:  # linear in the others
-            unit[0] = own[0]
+            unit[0] = wave[0]
             columns.append(np.array(self.coefficients(unit, n_joint), dtype=float))
         return np.array([column.ravel() for column in columns]).T
 
-    def full(self, own: np.ndarray, n_joint: int) -> np.ndarray:
+    def full(self, wave: np.ndarray, n_joint: int) -> np.ndarray:
         """The parameters of a wave, then its Fourier coefficients."""
-        return np.concatenate([own, np.ravel(self.coefficients(own, n_joint))])
+        return np.concatenate([wave, np.ravel(self.coefficients(wave, n_joint))])
 
     def _basis(self, n_joint: int) -> np.ndarray:
         n = n_joint * (2 * self.harmonics + 1)  # the Fourier coefficients alone enter the angles
@@ -177,8 +177,8 @@ class Serpenoid(Harmonic):
 
         def disagreement(lag: float) -> float:
             wave = _at_the_middle(gait, lag)
-            kept = wave.imag if self.symmetry == BILATERAL else np.abs(wave)
-            return -float(np.sum(kept**2))
+            amplitudes = wave.imag if self.symmetry == BILATERAL else np.abs(wave)
+            return -float(np.sum(amplitudes**2))
 
         first = _LAGS[np.argmin([disagreement(lag) for lag in _LAGS])]
         step = _LAGS[1] - _LAGS[0]

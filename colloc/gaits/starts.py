@@ -145,13 +145,15 @@ def to_class(
     A truncated series overshoots, so that a path at its limits shrinks; it cuts corners, so that a
     path as short as it may be grows about its mean.
     """
-    near = gait_class.through(gait)
-    growth = 2 * np.pi * smallest_shape_speed / near.length
+    start = gait_class.through(gait)
+    growth = 2 * np.pi * smallest_shape_speed / start.length
     if growth > _SHORT:
-        near = near.grown(growth)
-    if near is gait or not near.is_series:
-        return near
-    return near.scaled(min(1.0, largest_factor(body, joint_limit, near.angles(_PERIOD), near.rest)))
+        start = start.grown(growth)
+    if start is gait or not start.is_series:
+        return start
+    return start.scaled(
+        min(1.0, largest_factor(body, joint_limit, start.angles(_PERIOD), start.rest))
+    )
 
 
 def prolong(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:

@@ -88,7 +88,7 @@ def check_symmetric(problem: Any) -> None:
             f"gaits of this one may have the symmetry {' or '.join(problem.body.symmetries)}."
         )
     if isinstance(problem.joint_limit, tuple):
-        ranges = [range_of(own) for own in problem.joint_limit]
+        ranges = [range_of(limit) for limit in problem.joint_limit]
         opposite = [(-high, -low) for low, high in ranges]
         if (symmetry == BILATERAL and ranges != opposite[::-1]) or (
             symmetry == ANTIPODAL and ranges != opposite
