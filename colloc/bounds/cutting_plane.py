@@ -174,7 +174,6 @@ def exchanged_optimum(
     starts: int,
     tolerance: float,
     smoothing: float = 1e-5,
-    seed: int = 0,
 ) -> Optimum:
     """The potential whose largest ratio over `domain` is smallest, with knots inserted up to
     `intervals`.
@@ -183,7 +182,7 @@ def exchanged_optimum(
     motions, thrice as many in the final check, end when summits exceed the value by less than
     `tolerance`. `smoothing` weighs the roughness, about 0.2: 1e-5 costs 1e-6 of the bound.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng, smoothing)
     spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
     seen, quiet, surprise = program.samples.motion.size, 0, _UNKNOWN
@@ -217,9 +216,7 @@ def exchanged_optimum(
         if (quiet == 2 and not coarse) or count == rounds:
             # what a check finds is no more than a sample that was missing
             finer = {"shapes": 3 * shapes, "directions": 2 * directions, "starts": 2 * starts}
-            checked, motion = summits_met(
-                domain, space, free, seed=seed + count, level=level, **finer
-            )
+            checked, motion = summits_met(domain, space, free, seed=count, level=level, **finer)
             if checked.max() > top:
                 top, best = float(checked.max()), motion.take(np.array([int(np.argmax(checked))]))
             quiet = quiet if top <= level + 2 * tolerance else 0

@@ -12,9 +12,7 @@ from colloc.numerics.arrays import Array
 
 
 def implicit_derivatives(
-    equations: Callable[[Array, Array, Array], tuple[list[Array], Array | None]],
-    n_y: int,
-    n_z: int,
+    equations: Callable[[Array, Array, Array], tuple[list[Array], Array | None]], n_y: int, n_z: int
 ) -> Callable[[np.ndarray, np.ndarray, float], np.ndarray]:
     """A function of y ``(n_y, n_time)``, z ``(n_z, n_time)`` and a parameter: total derivatives
     ``(n_out, n_y, n_time)`` along y of outputs at the z that solve ``residual = 0``.

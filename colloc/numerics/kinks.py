@@ -27,13 +27,12 @@ def stationarity_around(
     *,
     enough: float,
     points: int = 4,
-    seed: int = 0,
 ) -> Stationarity:
     """Replace the KKT error at v by that of the best mean of the gradients within `radius`; `at`
     itself if none is closer to 0, or some point around is clearly lower. `points` are drawn per
     variable, until a mean is within `enough` of 0."""
     rows, slopes, columns = program.rows(v), program.row_slopes(v), binding(program, v)[2]
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
 
     def lagrangian(u: np.ndarray) -> np.ndarray:
         """Gradient and value ``(n + 1,)``; rows count by what is not linear in them."""

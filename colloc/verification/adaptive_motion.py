@@ -120,10 +120,6 @@ class FineMotion:
     its end and half way, ``(n,)``."""
 
     @property
-    def work(self) -> np.ndarray:
-        return np.asarray(self.totals[0])
-
-    @property
     def nodes(self) -> np.ndarray:
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 

@@ -23,8 +23,6 @@ from colloc.motion.kinds import OMEGA, Passed, kind_of_motion, through_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 from colloc.verification.adaptive_motion import (
-    FineMotion,
-    Rates,
     fine_motion,
     rates_at,
     totals_along,
@@ -40,12 +38,6 @@ _SAMPLES = 32
 class MeshError:
     """Errors of collocating one gait on one mesh; arrays over intervals, ``(n,)``."""
 
-    rotation: np.ndarray  # [rad]
-    displacement: np.ndarray  # magnitude [body lengths]
-    work: np.ndarray
-    velocity: np.ndarray
-    """Largest error between the nodes of the interpolated tail velocity [body lengths per
-    period]."""
     value: np.ndarray
     """Contribution to the relative error of the objective, signed, to first order."""
     violation: np.ndarray
@@ -111,10 +103,6 @@ def mesh_error(
     cells, objective = _collocated_cells(known, mesh.scheme, *_ends(mesh)), control.aims.objective
     seen = _period(known, cells.pose.place[-1], cells.pose.theta[-1], cells.totals)[1]
     return MeshError(
-        rotation=cells.rotation,
-        displacement=np.abs(cells.displacement),
-        work=cells.gained[0],
-        velocity=_velocity_error(mesh, cells.rates, fine),
         value=cells.value,
         violation=violation,
         total=objective(seen) / objective(_exact(known)[1]) - 1,
@@ -158,12 +146,9 @@ class _Cells(NamedTuple):
     """Intervals by a scheme, with their errors."""
 
     rotation: np.ndarray
-    displacement: np.ndarray
-    gained: np.ndarray
     value: np.ndarray
-    rates: Rates
     pose: CollocatedPose
-    totals: np.ndarray
+    totals: np.ndarray  # work and integrals, (1 + k,)
 
 
 def _collocated_cells(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Cells:
@@ -181,7 +166,7 @@ def _collocated_cells(known: Known, rule: Scheme, left: np.ndarray, right: np.nd
     # an error of rotation turns everything after it
     added = displacement + 1j * rotation * (fine.path[-1] - path_right)
     value = _first_order(control, *_exact(known), rotation, added, gained[0], gained[1:])
-    return _Cells(rotation, displacement, gained, value, rates, pose, totals.sum(axis=1))
+    return _Cells(rotation, value, pose, totals.sum(axis=1))
 
 
 def _turning(known: Known, cells: _Cells) -> np.ndarray:
@@ -205,8 +190,7 @@ def _exact(known: Known) -> tuple[Passed, dict[str, float]]:
 
 
 def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
-    """`MeshError` but for the violation; the work is that against friction, velocities have no
-    error."""
+    """`MeshError` but for the violation."""
     (control, gait, delta, exact), kind = known, kind_of_motion(known.control.dynamics)
     aims, seen = control.aims, collocated(control, mesh, gait, delta)
     shapes, along, pose = seen[:3]
@@ -246,25 +230,11 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     off = [seen.integrals[name] - part for name, part in integrals.items()]
     value = by_states + _first_order(control, passed, period, rotation, displacement, energy, off)
     return {
-        "rotation": rotation,
-        "displacement": np.abs(displacement),
-        "work": energy,
-        "velocity": np.full(mesh.n, np.nan),
         "value": value if along.held.all() else np.nan * value,
         "total": float(aims.objective(seen.period) / aims.objective(period) - 1),
         "unresolved": float(exact.error * sum(map(abs, weights.values()))),
         "turning": turned if control.admissible.gait.symmetry == NONE else 0.0,
     }
-
-
-def _velocity_error(mesh: Mesh, rates: Rates, fine: FineMotion) -> np.ndarray:
-    t = fine.nodes.ravel()
-    k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
-    weights = mesh.scheme.lagrange((t - mesh.edges[k]) / mesh.h[k])
-    interpolated = np.einsum("ts,cts->ct", weights, rates.z[:, k])
-    largest = np.zeros(mesh.n)
-    np.maximum.at(largest, k, np.abs(interpolated - fine.rates.z.reshape(3, -1)).max(axis=0))
-    return largest
 
 
 def constraint_violation(admissible: Admissible, mesh: Mesh, gait: AnyGait) -> np.ndarray:

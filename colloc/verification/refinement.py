@@ -21,13 +21,7 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.adaptive_motion import FineMotion
 from colloc.verification.kinks import kink_phases
-from colloc.verification.mesh_error import (
-    FINER,
-    Known,
-    gait_motion,
-    interval_shares,
-    mesh_error,
-)
+from colloc.verification.mesh_error import FINER, Known, gait_motion, interval_shares, mesh_error
 
 VIOLATION = 5e-7
 """Violation of a joint limit or of self-contact that needs no refinement [rad, body lengths]."""

@@ -250,10 +250,7 @@ def replay(
 
 
 def _grid(
-    solver: _Solver,
-    instants: int,
-    breaks: np.ndarray | tuple[float, ...],
-    near: Replay | None,
+    solver: _Solver, instants: int, breaks: np.ndarray | tuple[float, ...], near: Replay | None
 ) -> Panels:
     """Equal panels between any two corners, where rates are one-sided."""
     ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])

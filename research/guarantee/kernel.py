@@ -22,9 +22,7 @@ SOURCES = Path(__file__).with_name("native")
 FLAGS = tuple((native_kernel.SOURCES / "flags.txt").read_text("ascii").split())
 """Those of the library's C: nothing that reorders arithmetic."""
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
-_SIGNATURES = {
-    "colloc_loaded": (*BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
-}
+_SIGNATURES = {"colloc_loaded": (*BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6)}
 _PROOFS = {
     "colloc_states": (_COUNT, *[_ARRAY] * 5, _REAL, _ARRAY),
     "colloc_by_convexity": (_COUNT, *[_ARRAY] * 7, _REAL, _ARRAY),

@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion
-from colloc.bounds.infinitesimal import SmallGait
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.system.errors import NotConvergedError
-from research import small_gaits
 from research.small_gaits import best_small_gait, small_gait
 from tests.shared.laws import coulomb
 
@@ -180,36 +177,6 @@ def test_small_gaits_stay_below_the_bound(isotropic):
         assert (
             small_gait(Chain(), Friction(), np.array(shape), 90, 8).efficiency < isotropic.sampled
         )
-
-
-def test_shapes_at_which_few_directions_do_not_close_are_passed_over(monkeypatch):
-    """So it is at four links with friction (0.5, 1, 5) and the 36 directions of the first look:
-    that ended the search."""
-
-    def failing(body, friction, shape, *settings):
-        if settings and shape[0] > 0:
-            raise NotConvergedError("infeasible")
-        return SmallGait(1.0 + float(shape[0]), 0.0, np.empty((2, 0)), np.empty(0))
-
-    monkeypatch.setattr(small_gaits, "small_gait", failing)
-    best, shape = best_small_gait(Chain(), Friction(), 2.5, steps=4, refined=1)
-    assert shape[0] == pytest.approx(0.0, abs=1e-2)
-    assert best.efficiency == 1.0 + shape[0]
-
-
-def test_the_start_of_a_search_counts_where_it_is_better_than_its_end(monkeypatch):
-    """As at four straight links, which do 0.7319: values from a few directions led away from them,
-    to 0.7311."""
-
-    def misleading(body, friction, shape, *settings):
-        size = float(np.abs(shape).max())
-        return SmallGait(
-            size if settings and settings[0] == 180 else -size, 0.0, np.empty((2, 0)), np.empty(0)
-        )
-
-    monkeypatch.setattr(small_gaits, "small_gait", misleading)
-    best, shape = best_small_gait(Chain(), Friction(), 2.0, steps=4, refined=1)
-    assert (best.efficiency, *shape) == (0.0, 0.0, 0.0)
 
 
 def test_four_straight_links_crawl_sideways_by_bends_of_no_size():

@@ -5,13 +5,7 @@ import numpy as np
 import pytest
 
 from colloc.bounds.cutting_plane import exchanged_optimum
-from colloc.bounds.potential import (
-    PotentialSpace,
-    Samples,
-    with_knots,
-    with_more_knots,
-    worth,
-)
+from colloc.bounds.potential import PotentialSpace, Samples, with_knots, with_more_knots, worth
 from colloc.bounds.sampling import Domain
 from colloc.bounds.spline import TensorSpline
 from colloc.mechanics.chain import Chain

@@ -10,17 +10,11 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from colloc import solve_balance
-from colloc.bounds import cutting_plane, potential
-from colloc.bounds.coulomb_motion import (
-    CoulombMotion,
-    balanced_motion,
-    fundamental,
-    two_resting,
-)
-from colloc.bounds.cutting_plane import exchanged_optimum, smallest_maximum
+from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental, two_resting
+from colloc.bounds.cutting_plane import smallest_maximum
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
-from colloc.bounds.potential import PotentialSpace, Samples, largest_gain, largest_ratios
-from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, usual_harmonics
+from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
+from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.bounds.spline import TensorSpline
 from colloc.gaits.harmonic import Harmonic
@@ -42,16 +36,6 @@ def random_points(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     turn = rng.uniform(0, 2 * np.pi, n)
     return rng.uniform(-np.pi, np.pi, (2, n)), np.stack([np.cos(turn), np.sin(turn)])
-
-
-def test_ratios_of_many_motions_are_those_of_all_at_once(monkeypatch):
-    space = PotentialSpace(TensorSpline(2, np.pi, 3), (1, 3), True)
-    motion = balanced_motion(Chain(), Friction(), *random_points(5, 50))
-    free = np.random.default_rng(6).normal(size=space.size)
-    monkeypatch.setattr(potential, "_AT_ONCE", 7)
-    np.testing.assert_allclose(
-        largest_ratios(space, free, motion), Samples(space, motion).ratio(free)[0], rtol=1e-12
-    )
 
 
 def test_splines_add_up_to_one_and_differentiate():
@@ -190,9 +174,7 @@ def test_mirror_images_and_end_swap_move_alike(mu, lengths):
     friction, body, rng = coulomb(*mu), Chain(lengths), np.random.default_rng(9)
     q, r = rng.uniform(-2.0, 2.0, (body.n_joint, 80)), rng.normal(size=(body.n_joint, 80))
     space = PotentialSpace(
-        TensorSpline(body.n_joint, 2.0, 4),
-        (1,) if friction.reversible else (0, 1),
-        body.symmetric,
+        TensorSpline(body.n_joint, 2.0, 4), (1,) if friction.reversible else (0, 1), body.symmetric
     )
     free = 0.1 * np.random.default_rng(10).standard_normal(space.size)
     ratio = Samples(space, balanced_motion(body, friction, q, r)).ratio(free)[0]
@@ -321,28 +303,6 @@ def test_lattices_hold_the_corners_between_limit_and_contact(shift):
     assert np.isclose(angles.max(), 2.5)  # and the limit
 
 
-def test_what_a_check_finds_is_sampled_and_checked_again(monkeypatch):
-    domain = Domain(Chain(), Friction(), 2.0)
-    space = PotentialSpace(TensorSpline(2, 2.0, 4), (1,), True)
-    missed = domain.lattice(3, 5, 0.3).take(np.arange(2))
-    answers = [np.array([0.1, 9.0]), np.array([0.1, 0.2])]
-    monkeypatch.setattr(cutting_plane, "summits_met", lambda *_, **__: (answers.pop(0), missed))
-    held, add = [], cutting_plane._Program.add
-
-    def noted(program, motion):
-        held.append(motion)
-        add(program, motion)
-
-    monkeypatch.setattr(cutting_plane._Program, "add", noted)
-    found = exchanged_optimum(
-        domain, space, shapes=6, directions=12, rounds=12, starts=10, tolerance=0.3
-    )
-    assert not answers
-    assert found.converged
-    assert found.top < 1.5
-    assert any(m.size == 1 and np.array_equal(m.angles, missed.angles[:, 1:]) for m in held)
-
-
 def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     tiny = Budget(intervals=3, harmonics=(1,), shapes=6, directions=6, rounds=1, starts=10)
     cache = tmp_path / "bounds.sqlite"
@@ -363,20 +323,6 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     cache.write_text("{")
     with pytest.raises(StoreError, match="cannot be read"):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
-
-
-def test_more_joints_have_coarser_potentials_by_default(monkeypatch):
-    """No more unknowns than a solver can hold: with the 12 intervals of three links four would have
-    1,700."""
-
-    def unknowns(domain, budget):
-        n_joint, harmonics = domain.body.n_joint, usual_harmonics(domain.body, domain.friction)
-        return PotentialSpace(
-            TensorSpline(n_joint, 2.0, budget.intervals), harmonics, True, budget.together
-        ).size
-
-    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", unknowns)
-    assert all(50 < efficiency_bound(Chain((1 / n,) * n), Friction()) < 250 for n in (3, 4, 5))
 
 
 @pytest.mark.parametrize(
@@ -502,20 +448,6 @@ def test_climbs_go_along_creases_where_one_joint_rests():
 
     top = domain.summits(crease, start, 0.5, 0.3, 40, np.random.default_rng(19))
     assert np.median(crease(top)) > 0.99
-
-
-def test_the_exchange_does_not_drop_what_it_will_miss():
-    """Dropped as soon as it is slack, an inequality is broken again two programs later: 15
-    exchanges then still left samples above the program's value by 4.5, where with patience they end
-    below the excess asked for."""
-    domain = Domain(Chain(), Friction(), 2.5)
-    rng = np.random.default_rng(0)
-    program = cutting_plane._Program.begun(
-        Samples(PotentialSpace(TensorSpline(2, 2.5, 6), (1, 3), True), domain.lattice(20, 48)),
-        rng,
-        1e-5,
-    )
-    assert program.settle(0.01) < program.best.value + 0.01
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ def test_the_adaptive_motion_follows_the_branch_that_the_replay_follows(seed):
     friction, path = Friction(mu_t=100, mu_f=1, mu_b=1), random_path(seed)
     fine = fine_motion(BODY, friction, path, 1e-4, np.linspace(0, 1, 61), 1e-6)
     expected = replay(BODY, friction, path, 1e-4).efficiency
-    assert abs(fine.path[-1]) / fine.work[-1] == pytest.approx(expected, rel=1e-5)
+    assert abs(fine.path[-1]) / fine.totals[0, -1] == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.parametrize(

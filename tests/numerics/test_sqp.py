@@ -102,34 +102,6 @@ def of_one(f, slope, lower=-np.inf, upper=np.inf):
     )
 
 
-@pytest.mark.parametrize(
-    ("stiff", "wanted"), [(1.9, [-0.9, 0.05]), (4, [-3, 0]), (40, [-39, -3, 0])]
-)
-def test_a_step_that_is_too_long_is_cut_to_the_least_of_a_parabola_between_a_tenth_and_half(
-    stiff, wanted
-):
-    """A model of curvature 1 leads from 1 to 1 - stiff."""
-    tried = []
-    minimised(
-        of_one(lambda x: tried.append(x[0]) or 0.5 * stiff * x[0] ** 2, lambda x: stiff * x),
-        np.ones(1),
-        np.inf,
-        1e-12,
-    )
-    assert tried[: 1 + len(wanted)] == pytest.approx([1, *wanted], abs=1e-12)
-
-
-def test_a_curvature_that_is_negative_counts_as_a_fifth_of_the_modelled_one():
-    found = minimised(
-        of_one(lambda x: -0.5 * x[0] ** 2, lambda x: -x), np.array([0.1]), 1.0, 1e-12, iterations=1
-    )
-    assert (found.iterations, found.v[0], found.curvature[0, 0]) == (
-        1,
-        pytest.approx(0.2),
-        pytest.approx(0.2),
-    )
-
-
 def test_where_no_step_is_an_improvement_the_start_is_what_is_found():
     found = minimised(of_one(lambda x: x[0], lambda x: -np.ones(1)), np.array([0.3]), 1.0, 1e-12)
     assert (found.v[0], found.objective, found.iterations) == (0.3, 0.3, 1)

@@ -139,11 +139,7 @@ def crawler():
 
 def trajectories():
     fast, slow = (plan_trajectory(SKEW, 20.0, t, limits=(2.0, 1.5)) for t in (None, 9.0))
-    return [
-        fast.period,
-        *fast.angles[:, ::9].ravel(),
-        *slow.speeds[:, ::40].ravel(),
-    ]
+    return [fast.period, *fast.angles[:, ::9].ravel(), *slow.speeds[:, ::40].ravel()]
 
 
 CASES = {

@@ -8,7 +8,7 @@ from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion
 from colloc.bounds.potential import PotentialSpace, Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
-from colloc.bounds.spline import DEGREE, TensorSpline
+from colloc.bounds.spline import TensorSpline
 from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.balance import dissipation_potential, instant, net_force
 from colloc.mechanics.chain import Chain
@@ -20,7 +20,7 @@ from research.guarantee import enclosure, guaranteed
 from research.guarantee.enclosure import CORNERS, DELTA, by_convexity, by_loads, corner_motions
 from research.guarantee.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from research.guarantee.loaded_balance import loaded_balance
-from research.guarantee.potential_range import PotentialRange, gain_bound, turned
+from research.guarantee.potential_range import PotentialRange, turned
 from tests.research.convexity_enclosure import allowance
 from tests.research.load_enclosure import KAPPA, allowance_by_loads
 from tests.research.random_cells import all_cells, random_cells
@@ -370,43 +370,6 @@ def stated(bound, body=BODY, friction=None):
     )
 
 
-def test_the_gain_over_all_headings_is_bounded_from_above_and_closely():
-    rng = np.random.default_rng(41)
-    amplitudes = {k: rng.normal(size=40) + 1j * rng.normal(size=40) for k in (1, 3, 5)}
-    theta = np.linspace(0, 2 * np.pi, 20001)
-    fine = sum(np.real(a[:, None] * np.exp(1j * k * theta)) for k, a in amplitudes.items()).max(
-        axis=1
-    )
-    assert np.all(gain_bound(amplitudes) >= fine)
-    assert np.all(gain_bound(amplitudes) <= fine * 1.005)
-
-
-@pytest.mark.parametrize("order", [(2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
-def test_derivatives_of_the_potential_stay_below_their_bound_which_is_met_where_they_are_constant(
-    potential, order
-):
-    rng, spline = np.random.default_rng(39), potential.spline
-    centres = rng.uniform(-3, 3, (2, 30))
-    i, j = spline.cell(centres[0]), spline.cell(centres[1])
-    largest = np.stack([potential.largest[k, order][i, j] for k in potential.c])
-    cell = spline.cell(centres)
-    knots = (
-        [spline.extended[DEGREE + cell[a]] for a in (0, 1)],
-        [spline.extended[DEGREE + 1 + cell[a]] for a in (0, 1)],
-    )
-    inside = np.array(knots[0])[:, :, None] + (np.array(knots[1]) - np.array(knots[0]))[
-        :, :, None
-    ] * rng.uniform(0.001, 0.999, (2, 30, 200))
-    found = np.stack(
-        [
-            np.abs(spline.matrix(inside.reshape(2, -1), order) @ c).reshape(30, 200).max(axis=1)
-            for c in potential.c.values()
-        ]
-    )
-    assert np.all(found <= largest * (1 + 1e-9) + 1e-12)
-    assert np.median(largest / found) < 3
-
-
 @needs_kernel
 @pytest.mark.slow
 def test_no_gait_of_the_isotropic_body_reaches_nine_tenths(bound):
@@ -498,22 +461,6 @@ def test_no_box_is_left_out_that_holds_a_shape_without_crossing(body):
         depth = crossing_depth(body, inside.reshape(2, -1)).reshape(-1, 40)
         assert np.all(kept[(depth == 0).any(axis=1)])
         assert (~kept).sum() > 0.6 * (depth > 0).all(axis=1).sum() > 0
-
-
-def test_cells_know_the_places_of_their_corners_and_share_each():
-    edges = (
-        np.array([0.0, 0.3, 1.0]),
-        np.array([-1.0, -0.2, 0.5, 2.0]),
-        np.array([-1.0, 0.0, 0.1, 0.4, 1.0]),
-    )
-    for levels in ((0, 0, 0), (2, 2, 2), (2, 2, 1)):
-        counts = [(each.size - 1) << level for each, level in zip(edges, levels, strict=True)]
-        index = np.stack([a.ravel() for a in np.meshgrid(*map(np.arange, counts), indexing="ij")])
-        cells = guaranteed._Lattice(edges, levels).cells(index)
-        places = cells.low[:, :, None] + cells.size[:, :, None] * CORNERS.T[:, None]
-        np.testing.assert_allclose(cells.points[:, cells.at], places, atol=1e-15)
-        assert cells.points.shape[1] == np.prod(np.array(counts) + 1)
-        assert np.prod(cells.size, axis=0).sum() == pytest.approx(1.0 * 3.0 * 2.0)
 
 
 def test_halves_of_cells_fill_them_and_thin_ones_keep_their_rates():

@@ -91,6 +91,17 @@ def test_what_is_stated_of_a_harmonic_and_of_its_gain_holds_what_they_are_in_fra
         assert max(off.max() for _, off in stated) < 1e-13
 
 
+def test_the_gain_over_all_headings_is_bounded_from_above_and_closely():
+    rng = np.random.default_rng(41)
+    amplitudes = {k: rng.normal(size=40) + 1j * rng.normal(size=40) for k in (1, 3, 5)}
+    theta = np.linspace(0, 2 * np.pi, 20001)
+    fine = sum(np.real(a[:, None] * np.exp(1j * k * theta)) for k, a in amplitudes.items()).max(
+        axis=1
+    )
+    assert np.all(gain_bound(amplitudes) >= fine)
+    assert np.all(gain_bound(amplitudes) <= fine * 1.005)
+
+
 @pytest.mark.parametrize("harmonic", [1, 2, 3])
 def test_half_way_between_headings_the_bound_of_the_gain_is_met_to_fourth_order(harmonic):
     step = np.pi / _HEADINGS

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc.mechanics.inertia import moment_of_inertia, momenta, momentum_rates, tail_velocity
+from colloc.mechanics.inertia import momentum_rates
 from colloc.motion.slow_enough import SCHEME, GaitOnMesh
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
@@ -125,20 +125,6 @@ def test_masses_and_inertias_of_ones_own_move_as_newtons_law_says():
     )
 
 
-def test_momenta_and_tail_velocity_are_inverse_to_each_other():
-    rng = np.random.default_rng(2)
-    angles, rates, z = rng.normal(size=(2, 5)), rng.normal(size=(2, 5)), rng.normal(size=(3, 5))
-    posture = UNEQUAL.posture(angles)
-    states = momenta(UNEQUAL, posture, UNEQUAL.velocity(posture, rates, z))
-    np.testing.assert_allclose(tail_velocity(UNEQUAL, angles, rates, states), z, atol=1e-13)
-
-
-def test_a_straight_body_has_the_moment_of_inertia_of_a_rod():
-    assert moment_of_inertia(UNEQUAL, UNEQUAL.posture(np.zeros((2, 1))))[0] == pytest.approx(
-        1 / 12, rel=1e-14
-    )
-
-
 def test_without_friction_momentum_is_conserved():
     """A free body that is not pushed keeps its velocity in the plane and its angular momentum,
     however its joints move."""
@@ -216,17 +202,6 @@ def test_corners_are_passed_where_they_are():
     exact = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1, breaks=gait.corner_phases)
     blind = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1)
     assert exact.distance == pytest.approx(blind.distance, rel=1e-4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "friction", [ISOTROPIC, ANISOTROPIC, colloc.Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)]
-)
-def test_slow_enough_is_where_the_part_is_lost(friction):
-    froude = colloc.slow_enough(CHAIN, friction, GAIT, 1e-3, 0.01)
-    slow = colloc.replay(CHAIN, friction, GAIT, 1e-3).efficiency
-    played = colloc.inertial_motion(CHAIN, friction, GAIT, 1e-3, froude, tolerance=1e-4)
-    assert abs(1 - played.efficiency / slow) == pytest.approx(0.01, rel=0.06)
 
 
 @pytest.mark.parametrize("loss", [0.01, 0.2])
@@ -358,24 +333,6 @@ def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_frictio
     )
     # some 30,000, by rounding, where more would let the first method give up
     assert len(asked) < 50_000
-
-
-def test_momenta_that_lead_nowhere_give_way_to_slow_ones_and_these_to_rest(monkeypatch):
-    at, begun, closed = (CHAIN, ISOTROPIC, GAIT, 1e-2, 0.1), [], GaitWithInertia.rough_period
-    usual = colloc.inertial_motion(*at, tolerance=1e-3)
-
-    def mostly_lost(self, near):
-        begun.append(near)
-        if len(begun) < 3:
-            raise colloc.NotConvergedError("nowhere")
-        return closed(self, near)
-
-    monkeypatch.setattr(GaitWithInertia, "rough_period", mostly_lost)
-    asked = np.array([0.1, 0.2, 0.3])
-    found = colloc.inertial_motion(*at, tolerance=1e-3, near=asked)
-    assert [near.any() for near in begun] == [True, True, False]
-    np.testing.assert_array_equal(begun[0], asked)
-    assert found.efficiency == pytest.approx(usual.efficiency, rel=1e-3)
 
 
 def test_a_gait_that_inertia_makes_better_is_slow_enough_up_to_where_it_is_by_that_part():

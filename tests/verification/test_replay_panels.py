@@ -72,34 +72,12 @@ def test_stated_errors_cover_a_kink_wherever_it_lies(share):
     assert np.median(np.array(stated) / true) < 8
 
 
-def test_what_smooth_motion_would_leave_is_stated_even_where_nothing_changes_by_accident():
-    """A rule of fourth order leaves a fifteenth of a sixteenth of the change on the panel twice as
-    wide, on both halves; and a kink a quarter of each change."""
-    nothing, wide = np.zeros((1, 5)), np.ones((1, 5))
-    assert remaining_error(nothing, nothing, wide).min() >= 1 / (2 * 16 * 15)
-    np.testing.assert_allclose(remaining_error(wide, wide, wide), 1 / 3)
-
-
 def test_corners_are_not_taken_for_kinks():
     """On both sides of a jump the power is linear: nothing is left, though the instants beside it
     do not fit."""
     assert stated_work(panels_of(lambda t: np.where(t < 0.5, 1 + t, 3 - t), corner=0.5)) < 1e-14
     kept_in_view = panels_of(lambda t: np.where(t < 0.51, 1 + t, 3 - t))
     assert stated_work(kept_in_view) > 1e-3
-
-
-def test_halves_carry_on_and_know_what_halving_their_panel_changed():
-    panels, n = panels_of(np.exp), 16
-    changed = changes(panels)[0]
-    between = panels.left[:, None] + panels.width[:, None] * (np.arange(4) + 0.5) / 4
-    finer = panels.halves(at_rest(np.exp(between)), changed)
-    for side in (0, 1):
-        np.testing.assert_array_equal(finer.wider[side::2], changed)
-    np.testing.assert_array_equal(finer.left, np.arange(2 * n) / (2 * n))
-    instants = finer.left[:, None] + finer.width[:, None] * np.linspace(0, 1, 5)
-    np.testing.assert_allclose(finer.rates[..., WORK], np.exp(instants), rtol=1e-15)
-    off = abs(increments(panels)[WORK].sum() - np.e + 1)
-    np.testing.assert_allclose(changed[:, WORK].sum(), 15 * off, rtol=0.01)
 
 
 @pytest.mark.parametrize("steady", [False, True])
