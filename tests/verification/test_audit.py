@@ -6,6 +6,7 @@ import pytest
 from benchmarks.audit import crossing, path_of, wrong
 from benchmarks.independent_replay import Crawler, Gait, Played, played, played_together
 from colloc import Chain
+from colloc.mechanics.contact import crossing_depth
 
 ELLIPSE = [[0.0, 0.0], [[2.0], [-2.0]], [[1.0], [1.0]]]
 TRUE = Played(0.05, 0.1, 2.0, 0.0, 100, 1e-9)
@@ -32,7 +33,7 @@ def test_gaits_played_together_are_those_played_alone():
 @pytest.mark.parametrize("lengths", [(1 / 3, 1 / 3, 1 / 3), (0.45, 0.2, 0.35)])
 def test_links_cross_where_collocs_own_test_says_so(lengths):
     angles = np.random.default_rng(0).uniform(-np.pi, np.pi, (2, 4000))
-    depth = Chain(lengths).crossing_depth(angles)
+    depth = crossing_depth(Chain(lengths), angles)
     crossed = crossing(lengths, angles)
     assert 0.02 < crossed.mean() < 0.3
     np.testing.assert_array_equal(crossed, depth > 0)

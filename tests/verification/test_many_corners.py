@@ -9,6 +9,7 @@ import pytest
 
 from colloc import Chain, Friction, replay
 from colloc.gaits.polygon import Corners
+from colloc.mechanics.contact import crossing_depth
 
 FILE = Path(__file__).resolve().parents[2] / "results/curated/many_corners.json"
 
@@ -21,4 +22,4 @@ def test_the_best_polygon_that_is_known_is_replayed_at_its_value():
     found = replay(Chain(), Friction(), gait, 1e-5 * gait.length, breaks=gait.corner_phases)
     assert found.efficiency == pytest.approx(0.448547, abs=2e-6)
     assert found.distance == pytest.approx(0.677236, abs=2e-6)
-    assert Chain().crossing_depth(gait.angles(np.linspace(0, 1, 20001))).max() == 0
+    assert crossing_depth(Chain(), gait.angles(np.linspace(0, 1, 20001))).max() == 0
