@@ -239,7 +239,9 @@ def test_a_gait_that_is_given_is_evaluated_at_its_pace():
 def test_what_a_gait_that_turns_is_worth_slowly_is_the_limit_of_slow_paces():
     """Its chord, then, as at any pace."""
     bent = colloc.Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
-    found = colloc.evaluate(colloc.Problem("bent", froude=1e-5, delta=1e-2), bent)
+    found = colloc.evaluate(
+        colloc.Problem("bent", froude=1e-5, delta=0.1, mesh_tolerance=1e-3), bent
+    )
     assert abs(found.rotation) > 0.3
     assert found.played_slowly == pytest.approx(found.value, rel=1e-3)
 

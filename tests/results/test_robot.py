@@ -162,8 +162,8 @@ def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_at_the_peri
     three_link,
 ):
     """No limit to solve with is advised: such a gait may be slower."""
-    sheet = str(three_link.robot(1.2, 3, 5, max_speed=[2, 3]))
-    facts = three_link.robot(1.2, 3, 5, max_speed=[2, 3]).facts
+    robot = three_link.robot(1.2, 3, 5, max_speed=[2, 3])
+    sheet, facts = str(robot), robot.facts
     slower = three_link.robot(1.2, 3, facts["shortest_period_s"]).facts["speed_m_per_s"]
     assert facts["speed_at_shortest_period_m_per_s"] == pytest.approx(slower, rel=1e-6)
     assert f"with the gait's own timing ({slower:.4g} m/s)" in sheet

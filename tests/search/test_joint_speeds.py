@@ -55,6 +55,7 @@ def test_the_fastest_instants_are_as_fast_as_allowed(gait, limit, more):
     assert share.max() == pytest.approx(1.0, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_flat_top_that_the_second_round_comes_back_to_is_no_end():
     """Instants that move far make the first round overshoot; the rounds that follow them settle."""
     stated = Problem(

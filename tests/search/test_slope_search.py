@@ -15,7 +15,7 @@ from colloc import (
     load,
     save,
 )
-from colloc.commands.results import report
+from colloc.commands.summary import summary_lines
 from colloc.commands.verify import verify
 from colloc.gaits.control_problem import control_problem
 from colloc.mechanics.bodies import FULL
@@ -56,6 +56,7 @@ def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
     )
 
 
+@pytest.mark.slow
 def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, capsys):
     found = solve(SIDES, 1)
     assert (found.status, found.answer.program) == ("solved", FULL), found.message
@@ -104,7 +105,7 @@ def test_whole_periods_add_up_along_the_fall_line(uphill):
     )
 
 
-def test_it_is_kept_verified_reported_and_summarised_like_any_other(uphill, tmp_path, capsys):
+def test_it_is_kept_verified_and_summarised_like_any_other(uphill, tmp_path, capsys):
     path = save(uphill, tmp_path / "climber.h5")
     again = load(path)
     assert again.certificate == uphill.certificate
@@ -112,8 +113,7 @@ def test_it_is_kept_verified_reported_and_summarised_like_any_other(uphill, tmp_
     assert again.gait.theta == uphill.gait.theta
     assert verify([str(path)]) == 0
     assert "certified" in capsys.readouterr().out
-    assert report([str(path)]) == 0
-    assert "slope of grade 0.1" in path.with_suffix(".html").read_text(encoding="utf-8")
+    assert any("slope of grade 0.1" in line for line in summary_lines(again, None, verbose=True))
 
 
 def test_a_gait_that_turns_and_points_elsewhere_fails_its_certificate(uphill):
@@ -165,6 +165,6 @@ def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
 
 
 def test_a_slope_that_is_not_climbed_is_said_so():
-    found = solve(PROBLEM.with_(grade=0.9), 1)
+    found = solve(PROBLEM.with_(grade=0.9, delta=0.1), 1)
     assert found.status == "not converged"
     assert "no gait was found that climbs a grade of 0.9" in found.message
