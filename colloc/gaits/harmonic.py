@@ -199,10 +199,12 @@ class Harmonic(LinearClass):
         # 1, cos 1, sin 1, cos 2, ...
         k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
         waves = np.empty((2 * self.harmonics + 1, t.size))
-        if derivative:
+        if derivative % 2:
             waves[0], waves[1::2], waves[2::2] = 0.0, -k * np.sin(k * t), k * np.cos(k * t)
         else:
             waves[0], waves[1::2], waves[2::2] = 1.0, np.cos(k * t), np.sin(k * t)
+        if derivative == 2:
+            waves *= np.concatenate([[0.0], np.repeat(-(k[:, 0] ** 2), 2)])[:, None]
         return waves
 
     @property

@@ -148,17 +148,34 @@ class Paced(Regime):
                 f"as nothing with inertia "
                 f"does: take symmetry {ANTIPODAL!r} or {NONE!r}."
             )
-        if problem.path_limits.names or any(each.needs_forces for each in problem.integrals):
+        if any(each.needs_forces for each in problem.integrals):
             raise ProblemError(
-                "what single joints have to do with inertia is not known yet: leave driven work "
-                "and limits out."
+                "the work of single joints with inertia is not known yet: leave driven work out."
             )
+        if problem.path_limits.needs_forces:
+            _check_accelerations(problem.gait, problem.body.n_joint)
         if problem.formulation != FULL:
             raise ProblemError(f"with inertia there is only the formulation {FULL!r}.")
         if scheme(problem.scheme).left:
             raise ProblemError(
                 f"with inertia a gauss-N or radau-N scheme is needed, not {problem.scheme}."
             )
+
+
+def _check_accelerations(gait_class: Any, n_joint: int) -> None:
+    if gait_class.relative_delta:
+        raise ProblemError(
+            "with inertia torques are infinite where joint rates jump: limit them for gaits of a "
+            "smooth class, such as Harmonic or BSpline."
+        )
+    t, step = np.array([0.123, 0.456]), 1e-6
+    after, before = (gait_class.rate_matrix(t + by, n_joint) for by in (step, -step))
+    error = np.abs(gait_class.angle_matrix(t, n_joint, 2) - (after - before) / (2 * step)).max()
+    if not error < 1e-3 * np.abs(after).max():
+        raise ProblemError(
+            f"torques with inertia need second derivatives of the gait, which "
+            f"{type(gait_class).__name__}.functions(t, 2) does not give."
+        )
 
 
 @dataclass(frozen=True)

@@ -150,6 +150,7 @@ class Kind(Protocol):
         on_theta: np.ndarray,
         on_out: np.ndarray,
         on_states: np.ndarray,
+        by_states: np.ndarray | float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Adjoint of the orientation: add its part to `on_out` ``(m, 4 + more, n, s)``, derivatives
         of m numbers along (rotation rate, velocity of the centre, power, rates of states) at the
@@ -232,6 +233,7 @@ class SlowOnLevel:
         on_theta: np.ndarray,
         on_out: np.ndarray,
         on_states: np.ndarray,
+        by_states: np.ndarray | float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:
         on_out[:, 0] += pose.on_rates(on_theta)
         return np.empty((len(on_out), 0)), np.empty((len(on_out), 0, mesh.n))
@@ -276,6 +278,7 @@ class _WithStates:
         on_theta: np.ndarray,
         on_out: np.ndarray,
         on_states: np.ndarray,
+        by_states: np.ndarray | float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:
         m, k, turns = len(on_out), len(self.states), [name == "theta" for name in self.states]
         if not any(turns):
@@ -283,6 +286,7 @@ class _WithStates:
         of_states = np.einsum(
             "mrt,rkt->mkt", on_out[:, :4].reshape(m, 4, -1), on_states[OUTPUTS, :k][:4]
         )
+        of_states += by_states
         of_states[:, turns] += on_theta.reshape(m, 1, -1)
         on_begin, on_rates, on_ends = self._equations(mesh).pulled_back(
             on_states[self._grow, :k], of_states
@@ -511,6 +515,14 @@ class WithInertia(_WithStates):
             mesh, np.array([name in STATES for name in self.states]), self._image, unit
         )
 
+    def torque_arguments(
+        self, shapes: Shapes, accelerations: np.ndarray, states: np.ndarray, begin: np.ndarray
+    ) -> tuple[Any, ...]:
+        """Body, law and regime, with what joint torques depend on
+        (`colloc.motion.torques.limit_shares`)."""
+        y = (shapes.angles, shapes.rates, accelerations, states, self._froude_at(shapes, begin))
+        return (self._chain, self.friction, self._regime), y
+
     def _froude_at(self, shapes: Shapes, begin: np.ndarray) -> float:
         froude = float(np.exp(-2.0 * begin[0])) if self._timed else self._regime.froude
         return froude * shapes.unit**2
@@ -536,6 +548,7 @@ def through_motion(
     shares: Iterable[Share],
     on_states: np.ndarray,
     by_theta: np.ndarray | float = 0.0,
+    by_states: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of m period totals along (rotation rate, velocity of the centre, power, rates of
     states) at the stages, ``(m, 4 + more, n, s)``, and those of `Kind.through_pose`; `by_theta`
@@ -546,7 +559,7 @@ def through_motion(
     rows = np.zeros((side.size, len(on_states[OUTPUTS]), *weight.shape))
     rows[:, 0], rows[:, 3] = (part[:, None, None] * weight for part in (rotation, work))
     rows[:, 1:3] = on_centre
-    return rows, *kind.through_pose(mesh, pose, on_theta + by_theta, rows, on_states)
+    return rows, *kind.through_pose(mesh, pose, on_theta + by_theta, rows, on_states, by_states)
 
 
 @singledispatch

@@ -57,6 +57,14 @@ class Scheme:
                     values[:, j] *= (tau - self.c[m]) / (self.c[j] - self.c[m])
         return values
 
+    def with_begin(self, tau: np.ndarray) -> np.ndarray:
+        """Weights ``(k, s + 1)`` of the state at the begin and at the nodes in the collocation
+        polynomial at tau ``(k,)``."""
+        nodes = np.concatenate([[0.0], self.c])
+        others = np.where(np.eye(nodes.size, dtype=bool), np.nan, nodes)
+        factors = (np.asarray(tau)[:, None, None] - others) / (nodes[:, None] - others)
+        return np.asarray(np.nanprod(factors, axis=2))
+
     def integrals(self, tau: np.ndarray) -> np.ndarray:
         """Integrals of the Lagrange polynomials from 0 to tau ``(k,)``, as ``(k, s)``."""
         tau = np.asarray(tau, dtype=float)

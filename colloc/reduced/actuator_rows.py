@@ -7,14 +7,10 @@ excess once the gait settles.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from colloc.mechanics.densities import PathLimits
-from colloc.motion.kinds import Shapes
 from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks
-from colloc.reduced.density_slopes import density_slopes
 from colloc.reduced.motion import ReducedMotion
 
 _INSIDE = np.linspace(1e-9, 1 - 1e-9, SAMPLES + 1)
@@ -43,9 +39,8 @@ class ActuatorRows:
         self,
         motion: ReducedMotion,
         limits: PathLimits,
-        at_times: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
     ) -> None:
-        self._motion, self._limits, self._at_times = motion, limits, at_times
+        self._motion, self._limits = motion, limits
         self.placed = np.empty((2, 0), dtype=int)
         shape = len(limits.names), motion.mesh.n_point
         self.lower, self.upper = np.tile(limits.least[:, None], shape[1]), np.ones(shape)
@@ -91,10 +86,7 @@ class ActuatorRows:
         return largest
 
     def _signed_at(self, v: np.ndarray, delta: float, t: np.ndarray) -> np.ndarray:
-        """Shares at times of the mesh, ``(n_share, n_time)``."""
-        motion = self._motion
-        shapes = Shapes(*self._at_times(v, t), delta)
-        return np.asarray(self._limits.at(motion.kind.instants(shapes, motion.theta(v, delta, t))))
+        return self._motion.shares(self._limits, v, delta, t)
 
     def of_moving_peaks(self, v: np.ndarray, delta: float, on_rows: np.ndarray) -> np.ndarray:
         """Part ``(n, n)`` of the Lagrangian's second derivatives that is due to peaks between the
@@ -121,7 +113,7 @@ class ActuatorRows:
         return curvature_of_moving(on_rows, shares(v, t).T, slopes.transpose(2, 1, 0))
 
     def _all(self, v: np.ndarray, delta: float) -> np.ndarray:
-        return np.asarray(self._limits.at(self._motion.instants(v, delta)))
+        return self._motion.shares(self._limits, v, delta)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         return self.lower[tuple(self.placed)], self.upper[tuple(self.placed)]
@@ -131,14 +123,9 @@ class ActuatorRows:
 
     def slopes(self, v: np.ndarray, delta: float) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
-        motion, now = self._motion, self._motion.instants(v, delta)
-        (share, point), each = self.placed, np.arange(self.placed.shape[1])
-        if not each.size:
+        if not self.placed.size:
             return np.empty((0, v.size))
-        slopes = density_slopes(self._limits, now.chosen(point))
-        on_points = np.zeros((each.size, slopes.shape[1], motion.mesh.n_point))
-        on_points[each, :, point] = slopes[share, :, each]
-        return motion.through_points(v, delta, on_points)
+        return self._motion.share_slopes(self._limits, v, delta, self.placed)
 
     def every_bound(self) -> tuple[np.ndarray, np.ndarray]:
         """Bounds at all points, in the order of the full program's rows."""

@@ -86,6 +86,15 @@ class LinearSpace:
         relative = self._admissible.gait.relative_delta
         return angles, rates / np.linalg.norm(rates, axis=0) if relative else rates
 
+    def _acceleration_matrix(self, t: np.ndarray) -> np.ndarray:
+        return self._admissible.gait.angle_matrix(t, self._admissible.n_joint, 2)
+
+    def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
+        return (self._acceleration_matrix(t) @ v).T
+
+    def accelerations_pulled_back(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+        return np.einsum("kjt,tjp->kp", on_points, self._acceleration_matrix(self.mesh.times))
+
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         if self._admissible.gait.relative_delta:
             _, unit, speed = self.at(v)
@@ -241,6 +250,12 @@ class SerpenoidSpace(LinearSpace):
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         return super().pulled_back(self.full_parameters(v), on_shape, on_pace) @ self._slopes(v)
+
+    def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
+        return super().accelerations(self.full_parameters(v), t)
+
+    def accelerations_pulled_back(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+        return super().accelerations_pulled_back(v, on_points) @ self._slopes(v)
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         return super().constraints(v, later).through(self.full_parameters, self._slopes)

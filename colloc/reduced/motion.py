@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from colloc.mechanics.densities import Instants, Quantity
+from colloc.mechanics.densities import Instants, PathLimits, Quantity
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
 from colloc.motion.kinds import (
     OMEGA,
@@ -24,10 +24,12 @@ from colloc.motion.kinds import (
     Kind,
     Passed,
     Share,
+    WithInertia,
     first_theta,
     through_motion,
 )
 from colloc.motion.kinds import Shapes as Moving
+from colloc.motion.torques import limit_share_slopes, limit_shares
 from colloc.numerics.mesh import Mesh
 
 
@@ -70,6 +72,7 @@ class ReducedMotion:
         self, kind: Kind, mesh: Mesh, shapes: Shapes, integrals: Sequence[Quantity] = ()
     ) -> None:
         self.body, self.friction, self.shapes, self.mesh = kind.body, kind.friction, shapes, mesh
+        self._space: Any = shapes  # a `SearchSpace` where actuators are limited
         self.kind, self._integrals, self._weight, self._point_weight = (
             kind,
             integrals,
@@ -141,6 +144,84 @@ class ReducedMotion:
                 s.values |= {each.name: float(each.at(now)[0] @ weight) for each in self._integrals}
         return s.values
 
+    def shares(
+        self, limits: PathLimits, v: np.ndarray, delta: float, t: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Shares of actuator limits ``(n_share, n_time)`` at the points of the mesh, or at times of
+        it."""
+        if limits.needs_forces and isinstance(self.kind, WithInertia):
+            of, y = self._torque_arguments(self.kind, v, delta, t)
+            return limit_shares(of, limits, y, delta)
+        if t is None:
+            return np.asarray(limits.at(self.instants(v, delta)))
+        angles, rates = self._space.at_times(v, t)
+        shapes = Moving(angles, rates, delta)
+        return np.asarray(limits.at(self.kind.instants(shapes, self.theta(v, delta, t))))
+
+    def share_slopes(
+        self, limits: PathLimits, v: np.ndarray, delta: float, rows: np.ndarray
+    ) -> np.ndarray:
+        """Derivatives ``(n_row, n)`` of shares of actuator limits; `rows` ``(2, n_row)`` are their
+        shares and points."""
+        share, point = rows
+        if limits.needs_forces and isinstance(self.kind, WithInertia):
+            return self._torque_share_slopes(self.kind, limits, v, delta, rows)
+        from colloc.reduced.density_slopes import density_slopes  # loads CasADi
+
+        slopes = density_slopes(limits, self.instants(v, delta).chosen(point))
+        each = np.arange(share.size)
+        on_points = np.zeros((share.size, slopes.shape[1], self.mesh.n_point))
+        on_points[each, :, point] = slopes[share, :, each]
+        return self.through_points(v, delta, on_points)
+
+    def _torque_arguments(
+        self, kind: WithInertia, v: np.ndarray, delta: float, t: np.ndarray | None = None
+    ) -> tuple[Any, ...]:
+        s = self.at(v, delta)
+        if t is None:
+            shapes, states, times = (
+                Moving(s.angles, s.rates, delta),
+                s.along.states,
+                self.mesh.times,
+            )
+        else:
+            times, (angles, rates) = t, self._space.at_times(v, t)
+            shapes = Moving(angles, rates, delta)
+            k = np.clip(np.searchsorted(self.mesh.edges, t, side="right") - 1, 0, self.mesh.n - 1)
+            tau = (t - self.mesh.edges[k]) / self.mesh.h[k]
+            momenta = s.along.states[: len(s.along.edges), self.mesh.points]
+            nodes = np.concatenate([s.along.edges[:, :-1, None], momenta], axis=2)
+            states = np.einsum("nj,anj->an", self.mesh.scheme.with_begin(tau), nodes[:, k])
+            if "theta" in kind.states:
+                states = np.vstack([states, self.theta(v, delta, t)])
+        return kind.torque_arguments(
+            shapes, self._space.accelerations(v, times), states, s.passed.told
+        )
+
+    def _torque_share_slopes(
+        self,
+        kind: WithInertia,
+        limits: PathLimits,
+        v: np.ndarray,
+        delta: float,
+        rows: np.ndarray,
+    ) -> np.ndarray:
+        of, y = self._torque_arguments(kind, v, delta)
+        share, point = rows
+        slopes = limit_share_slopes(of, limits, (*(row[:, point] for row in y[:-1]), y[-1]), delta)
+        s, n, k, each = self.at(v, delta), len(y[0]), len(kind.states), np.arange(share.size)
+        at_points = np.zeros((share.size, slopes.shape[1], self.mesh.n_point))
+        at_points[each, :, point] = slopes[share, :, each]
+        on_points = np.zeros((share.size, 2 * n + 1, self.mesh.n_point))
+        on_points[:, : 2 * n] = at_points[:, : 2 * n]
+        on_pace = np.zeros((share.size, self.mesh.n_point))
+        by_states, of_period = at_points[:, 3 * n : 3 * n + k], [Share()] * share.size
+        if "log_period" in kind.told:
+            on_froude = at_points[:, -1].sum(axis=1)
+            of_period = [Share(told=-2.0 * y[-1] * each) for each in on_froude]
+        through = self._through(s, of_period, on_points, on_pace, by_states)
+        return through + self._space.accelerations_pulled_back(v, at_points[:, 2 * n : 3 * n])
+
     def instants(self, v: np.ndarray, delta: float) -> Instants:
         s = self.at(v, delta)
         return self.kind.instants(Moving(s.angles, s.rates, delta), s.pose.theta_on(self.mesh), s.z)
@@ -183,13 +264,24 @@ class ReducedMotion:
         return self._through(self.at(v, delta), [Share()] * len(on_points), on_points, on_pace)
 
     def _through(
-        self, s: _State, shares: Sequence[Share], on_points: np.ndarray, on_pace: np.ndarray
+        self,
+        s: _State,
+        shares: Sequence[Share],
+        on_points: np.ndarray,
+        on_pace: np.ndarray,
+        by_states: np.ndarray | float = 0.0,
     ) -> np.ndarray:
         """Derivatives of numbers that depend on shapes, pace, and totals of the period."""
         mesh, kind = self.mesh, self.kind
         slopes, on_states = self._slopes(s)
         rows, on_begin, _ = through_motion(
-            kind, mesh, s.pose, shares, on_states * s.pace, on_points[:, -1][:, mesh.points]
+            kind,
+            mesh,
+            s.pose,
+            shares,
+            on_states * s.pace,
+            on_points[:, -1][:, mesh.points],
+            by_states,
         )
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point

@@ -49,6 +49,12 @@ class OneGait:
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return *self._gait(self.mesh.times), np.ones(self.mesh.n_point)
 
+    def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
+        raise NotImplementedError  # prescribed motions have no limits of actuators
+
+    def accelerations_pulled_back(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+        raise NotImplementedError
+
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         return np.empty((len(on_shape), 0))
 

@@ -44,6 +44,13 @@ class SearchSpace(Shapes, Protocol):
     def at_times(self, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Angles and rates ``(n_joint, n_time)`` at times of the mesh."""
 
+    def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Second derivatives of the angles, ``(n_joint, n_time)``."""
+
+    def accelerations_pulled_back(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+        """Derivatives ``(k, n)`` of k numbers, from those along the accelerations at the points,
+        ``(k, n_joint, n_point)``."""
+
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """Path constraints at the worst instants of v, or later by a part of the mesh cell."""
 
@@ -76,7 +83,7 @@ class ReducedProgram:
             np.array([*equal, *least]),
             np.array([*equal, *np.full(len(least), np.inf)]),
         )
-        self.actuators = ActuatorRows(self.motion, limits, space.at_times) if limits.names else None
+        self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
         self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None
 

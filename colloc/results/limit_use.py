@@ -14,6 +14,7 @@ from colloc.mechanics.actuators import largest_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.law import rate_independent
+from colloc.results.robot import joint_torques
 from colloc.results.solution import Solution
 
 _INSTANTS = np.arange(2000) / 2000
@@ -43,6 +44,9 @@ def shares(solution: Solution) -> dict[str, float]:
         z, load = (motion.z, problem.regime.pull(motion.theta[None])) if forces else (None, None)
         at = (body, problem.law, motion.angles, motion.rates, solution.delta_per_period)
         now = Instants(*at, z, load=load, joint_map=problem.joint_map)
+        if forces and problem.froude:
+            moments = joint_torques(solution, _INSTANTS, motion)
+            now = Instants(*at, moments=moments)
         each_used = iter(limits.sizes(limits.at(now)).max(axis=1))
         used |= {x.name: max(float(next(each_used)) for _ in x.names) for x in limits.each}
     return used

@@ -21,13 +21,11 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import (
     GRAVITY,
     checked_mass,
-    inertial_moments,
     momenta,
-    momentum_rates,
     tail_velocity,
 )
 from colloc.mechanics.law import rate_independent
-from colloc.mechanics.links import LinkVelocity
+from colloc.motion.torques import accelerating_torques
 from colloc.results.arc import arc
 from colloc.results.motion import Column, SampledMotion, motion_dataset, turned
 from colloc.results.solution import Solution, direction_of_travel
@@ -40,7 +38,6 @@ if TYPE_CHECKING:
     import xarray
 
 SLOW_ENOUGH = 0.01  # share of the efficiency that inertia may take from a quasi-static gait
-_STEP = 1e-5  # of a period, for central differences of link velocities
 _SAME_PACE = 0.01  # relative difference of Froude numbers that counts as none
 _ACCURACY = 1e-6  # of the momenta with inertia
 _SMALLEST_LOSS, _SMALLEST_TURN = 1e-3, 0.1  # share, and degrees per period, that are stated
@@ -68,8 +65,12 @@ def joint_torques(
     load = problem.regime.pull(motion.theta[None])
     if not froude:
         return quasi_static_torques(solution, angles, rates, load, start=z)
-    friction = quasi_static_torques(solution, angles, rates, load, z)
-    return friction + _inertial_torques(solution, t, z, load, froude)
+    body, law = checked_mass(problem.body), problem.law
+    posture = body.posture(angles)
+    states = momenta(body, posture, body.velocity(posture, rates, z))
+    how: Any = {"delta": solution.delta_per_period, "froude": froude}
+    inertial = accelerating_torques(body, law, solution.gait, t, states, load, **how)
+    return quasi_static_torques(solution, angles, rates, load, z) + problem.of_motors(inertial)
 
 
 def quasi_static_torques(
@@ -89,29 +90,6 @@ def quasi_static_torques(
         z = balance(law, angles, rates, delta, start=start).z
     forces = body.forces(law, angles, rates, z, delta)
     return solution.problem.of_motors(joint_moments(body, angles, forces, load))
-
-
-def _inertial_torques(
-    solution: Solution, t: np.ndarray, z: np.ndarray, load: np.ndarray | None, froude: float
-) -> np.ndarray:
-    """Motor torques that accelerate the links."""
-    problem, how = solution.problem, {"delta": solution.delta_per_period, "froude": froude}
-    body, joints = checked_mass(problem.body), solution.gait
-    angles, rates = joints(t)
-    link = body.velocity(body.posture(angles), rates, z)
-    states = momenta(body, body.posture(angles), link)
-    changes = momentum_rates(body, problem.law, angles, rates, states, **how).rates
-    if load is not None:
-        changes[:2] += load / froude
-
-    def link_velocity(by: float) -> LinkVelocity:
-        then, pace = joints(t + by)
-        tail = tail_velocity(body, then, pace, states + by * changes)
-        return body.velocity(body.posture(then), pace, tail)
-
-    pairs = zip(link_velocity(-_STEP), link_velocity(_STEP), strict=True)
-    growth = LinkVelocity(*((after - before) / (2 * _STEP) for before, after in pairs))
-    return problem.of_motors(froude * inertial_moments(body, angles, link, growth))
 
 
 class _MotionWithInertia:

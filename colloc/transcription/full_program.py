@@ -20,9 +20,11 @@ inertia the momenta m of the body take the place of N and M::
     m = (sum m_i v_i in the tail's axes, sum J_i w_i + m_i x_i x v_i)
     m' = (sum f_i + m_i g, sum c_i + x_i x f_i) / Fr + turning of the axes        collocated
 
-with x_i the midpoints seen from the centre of mass. Other bodies, and the formulation "implicit
-velocity", have shape coordinates q, rates r and tail velocity z as variables, and z = Z(q, r), the
-velocity that balances them, in place of friction and balance (`colloc.transcription.velocity_map`).
+with x_i the midpoints seen from the centre of mass; where torques are limited they follow from
+q'', variables too, and the momenta (`colloc.motion.torques`). Other bodies, and the formulation
+"implicit velocity", have shape coordinates q, rates r and tail velocity z as variables, and z =
+Z(q, r), the velocity that balances them, in place of friction and balance
+(`colloc.transcription.velocity_map`).
 
 Inequalities are the limits of the shape, each at the worst instant of the mesh cells in which it
 may bind for a given gait; what actuators can do, at every point; and the mean shape speed. All
@@ -53,6 +55,7 @@ from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.link_friction import LinkForce
 from colloc.motion.heading import closing_sign, momenta_image
 from colloc.motion.kinds import kind_of_motion
+from colloc.motion.torques import torque_function
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.repeated import Nlp, Repeated, Rows, nonlinear_program
 from colloc.transcription.layout import RADIANS, Layout, layout_of
@@ -450,35 +453,58 @@ class _Links(_Motion):
 
     def _change(self) -> np.ndarray:
         """Velocity of the centre of mass in tail axes, and the rates of the momenta."""
-        layout, regime = self.layout, self.dynamics.regime
-        free = [layout.pace] if regime.free_pace else []
-        paces = np.repeat(layout.parameters[free], self.mesh.n_point, axis=1)
+        layout, (free, paces) = self.layout, self._paces()
         gather = np.concatenate(
             [
                 layout.directions[:1],
                 layout.spins[:1],
                 layout.centre,
                 layout.momenta[:, self.sites],
-                paces.reshape(len(free), self.mesh.n_point),
+                paces,
             ]
         )
         local = ca.SX.sym("point", gather.shape[0])
         phi, w, vx, vy, fx, fy, moment = ca.vertsplit(local)[:7]
         momenta = local[7 : 7 + len(STATES)]
-        froude = (ca.exp(-2.0 * local[-1]) if free else regime.froude) * RADIANS**2
         c, s = ca.cos(phi), ca.sin(phi)
-        pushed = ca.vertcat(c * fx + s * fy, c * fy - s * fx, moment) / froude
+        pushed = ca.vertcat(c * fx + s * fy, c * fy - s * fx, moment) / self._froude(local, free)
         changes = pushed + turning(ca.vertcat(0, 0, w), momenta)
         out = ca.vertcat(c * vx + s * vy, c * vy - s * vx, changes)
         return self.program.repeat(local, out, gather, delta=self.delta)
 
     def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
         layout, n = self.layout, self.chain.n_joint
-        rows = [layout.directions, layout.spins, *([layout.moments] if with_moments else [])]
+        rows = [layout.directions, layout.spins]
+        inertial = with_moments and bool(layout.momenta.size)
+        if inertial:
+            free, paces = self._paces()
+            rows += [layout.accelerations, layout.momenta[:, self.sites], paces]
+        elif with_moments:
+            rows.append(layout.moments)
         gather = np.concatenate(rows)
         local = ca.SX.sym("point", gather.shape[0])
-        phi, w, moment = local[: n + 1], local[n + 1 : 2 * n + 2], local[2 * n + 2 :]
-        return local, gather, ca.diff(phi), ca.diff(w), moment if with_moments else None
+        phi, w, rest = local[: n + 1], local[n + 1 : 2 * n + 2], local[2 * n + 2 :]
+        q, r = ca.diff(phi), ca.diff(w)
+        if not inertial:
+            return local, gather, q, r, rest if with_moments else None
+        states = rest[n : n + len(STATES)]
+        if self.dynamics.regime.pull(phi[0]) is not None:
+            states = ca.vertcat(states, phi[0])
+        torques = torque_function(
+            self.chain, self.dynamics.law, self.dynamics.regime, states.numel()
+        )
+        moment = torques(q, r, rest[:n], states, self.delta, self._froude(local, free))
+        return local, gather, q, r, moment
+
+    def _paces(self) -> tuple[bool, np.ndarray]:
+        """Whether the pace is free, and its parameter at every point, ``(1 or 0, n_point)``."""
+        free = [self.layout.pace] if self.dynamics.regime.free_pace else []
+        paces = np.repeat(self.layout.parameters[free], self.mesh.n_point, axis=1)
+        return bool(free), paces.reshape(len(free), self.mesh.n_point)
+
+    def _froude(self, local: ca.SX, free: bool) -> Any:
+        """Froude number for time in radians; a free log period is the last local variable."""
+        return (ca.exp(-2.0 * local[-1]) if free else self.dynamics.regime.froude) * RADIANS**2
 
     def _on_links(self, output: int) -> sparse.csr_matrix:
         """Sum over the contacts of each link."""
@@ -548,6 +574,13 @@ class _Links(_Motion):
             program.add(
                 f"momentum {name}", state @ sites - RADIANS * rate @ pick(self.change[2 + k])
             )
+        if layout.accelerations.size:
+            matrix = self.control.admissible.gait.angle_matrix(
+                self.mesh.times, self.chain.n_joint, 2
+            )
+            rows = matrix.transpose(1, 0, 2).reshape(-1, matrix.shape[2]) / RADIANS**2
+            p = pick(layout.parameters)
+            program.add("accelerations", pick(layout.accelerations) - sparse.csr_matrix(rows) @ p)
         image = momenta_image(self.dynamics.symmetry)
         begin, end = pick(layout.momenta[:, 0]), pick(layout.momenta[:, -1])
         program.add("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin))

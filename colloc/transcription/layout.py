@@ -29,7 +29,8 @@ class Layout:
     points of a lifted chain the directions of the links, their rotation rates, the velocities of
     their midpoints, the friction on what touches the floor, the shape speed where delta is relative
     to it, and the force and the moment at each joint or, with inertia, positions of the midpoints
-    from the centre of mass and the velocity of that, force and moment about it; of other bodies
+    from the centre of mass and the velocity of that, force and moment about it, and where torques
+    are limited the accelerations of the joints; of other bodies
     shape coordinates, their rates and the tail velocity z.
     """
 
@@ -39,6 +40,7 @@ class Layout:
     work: np.ndarray
     totals: np.ndarray
     momenta: np.ndarray
+    accelerations: np.ndarray
     directions: np.ndarray
     spins: np.ndarray
     vx: np.ndarray
@@ -96,6 +98,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
         "work": (1, mesh.n + 1),
         "totals": (len(control.aims.integrals), 1),
         "momenta": (len(STATES) * inertial, mesh.n_site),
+        "accelerations": (n_joint, moved * control.actuators.needs_forces),
         **dict.fromkeys(("directions", "spins", "vx", "vy"), (n_joint + 1, lifted)),
         "friction": (contacts, lifted),
         "speed": (1, lifted * gait.relative_delta),

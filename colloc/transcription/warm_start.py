@@ -68,6 +68,9 @@ def balanced_variables(
     if layout.momenta.size:
         x[layout.momenta[:, mesh.sites]] = along.states[: len(layout.momenta), points]
         x[layout.momenta[:, mesh.edge_sites]] = along.edges
+    if layout.accelerations.size:
+        matrix = gaits.angle_matrix(mesh.times, n_joint, 2) / RADIANS**2
+        x[layout.accelerations] = (matrix @ parameters).T
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     else:

@@ -19,12 +19,13 @@ from colloc.gaits.period import Period, chord_per_way
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import LENGTH, Quantity, quantities_of
+from colloc.mechanics.densities import LENGTH, Instants, PathLimits, Quantity, quantities_of
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_mass, kinetic_energy, momenta, tail_velocity
 from colloc.mechanics.law import Law
 from colloc.motion.compiled_momenta import MomentaAt
 from colloc.motion.follow import ONE_SIDED, STEP, Course, followed
+from colloc.motion.torques import joint_torques
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
@@ -360,6 +361,7 @@ def inertial_replay(
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
     quantities: Iterable[Quantity | str] = (),
+    limits: PathLimits | None = None,
     near: Replay | None = None,
     **_: object,
 ) -> Replay:
@@ -386,6 +388,13 @@ def inertial_replay(
     z = tail_velocity(chain, angles, rates, states[_MOMENTA])
     energy = regime.froude * kinetic_energy(chain, angles, rates, z)[0]
     change = states[:, -1] - states[:, 0]
+    shares = np.empty(0)
+    if limits is not None and limits.names:
+        load = regime.pull(states[None, _THETA])
+        at: Any = {"delta": delta, "froude": regime.froude}
+        moments = joint_torques(chain, friction, moving.path, phases, states[_MOMENTA], load, **at)
+        now = Instants(chain, friction, angles, rates, delta, moments=moments)
+        shares = limits.sizes(limits.at(now)).max(axis=1)
     return Replay(
         values=ran.values,
         errors=ran.errors,
@@ -399,6 +408,7 @@ def inertial_replay(
         tail=(phases, z),
         objective=objective,
         across=regime.counted(complex(*change[_PLACE])).imag,
+        shares=shares,
         multipliers=tuple(map(complex, ran.multipliers)),
     )
 
