@@ -1,4 +1,4 @@
-"""How commands end: an exit code, and one sentence instead of a traceback.
+"""End of a command: an exit code, and one sentence instead of a traceback.
 
 0 success; 2 bad problem, option or file; 3 not converged or none found; 4 a certificate failed;
 130 interrupted; 141 the reader of the output left. Nothing slow is imported here.

@@ -7,7 +7,6 @@ import csv
 import io
 import json
 import math
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -27,7 +26,7 @@ from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import STATUSES, Outcome, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import ProblemError, StoreError
-from colloc.system.files import locked, replaced_file
+from colloc.system.files import lock_file, write_text
 
 if TYPE_CHECKING:
     from colloc.results.archive import Archive
@@ -85,9 +84,8 @@ def starts_summary(
 @cli.command(
     "multistart",
     """\
-Start k of a seed is the same gait whatever --starts and --workers are. What the archive of the
-problem holds already is not solved again: the same command goes on after Ctrl-C, and a larger
---starts or another --seed adds to it.
+Start k of a seed is the same gait whatever --starts and --workers are. What the archive holds is
+not solved again: the same command goes on after Ctrl-C, and more starts and seeds add to it.
 
   colloc multistart problems/three_link.py --starts 100 --workers 2""",
     *cli.PROBLEM,
@@ -190,23 +188,28 @@ def sweep(options: argparse.Namespace) -> int:
     # slow imports only now: a bad study is refused at once
     from colloc.studies.run import StudyRun
 
-    out = cli.output_folder(options.output)
-    folder = out / f"{study.name}.study"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"cannot make the folder {folder}: {error.strerror or error}.") from None
-    if not (os.access(folder, os.W_OK) and os.access(out, os.W_OK)):
-        raise StoreError(f"cannot write in {out}; choose another --output.")
-    with locked(folder / "lock"):
+    path = cli.output_path(None, cli.output_folder(options.output) / f"{study.name}.nc")
+    folder = path.with_suffix(".study")
+
+    def save() -> None:
+        from colloc.bounds.optimality_gap import upper_bound
+        from colloc.studies.table import save_study, study_table
+
+        def bound(problem: Problem) -> float | None:
+            known = upper_bound(problem, path.parent, compute=False)
+            return None if known is None else known.sampled
+
+        save_study(study_table(run, bound), path, source=source, command=options.command)
+
+    with lock_file(folder / "lock"):
         run = StudyRun(study, folder, retry=options.retry)
         if not cli.quiet(options):
             total = math.prod(study.shape)
             print(f"{study.name}: {total} cells, {run.visited} of them in the journal", flush=True)
         try:
-            interrupted = _run_cells(run, options, lambda: _save(run, out, source, options.command))
+            interrupted = _run_cells(run, options, save)
         finally:
-            path = _save(run, out, source, options.command)
+            save()
     cli.tell(options, *sweep_summary(run, path))
     if interrupted:
         cli.complain("interrupted; what is done is kept, and the same command goes on from there.")
@@ -215,7 +218,7 @@ def sweep(options: argparse.Namespace) -> int:
     return OK if solved == math.prod(study.shape) else NONE_FOUND
 
 
-def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], Path]) -> bool:
+def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], None]) -> bool:
     """Work until all is done, saving now and then; whether Ctrl-C came."""
     from colloc.system.task_pool import process_pool
 
@@ -251,18 +254,6 @@ def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], Pa
     except BrokenExecutor as error:
         raise StoreError(f"no worker could be started ({error}); what is done is kept.") from None
     return False
-
-
-def _save(run: StudyRun, out: Path, source: str, command: str) -> Path:
-    from colloc.bounds.optimality_gap import upper_bound
-    from colloc.studies.table import save_study, study_table
-
-    def bound(problem: Problem) -> float | None:
-        known = upper_bound(problem, out, compute=False)
-        return None if known is None else known.sampled
-
-    path = out / f"{run.study.name}.nc"
-    return save_study(study_table(run, bound), path, source=source, command=command)
 
 
 def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]:
@@ -328,8 +319,7 @@ def _save_family(
         saved += (one := save_result(solution, table.with_suffix("") / f"{name}.h5"))
         paths.append(one[0].path)
     content, facts, lines, points = describe(paths)
-    with replaced_file(table) as temporary:
-        Path(temporary).write_text(content, encoding="utf-8", newline="")
+    write_text(table, content)
     files = [table]
     if not options.no_figure:
         from colloc.pictures.style import save as save_figure
@@ -345,11 +335,9 @@ def _save_family(
     "pareto",
     """\
 An objective is "efficiency", "speed", "turning", or an expression of distance, work, rotation and
-length of a period. Every point is a result like any other: NAME.front/00.h5 is the best by the
-first objective, the last one the best by the second. Exit code 4: a gap is left where gaits are
-not certified.
+length of a period. Every point is a result: NAME.front/00.h5 is the best by the first objective,
+the last one the best by the second. Exit code 4: a gap is left where gaits are not certified.
 
-  colloc pareto problems/three_link.py
   colloc pareto mine.py --objectives distance "distance / work" --points 15""",
     *cli.PROBLEM,
     cli.text(
@@ -414,12 +402,10 @@ def pareto(options: argparse.Namespace) -> int:
     "steer",
     """\
 Positive angles turn left, counter-clockwise. The problem states the gait that goes straight. Every
-gait is a result like any other: NAME.steer/00.h5 turns right the most. NAME.steer.json holds all
-their joint angles at equal phases: a controller interpolates between two turns. --spot adds the
-gaits of least work for their turn, NAME.steer/spot_00.h5 and so on. Chord and radius are those of
-the arc that a period crawls.
+gait is a result: NAME.steer/00.h5 turns right the most, NAME.steer/spot_00.h5 with --spot. A
+controller interpolates the joint angles in NAME.steer.json. Chord and radius are those of the arc
+of a period.
 
-  colloc steer problems/three_link.py
   colloc steer mine.py --turn -40 -20 -10 0 10 20 40 --spot -30 30""",
     *cli.PROBLEM,
     cli.number(

@@ -26,7 +26,6 @@ def _written(path: Path) -> tuple[dict[str, Any], str]:
 The page needs no network and no other file. Results that failed get one too.
 
   colloc report results/three_link.h5                 results/three_link.html
-  colloc report results/three_link.h5 --figures       also PDF and PNG of each panel
   colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5   of a robot""",
     cli.RESULT,
     cli.text("--problem", "FILE.py", "problem file with the REFERENCE to compare the result with"),
@@ -71,8 +70,7 @@ Orange arrows are the friction on the links; the large disc is the head; the sma
 first two joint angles.
 
   colloc animate results/three_link.h5                            results/three_link.gif
-  colloc animate results/three_link.h5 --format mp4 --fps 50      needs ffmpeg
-  colloc animate results/three_link.h5 --periods 4 --seconds 2 --no-arrows""",
+  colloc animate results/three_link.h5 --format mp4 --fps 50      needs ffmpeg""",
     cli.RESULT,
     cli.choice("--format", ("gif", "mp4"), "default: by the suffix of --output, else gif"),
     cli.count("--periods", "N", "periods in a row (default: 2)", 2),
@@ -103,20 +101,16 @@ def animate(options: argparse.Namespace) -> int:
     """\
 With --max-speed the path is retimed as evenly as the limits allow; without --period as fast as they
 allow. Where the pace matters (drag, power limits) the gait's own timing is kept and the period
-stretched. The period is rounded up to a whole number of samples; the cycle repeats after the last
-sample. Samples at times below 0 lead from the straight body, at rest, into the gait; --no-ramp
-leaves them out.
+stretched. The period is a whole number of samples; the cycle repeats after the last one. Samples
+before time 0 lead from the straight body, at rest, into the gait.
 
   colloc export results/three_link.h5 --period 4                          50 samples a second
-  colloc export results/three_link.h5 --max-speed 2.0 --rate 100          as fast as 2 rad/s allow
-  colloc export results/three_link.h5 --max-speed 2.0 1.0 --format json   a limit for each joint
+  colloc export results/three_link.h5 --max-speed 2.0 1.0 --rate 100      as fast as they allow
   colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3    with torques, powers
   colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3 --format mjcf    for MuJoCo
-  colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3 --format urdf    for others
 
-CSV: '#' lines about the result, then time_s, joint_1_rad, ..., joint_1_rad_per_s, ... (mode_1_rad,
-... of a smooth body) and, with --length and --mass, joint_1_N_m, ..., joint_1_W, ... Joints count
-from tail to head; angles are positive counter-clockwise.""",
+Columns: time_s, joint_1_rad, ..., joint_1_rad_per_s, ..., joint_1_N_m, ..., joint_1_W, ... (mode_1
+of a smooth body). Joints count from tail to head; angles are positive counter-clockwise.""",
     cli.RESULT,
     cli.number("--rate", "HZ", "samples a second (default: 50)", 50.0),
     cli.PERIOD,
@@ -189,12 +183,9 @@ def _trajectory_lines(solution: Solution, facts: dict[str, Any], periods: int) -
 @cli.command(
     "robot",
     """\
-The robot is as long as its links together, and its mass is spread over them as the problem says.
-The numbers are those at the period that is given, with inertia.
+Numbers include inertia at the period that is given.
 
-  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 \\
-    --max-speed 2.0 --max-torque 2.5 2.0
-  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --figure   with a picture""",
+  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --max-torque 2.5 2.0""",
     cli.RESULT,
     *(
         (name, settings | {"required": True})
@@ -224,10 +215,9 @@ def robot(options: argparse.Namespace) -> int:
 @cli.command(
     "sensitivity",
     """\
-The slope is the exact derivative at the optimum; multiply it by 0.1 for a tenth more. With --again
-every number is made a tenth smaller and larger and the gait re-optimised, a second or two each.
+The slope is the exact derivative at the optimum. With --again every number is made a tenth smaller
+and larger and the gait re-optimised, a second or two each.
 
-  colloc sensitivity results/three_link.h5
   colloc sensitivity results/three_link.h5 --again""",
     cli.RESULT,
     cli.flag("--again", "also re-optimise there, and compare with this gait"),

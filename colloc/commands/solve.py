@@ -33,7 +33,6 @@ A failed solve is kept as NAME.failed.h5, a former result of another problem cal
 better one of this problem, as NAME.former-1.h5. After Ctrl-C or a crash the same command goes on
 from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
 
-  colloc solve problems/three_link.py
   colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
   colloc solve mine.py --start results/three_link.h5      begin with the gait of another result""",
     *cli.PROBLEM,
@@ -135,8 +134,7 @@ they go from tail to head. Angles are radians unless names or --degrees say othe
 include the residual of the samples, with two standard deviations.
 
   colloc evaluate problems/three_link.py mine.csv                          results/mine-evaluated.h5
-  colloc compare results/mine-evaluated.h5 results/three_link.h5
-  colloc animate results/mine-evaluated.h5""",
+  colloc compare results/mine-evaluated.h5 results/three_link.h5""",
     cli.text("problem", None, "a Python file that states PROBLEM, for body, friction and limits"),
     cli.text("gait", "GAIT.csv", "times and joint angles"),
     cli.number("--period", "T", "in the file's unit of time (default: from repetition)"),
@@ -164,7 +162,6 @@ def evaluate(options: argparse.Namespace) -> int:
 Without --start: the distinct optima of the archive. With it: that start, solved again from its gait
 (from its guess, if it had failed) and saved as a result like any other.
 
-  colloc open results/three_link.starts.h5
   colloc open results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
     cli.text("archive", "ARCHIVE.h5", "an archive that colloc multistart wrote"),
     cli.count("--start", "N", "the start to make a result of"),

@@ -75,12 +75,11 @@ def summary_lines(
 def _background(solution: Solution) -> list[str]:
     problem = solution.problem
     paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
-    gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
-    return [
-        *(f"  search          {text}" for text in _search_lines(solution)),
-        *([f"  scene           {problem.scene}"] if problem.scene else []),
-        *(f"  gait            {text}" for text in gait),
-    ]
+    rows = [("search", text) for text in _search_lines(solution)]
+    rows += [("scene", problem.scene)] if problem.scene else []
+    rows += [("gait", f"class: {problem.gait.describe()}{paced}")]
+    rows += [("gait", text) for text in solution.gait.lines()]
+    return [f"  {name:<15s} {text}" for name, text in rows]
 
 
 def _check_lines(certificate: Certificate, verbose: bool) -> list[str]:

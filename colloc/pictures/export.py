@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from collections.abc import Sequence
@@ -24,7 +23,7 @@ from colloc.results.robot import Robot, joint_torques, pressing, quasi_static_to
 from colloc.results.solution import Solution
 from colloc.system.arguments import check_count, checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.files import replaced_file
+from colloc.system.files import write_text
 from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion
 from colloc.verification.trajectory import (
     MOST_SAMPLES,
@@ -40,6 +39,7 @@ _CROSSES = 1e-8  # depth of links in each other above rounding [body lengths]
 _FINE, _ACCURACY = 2000, 1e-5  # samples per period, and error, of where the body ends
 _SETTLED = 10  # periods after which all are alike
 _UNITS = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
+_Way = tuple[np.ndarray, np.ndarray, np.ndarray]  # times up to 0 [periods], angles, rates
 
 
 @checked_arguments
@@ -110,8 +110,8 @@ def write_export(
     if is_model:
         return _write_model(Robot(solution, length, mass, period, gravity), path)  # type: ignore[arg-type]
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
-    gait, own_pace = solution.gait.motor_gait, bool(problem.paced_by)
-    trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=own_pace)
+    gait, own_timing = solution.gait.motor_gait, bool(problem.paced_by)
+    trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=own_timing)
     facts = _about(solution, trajectory, rate, limits) | _pace(solution, trajectory.period, gravity)
     way = _approach(solution, trajectory, rate, limits) if ramp else None
     parts: list[Approach | Trajectory] = [trajectory] if way is None else [way, trajectory]
@@ -122,22 +122,23 @@ def write_export(
             raise ProblemError("torques need both the length and the mass of the robot.")
         # the period that was requested: that of whole samples may be another pace
         robot = Robot(solution, length, mass, period or trajectory.period, gravity)
-        at_pace = robot if limits is None or own_pace else None
-        if at_pace is None:  # inertia with another timing is not known
-            there = joint_torques(solution, trajectory.phase, froude=solution.froude)
-            torques = [robot.torque_unit * there]
-        else:
-            torques = [robot.torques(trajectory.phase)]
+        facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
+        if limits is None or own_timing:
+            at_pace, torques = robot, [robot.torques(trajectory.phase)]
+            facts["torques"] = "those of this pace; of slow motion before time 0"
+        else:  # inertia with another timing is not known
+            slow = joint_torques(solution, trajectory.phase, froude=solution.froude)
+            torques = [robot.torque_unit * slow]
+            facts["torques"] = "those of slow motion, as the pace is not the gait's own"
         if way is not None:
             joints = problem.joint_path(way.angles, trajectory.period * way.speeds)
-            slow = quasi_static_torques(solution, *joints, _pull(solution, way.time.size))
+            theta = getattr(solution.gait, "theta", None) or 0.0  # the initial heading on a slope
+            pull = problem.regime.pull(np.full((1, way.time.size), theta))
+            slow = quasi_static_torques(solution, *joints, pull)
             torques.insert(0, robot.torque_unit * slow)
         for part, row, torque in zip(parts, rows, torques, strict=True):
             row += [torque, torque * part.speeds]
-        facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
-        facts["torques"] = "those of slow motion, as the pace is not the gait's own"
         if at_pace is not None:
-            facts["torques"] = "those of this pace; of slow motion before time 0"
             facts["distance_at_this_pace_m"] = robot.facts["speed_m_per_s"] * robot.period
     if periods * trajectory.time.size > MOST_SAMPLES:
         raise ProblemError(
@@ -150,14 +151,19 @@ def write_export(
         facts |= _end(solution, trajectory, limits, periods, at_pace)
         time = np.append(way.time, time)
         table = np.append(np.array(rows[0]), table, axis=2)
-    write = _csv if path.suffix == ".csv" else _json
-    _write(path, write(facts, time, table, gait.coordinate))
+    columns = {unit: table[k] for k, unit in enumerate(_UNITS) if k < len(table)}
+    if path.suffix == ".csv":
+        lines = [f"# {key}: {json.dumps(value)}" for key, value in facts.items()]
+        count = table.shape[1]
+        names = [f"{gait.coordinate}_{j + 1}_{unit}" for unit in columns for j in range(count)]
+        lines.append(",".join(["time_s", *names]))
+        lines += [",".join(f"{x:.9g}" for x in row) for row in np.vstack([time, *table]).T]
+        write_text(path, "\n".join(lines) + "\n")
+    else:
+        arrays = {f"{_UNITS[unit]}_{unit}": values.tolist() for unit, values in columns.items()}
+        content = {**facts, "coordinate": gait.coordinate, "time_s": time.tolist(), **arrays}
+        write_text(path, json.dumps(content) + "\n")
     return facts
-
-
-def _write(path: Path, text: str) -> None:
-    with replaced_file(path) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8")
 
 
 def _approach(
@@ -178,12 +184,6 @@ def _approach(
             "(ramp=False, --no-ramp), and bring the robot to the first sample by hand."
         )
     return way
-
-
-def _pull(solution: Solution, count: int) -> np.ndarray | None:
-    """Downhill pull while the tail link keeps its initial heading."""
-    theta = getattr(solution.gait, "theta", None) or 0.0
-    return solution.problem.regime.pull(np.full((1, count), theta))
 
 
 def _end(
@@ -213,9 +213,6 @@ def _end(
         "end_turned_deg": math.degrees(turn),
         "end_includes_inertia": end is not None,
     }
-
-
-_Way = tuple[np.ndarray, np.ndarray, np.ndarray]  # times up to 0 [periods], angles, rates
 
 
 def _end_slowly(solution: Solution, way: _Way, periods: int) -> tuple[complex, float]:
@@ -251,12 +248,12 @@ def _end_with_inertia(
         before, state = state, cycle.run(state, _ACCURACY).states[:, -1]
     place, turn = complex(*state[4:6]), state[3] - before[3]
     last = place - complex(*before[4:6]) * np.exp(1j * turn)
-    more = RigidMotion(turn, last).repeated(periods - min(periods, _SETTLED))
+    more = RigidMotion(turn, last).repeat(periods - min(periods, _SETTLED))
     return complex(np.exp(1j * more.rotation) * place + more.shift), float(state[3] + more.rotation)
 
 
 def _write_model(robot: Robot, path: Path) -> dict[str, Any]:
-    _write(path, FORMATS[path.suffix](robot))
+    write_text(path, FORMATS[path.suffix](robot))
     names = ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")
     facts = {name: robot.facts[name] for name in names}
     facts |= {"length_m": robot.length, "mass_kg": robot.mass, "period_s": robot.period}
@@ -265,19 +262,15 @@ def _write_model(robot: Robot, path: Path) -> dict[str, Any]:
         "floor"
     )
     if path.suffix != ".urdf":
-        note = note_of(robot)
-        if rate_independent(robot.solution.problem.law):
+        note, solution = note_of(robot), robot.solution
+        if rate_independent(solution.problem.law):
             with suppress(ProblemError, NotConvergedError):
-                facts["moves_body_lengths_per_period"] = _distance_on_floor(robot)
+                facts["moves_body_lengths_per_period"] = inertial_motion(
+                    *floor_of(robot), solution.gait, solution.delta_per_period, robot.froude,
+                    tolerance=1e-3, turn=solution.rotation, breaks=solution.gait.corner_phases,
+                    regime=solution.problem.regime,
+                ).distance  # fmt: skip
     return facts | ({"note": note} if note else {})
-
-
-def _distance_on_floor(robot: Robot) -> float:
-    solution, gait = robot.solution, robot.solution.gait
-    return inertial_motion(
-        *floor_of(robot), gait, solution.delta_per_period, robot.froude, tolerance=1e-3,
-        turn=solution.rotation, breaks=gait.corner_phases, regime=solution.problem.regime,
-    ).distance  # fmt: skip
 
 
 def _about(
@@ -321,21 +314,3 @@ def _pace(solution: Solution, period: float, gravity: float) -> dict[str, Any]:
         "pace": f"the gait's own, as {reason}; distance and work are {robot}",
         "froude_number": froude,
     }
-
-
-def _csv(facts: dict[str, Any], time: np.ndarray, table: np.ndarray, coordinate: str) -> str:
-    """CSV with the facts in '#' lines; for every unit a column per joint."""
-    units = list(_UNITS)[: len(table)]
-    names = [f"{coordinate}_{j}_{unit}" for unit in units for j in range(1, table.shape[1] + 1)]
-    text = io.StringIO()
-    for key, value in facts.items():
-        text.write(f"# {key}: {json.dumps(value)}\n")
-    text.write(",".join(["time_s", *names]) + "\n")
-    np.savetxt(text, np.vstack([time, *table]).T, fmt="%.9g", delimiter=",")
-    return text.getvalue()
-
-
-def _json(facts: dict[str, Any], time: np.ndarray, table: np.ndarray, coordinate: str) -> str:
-    units = zip(_UNITS.items(), table, strict=False)
-    arrays = {f"{what}_{unit}": rows.tolist() for (unit, what), rows in units}
-    return json.dumps({**facts, "coordinate": coordinate, "time_s": time.tolist(), **arrays}) + "\n"

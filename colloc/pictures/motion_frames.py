@@ -11,7 +11,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import FOOT, PAD, WHEEL
 from colloc.results.body_marks import ARROWS, footprints, friction_arrows
-from colloc.results.motion import RigidMotion, SampledMotion, turned
+from colloc.results.motion import RigidMotion, SampledMotion, rotate
 from colloc.results.solution import Solution
 
 _ARROW = 0.12  # length of the arrow of the largest friction [body lengths]
@@ -25,7 +25,7 @@ _WORDS = {
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """One period from phase 0 to 1, or several from rest; positions in the lab."""
+    """Positions in the lab of a period from phase 0 to 1, or of several from rest."""
 
     t: np.ndarray  # (n_time,)
     angles: np.ndarray  # (n_joint, n_time)
@@ -63,12 +63,12 @@ def foot_words(kinds: Sequence[str]) -> str:
 
 def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
     """Outline in the lab, ``(2, n_point, n_time)``."""
-    return tail[:, None] + turned(np.stack(body.outline(angles)), theta)
+    return tail[:, None] + rotate(np.stack(body.outline(angles)), theta)
 
 
 def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
     """Both ends of the feet in the lab, ``(2, 2, n_foot, n_time)``."""
-    return tail[:, None, None] + turned(footprints(body, angles, _WHEEL), theta)
+    return tail[:, None, None] + rotate(footprints(body, angles, _WHEEL), theta)
 
 
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
@@ -92,9 +92,9 @@ def frames_of(
         motion.angles,
         lab_outline(*at),
         motion.centre,
-        motion.tail[:, None] + turned(places, motion.theta),
-        turned(forces, motion.theta),
+        motion.tail[:, None] + rotate(places, motion.theta),
+        rotate(forces, motion.theta),
         solution.holding(motion),
         lab_feet(*at),
-        tuple(period.repeated(k) for k in range(periods)),
+        tuple(period.repeat(k) for k in range(periods)),
     )

@@ -19,7 +19,7 @@ from colloc.pictures.figure import FootMarks, draw_shape_path
 from colloc.pictures.motion_frames import Frames, foot_kinds, frames, frames_of
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
 from colloc.results.body_marks import hinges
-from colloc.results.motion import turned
+from colloc.results.motion import rotate
 from colloc.results.solution import Solution
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
@@ -121,7 +121,7 @@ class _Scene:
             line.set_data(*np.concatenate([*whole, before.of(path[:, : k + 1])], axis=1))
         self.feet.place(before.of(shown.feet[..., k]), shown.holding[:, k])
         if self.quiver is not None:
-            force = shown.arrow_scale * turned(shown.arrow[:, :, k], before.rotation)
+            force = shown.arrow_scale * rotate(shown.arrow[:, :, k], before.rotation)
             self.quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
             self.quiver.set_UVC(*force)
         if self.dot is not None:

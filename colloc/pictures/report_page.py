@@ -1,4 +1,4 @@
-"""One self-contained HTML page about a result; everything from the file is escaped."""
+"""Self-contained HTML page about a result; everything from the file is escaped."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from colloc.results.robot import SLOW_ENOUGH, Robot
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.files import replaced_file
+from colloc.system.files import write_text
 
 _MOST_PLANES = 6
 _ANY_FLOOR = 0.5  # share of the stated friction for which a period is stated
@@ -116,9 +116,7 @@ def write_report(
     if solution.certificate.replayed:
         bound = upper_bound(solution.problem, known or path.parent, compute=False)
         gap = gap_line(solution.problem, solution.certificate.efficiency, bound)
-    with replaced_file(path) as temporary:
-        page = report_page(solution, reference, gap, robot=robot)
-        Path(temporary).write_text(page, encoding="utf-8")
+    write_text(path, report_page(solution, reference, gap, robot=robot))
     return path
 
 
@@ -185,7 +183,7 @@ def _picture(
 
 
 def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
-    """What report.js draws."""
+    """Data that report.js draws."""
     low, high = shown.window
     steps = (0.1, 0.2, 0.5, 1, 2, 5, 10, 1e9)
     kinds, (wide, tall) = foot_kinds(body), high - low

@@ -162,7 +162,7 @@ def floor_of(robot: Robot) -> tuple[Chain, Law]:
 
 
 def note_of(robot: Robot) -> str:
-    """How friction in the MJCF differs from the problem's, or ""."""
+    """Difference of friction in the MJCF from the problem's, or ""."""
     problem = robot.solution.problem
     stated = problem.friction
     if not rate_independent(problem.law):

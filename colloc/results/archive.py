@@ -23,7 +23,7 @@ from colloc.results.distinct_optima import basins, fourier_series
 from colloc.results.outcome import RETRIED, UNITS, Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions
 from colloc.system.errors import StoreError
-from colloc.system.files import locked
+from colloc.system.files import lock_file
 from colloc.system.row_file import put_rows, read_rows
 from colloc.system.store_file import Table, save_table
 
@@ -116,7 +116,7 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
     `StoreError` if it is damaged, of another problem or version, or cannot be written.
     """
     path = Path(path)
-    with locked(_lock(path), wait=True):
+    with lock_file(_lock(path), wait=True):
         archive = _read(path, problem)
         if archive is None:
             if path.exists():
@@ -146,7 +146,7 @@ def archive_at(path: str | os.PathLike[str]) -> Archive:
 def save_archive(archive: Archive, command: str = "") -> Path:
     """Write the HDF5 file of all starts on the disk, which `archive` then holds as well."""
     assert archive.path is not None
-    with locked(_lock(archive.path), wait=True):
+    with lock_file(_lock(archive.path), wait=True):
         if stored := _read(archive.path, archive.problem):
             archive.outcomes |= stored.outcomes
         return save_table(_table(archive, command), archive.path, _KIND, _VERSION)

@@ -18,7 +18,7 @@ from colloc.mechanics.inertia import about_tail, checked_mass, turning
 from colloc.motion.collocated import CollocatedPose
 from colloc.motion.heading import whole_turns
 from colloc.numerics.mesh import Mesh
-from colloc.results.motion import RigidMotion, SampledMotion, turned
+from colloc.results.motion import RigidMotion, SampledMotion, rotate
 from colloc.transcription.layout import RADIANS, Layout
 
 
@@ -114,10 +114,10 @@ class CollocatedMotion:
             theta = np.where(second, whole_turns(x_theta[0], x_theta[-1]) - theta, theta)
             centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
             end = np.array([2 * end[0], 0.0])
-        before = RigidMotion(self.rotation, complex(*end)).repeated(period)
+        before = RigidMotion(self.rotation, complex(*end)).repeat(period)
         theta, centre = theta + before.rotation, before.of(centre)
         return SampledMotion(
-            t, angles, rates, z, theta, centre, centre - turned(body.centre(angles), theta)
+            t, angles, rates, z, theta, centre, centre - rotate(body.centre(angles), theta)
         )
 
     def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

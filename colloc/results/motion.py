@@ -49,7 +49,7 @@ class SampledMotion:
         )
 
 
-def turned(vectors: np.ndarray, theta: np.ndarray | float) -> np.ndarray:
+def rotate(vectors: np.ndarray, theta: np.ndarray | float) -> np.ndarray:
     """Rotate vectors ``(2, ..., n_time)`` by angles theta, from body to lab axes."""
     (x, y), c, s = vectors, np.cos(theta), np.sin(theta)
     return np.stack([c * x - s * y, s * x + c * y])
@@ -60,14 +60,14 @@ class RigidMotion:
     """Rotation about the origin [rad], then a shift x + iy: the effect of a period of a gait.
 
     >>> quarter = RigidMotion(np.pi / 2, 1.0 + 0.0j)
-    >>> np.round(quarter.repeated(np.array([2, 4])).shift, 9) + 0.0
+    >>> np.round(quarter.repeat(np.array([2, 4])).shift, 9) + 0.0
     array([1.+1.j, 0.+0.j])
     """
 
     rotation: float | np.ndarray
     shift: complex | np.ndarray
 
-    def repeated(self, times: np.ndarray | int) -> RigidMotion:
+    def repeat(self, times: np.ndarray | int) -> RigidMotion:
         """Power of the motion; negative ones are inverse."""
         angle = math.remainder(self.rotation, 2 * np.pi)
         # sum_k<n e^(i k angle) = e^(i (n - 1) angle / 2) sin(n angle / 2) / sin(angle / 2)
@@ -78,7 +78,7 @@ class RigidMotion:
 
     def of(self, points: np.ndarray) -> np.ndarray:
         """Image of points ``(2, ..., n)``."""
-        x, y = turned(points, self.rotation)
+        x, y = rotate(points, self.rotation)
         return np.stack([x + np.real(self.shift), y + np.imag(self.shift)])
 
 

@@ -27,7 +27,7 @@ from colloc.mechanics.inertia import (
 from colloc.mechanics.law import rate_independent
 from colloc.motion.torques import accelerating_torques
 from colloc.results.arc import arc
-from colloc.results.motion import Column, SampledMotion, motion_dataset, turned
+from colloc.results.motion import Column, SampledMotion, motion_dataset, rotate
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -120,9 +120,9 @@ class _MotionWithInertia:
     def sample(self, t: np.ndarray) -> SampledMotion:
         """Motion at ascending phases in [0, 1], in the axes of `Solution.sample`."""
         states, (angles, rates) = self._course.at(t), self._gait(t)
-        theta, centre = states[3] - self._heading, turned(states[4:6], -self._heading)
+        theta, centre = states[3] - self._heading, rotate(states[4:6], -self._heading)
         z = tail_velocity(self._chain, angles, rates, states[:3])
-        tail = centre - turned(np.array(self._chain.centre(angles)), theta)
+        tail = centre - rotate(np.array(self._chain.centre(angles)), theta)
         return SampledMotion(t, angles, rates, z, theta, centre, tail)
 
 
@@ -135,31 +135,8 @@ def pressing(solution: Solution, gravity: float) -> float:
 class Robot:
     """A gait on a robot, made by `colloc.Solution.robot`; ``print`` shows its data sheet.
 
-    Parameters
-    ----------
-    solution : Solution
-    length, mass : float
-        Of the stretched robot [m], [kg].
-    period : float
-        [s]
-    gravity : float
-        [m/s^2]
-    max_speed, max_torque : float or (n_joint,), optional
-        Limits of the motors [rad/s], [N m].
-
-    Raises
-    ------
-    ProblemError
-        If a number is not positive, the body has no joints, the gait is for another pace, or
-        `max_speed` or `max_torque` is given where torques depend on the pace.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
-    >>> round(robot.facts["work_per_period_J"], 1)
-    36.5
+    In SI units; `max_speed` and `max_torque` are limits of the motors, one or one each.
+    `ProblemError` if a number is unusable, the body has no joints, or the gait is for another pace.
     """
 
     solution: Solution = field(repr=False)
@@ -171,9 +148,8 @@ class Robot:
     max_torque: float | Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        numbers = {name: getattr(self, name) for name in ("length", "mass", "period", "gravity")}
-        check_finite(positive=True, **numbers)
-        for name, value in numbers.items():
+        for name in ("length", "mass", "period", "gravity"):
+            check_finite(positive=True, **{name: (value := getattr(self, name))})
             if not 1 / _LARGEST <= value <= _LARGEST:
                 raise ProblemError(
                     f"{name} must lie between {1 / _LARGEST:g} and {_LARGEST:g} in SI units, not "
@@ -228,7 +204,7 @@ class Robot:
 
     @cached_property
     def columns(self) -> dict[str, Column]:
-        """Motion over a period with the gait's own timing: values, units and dimensions by name."""
+        """Motion over a period: values, units and dimensions by name."""
         n = max(_INSTANTS, _A_SIDE * (len(self.solution.gait.corner_phases) + 1))
         t = np.arange(n + 1) / n
         motion = (self._with_inertia or self.solution).sample(t)
@@ -329,13 +305,11 @@ class Robot:
     def lines(self) -> list[str]:
         """Return the data sheet as lines of text."""
         f, coordinate = self.facts, self.solution.gait.motor_gait.coordinate
-        names = (
-            *("peak_torque_N_m", "rms_torque_N_m", "peak_speed_rad_per_s"),
-            *("rms_speed_rad_per_s", "peak_joint_power_W"),
-        )
+        names = ("torque_N_m", "speed_rad_per_s")
+        columns = [f[f"{kind}_{name}"] for name in names for kind in ("peak", "rms")]
         rows = (
             f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip()
-            for j, row in enumerate(zip(*(f[name] for name in names), strict=True), 1)
+            for j, row in enumerate(zip(*columns, f["peak_joint_power_W"], strict=True), 1)
         )
         return [
             f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period "
@@ -356,51 +330,39 @@ class Robot:
 
     def sentences(self) -> list[str]:
         """Return remarks on the numbers."""
-        law = self.solution.problem.law
-        sentences = [*self._speed_sentences(), *self._torque_sentences()]
+        return [*self._motor_sentences(), self._inertia_sentence()]
+
+    def _motor_sentences(self) -> Iterator[str]:
+        f, law = self.facts, self.solution.problem.law
+        if (shortest := f.get("shortest_period_s")) is not None:
+            speed = f.get("speed_at_shortest_period_m_per_s")
+            retimed = f.get("shortest_period_paced_by_speed_s")
+            yield (
+                f"Shortest period within the speed limits: {shortest:.3g} s with the gait's own "
+                f"timing{'' if speed is None else f' ({speed:.4g} m/s)'}"
+                f"{'' if retimed is None else f', {retimed:.3g} s retimed (export --max-speed)'}."
+            )
+            if shortest > self.period * (1 + 1e-9):
+                yield f"{self.period:g} s, the period stated here, is too short for the joints."
+        if (used := f.get("torque_used")) is not None:
+            worst = int(np.argmax(used))
+            needs = f"Joint {worst + 1} needs {f['peak_torque_N_m'][worst]:.3g} N m"
+            has = f"and has {f['max_torque_N_m'][worst]:.3g}"
+            if used[worst] <= 1:
+                share = f"joint {worst + 1} comes closest ({100 * used[worst]:.3g} %)"
+                yield f"Torque limits are met at this pace; {share}."
+            elif max(f.get("torque_used_slowly", used)) <= 1:
+                yield f"{needs} at this pace {has}; slow motion needs less: take a longer period."
+            else:
+                limits = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
+                yield (
+                    f"{needs} {has}. Motors are too weak in slow motion as well, so a longer "
+                    f"period does not help: solve with torque_limit=({limits})."
+                )
         if not rate_independent(law):
-            sentences.append(
+            yield (
                 f"Torques depend on the pace under {law.label}: its coefficients are taken to be "
                 f"those in units of this period."
-            )
-        return [*sentences, self._inertia_sentence()]
-
-    def _speed_sentences(self) -> Iterator[str]:
-        f = self.facts
-        if "shortest_period_s" not in f:
-            return
-        speed = f.get("speed_at_shortest_period_m_per_s")
-        retimed = f.get("shortest_period_paced_by_speed_s")
-        yield (
-            f"Shortest period within the speed limits: {f['shortest_period_s']:.3g} s with the "
-            f"gait's own timing{'' if speed is None else f' ({speed:.4g} m/s)'}"
-            f"{'' if retimed is None else f', {retimed:.3g} s retimed (export --max-speed)'}."
-        )
-        if f["shortest_period_s"] > self.period * (1 + 1e-9):
-            yield f"{self.period:g} s, the period of these numbers, is too short for the joints."
-
-    def _torque_sentences(self) -> Iterator[str]:
-        f = self.facts
-        if "torque_used" not in f:
-            return
-        worst = int(np.argmax(f["torque_used"]))
-        peak, limit = f["peak_torque_N_m"][worst], f["max_torque_N_m"][worst]
-        if f["torque_used"][worst] <= 1:
-            yield (
-                f"Torque limits are met at this pace; joint {worst + 1} comes closest "
-                f"({100 * peak / limit:.3g} %)."
-            )
-        elif max(f.get("torque_used_slowly", f["torque_used"])) <= 1:
-            yield (
-                f"Joint {worst + 1} needs {peak:.3g} N m at this pace and has {limit:.3g}; in slow "
-                f"motion torque limits are met: take a longer period."
-            )
-        else:
-            limits = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
-            yield (
-                f"Joint {worst + 1} needs {peak:.3g} N m and has {limit:.3g}. Motors are too weak "
-                f"in slow motion as well, so a longer period does not help: solve with "
-                f"torque_limit=({limits})."
             )
 
     def _inertia_sentence(self) -> str:

@@ -30,7 +30,7 @@ from colloc.results.motion import (
     motion_columns,
     motion_dataset,
     motion_frame,
-    turned,
+    rotate,
 )
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
@@ -342,7 +342,7 @@ class Solution:
             z,
             theta,
             centre,
-            centre - turned(np.array(chain.centre(angles)), theta),
+            centre - rotate(np.array(chain.centre(angles)), theta),
         )
 
     def holding(self, motion: SampledMotion) -> np.ndarray:

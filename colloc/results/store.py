@@ -109,7 +109,7 @@ def load(path: str | os.PathLike[str]) -> Solution:
 
 
 def holds_more(path: str | os.PathLike[str], solution: Solution) -> bool:
-    """Whether a file of a solution holds more than `save` writes, such as remarks."""
+    """True if the file of a solution holds more than `save` writes, such as remarks."""
     with h5py.File(path, "r", locking=False) as file, h5py.File(io.BytesIO(), "w") as written:
         _write(written, solution)
         return not _names(file) <= _names(written)

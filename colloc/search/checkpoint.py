@@ -30,7 +30,7 @@ from colloc.search.options import OPTIONS
 from colloc.search.spaces import SPACES, space_of
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.interruption import interruptible, time_limit
-from colloc.system.plain_values import Codec, Own
+from colloc.system.plain_values import Codec, Encoding
 from colloc.system.row_file import put_rows, read_rows
 
 Arguments = ParamSpec("Arguments")
@@ -117,8 +117,8 @@ class Run:
             return
         self._stated = self.problem.to_dict()
         records = [Answer, Certificate, Check, Iterate, SecondOrder, Step]
-        by_rule: dict[type, Own] = {Problem: Own(self._changes, self._with_changes)}
-        by_rule |= dict.fromkeys(SPACES, Own(self._space_arguments, self._space))
+        by_rule: dict[type, Encoding] = {Problem: Encoding(self._changes, self._with_changes)}
+        by_rule |= dict.fromkeys(SPACES, Encoding(self._space_arguments, self._space))
         self._codec = Codec([*records, *gait_fields.GAITS, *gait_fields.CLASSES], by_rule)
         if self.path is None:
             return
@@ -163,10 +163,10 @@ class Run:
 
     def encode(self, value: Any) -> Any:
         """The value as JSON can hold it."""
-        return self._codec.written(value)
+        return self._codec.encode(value)
 
     def decode(self, plain: Any) -> Any:
-        return self._codec.read(plain)
+        return self._codec.decode(plain)
 
     def update(self, rows: Mapping[str, Any]) -> None:
         """Add results of another run of the same problem."""

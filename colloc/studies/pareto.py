@@ -43,17 +43,8 @@ class Gap:
 
 @dataclass(frozen=True, eq=False)
 class ParetoFront:
-    """Certified gaits from the best by the first objective to the best by the second.
-
-    Attributes
-    ----------
-    problem : Problem
-    objectives : (Objective, Objective)
-    points : tuple of Solution
-        By more than its errors none is worse than another one in both objectives.
-    gaps : tuple of Gap
-        Where neighbours are more than twice the even spacing apart.
-    """
+    """Certified gaits from the best by the first objective to the best by the second; gaps are
+    where neighbours are more than twice the even spacing apart."""
 
     problem: Problem
     objectives: Objectives
@@ -67,7 +58,7 @@ class ParetoFront:
 
     @property
     def certified(self) -> bool:
-        """Whether the gaits that were found in its gaps are certified, too."""
+        """True if the gaits that were found in its gaps are certified, too."""
         return all(gap.certified for gap in self.gaps)
 
     def plot(self, ax: Any = None) -> Any:

@@ -10,9 +10,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ class CellState:
 
     @property
     def missing(self) -> bool:
-        """Whether the problem's own guess was not tried yet."""
+        """True if the problem's own guess was not tried yet."""
         return self.problem is not None and start_key(self.problem.guess) not in self.tried
 
     def add(self, visit: Visit) -> None:
@@ -129,7 +130,7 @@ class StudyRun:
         return max((score for score in scores if not math.isnan(score)), default=math.nan)
 
     def below_neighbour(self, cell: Index) -> bool:
-        """Whether a neighbour's gait does clearly better in the cell than its own best."""
+        """True if a neighbour's gait does clearly better in the cell than its own best."""
         best = self.cells[cell].best
         return best is not None and self.neighbour_value(cell) > (1 + BETTER) * best.outcome.value
 
@@ -144,24 +145,28 @@ class StudyRun:
         arguments as for `colloc.system.task_pool.run_tasks`."""
         native_kernel()  # its absence is reported once for all workers
         ahead = 1 + workers // 4 if ahead is None else ahead
-        tasks: _Wavefront | _Round = _Wavefront(self)
+        first = _Wavefront(self)
+        tasks, total = first.ready, lambda: first.total
         for number in itertools.count():
             done = 0
             for task, result in run_tasks(
-                run_chunk, tasks.ready, workers=workers, executor=executor, ahead=ahead
+                run_chunk, tasks, workers=workers, executor=executor, ahead=ahead
             ):
                 (works,) = task.arguments
                 if isinstance(result, Lost):
                     result = [failed_visit(work, CRASHED, result.message) for work in works]
                 append_visits(self.folder, [v for v in result if v.attempts or v.scores])
-                for work, visit in zip(works, result, strict=True):
-                    self.cells[work.cell].add(visit)
-                tasks.finish(task.key)
-                for work, visit in zip(works, result, strict=True):
+                visited = [
+                    (self.cells[w.cell], w.cell, v) for w, v in zip(works, result, strict=True)
+                ]
+                for state, _, visit in visited:
+                    state.add(visit)
+                if number == 0:
+                    first.finish(task.key)
+                for state, cell, visit in visited:
                     done += 1
                     if visit.attempts:
-                        state, total = self.cells[work.cell], tasks.total
-                        yield Progress(work.cell, state, visit.attempts, number, done, total)
+                        yield Progress(cell, state, visit.attempts, number, done, total())
             improvable = [
                 cell
                 for cell, state in list(self.cells.items())
@@ -170,45 +175,30 @@ class StudyRun:
             ]
             if not improvable:
                 return
-            tasks = _Round(self, improvable)
+            # all start from what is known now
+            known = {cell: state.best for cell, state in self.cells.items()}
+            waiting = iter([Task(cell, ((self.work(cell, known.get),),)) for cell in improvable])
+            tasks, total = partial(next, waiting, None), partial(len, improvable)
 
     def work(
         self, cell: Index, best: Callable[[Index], Attempt | None], chunk: tuple[Index, ...] = ()
     ) -> Work:
         """Work on a cell: in the first round within a chunk, later with none."""
-        study, state, own = self.study, self.cells[cell], best(cell)
+        study, state, incumbent = self.study, self.cells[cell], best(cell)
         assert state.problem is not None
         sources = study.before(cell) if chunk else study.around(cell)
-        inside = tuple(c for c in sources if c in chunk)
-        others = (best(c) for c in sources if c not in inside)
+        others = (best(c) for c in sources if c not in chunk)
         return Work(
             cell,
             state.problem,
             bool(chunk),
-            inside,
+            tuple(c for c in sources if c in chunk),
             tuple(a.outcome.gait for a in others if a and a.gait_key not in state.scores),
             study.cold_numbers(cell) if chunk else (),
-            own.outcome.value if own else 0.0,
+            incumbent.outcome.value if incumbent else 0.0,
             state.tried,
-            study.warm_starts,
-            study.time_limit,
-            study.seed,
+            *(study.warm_starts, study.time_limit, study.seed),
         )
-
-
-class _Round:
-    """Tasks of a later round: cells that start from what is known when it begins."""
-
-    def __init__(self, run: StudyRun, cells: list[Index]) -> None:
-        known = {cell: state.best for cell, state in run.cells.items()}
-        self.total = len(cells)
-        self._tasks = (Task(cell, ((run.work(cell, known.get),),)) for cell in cells)
-
-    def ready(self) -> Task | None:
-        return next(self._tasks, None)
-
-    def finish(self, chunk: Any) -> None:
-        pass
 
 
 class _Wavefront:
@@ -216,29 +206,30 @@ class _Wavefront:
     before it are finished."""
 
     def __init__(self, run: StudyRun) -> None:
-        self._run, self._study = run, run.study
+        self._run, self._size = run, run.study.chunk
         self.total = math.prod(run.study.shape)  # less what is not missing, as it is reached
-        *sizes, last = run.study.shape
-        counts = (*sizes, -(-last // run.study.chunk))
-        self._counts, self._travels = counts, [axis.travels for axis in run.study.axes]
-        first = ((0,) if goes else range(n) for n, goes in zip(counts, self._travels, strict=True))
+        *sizes, self._last = run.study.shape
+        self._counts = (*sizes, -(-self._last // self._size))
+        self._travels = [axis.travels for axis in run.study.axes]
+        first = (
+            (0,) if goes else range(n) for n, goes in zip(self._counts, self._travels, strict=True)
+        )
         self._first: Iterator[Index] = itertools.product(*first)
         self._released: deque[Index] = deque()
         self._finished: set[Index] = set()
 
     def ready(self) -> Task | None:
-        while True:
-            chunk = self._released.popleft() if self._released else next(self._first, None)
-            if chunk is None:
-                return None
-            first = chunk[-1] * self._study.chunk
-            every = range(first, min(first + self._study.chunk, self._study.shape[-1]))
-            cells = tuple(c for k in every if self._run.cells[c := (*chunk[:-1], k)].missing)
+        states = self._run.cells
+        while chunk := self._released.popleft() if self._released else next(self._first, None):
+            begin = chunk[-1] * self._size
+            every = [(*chunk[:-1], k) for k in range(begin, min(begin + self._size, self._last))]
+            cells = tuple(cell for cell in every if states[cell].missing)
             self.total -= len(every) - len(cells)
             if cells:
-                works = (self._run.work(c, lambda x: self._run.cells[x].best, cells) for c in cells)
+                works = (self._run.work(cell, lambda c: states[c].best, cells) for cell in cells)
                 return Task(chunk, (tuple(works),))
             self.finish(chunk)
+        return None
 
     def finish(self, chunk: Any) -> None:
         """Release the chunks after one of which all others before them are finished, too."""
@@ -247,7 +238,7 @@ class _Wavefront:
             if self._finished.issuperset(self._shifted(following, -1)):
                 self._released.append(following)
 
-    def _shifted(self, chunk: Index, by: int) -> Iterable[Index]:
+    def _shifted(self, chunk: Index, by: int) -> Iterator[Index]:
         for a, goes in enumerate(self._travels):
             if goes and 0 <= (i := chunk[a] + by) < self._counts[a]:
                 yield (*chunk[:a], i, *chunk[a + 1 :])

@@ -30,26 +30,16 @@ _PHASES = 1000  # tried for the begin of a gait
 
 @dataclass(frozen=True, eq=False)
 class Steering:
-    """Family of gaits by the angle that a period turns.
-
-    Attributes
-    ----------
-    problem : Problem
-    turns : tuple of float
-        Counter-clockwise [rad], ascending.
-    points : tuple of Solution
-    on_the_spot : Steering, optional
-        Gaits that turn with the least work.
-    """
+    """Family of gaits by the angle that a period turns."""
 
     problem: Problem
-    turns: tuple[float, ...]
+    turns: tuple[float, ...]  # counter-clockwise [rad], ascending
     points: tuple[Solution, ...]
-    on_the_spot: Steering | None = None
+    on_the_spot: Steering | None = None  # gaits that turn with the least work
 
     @property
     def certified(self) -> bool:
-        """Whether every gait is certified."""
+        """True if every gait is certified."""
         spot = self.on_the_spot is None or self.on_the_spot.certified
         return spot and all(point.success for point in self.points)
 

@@ -188,13 +188,13 @@ def _or(names: list[str]) -> str:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a finite real number, not a bool, that NumPy can hold."""
+    """True for a finite real number, not a bool, that NumPy can hold."""
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     return real and (abs(value) < 2**63 if isinstance(value, int) else math.isfinite(float(value)))  # type: ignore[arg-type]
 
 
 def is_whole(value: object, least: float = -math.inf, most: float = math.inf) -> TypeGuard[int]:
-    """Whether a value is a whole number in [least, most], not a bool."""
+    """True for a whole number in [least, most], not a bool."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     return whole and bool(least <= value <= most)  # type: ignore[operator]
 

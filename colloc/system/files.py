@@ -54,8 +54,14 @@ def replaced_file(path: Path) -> Iterator[str]:
             os.unlink(temporary)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Replace a file by a text. `StoreError` if it cannot be written."""
+    with replaced_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8", newline="")
+
+
 @contextlib.contextmanager
-def locked(path: Path, *, wait: bool = False) -> Iterator[None]:
+def lock_file(path: Path, *, wait: bool = False) -> Iterator[None]:
     """Hold a lock file; if another does, `wait` for it or raise a `StoreError`."""
     with contextlib.ExitStack() as stack:
         try:
@@ -91,7 +97,7 @@ def alone_in(folder: Path) -> Iterator[None]:
             stack.callback(os.close, handle)
             fcntl.flock(handle, fcntl.LOCK_EX)
         except (ImportError, OSError):  # Windows and some network file systems lock files only
-            stack.enter_context(locked(folder / ".colloc.lock", wait=True))
+            stack.enter_context(lock_file(folder / ".colloc.lock", wait=True))
         yield
 
 

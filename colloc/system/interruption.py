@@ -36,7 +36,7 @@ def end_at_once(number: int, frame: FrameType | None) -> None:
 
 
 def interrupted() -> bool:
-    """Whether code within `interruptible` should stop: Ctrl-C came, or a `time_limit` is over."""
+    """True if code within `interruptible` should stop: Ctrl-C, or the end of a `time_limit`."""
     return (_requested and _in_main_thread()) or time.monotonic() > _DEADLINE.get()
 
 

@@ -16,11 +16,11 @@ import numpy as np
 KIND, ARRAY = "kind", "array"
 
 
-class Own(NamedTuple):
+class Encoding(NamedTuple):
     """Encoder and decoder of a class whose fields are not what should be stored."""
 
-    written: Callable[[Any], Any]
-    read: Callable[[Any], Any]
+    encode: Callable[[Any], Any]
+    decode: Callable[[Any], Any]
 
 
 class Codec:
@@ -29,25 +29,25 @@ class Codec:
     >>> from colloc.system.plain_values import Codec
     >>> from colloc.mechanics.friction import Friction
     >>> codec = Codec([Friction])
-    >>> codec.read(codec.written((Friction(mu_t=2.0), 0.1)))
+    >>> codec.decode(codec.encode((Friction(mu_t=2.0), 0.1)))
     (Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.1)
     """
 
-    def __init__(self, kinds: Iterable[type], own: Mapping[type, Own] | None = None) -> None:
+    def __init__(self, kinds: Iterable[type], own: Mapping[type, Encoding] | None = None) -> None:
         self._kinds = {kind.__name__: kind for kind in kinds}
         self._own = {kind.__name__: how for kind, how in (own or {}).items()}
 
-    def written(self, value: Any) -> Any:
+    def encode(self, value: Any) -> Any:
         """Encode a value as plain JSON. `TypeError` for a class that is not listed."""
         name = type(value).__name__
         if name in self._own:
-            return {KIND: name, "of": self._own[name].written(value)}
+            return {KIND: name, "of": self._own[name].encode(value)}
         if name in self._kinds:
             if isinstance(value, tuple):
                 named = value._asdict()  # type: ignore[attr-defined]
             else:
                 named = {x.name: getattr(value, x.name) for x in dataclasses.fields(value)}
-            return {KIND: name, "of": {key: self.written(part) for key, part in named.items()}}
+            return {KIND: name, "of": {key: self.encode(part) for key, part in named.items()}}
         if isinstance(value, np.ndarray):
             data = np.ascontiguousarray(value)
             return {
@@ -58,20 +58,20 @@ class Codec:
         if isinstance(value, np.generic):
             return value.item()
         if isinstance(value, tuple):
-            return {KIND: "tuple", "of": [self.written(part) for part in value]}
+            return {KIND: "tuple", "of": [self.encode(part) for part in value]}
         if isinstance(value, list):
-            return [self.written(part) for part in value]
+            return [self.encode(part) for part in value]
         if isinstance(value, dict):
-            items = [[self.written(k), self.written(v)] for k, v in value.items()]
+            items = [[self.encode(k), self.encode(v)] for k, v in value.items()]
             return {KIND: "dict", "of": items}
         if value is None or isinstance(value, (bool, int, float, str)):
             return value
         raise TypeError(f"cannot write a {name}.")
 
-    def read(self, plain: Any) -> Any:
-        """Decode. `KeyError`, `TypeError` or `ValueError` if `written` did not write it."""
+    def decode(self, plain: Any) -> Any:
+        """Decode. `KeyError`, `TypeError` or `ValueError` if `encode` did not make it."""
         if isinstance(plain, list):
-            return [self.read(part) for part in plain]
+            return [self.decode(part) for part in plain]
         if not isinstance(plain, dict):
             return plain
         if ARRAY in plain:
@@ -79,12 +79,12 @@ class Codec:
             return data.reshape(plain["shape"]).copy()
         name, of = plain[KIND], plain["of"]
         if name == "tuple":
-            return tuple(self.read(part) for part in of)
+            return tuple(self.decode(part) for part in of)
         if name == "dict":
-            return {self.read(k): self.read(v) for k, v in of}
+            return {self.decode(k): self.decode(v) for k, v in of}
         if name in self._own:
-            return self._own[name].read(of)
-        kind, values = self._kinds[name], {key: self.read(part) for key, part in of.items()}
+            return self._own[name].decode(of)
+        kind, values = self._kinds[name], {key: self.decode(part) for key, part in of.items()}
         if issubclass(kind, tuple):
             return kind(**values)
         made: Any = object.__new__(kind)

@@ -24,7 +24,7 @@ _PATIENCE = 60.0  # seconds to wait for other writers, each of which takes milli
 
 
 @contextlib.contextmanager
-def _opened(path: Path, kind: str, begin: str) -> Iterator[tuple[sqlite3.Connection, bool]]:
+def _transaction(path: Path, kind: str, begin: str) -> Iterator[tuple[sqlite3.Connection, bool]]:
     """A connection within a transaction, rolled back unless committed; whether there is a table."""
     address = f"{path.absolute().as_uri()}?mode=rw"
     with contextlib.closing(
@@ -58,7 +58,7 @@ def read_rows(
     if not path.exists():
         return {}
     try:
-        with _opened(path, kind, "BEGIN") as (connection, filled):
+        with _transaction(path, kind, "BEGIN") as (connection, filled):
             query = f'SELECT key, value FROM "{kind}" ORDER BY rowid'
             rows = connection.execute(query) if filled else ()
             return {key: decode(json.loads(text)) for key, text in rows}
@@ -82,7 +82,7 @@ def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:
         # with 0o666 less the umask, where SQLite would take 0o644: a group may share it
         with contextlib.suppress(FileExistsError):
             os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-        with _opened(path, kind, "BEGIN IMMEDIATE") as (connection, filled):
+        with _transaction(path, kind, "BEGIN IMMEDIATE") as (connection, filled):
             if not filled:
                 connection.execute(_table(kind))
             update = "ON CONFLICT(key) DO UPDATE SET value = excluded.value"

@@ -37,7 +37,7 @@ _STARTING = threading.Lock()
 
 @dataclass(frozen=True)
 class Task:
-    """One call: a unique key, and the arguments."""
+    """A call: a unique key, and the arguments."""
 
     key: Hashable
     arguments: tuple[Any, ...]
@@ -143,28 +143,13 @@ def run_tasks(
     executor: Callable[[int], Executor] = process_pool,
     ahead: int = 0,
 ) -> Iterator[tuple[Task, Any]]:
-    """Yield tasks with their results, each as soon as it is there.
+    """Yield tasks with their results ``function(*task.arguments)``, each as soon as it is there.
 
-    Parameters
-    ----------
-    function : callable
-        Called as ``function(*task.arguments)`` on a worker. A task that raises, or loses its
-        worker, is repeated alone; if that fails too its result is `Lost`.
-    ready : callable
-        Returns the next task, or None if there is none now; called again after each result. The
-        run ends when there is none and nothing is under way.
-    workers, ahead : int
-        Tasks that run, and that wait for a worker, at a time.
-    executor : callable
-        Makes an executor for a number of workers. Its method `check`, if it has one, is called
-        while nothing ends, and may raise `EngineGone`.
-
-    Raises
-    ------
-    BrokenExecutor
-        If not even a first task can be submitted.
-    EngineGone
-        If the executor says so: nothing is repeated, and no task recorded as lost.
+    `ready` returns the next task, or None if there is none now; it is called again after each
+    result, and the run ends when nothing is under way. `ahead` tasks wait for a worker. A task that
+    raises, or loses its worker, is repeated alone; if that fails too its result is `Lost`. While
+    nothing ends, a method `check` of the executor is called, which may raise `EngineGone`.
+    BrokenExecutor is raised if not even a first task can be submitted.
     """
     suspects: list[Task] = []  # under way when a worker died
     more = True

@@ -20,7 +20,7 @@ from colloc.commands.solve import open_archive as show_archive
 from colloc.results.archive import StartName, archive_at, open_archive
 from colloc.studies.journal import append_visits, read_journal
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.files import alone_in, locked, replaced_file
+from colloc.system.files import alone_in, lock_file, replaced_file
 from colloc.system.row_file import CACHE, put_rows, read_rows
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits and processes")
@@ -154,12 +154,12 @@ def test_an_archive_is_read_where_nothing_can_be_written(tmp_path, tmp_path_fact
 def test_a_lock_keeps_other_processes_out_until_its_holder_lets_go(tmp_path):
     def attempt():
         try:
-            with locked(tmp_path / "lock"):
+            with lock_file(tmp_path / "lock"):
                 return 20
         except StoreError as refused:
             return 10 if f"in use by process {os.getppid()} on" in str(refused) else 0
 
-    with locked(tmp_path / "lock"):
+    with lock_file(tmp_path / "lock"):
         assert in_child(attempt) == 10
     assert in_child(attempt) == 20
     assert [path.name for path in tmp_path.iterdir()] == ["lock"]
@@ -173,7 +173,7 @@ def test_a_file_system_without_locks_stops_nobody(tmp_path, monkeypatch, failure
 
     monkeypatch.setattr("fcntl.flock", refuse)
     ran = []
-    for hold in (locked(tmp_path / "lock"), alone_in(tmp_path)):
+    for hold in (lock_file(tmp_path / "lock"), alone_in(tmp_path)):
         with hold:
             ran.append(failure)
     assert ran == [failure] * 2
