@@ -3,7 +3,6 @@ friction."""
 
 import numpy as np
 import pytest
-from scipy.integrate import quad_vec
 
 from benchmarks.zoo import feet_problem
 from colloc.mechanics.balance import instant, net_force, total_power
@@ -28,46 +27,6 @@ def random_instants(seed, count, n_joint=2):
     rates = rng.normal(size=(n_joint, count))
     rates[0, ::10] = 0.0
     return rng.uniform(-np.pi, np.pi, (n_joint, count)), rates
-
-
-def naive_net_force(lengths, angles, rates, z, delta, friction):
-    """Force and torque about the tail of one body, by walking along it point by point."""
-
-    def density(s):
-        phi, x, y = 0.0, 0.0, 0.0
-        vx, vy, w = z[0], z[1], z[2]
-        left = s
-        for i, length in enumerate(lengths):
-            if i > 0:
-                phi += angles[i - 1]
-                w += rates[i - 1]
-            step = min(left, length)
-            c, sn = np.cos(phi), np.sin(phi)
-            x, y = x + step * c, y + step * sn
-            vx, vy = vx - w * step * sn, vy + w * step * c
-            left -= step
-            if left <= 0:
-                break
-        speed = np.sqrt(vx**2 + vy**2 + delta**2)
-        along, across = vx * c + vy * sn, -vx * sn + vy * c
-        mu_s = friction.mu_f if along > 0 else friction.mu_b
-        fx = -(mu_s * along * c - friction.mu_t * across * sn) / speed
-        fy = -(mu_s * along * sn + friction.mu_t * across * c) / speed
-        return np.array([fx, fy, x * fy - y * fx])
-
-    breaks = np.cumsum(lengths)[:-1]
-    return quad_vec(density, 0, 1, points=breaks, epsabs=1e-11, epsrel=1e-11)[0]
-
-
-@pytest.mark.parametrize("friction", FRICTIONS[:4])
-def test_net_force_is_the_integral_along_the_body(friction):
-    body = Chain((0.25, 0.45, 0.3))
-    rng = np.random.default_rng(11)
-    for _ in range(6):
-        angles, rates, z = rng.uniform(-3, 3, 2), rng.normal(size=2), rng.normal(size=3)
-        now = instant(body, friction, angles[:, None], rates[:, None], z[:, None], 0.05)
-        expected = naive_net_force(body.lengths, angles, rates, z, 0.05, friction)
-        np.testing.assert_allclose(net_force(now.posture, now.force)[:, 0], expected, atol=2e-9)
 
 
 @pytest.mark.parametrize("friction", FRICTIONS)
@@ -143,34 +102,6 @@ def test_reversing_the_rates_reverses_the_solution_where_friction_is_reversible_
     ):
         there, back = (solve_balance(Chain(), friction, angles, k * rates, 1e-3).z for k in (1, -1))
         assert np.allclose(there, -back, atol=1e-9) == reverses
-
-
-@pytest.mark.parametrize("friction", FRICTIONS)
-def test_mirror_image(friction):
-    angles, rates = random_instants(18, 60)
-    z, mirrored = (solve_balance(Chain(), friction, k * angles, k * rates, 1e-3).z for k in (1, -1))
-    np.testing.assert_allclose(mirrored, z * np.array([[1], [-1], [-1]]), atol=1e-9)
-
-
-def test_balance_does_not_change_when_the_lab_is_rotated():
-    body, friction = Chain(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)
-    angles, rates = random_instants(19, 30)
-    z = solve_balance(body, friction, angles, rates, 1e-3).z
-    now = instant(body, friction, angles, rates, z, 1e-3)
-    force = net_force(now.posture, now.force)
-    turned_posture = body.posture(angles)
-    c, s = np.cos(0.7), np.sin(0.7)
-    turned = type(turned_posture)(
-        c * turned_posture.cos - s * turned_posture.sin,
-        s * turned_posture.cos + c * turned_posture.sin,
-        c * turned_posture.x - s * turned_posture.y,
-        s * turned_posture.x + c * turned_posture.y,
-    )
-    turned_z = np.stack([c * z[0] - s * z[1], s * z[0] + c * z[1], z[2]])
-    velocity = body.velocity(turned, rates, turned_z)
-    np.testing.assert_allclose(velocity.vs, now.velocity.vs, atol=1e-12)
-    np.testing.assert_allclose(velocity.vn, now.velocity.vn, atol=1e-12)
-    np.testing.assert_allclose(net_force(turned, now.force)[2], force[2], atol=1e-12)
 
 
 def test_the_balanced_velocity_minimises_dissipation_and_power_is_at_least_friction_times_speed():
@@ -260,28 +191,15 @@ CASES = ["five links", "four links", "backward friction", "on three feet"]
 
 
 @pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=CASES)
-def test_beside_a_fold_of_the_balance_the_other_solution_is_found(case):
+def test_beside_a_fold_of_the_balance_the_other_solution_is_found_in_few_steps(case):
     """Two solutions have just met and vanished: the residual has a minimum there, at which every
-    step from rest used to end."""
+    step from rest ends. The way down from a large delta takes thousands of steps: it comes last."""
     body, friction, delta, angles, rates = case
-    solution = solve_balance(
-        body, friction, np.array(angles)[:, None], np.array(rates)[:, None], delta
-    )
-    assert solution.converged.all()
-    now = instant(
-        body, friction, np.array(angles)[:, None], np.array(rates)[:, None], solution.z, delta
-    )
-    assert np.abs(net_force(now.posture, now.force)).max() < 1e-9
-
-
-@pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=CASES)
-def test_another_start_is_tried_before_a_long_way_from_afar(case):
-    """Where the first attempt ends beside a fold, the way down from a large delta takes thousands
-    of steps: it comes last."""
-    body, friction, delta, angles, rates = case
-    at = body, friction, np.array(angles)[:, None], np.array(rates)[:, None], delta
-    first, found = solve_balance(*at, method="direct"), solve_balance(*at)
-    assert not first.converged.any()
+    at = body, friction, np.array(angles)[:, None], np.array(rates)[:, None]
+    first, found = solve_balance(*at, delta, method="direct"), solve_balance(*at, delta)
     assert found.converged.all()
+    assert not first.converged.any()
+    now = instant(*at, found.z, delta)
+    assert np.abs(net_force(now.posture, now.force)).max() < 1e-9
     # forty with each link as the anchor
     assert max(first.iterations.max(), found.iterations.max()) <= 40 * body.n_link

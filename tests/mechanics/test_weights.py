@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 from shared.instants import random_instants
-from shared.kernels import by_both
 
 from benchmarks.independent_replay import Crawler, played
 from colloc import (
     Chain,
     Elliptic,
     Friction,
-    OwnLaw,
-    PowerLaw,
     Problem,
     ProblemError,
     load,
@@ -22,9 +19,6 @@ from colloc import (
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.search.solve import solve
 from research.guarantee.guaranteed import certify
 from tests.shared.laws import coulomb
@@ -42,63 +36,12 @@ def test_weights_in_proportion_to_the_lengths_are_no_weights_to_the_last_bit():
     np.testing.assert_array_equal(said.z, unsaid.z)
 
 
-def test_friction_on_a_link_is_in_proportion_to_its_weight():
-    angles, rates = random_instants(20)
-    z = np.random.default_rng(1).normal(size=(3, 20))
-    for law in (*LAWS, PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")):
-        plain, heavy = (
-            instant(Chain(LENGTHS, weights=w), law, angles, rates, z, 1e-3).force
-            for w in ((), WEIGHTS)
-        )
-        for own, more in zip(plain, heavy, strict=True):
-            np.testing.assert_allclose(more, own * np.divide(WEIGHTS, LENGTHS)[:, None], rtol=1e-14)
-
-
 def test_a_nearly_weightless_head_neither_holds_nor_moves_the_body():
     angles, rates = random_instants(30)
     rates[0] = 0.0  # tail and middle are one stiff piece, which stays where it is
     light = Chain((0.3, 0.3, 0.4), weights=(0.5, 0.5 - 1e-9, 1e-9))
     solved = solve_balance(light, Friction(), angles, rates, 1e-6)
     np.testing.assert_allclose(solved.z, 0.0, atol=1e-6)
-
-
-def test_a_body_named_from_its_other_end_moves_the_same_way():
-    # shape coordinates from the head: the chain turned round, its weights with it
-    angles, rates = random_instants(30)
-    body, turned = Chain(LENGTHS, weights=WEIGHTS), Chain(LENGTHS[::-1], weights=WEIGHTS[::-1])
-    law = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0)
-    power = [
-        chain_motion(b, law, q, r, 1e-4, solve_balance(b, law, q, r, 1e-4)).power
-        for b, q, r in ((body, angles, rates), (turned, -angles[::-1], -rates[::-1]))
-    ]
-    np.testing.assert_allclose(*power, rtol=1e-8)
-    assert Chain(weights=(0.4, 0.2, 0.4)).symmetric
-    assert not Chain(weights=(0.4, 0.4, 0.2)).symmetric
-    assert not Chain(inertias=(0.01, 0.01, 0.02)).symmetric
-
-
-@pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
-@pytest.mark.parametrize("law", LAWS, ids=str)
-def test_compiled_balances_and_slopes_are_those_of_numpy(law):
-    body, (angles, rates) = Chain(LENGTHS, weights=WEIGHTS), random_instants(100)
-    (z, motion, slopes), (same_z, known, reference) = by_both(body, law, angles, rates, 1e-4)
-    np.testing.assert_allclose(same_z, z, atol=1e-9)
-    np.testing.assert_allclose(motion.centre, known.centre, atol=1e-12)
-    np.testing.assert_allclose(motion.actuator_power, motion.power, atol=1e-9)
-    np.testing.assert_allclose(slopes, reference, atol=1e-9)
-
-
-def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced():
-    body, law, (angles, rates) = (
-        Chain(LENGTHS, weights=WEIGHTS),
-        Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
-        random_instants(40),
-    )
-    solved = solve_balance(body, law, angles, rates, 1e-3)
-    forces = body.forces(law, angles, rates, solved.z, 1e-3)
-    assert (np.abs(forces) <= body.contact.largest_forces(law)).all()
-    now = instant(body, law, angles, rates, solved.z, 1e-3)
-    np.testing.assert_allclose(net_force(now.posture, now.force), 0.0, atol=1e-10)
 
 
 @pytest.mark.parametrize("mu", [(1, 1, 3), (1, 3, 1), (3, 1, 2)], ids=str)
@@ -151,14 +94,6 @@ def test_the_replay_is_that_of_a_program_of_its_own():
     assert ours.rotation == pytest.approx(theirs.rotation, rel=1e-4)
 
 
-@pytest.mark.parametrize("off", [1e-3, -1e-3, 1e-10])
-def test_lengths_and_weights_are_parts_of_one_body(off):
-    for name in ("lengths", "weights"):
-        with pytest.raises(ProblemError, match=f"body.{name} must add up to .* 1, not "):
-            Chain(**{name: (0.3, 0.3, 0.4 + off)})
-    assert Chain((0.1,) * 10).n_link == 10  # whose sum is 1 less a rounding
-
-
 def test_a_problem_with_weights_is_solved_certified_and_kept(tmp_path):
     problem = Problem(
         "heavy_ends", body=Chain(weights=(0.4, 0.2, 0.4)), gait=Harmonic(1, "bilateral")
@@ -190,72 +125,23 @@ def test_a_bound_knows_the_weights_or_refuses():
         )
 
 
-@pytest.mark.parametrize(
-    "weights", [(1.0,), (0.5, 0.5, 0.5), (0.5, 0.5, 0.0), (0.5, 0.5, "x"), (np.nan, 0.5, 0.5), 3.0]
-)
-def test_unusable_weights_are_named(weights):
-    with pytest.raises(ProblemError, match=r"body\.weights"):
-        Chain(weights=weights)
-
-
 MASSES = (0.1, 0.3, 0.6)
 
 
 def test_masses_that_are_the_weights_are_no_masses():
     said, unsaid = Chain(LENGTHS, weights=WEIGHTS, masses=WEIGHTS), Chain(LENGTHS, weights=WEIGHTS)
     assert said.largest_imbalance == unsaid.largest_imbalance == 0.0
-    angles, rates = random_instants(30)
-    both = (by_both(body, Friction(mu_t=2.0), angles, rates, 1e-4) for body in (said, unsaid))
-    for one, other in zip(*both, strict=True):
-        np.testing.assert_array_equal(one[0], other[0])
-        np.testing.assert_array_equal(one[1].centre, other[1].centre)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_masses_move_the_centre_and_nothing_else_of_a_slow_body(law):
-    """The balance is that of the weights; the centre of mass is a mean with the masses, and so is
-    its velocity."""
-    plain, heavy = Chain(LENGTHS, weights=WEIGHTS), Chain(LENGTHS, weights=WEIGHTS, masses=MASSES)
-    angles, rates = random_instants(30)
-    solved = solve_balance(plain, law, angles, rates, 1e-4)
-    own = solve_balance(heavy, law, angles, rates, 1e-4)
-    np.testing.assert_array_equal(own.z, solved.z)
-    velocity = heavy.velocity(heavy.posture(angles), rates, own.z)
-    direction = np.exp(1j * heavy.tangent_angles(angles))
-    expected = np.array(MASSES) @ ((velocity.vs + 1j * velocity.vn) * direction)
-    (_, motion, slopes), (_, known, reference) = by_both(heavy, law, angles, rates, 1e-4)
-    np.testing.assert_allclose(motion.centre[0] + 1j * motion.centre[1], expected, atol=1e-9)
-    np.testing.assert_allclose(known.centre, motion.centre, atol=1e-9)
-    np.testing.assert_allclose(slopes, reference, atol=1e-9)
-
-
-def test_the_weight_of_a_mass_pulls_where_it_is():
-    """A slope pulls at the centre of mass; compiled and NumPy alike."""
-    body, law, (angles, rates) = Chain(LENGTHS, masses=MASSES), Friction(), random_instants(30)
-    load = np.repeat([[-0.2], [0.1]], 30, axis=1)
-    solved = solve_balance(body, law, angles, rates, 1e-3, load=load)
-    posture = body.posture(angles)
-    force = net_force(posture, instant(body, law, angles, rates, solved.z, 1e-3).force)
-    x, y = (np.array(MASSES) @ part for part in (posture.x, posture.y))
-    np.testing.assert_allclose(force, -np.stack([*load, x * load[1] - y * load[0]]), atol=1e-8)
-    motion, slopes = (
-        chain_motion(body, law, angles, rates, 1e-3, solved, load),
-        motion_derivatives(body, law, angles, rates, 1e-3, solved, load),
-    )
-    with numpy_instead():
-        known, reference = (
-            chain_motion(body, law, angles, rates, 1e-3, solved, load),
-            motion_derivatives(body, law, angles, rates, 1e-3, solved, load),
-        )
-    np.testing.assert_allclose(motion.actuator_power, known.actuator_power, atol=1e-9)
-    np.testing.assert_allclose(
-        slopes / np.abs(reference).max(), reference / np.abs(reference).max(), atol=1e-9
-    )
+    at = Friction(mu_t=2.0), *random_instants(30), 1e-4
+    one, other = (body.motion(*at, body.solve(*at)) for body in (said, unsaid))
+    for own, theirs in zip(one, other, strict=True):
+        np.testing.assert_array_equal(own, theirs)
 
 
 def test_a_body_with_masses_says_so_and_how_it_leans():
     body = Chain(masses=MASSES, inertias=(0.01, 0.0, 0.01))
     text = body.describe()
+    assert not Chain(weights=(0.4, 0.4, 0.2)).symmetric
+    assert not Chain(inertias=(0.01, 0.01, 0.02)).symmetric
     assert "of masses 0.1, 0.3, 0.6" in text
     assert "of moments of inertia 0.01, 0, 0.01" in text
     assert "beside the centre of mass" in text
@@ -268,12 +154,28 @@ def test_a_body_with_masses_says_so_and_how_it_leans():
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
+        *(
+            ({"lengths": (0.3, 0.3, 0.4 + off)}, "body.lengths must add up to")
+            for off in (1e-3, -1e-3, 1e-10)
+        ),
+        *(
+            ({"weights": weights}, r"body\.weights")
+            for weights in (
+                (1.0,),
+                (0.5, 0.5, 0.5),
+                (0.5, 0.5, 0.0),
+                (0.5, 0.5, "x"),
+                (np.nan, 0.5, 0.5),
+                3.0,
+            )
+        ),
         ({"masses": (0.5, 0.5)}, "one for each of the 3 links"),
         ({"masses": (0.5, 0.5, 0.5)}, "the body's mass 1"),
         ({"inertias": (0.1, -0.1, 0.1)}, "not negative"),
         ({"inertias": (0.1, 0.1)}, "one for each of the 3 links"),
     ],
 )
-def test_masses_that_cannot_be_are_refused_in_a_sentence(fields, said):
+def test_parts_that_cannot_be_are_refused_in_a_sentence(fields, said):
     with pytest.raises(ProblemError, match=said):
         Chain(**fields)
+    assert Chain((0.1,) * 10).n_link == 10  # whose sum is 1 less a rounding

@@ -1,0 +1,292 @@
+"""Feet, wheels and pads: the lines and points that they tend to, their directions and shares of
+weight, and what no body can have."""
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+from shared.instants import random_instants
+
+from colloc import Chain, Foot, Friction, Pad, Problem, ProblemError, Viscous, Wheel, solve_balance
+from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.results.body_marks import footprints
+from tests.mechanics.test_chain_mechanics import LAWS, LENGTHS, STANDS, each_law, wrench
+
+AHEAD, BACK = Friction(mu_t=1.0, mu_f=0.2, mu_b=0.9), Friction(mu_t=1.0, mu_f=0.9, mu_b=0.2)
+EQUAL, STILL = Friction(), np.zeros((2, 1))
+WEIGHTS = (0.2, 0.5, 0.3)
+
+
+def on_each(foot, **fields):
+    """A chain with feet or pads alike on each link."""
+    return Chain(LENGTHS, feet=tuple(foot(link) for link in range(3)), **fields)
+
+
+def sliding_force(body, law, delta=0.3, seed=1):
+    angles, rates = random_instants(20)
+    return body.sliding(
+        law, angles, rates, np.random.default_rng(seed).normal(size=(3, 20)), delta
+    ).force
+
+
+@each_law
+def test_many_feet_are_a_line_to_second_order_in_their_distance(law):
+    line = sliding_force(Chain(LENGTHS), law)
+    errors = [np.abs(sliding_force(Chain(LENGTHS, feet=n), law) - line).max() for n in (5, 10, 20)]
+    assert errors[1] < 0.3 * errors[0]
+    assert errors[2] < 0.3 * errors[1] < 1e-3 * law.largest
+
+
+@pytest.mark.parametrize("weights", [(), WEIGHTS], ids=["even", "weights"])
+@each_law
+def test_pads_from_end_to_end_are_the_line(law, weights):
+    line, pads = Chain(LENGTHS, weights=weights), on_each(Pad, weights=weights)
+    angles, rates = random_instants(20)
+    at = law, angles, rates, np.random.default_rng(1).normal(size=(3, 20)), 0.1
+    for own, known in zip(pads.sliding(*at), line.sliding(*at), strict=True):
+        np.testing.assert_allclose(own, known, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(pads.forces(*at), line.forces(*at), rtol=1e-14, atol=1e-15)
+    most = (body.contact.largest_forces(law) for body in (pads, line))
+    np.testing.assert_allclose(*most, rtol=1e-14)
+    own, known = (solve_balance(body, law, angles, rates, 1e-3).z for body in (pads, line))
+    np.testing.assert_allclose(own, known, rtol=1e-12, atol=1e-14)
+
+
+@each_law
+def test_two_halves_of_a_pad_are_the_whole(law):
+    cut = tuple(
+        Pad(k, *ends, weight=LENGTHS[k] * (ends[1] - ends[0]) / 0.8)
+        for k in range(3)
+        for ends in ((0.1, 0.4), (0.4, 0.9))
+    )
+    halves, whole = (
+        sliding_force(body, law, 0.1)
+        for body in (Chain(LENGTHS, feet=cut), on_each(lambda link: Pad(link, 0.1, 0.9)))
+    )
+    np.testing.assert_allclose(halves, whole, rtol=1e-8, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", [law for law in LAWS if not isinstance(law, Viscous)], ids=str)
+def test_a_short_pad_tends_to_a_foot_like_its_length_squared(law):
+    foot = sliding_force(on_each(lambda link: Foot(link, 0.4)), law)
+    errors = [
+        np.abs(sliding_force(on_each(lambda k, h=half: Pad(k, 0.4 - h, 0.4 + h)), law) - foot).max()
+        for half in (0.2, 0.1, 0.05, 0.025)
+    ]
+    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), 2.0, atol=0.2)
+
+
+@pytest.mark.parametrize("feet", [STANDS["offset"], STANDS["own laws"]], ids=["offset", "own laws"])
+def test_the_balance_is_the_root_that_another_solver_finds(feet):
+    body, law, (angles, rates) = Chain(LENGTHS, feet=feet), LAWS[1], random_instants(1)
+    own = root(
+        lambda z: wrench(body, law, angles[:, 0], rates[:, 0], z, 1.0)[0], np.zeros(3), tol=1e-13
+    )
+    z = solve_balance(body, law, angles, rates, 1.0).z[:, 0]
+    np.testing.assert_allclose(z, own.x, atol=1e-8)
+
+
+def wheels_that_do_not_slip(body, angles, rates):
+    """Tail velocity of one instant: no wheel moves across its rolling direction."""
+
+    def across(z):
+        column = np.array(z, dtype=float)[:, None]
+        moves = body.velocity(body.posture(angles[:, None]), rates[:, None], column)
+        return body.contact.velocities(moves).vn[:, 0]
+
+    rest = across(np.zeros(3))
+    return np.linalg.solve(np.transpose([across(unit) - rest for unit in np.eye(3)]), -rest)
+
+
+def test_a_wheeled_snake_tends_to_its_nonholonomic_kinematics_like_rolling_over_sideways_friction():
+    angles = np.array([[0.9, -0.4, 0.3], [0.2, -1.1, 1.4]])
+    rates = np.array([[1.0, -0.5, 0.8], [-0.6, 1.2, 0.4]])
+    errors = []
+    for ratio in (1e2, 1e3, 1e4):
+        wheel = {"rolling": 0.02, "sideways": 0.02 * ratio}
+        body = Chain(feet=tuple(Wheel(link, **wheel) for link in range(3)))
+        z = solve_balance(body, EQUAL, angles, rates, 1e-9).require().z
+        known = [wheels_that_do_not_slip(body, *at) for at in zip(angles.T, rates.T, strict=True)]
+        errors.append(np.abs(z - np.transpose(known)).max())
+    np.testing.assert_allclose(np.log10(np.divide(errors[:-1], errors[1:])), 1.0, atol=0.1)
+    assert errors[-1] < 2e-3
+
+
+def test_a_wheel_turned_by_a_right_angle_swaps_its_coefficients():
+    straight = {"rolling": 0.1, "sideways": 1.0}
+    turned = {"rolling": 1.0, "sideways": 0.1, "angle": np.pi / 2}
+    one, other = (
+        solve_balance(on_each(lambda i, h=how: Wheel(i, **h)), EQUAL, *random_instants(20), 1e-3).z
+        for how in (straight, turned)
+    )
+    np.testing.assert_allclose(one, other, atol=1e-8)
+
+
+@pytest.mark.parametrize("angle", [0.4, -0.4, 1.2])
+def test_turned_wheels_left_and_right_go_straight_on(angle):
+    """Across them acts the sum of what each has across itself."""
+    feet = (Wheel(k, angle=side * angle, rolling=0.1) for k in range(3) for side in (1, -1))
+    body, c, s = Chain(LENGTHS, feet=tuple(feet)), np.cos(angle), np.sin(angle)
+    ahead, aside = (
+        body.sliding(EQUAL, STILL, STILL, np.array(z)[:, None], 1e-9).force[:2, 0]
+        for z in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    )
+    np.testing.assert_allclose(ahead, [-(0.1 * c**2 + s**2), 0.0], atol=1e-8)
+    np.testing.assert_allclose(aside, [0.0, -(0.1 * s**2 + c**2)], atol=1e-8)
+
+
+def test_forwards_of_a_foot_is_towards_the_head_and_turned_round_its_law_is_backwards():
+    ahead, back = (on_each(lambda k, law=law: Foot(k, 0.3, friction=law)) for law in (AHEAD, BACK))
+    turned = on_each(lambda k: Foot(k, 0.3, friction=AHEAD, angle=np.pi))
+    for body, speed, force in ((ahead, 1.0, -0.2), (ahead, -1.0, 0.9), (back, 1.0, -0.9)):
+        z = np.array([[speed], [0.0], [0.0]])
+        assert body.sliding(EQUAL, STILL, STILL, z, 1e-9).force[0, 0] == pytest.approx(force)
+    np.testing.assert_allclose(sliding_force(turned, EQUAL), sliding_force(back, EQUAL), atol=1e-12)
+    # and is that of the body where all feet have it
+    own, theirs = (
+        solve_balance(body, law, *random_instants(10), 1e-2).require().z
+        for body, law in ((ahead, EQUAL), (on_each(lambda k: Foot(k, 0.3)), AHEAD))
+    )
+    np.testing.assert_allclose(own, theirs, rtol=0, atol=1e-8)
+
+
+def test_a_body_named_from_its_head_moves_alike_if_its_feet_have_their_laws_backwards():
+    """Offsets change sides, and forwards is backwards: then power is the same, else it is not."""
+    angles, rates = random_instants(20)
+    feet = (Foot(0, 0.2), Foot(2, 0.9), Foot(1, 0.3, offset=0.08), Foot(1, 0.3, offset=-0.08))
+    body, z = Chain(LENGTHS, feet=feet), np.random.default_rng(3).normal(size=(3, 20))
+
+    def power(body, law, angles, rates, z):
+        return body.sliding(law, angles, rates, z, 0.05).power[0]
+
+    # from the head links turn by -angles, and its velocity is that of the head, as seen there
+    phi = np.cumsum(np.concatenate([np.zeros((1, 20)), angles]), axis=0)
+    spin = np.cumsum(np.concatenate([z[2:], rates]), axis=0)
+    links = np.array(LENGTHS)[:, None] * np.exp(1j * phi)
+    seen = -(z[0] + 1j * z[1] + (1j * spin * links).sum(axis=0)) * np.exp(-1j * phi[-1])
+    at_head = -angles[::-1], -rates[::-1], np.array([seen.real, seen.imag, spin[-1]])
+    turned = Chain(LENGTHS[::-1], feet=tuple(foot.from_head(3) for foot in body.feet))
+    same, other = (power(turned, law, *at_head) for law in (BACK, AHEAD))
+    np.testing.assert_allclose(same, power(body, AHEAD, angles, rates, z), rtol=1e-10)
+    assert np.abs(other - same).max() > 0.05
+
+
+def test_an_offset_is_to_the_left_seen_from_the_tail_and_to_the_right_seen_from_the_head():
+    left = Foot(0, 0.2, offset=0.05)
+    assert left.from_head(3) == Foot(2, 0.8, offset=-0.05)
+    assert left.mirrored == Foot(0, 0.2, offset=-0.05)
+    # a body that spins on the spot drags a foot to its left backwards
+    body = Chain(LENGTHS, feet=(Foot(0, offset=0.05), Foot(0, offset=-0.05), Foot(1), Foot(2)))
+    slides = body.sliding(EQUAL, STILL, STILL, np.array([[0.0], [0.0], [1.0]]), 1e-9)
+    arms = np.hypot([0.15, 0.15, 0.525, 0.875], [0.05, 0.05, 0, 0])
+    assert slides.force[2, 0] == pytest.approx(-np.array([0.15, 0.15, 0.45, 0.25]) @ arms)
+
+
+@pytest.mark.parametrize(
+    ("feet", "link"),
+    [((Foot(0, 0.0, 0.5), Foot(0, 1.0, 0.5)), 0), ((Pad(1, 0.1, 0.9, weight=1.0),), 1)],
+)
+def test_a_link_that_alone_stands_stays_where_it_is(feet, link):
+    """Carried links are swung freely."""
+    body, (angles, rates) = Chain(feet=feet), random_instants(10)
+    z = solve_balance(body, EQUAL, angles, rates, 1e-6).require().z
+    moves = body.velocity(body.posture(angles), rates, z)
+    np.testing.assert_allclose([row[link] for row in moves], 0.0, atol=1e-12)
+
+
+def test_feet_nearly_on_a_line_are_balanced_where_the_residual_must_rise_before_it_falls():
+    bend, law = np.geomspace(1e-6, 0.1, 400), Friction(mu_t=1, mu_f=1, mu_b=3)
+    at = Chain((0.5, 0.5), feet=2), law, np.stack([[*bend, *-bend]]), np.ones((1, 800)), 5e-6
+    solved = solve_balance(*at).require()
+    for k in range(0, 800, 40):
+        net = wrench(*at[:2], at[2][:, k], at[3][:, k], solved.z[:, k], 5e-6)[0]
+        np.testing.assert_allclose(net, 0.0, atol=3e-9)  # rounding of velocities, over delta
+    assert (solve_balance(*at, method="direct").residual > 1e-9).any()
+    with numpy_instead():
+        solve_balance(*at[:2], *(a[:, ::20] for a in at[2:4]), 5e-6).require()
+
+
+def test_laws_that_the_kernel_does_not_know_at_points_are_left_to_numpy():
+    drag = on_each(lambda k: Foot(k, 0.4, friction=LAWS[4]) if k == 2 else Wheel(k))
+    for body, law in ((Chain(feet=1), Viscous()), (drag, EQUAL)):
+        assert native_kernel(body, body.law(law)) is None
+
+
+def test_a_foot_without_a_weight_bears_what_the_others_of_its_link_leave_in_equal_parts():
+    feet = (
+        Foot(0, 0.1, weight=0.06), Foot(0, 0.5), Foot(0, 0.9), Foot(1), Foot(2, 0.2),
+        Foot(2, 0.8, weight=0.05),
+    )  # fmt: skip
+    weights = [foot.weight for foot in Chain(LENGTHS, feet=feet).feet]
+    assert weights == pytest.approx([0.06, 0.12, 0.12, 0.45, 0.2, 0.05])
+
+
+def test_prints_of_pads_lie_where_they_press():
+    body, (angles, _) = Chain(LENGTHS, feet=(Pad(0, 0.1, 0.6), Foot(1), Pad(2))), random_instants(4)
+    (x0, x1), (y0, y1) = footprints(body, angles)
+    np.testing.assert_allclose(np.hypot(x1 - x0, y1 - y0).T, [[0.15, 0.0, 0.25]] * 4, atol=1e-15)
+    np.testing.assert_allclose([x1[2], y1[2]], np.stack(body.outline(angles))[:, -1], atol=1e-14)
+    assert footprints(Chain(), angles).size == 0
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: Chain(feet=(Foot(0), Foot(3))), "numbered 0 to 2"),
+        (lambda: Chain(feet=(Foot(0, weight=0.5), Foot(2, weight=0.4))), "add up to 1, not 0.9"),
+        (lambda: Chain(feet=(Foot(0, 1.0, 0.5), Foot(1, 0.0, 0.5))), "at two points at least"),
+        (lambda: Chain(feet=(Foot(0), Foot(2))), "no foot is on link 1"),
+        (lambda: Chain(feet=(Foot(0, weight=1.0),)), "two points"),
+        (lambda: Chain(feet=(Foot(0), Foot(1, offset=0.1), Foot(2))), "left and right"),
+        (lambda: Chain(feet=(Foot(0), Wheel(1, angle=0.3), Foot(2))), "left and right"),
+        (lambda: Chain(feet=(Pad(0, offset=0.1), Pad(1), Pad(2))), "left and right"),
+        (lambda: Chain(feet=(Foot(0, 0.2, 1 / 3), Foot(0), Foot(1), Foot(2))), "bear all that"),
+        (lambda: Chain(feet=-1), "0 \\(a line\\) to"),
+        (lambda: Chain(feet="many"), "sequence of Foot"),
+        (lambda: Chain(feet=0.5), "sequence of Foot"),
+        (lambda: Foot(0, place=1.2), "must lie on its link"),
+        (lambda: Foot(0, place=float("nan")), "must lie on its link"),
+        (lambda: Foot(0.5), "whole number"),
+        (lambda: Foot(0, weight=0.0), "positive part"),
+        (lambda: Foot(0, offset=float("inf")), "offset of a foot"),
+        (lambda: Foot(0, friction="oil"), "law of friction"),
+        (lambda: Foot(0, plaze=0.5), "did you mean place"),
+        (lambda: Foot(0, 0.9, extent=0.4), "must lie on its link"),
+        (lambda: Foot(0, extent=-0.4), "from 0 \\(a point\\) to 1"),
+        (lambda: Pad(0, 0.2, 1.2), "must lie on its link"),
+        (lambda: Pad(0, 0.6, 0.4), "must end behind where it begins"),
+        (lambda: Pad(0, "tail", 0.4), "first must be a number, not 'tail'"),
+        (lambda: Pad(0, angle=0.3), "may be turned"),
+    ],
+)  # fmt: skip
+def test_what_no_body_can_stand_on_is_refused_in_a_sentence(make, sentence):
+    with pytest.raises(ProblemError, match=sentence):
+        make()
+
+
+def test_no_feet_is_the_line():
+    assert Chain(feet=0) == Chain()
+    assert len(Chain(feet=()).contact.force_names) == 9
+
+
+@pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
+def test_files_hold_feet(feet):
+    problem = Problem("stands", body=Chain(LENGTHS, feet=feet))
+    again = Problem.from_dict(problem.to_dict())
+    assert (again.body, again.hash, again.law) == (problem.body, problem.hash, problem.law)
+
+
+@pytest.mark.parametrize(
+    ("feet", "symmetric"),
+    [
+        (2, True),
+        ((Foot(0, 0.1), Foot(1), Foot(2, 0.9)), True),
+        ((Foot(0, 0.1), Foot(1), Foot(2, 0.1)), False),
+        ((Foot(0, 0.1), Foot(1, friction=AHEAD), Foot(2, 0.9, friction=EQUAL)), False),
+        ((Wheel(0), Foot(1), Foot(2)), False),
+        ((Pad(0, 0.0, 0.3), Foot(1), Pad(2, 0.7, 1.0)), True),
+        ((Pad(0, 0.0, 0.3), Foot(1), Pad(2, 0.0, 0.3)), False),
+    ],
+)
+def test_symmetries_need_symmetric_feet(feet, symmetric):
+    body = Chain(feet=feet)
+    assert body.symmetric == ("bilateral" in body.symmetries) == symmetric
