@@ -19,8 +19,6 @@ then.
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections import Counter
 from pathlib import Path
@@ -33,6 +31,7 @@ from colloc import Chain, Friction, Harmonic, Problem, solve
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.results.measured import measured
 from colloc.results.solution import SOLVED
+from scripts.program import add_to_record, command_line, read_record
 
 SEED = 1000
 BATCH = 25
@@ -201,50 +200,27 @@ def summary(rows: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    options = command_line(
+        __doc__,
+        problems=1000,
+        first=0,
+        record=Path("results/audit.jsonl"),
+        seconds=1e9,
+        again=False,
     )
-    parser.add_argument("--problems", type=int, default=1000, metavar="N")
-    parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
-    parser.add_argument(
-        "--record",
-        type=Path,
-        default=Path("results/audit.jsonl"),
-        help="what it has is not done again",
-    )
-    parser.add_argument(
-        "--seconds",
-        type=float,
-        default=1e9,
-        metavar="S",
-        help="processor time after which none is begun",
-    )
-    parser.add_argument(
-        "--again", action="store_true", help="measure the gaits of the record anew, and no others"
-    )
-    options = parser.parse_args()
-    rows: dict[int, dict[str, Any]] = {}
-    if options.record.exists():
-        rows = {
-            row["number"]: row
-            for row in map(json.loads, options.record.read_text(encoding="utf-8").splitlines())
-        }
-    options.record.parent.mkdir(parents=True, exist_ok=True)
+    rows = {row["number"]: row for row in read_record(options.record)}
     if options.again:
         rows = {
             number: measured_again(row) if row.get("wrong") is not None else row
             for number, row in rows.items()
         }
-        options.record.write_text(
-            "".join(json.dumps(row) + "\n" for row in rows.values()), encoding="utf-8"
-        )
+        add_to_record(options.record, rows.values(), anew=True)
         options.problems = 0
     todo = [number for number in range(options.first, options.problems) if number not in rows]
     while todo and time.process_time() < options.seconds:
         now, todo = [solved(number) for number in todo[:BATCH]], todo[BATCH:]
         judged([row for row in now if row["status"] == SOLVED])
-        with options.record.open("a", encoding="utf-8") as record:
-            record.writelines(json.dumps(row) + "\n" for row in now)
+        add_to_record(options.record, now)
         rows |= {row["number"]: row for row in now}
         print(f"{len(rows)} problems, {time.process_time():.0f} s", flush=True)
     print(summary(list(rows.values())))

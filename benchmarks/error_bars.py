@@ -15,8 +15,6 @@ measured anew, and held against the references that it has.
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -34,6 +32,7 @@ from colloc.search.solve import confirm_optimum
 from colloc.system.errors import NotConvergedError
 from colloc.verification.played import Path as GaitPath
 from colloc.verification.replay import replay
+from scripts.program import add_to_record, command_line, read_record
 
 DELTA = 1e-4
 LIMIT = 1e-3
@@ -146,39 +145,20 @@ def summary(rows: list[dict[str, list[float]]]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    options = command_line(
+        __doc__,
+        gaits=300,
+        own=False,
+        again=False,
+        solved=0,
+        record=Path("results/error_bars.jsonl"),
+        seconds=1e9,
     )
-    parser.add_argument("--gaits", type=int, default=300, metavar="N")
-    parser.add_argument(
-        "--own", action="store_true", help="colloc's own replay, to 1e-9, as the reference"
-    )
-    parser.add_argument(
-        "--again", action="store_true", help="measure the gaits of the record anew, and no others"
-    )
-    parser.add_argument("--solved", type=int, default=0, metavar="N", help="problems of the zoo")
-    parser.add_argument(
-        "--record",
-        type=Path,
-        default=Path("results/error_bars.jsonl"),
-        help="what it has is not done again",
-    )
-    parser.add_argument(
-        "--seconds", type=float, default=1e9, metavar="S", help="begin no other after so long"
-    )
-    options = parser.parse_args()
-    begin, done = time.monotonic(), {}
-    if options.record.exists():
-        done = {
-            entry["name"]: entry
-            for entry in map(json.loads, options.record.read_text(encoding="utf-8").splitlines())
-        }
-    options.record.parent.mkdir(parents=True, exist_ok=True)
+    begin = time.monotonic()
+    done = {entry["name"]: entry for entry in read_record(options.record)}
     if options.again:
         done = {name: measured_again(entry) for name, entry in done.items()}
-        options.record.write_text(
-            "".join(json.dumps(entry) + "\n" for entry in done.values()), encoding="utf-8"
-        )
+        add_to_record(options.record, done.values(), anew=True)
         options.gaits = options.solved = 0
     todo = [("random", k) for k in range(options.gaits)] + [
         ("zoo", k) for k in range(options.solved)
@@ -197,8 +177,7 @@ def main() -> None:
             row = None
             print(name, error, flush=True)
         done[name] = {"name": name, "row": row}
-        with options.record.open("a", encoding="utf-8") as record:
-            record.write(json.dumps(done[name]) + "\n")
+        add_to_record(options.record, [done[name]])
     print(
         f"the reference or the search gave up on "
         f"{sum(entry['row'] is None for entry in done.values())} of {len(done)}\n"

@@ -15,7 +15,6 @@ results/error_control.md.
 
 from __future__ import annotations
 
-import argparse
 import time
 from functools import partial
 from pathlib import Path
@@ -30,6 +29,7 @@ from colloc.search.explore import first_optimum
 from colloc.search.solve import confirm_optimum
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replay
+from scripts.program import command_line
 
 OPTIMISM = 2.0
 """The estimate must be at least the true error divided by this."""
@@ -199,11 +199,7 @@ collocated efficiency against a replay of the same gait. *Optimum*: against the 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description="Estimated against true errors; see the top of this file."
-    )
-    parser.add_argument("--output", type=Path, default=Path("results"))
-    options = parser.parse_args()
+    options = command_line(__doc__, output=Path("results"))
     options.output.mkdir(parents=True, exist_ok=True)
     cache, lines, results = options.output / "error_control.sqlite", [HEADER], []
     for index in range(len(CASES)):

@@ -7,7 +7,6 @@ python -m benchmarks.freeze --against 1 --only files
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.solution import SOLVED
 from colloc.search.solve import solve
+from scripts.program import command_line
 
 FROZEN = Path(__file__).with_suffix(".json")
 FILES = Path(__file__).parents[1] / "problems"
@@ -83,13 +83,7 @@ def moved(old: dict[str, Any], new: dict[str, Any]) -> str:
 
 def main() -> None:
     """Freeze, or compare."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--against", type=int, metavar="N", help="compare every N-th with the file")
-    parser.add_argument("--only", default="", choices=["", "files", *ZOOS])
-    parser.add_argument("--output", type=Path, default=FROZEN, metavar="PATH")
-    options = parser.parse_args()
+    options = command_line(__doc__, against=int, only="", output=FROZEN)
     rows = json.loads(FROZEN.read_text(encoding="utf-8")) if FROZEN.exists() else {}
     ratios, differing = [], 0
     for k, (name, make) in enumerate(cases(options.only)):

@@ -6,7 +6,6 @@ processor time, as a ratio, and its distance to a floor that is stated with it.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import dataclasses
 import time
@@ -29,6 +28,7 @@ from colloc.results.solution import SOLVED
 from colloc.search.solve import solve
 from scripts.models.ellipses import admissible
 from scripts.models.sweep import Route, performance
+from scripts.program import command_line
 
 BODY, ISOTROPIC = Chain(), Friction()
 LAWS = (ISOTROPIC, Friction(mu_t=2.5, mu_f=1, mu_b=1.6))
@@ -223,15 +223,9 @@ def bounds(quick: bool) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--quick", action="store_true", help="fewer sizes and repetitions: two minutes"
-    )
-    quick = parser.parse_args().quick
+    quick = command_line(__doc__, quick=False).quick
     if native_kernel() is None:
-        parser.error("no C compiler on this machine, so there is nothing to compare.")
+        raise SystemExit("no C compiler on this machine, so there is nothing to compare.")
     for table in (instants(quick), starts(2 if quick else 10), sweep(quick), bounds(quick)):
         print(table, end="\n\n", flush=True)
 

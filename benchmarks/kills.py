@@ -11,7 +11,6 @@ number and every text to the last bit, times aside, and no other file beside it.
 
 from __future__ import annotations
 
-import argparse
 import os
 import signal
 import subprocess
@@ -22,6 +21,8 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+
+from scripts.program import command_line
 
 DEFAULT = (
     "three_link",
@@ -96,17 +97,9 @@ def undisturbed(problem: Path) -> tuple[dict[str, bytes], float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    arguments = command_line(
+        __doc__, ("problems", [Path("problems", f"{name}.py") for name in DEFAULT]), moments=100
     )
-    parser.add_argument(
-        "problems",
-        nargs="*",
-        type=Path,
-        default=[Path("problems") / f"{name}.py" for name in DEFAULT],
-    )
-    parser.add_argument("--moments", type=int, default=100)
-    arguments = parser.parse_args()
     if (
         signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     ):  # in the background of a shell; what is started would ignore it too

@@ -15,7 +15,6 @@ a test that lacks.
 
 from __future__ import annotations
 
-import argparse
 import ast
 import json
 import os
@@ -32,6 +31,8 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
+
+from scripts.program import command_line
 
 ROOT = Path(__file__).resolve().parents[1]
 OTHERS: dict[type, str] = {
@@ -245,13 +246,7 @@ def _unneeded(folder: str, names: list[str]) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--number", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=0)
-    options = parser.parse_args()
+    options = command_line(__doc__, number=40, seed=1, workers=0)
     kept = ROOT / "results" / f"mutants-{options.seed}.jsonl"
     done = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
     with tempfile.TemporaryDirectory() as folder:

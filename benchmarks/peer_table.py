@@ -21,7 +21,6 @@ at the best optimum; up to 2e-3 rad is forgiven here, not by colloc's certificat
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 from typing import NamedTuple
@@ -31,6 +30,7 @@ import numpy as np
 from benchmarks.tables import markdown_table
 from colloc import Chain, Friction, ellipse, replay
 from scripts.models.ellipses import admissible
+from scripts.program import command_line
 
 OPTIMA = (0.260030, 0.207596)
 """Certified by problems/three_link.py and problems/three_link_offset.py."""
@@ -145,9 +145,7 @@ def table() -> str:
 
 
 def main() -> None:
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    command_line(__doc__)
     print(table())
 
 

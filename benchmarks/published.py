@@ -10,7 +10,6 @@ agreement to the digits printed, or of the order or sign that a sentence states.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -27,6 +26,7 @@ from colloc.mechanics.law import Law
 from colloc.search.solve import solve
 from colloc.smooth.motion import Motion, sine_wave, tanh_wave
 from scripts.models.period import period
+from scripts.program import command_line
 
 SWIMMER = Viscous(normal=drag.NORMAL, tangential=drag.TANGENTIAL)
 PAPER = "S. Alben, Efficient sliding locomotion with isotropic friction (2019)"
@@ -467,11 +467,7 @@ def document() -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--output", type=Path, default=Path("results"), metavar="FOLDER")
-    arguments = parser.parse_args()
+    arguments = command_line(__doc__, output=Path("results"))
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / "published.md").write_text(document(), encoding="utf-8")
     print(f"{arguments.output / 'published.md'}")

@@ -24,7 +24,6 @@ results/robustness.md and .json are even at any time.
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -45,6 +44,7 @@ from colloc.results.solution import SOLVED
 from colloc.studies.multistart import process_pool, run_starts
 from colloc.system.versions import versions
 from colloc.verification.replay import replay
+from scripts.program import command_line
 
 Laws = tuple[tuple[float, float, float], ...]
 LAWS: Laws = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
@@ -281,30 +281,17 @@ def write_tables(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description="Success rates over random starts; see the top of this file."
+    options = command_line(
+        __doc__,
+        starts=100,
+        workers=1,
+        symmetries=[*SYMMETRIES],
+        harmonics=1,
+        laws=len(LAWS),
+        lengths=[float],
+        output=Path("results"),
+        tables=False,
     )
-    parser.add_argument("--starts", type=int, default=100)
-    parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--symmetries", nargs="+", choices=SYMMETRIES, default=SYMMETRIES)
-    parser.add_argument("--harmonics", type=int, default=1, metavar="N")
-    parser.add_argument(
-        "--laws", type=int, default=len(LAWS), metavar="N", help="the first so many of the six"
-    )
-    parser.add_argument(
-        "--lengths",
-        type=float,
-        nargs="+",
-        metavar="L",
-        help="of the links, by default three equal ones",
-    )
-    parser.add_argument("--output", type=Path, default=Path("results"))
-    parser.add_argument(
-        "--tables",
-        action="store_true",
-        help="write the tables of what is stored, and solve nothing",
-    )
-    options = parser.parse_args()
     folder = options.output / "robustness"
     table = Table(
         Chain(tuple(options.lengths)) if options.lengths else Chain(),

@@ -11,7 +11,6 @@ nan.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -25,6 +24,7 @@ import numpy as np
 import colloc
 from benchmarks.tables import markdown_table
 from benchmarks.zoo import zoo_problem
+from scripts.program import command_line
 
 MAIN = Path(__file__).resolve().parents[1] / "problems/three_link.py"
 SHELL = {
@@ -167,13 +167,7 @@ def _sized(name: str, size: int) -> Callable[[], object]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--quick", action="store_true", help="fewer sizes and repetitions: two minutes"
-    )
-    quick = parser.parse_args().quick
+    quick = command_line(__doc__, quick=False).quick
     print(f"The load takes {load():.3f} s of processor time now.", end="\n\n", flush=True)
     print(works(1 if quick else 5, 3 if quick else 25), end="\n\n", flush=True)
     print(growth(quick), flush=True)

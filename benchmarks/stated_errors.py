@@ -12,7 +12,6 @@ a hundred times less than the least of these errors; they state none themselves.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -27,6 +26,7 @@ from colloc.results.measured import measured
 from colloc.verification.inertial_motion import GaitWithInertia
 from colloc.verification.replay import replayer
 from colloc.verification.slope import GaitOnSlope
+from scripts.program import command_line
 
 FINER, LEAST = 1e-2, 1e-11
 """Error of the references' steps over the least of the errors that are stated, and the least:
@@ -170,14 +170,7 @@ def summary(rows: list[Row]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--number", type=int, default=100, metavar="N", help="cases of each kind")
-    parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
-    parser.add_argument("--seed", type=int, default=1, metavar="S")
-    parser.add_argument("--kind", choices=KINDS, action="append", help="by default all of them")
-    options = parser.parse_args()
+    options = command_line(__doc__, number=100, first=0, seed=1, kind=[*KINDS])
     for kind in options.kind or KINDS:
         rows, refused = [], 0
         for number in range(options.first, options.first + options.number):

@@ -11,7 +11,6 @@ keep to (`Problem.mesh_tolerance`), beyond the stated error of its replay.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 from itertools import combinations
 from pathlib import Path
@@ -21,6 +20,7 @@ import numpy as np
 import colloc
 from benchmarks.tables import markdown_table
 from colloc.mechanics.native_kernel import numpy_instead
+from scripts.program import command_line
 
 WAYS = {
     "gauss-3, kernel": ("gauss-3", False),
@@ -58,17 +58,12 @@ def _value(solution: colloc.Solution) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "problems",
-        nargs="*",
-        type=Path,
-        default=[Path("problems", f"{name}.py") for name in PROBLEMS],
-    )
     header = ["problem", *WAYS, "values", "angles"]
-    for number, path in enumerate(parser.parse_args().problems):
+    for number, path in enumerate(
+        command_line(
+            __doc__, ("problems", [Path("problems", f"{name}.py") for name in PROBLEMS])
+        ).problems
+    ):
         print(
             *markdown_table(header, [row(path)]).splitlines()[2 if number else 0 :],
             sep="\n",

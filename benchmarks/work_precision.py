@@ -10,7 +10,6 @@ results/work_precision.png and .pdf.
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -35,6 +34,7 @@ from colloc.pictures.style import (
 from colloc.results.solution import Solution
 from colloc.search.explore import first_optimum
 from colloc.search.solve import confirm_optimum
+from scripts.program import command_line
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 _MARKERS = "osD^vPX"
@@ -158,11 +158,7 @@ a replay of the same gait.
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--output", type=Path, default=Path("results"))
-    options = parser.parse_args()
+    options = command_line(__doc__, output=Path("results"))
     options.output.mkdir(parents=True, exist_ok=True)
     cache = options.output / "work_precision.sqlite"
     picture = ELLIPSE

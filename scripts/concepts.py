@@ -6,7 +6,6 @@ when the pictures are made.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ import colloc
 from colloc.pictures.motion_frames import lab_outline
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, VERMILION, Picture, save, styled
 from colloc.results.solution import Solution
+from scripts.program import command_line
 
 ROOT = Path(__file__).resolve().parents[1]
 CLASSES = {
@@ -161,11 +161,7 @@ def size_and_delta(ax: Axes) -> Axes:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "results/curated/concepts")
-    folder = parser.parse_args().folder
+    folder = command_line(__doc__, ("folder", ROOT / "results/curated/concepts")).folder
     folder.mkdir(parents=True, exist_ok=True)
     solutions = {name: colloc.solve(ROOT / "problems" / f"{name}.py") for name in CLASSES}
     with styled():

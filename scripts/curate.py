@@ -7,13 +7,13 @@ copied, and what has changed is noted. A file that is `archived` is not made any
 is one of the commit given there. A new file needs a line with its command first.
 """
 
-import argparse
 import json
 import shutil
 import subprocess
 from pathlib import Path
 
 from colloc.system.versions import versions
+from scripts.program import command_line
 
 CURATED = Path("results/curated")
 
@@ -25,17 +25,7 @@ def last_change(path: Path) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "source",
-        nargs="?",
-        type=Path,
-        default=Path("results"),
-        help="folder of results (default: results)",
-    )
-    source = parser.parse_args().source
+    source = command_line(__doc__, ("source", Path("results"))).source
     manifest = CURATED / "manifest.json"
     entries = json.loads(manifest.read_text(encoding="utf-8"))
     for name, entry in entries.items():

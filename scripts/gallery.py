@@ -136,9 +136,7 @@ def main() -> None:
         if names and example.name not in names:
             continue
         begin = time.process_time()
-        solution = solve(
-            example.stated["PROBLEM"], example.stated.get("OPTIONS.starts", OPTIONS.starts)
-        )
+        solution = solve(example.stated["PROBLEM"], example.stated.get("STARTS", OPTIONS.starts))
         row = solved_row(solution)
         row["cpu_seconds"] = round(time.process_time() - begin, 1)
         table[example.name] = row

@@ -7,10 +7,11 @@ without a change of results changes the file little.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import Any
+
+from scripts.program import command_line
 
 NOTEBOOK = Path(__file__).resolve().parents[1] / "docs/notebook.ipynb"
 _SECONDS = 300
@@ -38,9 +39,7 @@ def executed(path: Path, folder: Path) -> Any:
 
 
 def main() -> None:
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    command_line(__doc__)
     import nbformat
 
     with tempfile.TemporaryDirectory() as folder:

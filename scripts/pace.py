@@ -8,7 +8,6 @@ with the gaits along it.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from colloc.pictures.style import BLUE, GREY, Picture, save, styled
 from colloc.results.solution import Solution
 from colloc.search.solve import solve
 from colloc.verification.inertial_motion import inertial_motion
+from scripts.program import command_line
 
 FROUDE = tuple(float(f"{froude:.3g}") for froude in np.geomspace(1e-3, 1.0, 13))
 DRAWN = (0, 4, 8, 12)
@@ -29,11 +29,7 @@ STARTS = 8
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--output", type=Path, default=Path("results"), metavar="FOLDER")
-    folder = parser.parse_args().output
+    folder = command_line(__doc__, output=Path("results")).output
     slow = solve(SLOW)
     best, played = [slow], []
     lines = [

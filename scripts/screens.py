@@ -7,7 +7,6 @@ results/curated/report.png and results/curated/screens/*.png.
 
 from __future__ import annotations
 
-import argparse
 import re
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from PIL import Image
 from colloc.commands.results import report
 from colloc.commands.solve import solve
 from scripts.browser import BROWSERS, DARK, OPTIONS, browser
+from scripts.program import command_line
 
 ROOT = Path(__file__).resolve().parents[1]
 TARGET = ROOT / "results/curated"
@@ -86,9 +86,7 @@ def photograph(program: str, screen: Screen, target: Path, folder: Path) -> None
 
 
 def main() -> int:
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    command_line(__doc__)
     program = browser()
     if program is None:
         print(f"no browser: install one of {', '.join(BROWSERS)}.", file=sys.stderr)

@@ -9,7 +9,6 @@ is filled.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
 from colloc.results.solution import Solution
+from scripts.program import command_line
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = {
@@ -129,14 +129,11 @@ def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    options = command_line(
+        __doc__,
+        ("files", [ROOT / "problems" / f"{name}.py" for name in FILES]),
+        output=ROOT / "results/curated/side_by_side.gif",
     )
-    parser.add_argument(
-        "files", nargs="*", type=Path, metavar="FILE.py", help="problem files, the best gait last"
-    )
-    parser.add_argument("--output", type=Path, default=ROOT / "results/curated/side_by_side.gif")
-    options = parser.parse_args()
     solutions = [
         colloc.solve(file)
         for file in options.files or [ROOT / "problems" / f"{name}.py" for name in FILES]

@@ -8,7 +8,6 @@ a slope by itself.
 
 from __future__ import annotations
 
-import argparse
 from contextlib import suppress
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from colloc.results.solution import Solution
 from colloc.search.solve import solve
 from colloc.system.errors import NotConvergedError
 from colloc.verification.slope import SlopeMotion, slope_motion
+from scripts.program import command_line
 
 SCENES = (
     ("equal friction", Friction(), 1, (0.0, 0.05, 0.1, 0.15, 0.2)),
@@ -146,12 +146,7 @@ def figure(curves: list[Curve], path: Path) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--starts", type=int, default=16, metavar="N", help="of every search")
-    parser.add_argument("--output", type=Path, default=Path("results"), metavar="FOLDER")
-    options = parser.parse_args()
+    options = command_line(__doc__, starts=16, output=Path("results"))
     lines, curves = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"], list[Curve]()
     for scene, friction, harmonics, grades in SCENES:
         found = climbers(friction, harmonics, grades, options.starts)

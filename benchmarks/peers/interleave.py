@@ -9,13 +9,13 @@ names of tools (default: those with their best options).
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 from benchmarks.peer_table import FOLDER, OTHERS, OWN, RECORDED_ONCE, Tool
+from scripts.program import command_line
 
 _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -49,20 +49,7 @@ def turn(process: subprocess.Popen[str]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--peers", default=sys.executable, help="Python of the environment with rockit and YAPSS"
-    )
-    parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument(
-        "--first", type=int, default=0, help="go on after so many starts of an earlier run"
-    )
-    parser.add_argument(
-        "--only", nargs="*", metavar="NAME", help=f"of {', '.join((*OWN, *OTHERS))}"
-    )
-    options = parser.parse_args()
+    options = command_line(__doc__, peers=sys.executable, starts=20, first=0, only=[str])
     tools = {**OWN, **OTHERS}
     names = options.only or [name for name in tools if name not in RECORDED_ONCE]
     FOLDER.mkdir(parents=True, exist_ok=True)
