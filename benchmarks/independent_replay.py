@@ -333,22 +333,7 @@ def _summed(panels: _Panels) -> tuple[Played, np.ndarray]:
 def played_together(
     gaits: Sequence[Gait], tolerance: float = 1e-8, panels: int = 40
 ) -> list[Played | None]:
-    """Efficiency, distance of the centre of mass, work and rotation of every gait over its period.
-
-    Parameters
-    ----------
-    gaits : sequence of Gait
-        Of bodies with the same number of links: their instants are solved together.
-    tolerance : float
-        Relative, of the efficiency.
-    panels : int
-        To begin with.
-
-    Returns
-    -------
-    list of Played or None
-        None for a gait with instants at which no balance was found.
-    """
+    """Efficiency, distance of the centre of mass, work and rotation of every gait over its period."""
     edges = [
         np.union1d(np.linspace(0, 1, panels + 1), np.asarray(gait.breaks, dtype=float))
         for gait in gaits
@@ -386,13 +371,7 @@ def played(
     breaks: np.ndarray | Sequence[float] = (),
     panels: int = 40,
 ) -> Played:
-    """One gait; see `played_together`.
-
-    Raises
-    ------
-    ArithmeticError
-        If there is an instant where no balance was found.
-    """
+    """One gait; see `played_together`."""
     found = played_together([Gait(body, path, delta, breaks)], tolerance, panels)[0]
     if found is None:
         raise ArithmeticError("there are instants that are not balanced")

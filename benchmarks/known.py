@@ -53,30 +53,7 @@ _NUMBERS = "value", "value_error", "value_at_zero_delta", "value_error_at_zero_d
 
 @dataclass(frozen=True)
 class Known:
-    """One row: the best gait that is known of a problem.
-
-    Attributes
-    ----------
-    statement : dict
-        Fields of the problem, as `Problem.to_dict` gives them.
-    parameters : tuple of float
-        Of the class of gaits, as `member` takes them: in the class by construction.
-    value, value_error : float
-        The problem's objective at its delta.
-    value_at_zero_delta, value_error_at_zero_delta : float
-        The same for delta -> 0.
-    dry : (float, float) or None
-        Between what the efficiency, whatever is maximised, lies under dry friction, with no delta,
-        where the result stated it (``colloc solve --dry``).
-    command, version : str
-        What found it, with which version of colloc.
-
-    Examples
-    --------
-    >>> row = next(row for row in known() if row.statement["name"] == "three_link")
-    >>> row.complaint(row.certificate())
-    ''
-    """
+    """One row: the best gait that is known of a problem."""
 
     statement: dict[str, Any]
     parameters: tuple[float, ...]
@@ -149,24 +126,7 @@ class Known:
 
 
 def known(table: str | os.PathLike[str] | None = None) -> tuple[Known, ...]:
-    """The best gaits that are known, one a question.
-
-    Parameters
-    ----------
-    table : path-like, optional
-        Another table than `TABLE`.
-
-    Raises
-    ------
-    StoreError
-        If there is no such table, or it is damaged.
-
-    Examples
-    --------
-    >>> row = next(row for row in known() if row.problem.name == "three_link")
-    >>> round(row.value, 4), row.command
-    (0.26, 'colloc solve problems/three_link.py')
-    """
+    """The best gaits that are known, one a question."""
     path = TABLE if table is None else Path(table)
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
@@ -188,13 +148,7 @@ def _row(fields: dict[str, Any]) -> Known:
 
 
 def row_of(solution: Solution, command: str) -> Known:
-    """A solution as a row.
-
-    Raises
-    ------
-    ProblemError
-        If it is not certified, or no member of its own class (a prescribed motion).
-    """
+    """A solution as a row."""
     problem, answer = solution.problem, solution.answer
     if not solution.success or not problem.gait.free:
         raise ProblemError(
@@ -211,13 +165,7 @@ def row_of(solution: Solution, command: str) -> Known:
 
 
 def with_row(rows: Sequence[Known], new: Known) -> tuple[Known, ...]:
-    """A table with one more row, in place of the rival that it beats.
-
-    Raises
-    ------
-    ProblemError
-        If its own replay does not hold, or a rival is as good within the errors of both.
-    """
+    """A table with one more row, in place of the rival that it beats."""
     if why := new.complaint(new.certificate()):
         raise ProblemError(f"{new.statement['name']} is not accepted: {why}.")
     rival = next((row for row in rows if row.question == new.question), None)

@@ -25,13 +25,7 @@ def value_at_zero_delta(solution: Solution) -> Limit:
     Regularisation acts like c delta at leading order: c is the slope between the two smallest
     deltas, both on the mesh the continuation ran on, and the result is moved by it from the last
     level, which may have a finer mesh. The error bar adds the mesh error of the last level to the
-    larger of that whole move and what the next-larger pair of levels would change.
-
-    Raises
-    ------
-    ValueError
-        If fewer than two deltas converged.
-    """
+    larger of that whole move and what the next-larger pair of levels would change."""
     first: dict[float, Step] = {}
     for level in solution.history:
         if level.optimal:

@@ -82,14 +82,7 @@ def largest_amplitude(body: Chain, A0: np.ndarray, angle: np.ndarray) -> np.ndar
 
 @dataclass(frozen=True, eq=False)
 class GaitGrid:
-    """A rectangular grid of gaits, and the admissible ones on it.
-
-    Attributes
-    ----------
-    A0, A1, B1 : 1-D arrays
-        Nodes along each axis.
-    inside : (n_A0, n_A1, n_B1) bool array
-    """
+    """A rectangular grid of gaits, and the admissible ones on it."""
 
     A0: np.ndarray
     A1: np.ndarray

@@ -16,17 +16,7 @@ from colloc.verification.played import Path
 
 
 class Record(NamedTuple):
-    """A motion, with the net displacement along +x.
-
-    Attributes
-    ----------
-    t : (n_time,)
-        From 0 to 1, both included.
-    x, y : (n_link + 1, n_time)
-        Link ends in the lab frame, tail first; the tail starts at the origin.
-    speeds : (n_link + 1, n_time)
-        Their speeds.
-    """
+    """A motion, with the net displacement along +x."""
 
     t: np.ndarray
     x: np.ndarray

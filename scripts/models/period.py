@@ -22,31 +22,14 @@ from colloc.system.errors import ProblemError
 
 @dataclass(frozen=True)
 class Period:
-    """What a smooth body achieves in a period.
+    """What a smooth body achieves in a period."""
 
-    Attributes
-    ----------
-    d : float
-        Distance [body lengths].
-    W, W_inner : float
-        Work against friction [weight x length], and the part of it done within the region asked
-        for.
-    rotation : float
-        Net rotation over the period [rad]; zero by symmetry for an antipodal motion.
-    errors : dict of str to float
-        Difference of each of d, W, W_inner and efficiency from a coarser computation, where one was
-        made; else empty.
-    path : (3, n_time)
-        Tail position and orientation at the nodes.
-    nodes : SmoothSolution
-    """
-
-    d: float
-    W: float
-    W_inner: float
-    rotation: float
-    errors: dict[str, float]
-    path: np.ndarray
+    d: float  # [body lengths]
+    W: float  # against friction [weight x length]
+    W_inner: float  # within the region asked for
+    rotation: float  # net [rad]
+    errors: dict[str, float]  # differences of d, W, W_inner, efficiency from a coarser computation
+    path: np.ndarray  # tail position and orientation at the nodes, (3, n_time)
     nodes: SmoothSolution
 
     @property
@@ -69,26 +52,7 @@ def period(
     nodes: int = 6,
     **settings: Any,
 ) -> Period:
-    """Distance and work of one period.
-
-    Parameters
-    ----------
-    motion : Motion
-    friction : Law
-    delta : float
-        Regularisation speed [body lengths per period].
-    intervals, nodes : int
-        Intervals per stage of the motion, and Gauss nodes on each.
-    **settings
-        For `colloc.smooth.balance.solve_smooth`.
-
-    Raises
-    ------
-    NotConvergedError
-        If an instant does not balance.
-    ProblemError
-        If intervals is not positive, or for unusable settings.
-    """
+    """Distance and work of one period."""
     if intervals < 1:
         raise ProblemError(f"intervals must be at least 1, not {intervals!r}.")
     unit = scheme(f"gauss-{nodes}")

@@ -18,13 +18,7 @@ _STEPS_BETWEEN = 24
 
 
 class Snapshots(NamedTuple):
-    """Curves in the lab frame, the net displacement along the x axis.
-
-    Attributes
-    ----------
-    t : (n_time,)
-    x, y : (n_node, n_time)
-    """
+    """Curves in the lab frame, the net displacement along the x axis."""
 
     t: np.ndarray
     x: np.ndarray

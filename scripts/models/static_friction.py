@@ -48,15 +48,7 @@ def slowest_link(
 
 @dataclass(frozen=True)
 class Case:
-    """A shape and its rates at which a link is held.
-
-    Parameters
-    ----------
-    name : str
-        As in the paper's figure.
-    angles, rates : (2,)
-    what : str
-    """
+    """A shape and its rates at which a link is held."""
 
     name: str
     angles: tuple[float, float]
@@ -103,21 +95,7 @@ unknown."""
 
 
 class Held(NamedTuple):
-    """What a case gives as delta falls; arrays over delta.
-
-    Attributes
-    ----------
-    delta : (n,)
-    link : int
-        The held link.
-    speed : (n,)
-        Largest speed on it.
-    density : (n,)
-        Its friction, |net force|/length; kinetic friction would give mu where it slides without
-        turning.
-    couple : (n,)
-        |couple about its midpoint| / (length^2/4), the largest it can bear with unit coefficients.
-    """
+    """What a case gives as delta falls; arrays over delta."""
 
     delta: np.ndarray
     link: int
@@ -172,13 +150,7 @@ def symmetric_balance(
 
     For equal angles and rates (mirror symmetry) that is the link's normal velocity, and the normal
     net force is returned; for opposite ones (point symmetry) its rotation rate, and the net torque
-    about the centre. It falls as `unknown` grows. The other two components vanish.
-
-    Parameters
-    ----------
-    unknown : (n,)
-        Values of the velocity.
-    """
+    about the centre. It falls as `unknown` grows. The other two components vanish."""
     unknown = np.asarray(unknown, dtype=float)
     angles, rates = (
         np.repeat(np.array(pair)[:, None], unknown.size, axis=1)

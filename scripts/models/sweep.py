@@ -51,23 +51,8 @@ class Performance(NamedTuple):
 
 @dataclass(frozen=True)
 class Route:
-    """How tail velocities are found.
-
-    Parameters
-    ----------
-    body : Chain
-        Three links, symmetric.
-    friction : Friction
-        With mu_b = mu_f: otherwise ellipse gaits rotate, and distance means nothing.
-    delta : float
-        Regularisation speed, per period.
-    velocity_map : VelocityMap, optional
-        Interpolated; for a direct route, the start of the solves.
-    direct : bool
-        Solve the balance at every instant, to a residual of 1e-8.
-    method : str
-        Interpolation, see `VelocityMap.tail_velocity`.
-    """
+    """How tail velocities are found for a symmetric body with mu_b = mu_f: directly, begun at the map's,
+    or by the map alone; delta per period."""
 
     body: Chain
     friction: Friction
@@ -132,26 +117,8 @@ def performance(
     processes: int | None = 1,
     label: str = "",
 ) -> Performance:
-    """Distance and work of ellipse gaits.
-
-    Parameters
-    ----------
-    route : Route
-    gaits : (3, n_gait)
-        A0, A1, B1 of each.
-    instants : int
-        Even number of instants per period; half of them are evaluated, the symmetry gives the
-        others.
-    processes : int, optional
-        None uses all processors.
-    label : str
-        Heads a progress bar.
-
-    Raises
-    ------
-    NotConvergedError
-        If the balance cannot be solved at some instant.
-    """
+    """Distance and work of ellipse gaits (A0, A1, B1), ``(3, n_gait)``, at an even number of instants, half
+    of which are evaluated."""
     gaits = np.asarray(gaits, dtype=float)
     if gaits.ndim != 2 or len(gaits) != 3:
         raise ProblemError(f"gaits must have shape (3, n_gait), not {gaits.shape}.")
@@ -184,18 +151,7 @@ def local_maxima(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Maximum:
-    """A local maximum of the efficiency over ellipse gaits.
-
-    Attributes
-    ----------
-    A0, A1, B1 : float
-    replay : Replay
-        The gait replayed directly; its efficiency is the one to quote.
-    at_contact : bool
-        It lies on the boundary of the admissible gaits.
-    position_error : float
-        How far the maximiser moves when the search uses half as many instants [rad].
-    """
+    """A local maximum of the efficiency over ellipse gaits."""
 
     A0: float
     A1: float
@@ -232,18 +188,7 @@ def refined_maximum(
     route: Route, gait: np.ndarray, *, instants: int = 800, size: float = 0.02
 ) -> Maximum:
     """Climb from a gait (A0, A1, B1) to the local maximum of the efficiency nearby, and replay it
-    directly.
-
-    Parameters
-    ----------
-    route : Route
-        Used by the search; the replay is direct in any case.
-    gait : (3,)
-    instants : int
-        Per period, in the search.
-    size : float
-        Edge of the first simplex.
-    """
+    directly."""
     body = route.body
 
     def coordinates(values: np.ndarray) -> np.ndarray:
@@ -274,20 +219,7 @@ def distinct_maxima(
     apart: float = 0.1,
     instants: int = 800,
 ) -> list[Maximum]:
-    """The different local maxima that the maxima of a grid climb to, best first.
-
-    Parameters
-    ----------
-    route : Route
-    values : (n_A0, n_A1, n_B1)
-        Efficiency on the grid, NaN at inadmissible gaits. Steps in its boundary make maxima that
-        climb elsewhere.
-    gaits : (3, n_A0, n_A1, n_B1)
-    most : int
-        Candidates followed, best first.
-    apart : float
-        Maxima nearer than this [rad] are one.
-    """
+    """The different local maxima that the maxima of a grid climb to, best first."""
     found: list[Maximum] = []
     for index in local_maxima(values)[:most]:
         start = gaits[(slice(None), *index)]

@@ -40,18 +40,9 @@ STENCILS = {"linear": 2, "cubic": 4}
 class VelocityMap:
     """Tail velocities of a three-link body over shapes and ratios of rates.
 
-    Parameters
-    ----------
-    body : Chain
-        Three links.
-    friction : Friction
-    delta : float
-        Regularisation speed relative to the larger joint rate.
-    values : (n_face, n_angle, n_angle, n_ratio + 2, 3)
-        (u, v, omega) at unit larger rate. Faces: rate 1 = 1, rate 2 = 1; then, if mu_b != mu_f,
-        rate 1 = -1, rate 2 = -1. Angles are ``2 pi k / n_angle - pi``; ratios are ``2 (k -
-        1)/(n_ratio - 1) - 1``, a node more at either end. On the faces of negative rates both rates
-        are negated.
+    `values` are (u, v, omega) at unit larger rate, ``(n_face, n_angle, n_angle, n_ratio + 2, 3)``,
+    with a node more at either end of the ratios; faces: rate 1 = 1, rate 2 = 1, and where mu_b
+    differs from mu_f the same with both rates negated. `delta` is relative to the larger rate.
     """
 
     body: Chain
@@ -106,18 +97,7 @@ class VelocityMap:
     def tail_velocity(
         self, angles: np.ndarray, rates: np.ndarray, *, method: str = "cubic"
     ) -> np.ndarray:
-        """Tail velocities (u, v, omega) in the body frame, by scaling and interpolation.
-
-        Parameters
-        ----------
-        angles, rates : (2, n_time)
-            Any joint angles [rad] and rates [rad/time].
-        method : {"cubic", "linear"}
-
-        Returns
-        -------
-        (3, n_time) array
-        """
+        """Tail velocities (u, v, omega) in the body frame, by scaling and interpolation."""
         if method not in STENCILS:
             raise ProblemError(f"method must be one of {', '.join(STENCILS)}, not {method!r}.")
         width = STENCILS[method]
@@ -223,30 +203,7 @@ def velocity_map(
     processes: int | None = 1,
     label: str = "",
 ) -> VelocityMap:
-    """Tabulate the tail velocities of a three-link body by direct solves.
-
-    Parameters
-    ----------
-    body, friction
-        Any link lengths and coefficients.
-    delta : float
-        Regularisation speed relative to the larger joint rate.
-    n_angle : int
-        Nodes over the 2 pi of either joint angle; a multiple of 4 puts -pi/2, 0 and pi/2 on nodes.
-    n_ratio : int
-        Nodes over [-1, 1] of the ratio of rates; odd, so that 0 is a node.
-    processes : int, optional
-        None uses all processors.
-    label : str
-        Heads a progress bar.
-
-    Raises
-    ------
-    ProblemError
-        If the body has not three links, or the numbers of nodes are unusable.
-    NotConvergedError
-        If a node cannot be solved.
-    """
+    """Tabulate the tail velocities of a three-link body by direct solves."""
     if body.n_link != 3:
         raise ProblemError(f"a velocity map needs a body of three links, not {body.n_link}.")
     if n_angle < 4 or n_ratio < 3 or n_ratio % 2 == 0:
@@ -267,14 +224,7 @@ def velocity_map(
 @dataclass(frozen=True)
 class MapError:
     """Differences of interpolated from directly solved tail velocities at random shapes and rates,
-    larger rate 1.
-
-    Attributes
-    ----------
-    largest, rms, median : float
-        Of the largest component of (u, v, omega/2) at an instant; omega/2 is of the size of the
-        head's velocity.
-    """
+    larger rate 1."""
 
     largest: float
     rms: float

@@ -26,24 +26,7 @@ def write_arrays(
     attributes: Mapping[str, Any] | None = None,
 ) -> None:
     """Write arrays (numbers, strings or NumPy arrays by name; "a/b" makes a group) with what
-    describes them.
-
-    Parameters
-    ----------
-    path : Path
-        Replaced atomically.
-    arrays : mapping
-    units : mapping, optional
-        Unit or dimensions of an array, by name.
-    attributes : mapping, optional
-        Of the file, as JSON where they are not plain numbers or strings. The command line and
-        versions are added.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written.
-    """
+    describes them."""
     path = Path(path)
     described = {
         "command": " ".join(sys.orig_argv[1:]),
@@ -66,13 +49,7 @@ def write_arrays(
 
 
 def read_arrays(path: Path) -> dict[str, Any]:
-    """All arrays of a file by name; strings decoded, scalars as NumPy scalars.
-
-    Raises
-    ------
-    StoreError
-        If the file is missing, damaged or not of this kind.
-    """
+    """All arrays of a file by name; strings decoded, scalars as NumPy scalars."""
     names: list[str] = []
 
     def visit(name: str, item: Any) -> None:

@@ -25,15 +25,7 @@ def draw_link_fields(
     fields: str = "vf", lengths: tuple[float, float] = (0.25, 0.12), pose: tuple[float,
     complex] = (0.0, 0j),
 ) -> None:  # fmt: skip
-    """A body with arrows of velocity ("v") and friction force per length ("f") along its links.
-
-    Parameters
-    ----------
-    lengths : (float, float)
-        Length of an arrow of unit velocity and of unit force.
-    pose : (float, complex)
-        Angle and place of the tail.
-    """
+    """A body with arrows of velocity ("v") and friction force per length ("f") along its links."""
     angles, rates, z = (np.asarray(a, dtype=float).reshape(-1, 1) for a in (angles, rates, z))
     now = instant(body, friction, angles, rates, z, delta)
     turn = np.exp(1j * pose[0])

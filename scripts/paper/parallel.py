@@ -24,19 +24,7 @@ def parallel_map(
     label: str = "",
 ) -> list[Result]:
     """``[function(task) for task in tasks]``, on `processes` processes (all available ones by
-    default).
-
-    Parameters
-    ----------
-    function : callable
-        Picklable: a module-level function, or a partial of one. It travels with every chunk of
-        tasks.
-    tasks : sequence
-    processes : int, optional
-        1 stays in this process.
-    label : str
-        Heads the bar; none is drawn without it, nor where nobody watches.
-    """
+    default)."""
     count = min(available_processes() if processes is None else processes, len(tasks))
 
     def watched(results):

@@ -9,12 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table.
-
-    Parameters
-    ----------
-    what, printed, computed, error, verdict : str
-    """
+    """A line of the table."""
 
     what: str
     printed: str

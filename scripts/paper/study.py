@@ -39,23 +39,7 @@ class Context:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a study.
-
-    Parameters
-    ----------
-    name : str
-        Also that of its file.
-    compute : callable
-        From a Context to arrays by name.
-    settings : mapping
-        Plain numbers, strings and lists.
-    quick : mapping
-        Settings to replace for a quick run.
-    needs : tuple of str
-        Parts whose arrays it uses.
-    units : mapping
-        Units of its arrays, by name.
-    """
+    """A part of a study."""
 
     name: str
     compute: Callable[[Context], Arrays]
@@ -110,13 +94,7 @@ class PaperStudy:
         self._fingerprints = {name: self._fingerprint(name) for name in self.parts}
 
     def select(self, names: Sequence[str]) -> list[str]:
-        """The named parts and all they need, in order.
-
-        Raises
-        ------
-        ProblemError
-            If there is no part of a name.
-        """
+        """The named parts and all they need, in order."""
         unknown = [name for name in names if name not in self.parts]
         if unknown:
             raise ProblemError(
