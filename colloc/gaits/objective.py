@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from colloc.mechanics.densities import INTEGRALS, Quantity, quantities_of
-from colloc.numerics.expression import Dual, Formula, formula
+from colloc.numerics.expression import Formula, formula
 from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
@@ -165,14 +165,12 @@ class Objective:
         self, period: Mapping[str, float], slopes: Mapping[str, np.ndarray]
     ) -> np.ndarray | float:
         """Gradient of the value, from the quantities of a period and their gradients."""
-        variables = {name: Dual(period[name], (slopes[name],)) for name in self.uses}
-        return self._formula.differentiated(variables).slopes[0]
+        return sum(slope * slopes[name] for name, slope in self.partials(period).items())
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
         """Derivative with respect to each of its variables."""
-        n = len(self.uses)
-        slope = self.gradient(period, dict(zip(self.uses, np.eye(n), strict=True)))
-        return dict(zip(self.uses, np.broadcast_to(slope, n).tolist(), strict=True))
+        partials = self._formula.partials({name: period[name] for name in self.uses})
+        return {name: float(partials[name]) for name in self.uses}
 
     def shares(self, period: Mapping[str, float]) -> dict[str, float]:
         """Relative change of the value per unit of each quantity."""

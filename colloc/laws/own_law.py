@@ -10,7 +10,7 @@ import numpy as np
 from colloc.mechanics.friction import regularised_speed
 from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array
-from colloc.numerics.expression import Dual, Formula, formula
+from colloc.numerics.expression import Formula, formula
 from colloc.system.arguments import check_positive, named_arguments
 from colloc.system.errors import ProblemError
 
@@ -195,15 +195,13 @@ class OwnLaw:
     def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
         vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta))
         zero, r = 0.0 * (vs + vn), regularised_speed(vs, vn, delta)
-        at = {
-            "vs": Dual(vs, (1.0 + zero, zero)),
-            "vn": Dual(vn, (zero, 1.0 + zero)),
-            "speed": Dual(r, (vs / r, vn / r)),
-            "delta": Dual(delta + zero, (zero, zero)),
-        }
-        scale = self.speed_unit / self.unit
-        rows = [each.differentiated(at).slopes for each in self._read]
-        return tuple(tuple(zero - scale * slope for slope in row) for row in rows)
+        at, scale = {"vs": vs, "vn": vn, "speed": r, "delta": delta}, self.speed_unit / self.unit
+        rows = []
+        for each in self._read:
+            by = dict.fromkeys(at, 0.0) | each.partials(at)
+            slopes = by["vs"] + by["speed"] * vs / r, by["vn"] + by["speed"] * vn / r
+            rows.append(tuple(zero - scale * slope for slope in slopes))
+        return tuple(rows)
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
         # the trace in every direction: no less than the secant of a law that grows with the speed

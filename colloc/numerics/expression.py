@@ -1,13 +1,15 @@
-"""Formulas as text: evaluated on floats, NumPy arrays or CasADi symbols, and differentiated in
-forward mode. Nothing but arithmetic of known variables is ever evaluated."""
+"""Formulas as text: evaluated on floats, NumPy arrays or CasADi symbols, and differentiated.
+
+Nothing but arithmetic of known variables is ever evaluated.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from types import CodeType, SimpleNamespace
+from functools import cached_property, lru_cache
+from types import CodeType
 from typing import Any
 
 from colloc.numerics.arrays import Array, namespace
@@ -22,99 +24,51 @@ _NODES = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Dual:
-    """A value and its derivatives along some directions."""
-
-    value: Array
-    slopes: tuple[Array, ...]
-
-    def chain(self, value: Array, slope: Array) -> Dual:
-        """A function of this one, from its value and derivative."""
-        return Dual(value, tuple(slope * a for a in self.slopes))
-
-    def _combine(self, other: Any, value: Array, d_self: Array, d_other: Array) -> Dual:
-        """A function of this and another, from its value and partial derivatives."""
-        if not isinstance(other, Dual):
-            return self.chain(value, d_self)
-        pairs = zip(self.slopes, other.slopes, strict=True)
-        return Dual(value, tuple(d_self * a + d_other * b for a, b in pairs))
-
-    def __add__(self, other: Any) -> Dual:
-        return self._combine(other, self.value + _value(other), 1.0, 1.0)
-
-    def __mul__(self, other: Any) -> Dual:
-        return self._combine(other, self.value * _value(other), _value(other), self.value)
-
-    def __truediv__(self, other: Any) -> Dual:
-        under = _value(other)
-        return self._combine(other, self.value / under, 1.0 / under, -self.value / (under * under))
-
-    def __rtruediv__(self, other: float) -> Dual:
-        return self.chain(other / self.value, -other / (self.value * self.value))
-
-    def __pow__(self, power: float) -> Dual:
-        slope = power * self.value ** (power - 1) if power else 0.0 * self.value
-        return self.chain(self.value**power, slope)
-
-    def __neg__(self) -> Dual:
-        return self * -1.0
-
-    def __pos__(self) -> Dual:
-        return self
-
-    def __sub__(self, other: Any) -> Dual:
-        return self + -other
-
-    def __rsub__(self, other: float) -> Dual:
-        return -self + other
-
-    __radd__, __rmul__ = __add__, __mul__
-
-    def __gt__(self, other: Any) -> Array:
-        return self.value > _value(other)
-
-    def __ge__(self, other: Any) -> Array:
-        return self.value >= _value(other)
-
-    def __lt__(self, other: Any) -> Array:
-        return self.value < _value(other)
-
-    def __le__(self, other: Any) -> Array:
-        return self.value <= _value(other)
+_RULES: dict[type[ast.operator] | str, str] = {
+    ast.Add: "da + db",
+    ast.Sub: "da - db",
+    ast.Mult: "da * b + a * db",
+    ast.Div: "da / b - a * db / (b * b)",
+    "sqrt": "0.5 / sqrt(a) * da",
+    "exp": "exp(a) * da",
+    "log": "da / a",
+    "tanh": "(1.0 - tanh(a) * tanh(a)) * da",
+    "abs": "where(a < 0.0, -1.0, 1.0) * da",
+}
 
 
-def _value(a: Any) -> Any:
-    return a.value if isinstance(a, Dual) else a
+class _Substitution(ast.NodeTransformer):
+    def __init__(self, nodes: Mapping[str, ast.expr]) -> None:
+        self.nodes = nodes
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return self.nodes.get(node.id, node)
 
 
-def _dual_functions(xp: SimpleNamespace, count: int) -> dict[str, Callable[..., Any]]:
-    derivatives: dict[str, Callable[[Array, Array], Array]] = {
-        "sqrt": lambda x, y: 0.5 / y,
-        "exp": lambda x, y: y,
-        "log": lambda x, y: 1.0 / x,
-        "tanh": lambda x, y: 1.0 - y * y,
-        "abs": lambda x, y: xp.where(x < 0, -1.0, 1.0),
-    }
+def _template(text: str, **nodes: ast.expr) -> ast.expr:
+    return _Substitution(nodes).visit(ast.parse(text, mode="eval").body)
 
-    def where(condition: Array, a: Any, b: Any) -> Dual:
-        a, b = (x if isinstance(x, Dual) else Dual(x, (0.0,) * count) for x in (a, b))
-        slopes = zip(a.slopes, b.slopes, strict=True)
-        value = xp.where(condition, a.value, b.value)
-        return Dual(value, tuple(xp.where(condition, p, q) for p, q in slopes))
 
-    def lift(name: str) -> Callable[[Any], Any]:
-        function = getattr(xp, name)
-
-        def apply(a: Any) -> Any:
-            if not isinstance(a, Dual):
-                return function(a)
-            value = function(a.value)
-            return a.chain(value, derivatives[name](a.value, value))
-
-        return apply
-
-    return {"where": where} | {name: lift(name) for name in derivatives}
+def _derivative(node: ast.expr, name: str) -> ast.expr:
+    if name not in {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}:
+        return ast.Constant(0.0)
+    if isinstance(node, ast.UnaryOp):
+        return ast.UnaryOp(node.op, _derivative(node.operand, name))
+    if isinstance(node, ast.Call):
+        function, a = str(getattr(node.func, "id", "")), node.args[0]
+        if function != "where":
+            return _template(_RULES[function], a=a, da=_derivative(a, name))
+        sides = (_derivative(side, name) for side in node.args[1:])
+        return ast.Call(node.func, [a, *sides], [])
+    if not isinstance(node, ast.BinOp):
+        return ast.Constant(1.0)
+    a, b, da = node.left, node.right, _derivative(node.left, name)
+    if isinstance(node.op, ast.Pow):
+        n = _evaluate(_compiled(b), {})
+        if n == 0:
+            return ast.Constant(0.0)
+        return _template("n * a ** m * da", a=a, da=da, n=ast.Constant(n), m=ast.Constant(n - 1.0))
+    return _template(_RULES[type(node.op)], a=a, b=b, da=da, db=_derivative(b, name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,19 +77,33 @@ class Formula:
 
     text: str
     names: frozenset[str]
-    code: CodeType
+    tree: ast.Expression
+
+    @cached_property
+    def _code(self) -> CodeType:
+        return _compiled(self.tree.body)
+
+    @cached_property
+    def _derivatives(self) -> dict[str, CodeType]:
+        names = self.names - {*FUNCTIONS, "sum"}
+        return {name: _compiled(_derivative(self.tree.body, name)) for name in names}
 
     def __call__(self, at: Mapping[str, Array]) -> Array:
-        xp = namespace(*at.values())
-        functions = {name: getattr(xp, name) for name in FUNCTIONS} | {"sum": xp.sum_rows}
-        return eval(self.code, {"__builtins__": {}}, {**functions, **at})
+        return _evaluate(self._code, at)
 
-    def differentiated(self, at: Mapping[str, Dual]) -> Dual:
-        """Value and derivatives; not of a formula with ``sum``."""
-        count = len(next(iter(at.values())).slopes)
-        functions = _dual_functions(namespace(*(a.value for a in at.values())), count)
-        result = eval(self.code, {"__builtins__": {}}, {**functions, **at})
-        return result if isinstance(result, Dual) else Dual(result, (0.0,) * count)
+    def partials(self, at: Mapping[str, Array]) -> dict[str, Array]:
+        """Derivatives by each of its variables; not of a formula with ``sum``."""
+        return {name: _evaluate(code, at) for name, code in self._derivatives.items()}
+
+
+def _compiled(node: ast.expr) -> CodeType:
+    return compile(ast.fix_missing_locations(ast.Expression(node)), "<formula>", "eval")
+
+
+def _evaluate(code: CodeType, at: Mapping[str, Array]) -> Any:
+    xp = namespace(*at.values())
+    functions = {name: getattr(xp, name) for name in FUNCTIONS} | {"sum": xp.sum_rows}
+    return eval(code, {"__builtins__": {}}, {**functions, **at})
 
 
 class _Floats(ast.NodeTransformer):
@@ -166,11 +134,13 @@ def formula(
     try:
         written, tree = ast.unparse(tree), _Floats().visit(tree)
         for node in ast.walk(tree):
-            if isinstance(node, ast.BinOp) and not _has_name(node):
-                number = compile(ast.Expression(node), "<formula>", "eval")
-                if not isinstance(eval(number, {"__builtins__": {}}), float):
-                    raise ArithmeticError  # a root of a negative number
-        return Formula(written, names, compile(tree, "<formula>", "eval"))
+            if not isinstance(node, ast.BinOp) or _has_name(node):
+                continue
+            if not isinstance(_evaluate(_compiled(node), {}), float):
+                raise ArithmeticError  # a root of a negative number
+        parsed = Formula(written, names, tree)
+        _ = parsed._code  # which says if it is nested too deeply
+        return parsed
     except RecursionError:
         raise ProblemError(f"'{text}' is nested too deeply.") from None
     except ArithmeticError:
