@@ -29,7 +29,7 @@ from colloc.motion.torques import joint_torques
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.played import Numbers, Path, Replay, lever, to_tolerance
+from colloc.verification.played import Numbers, Path, Replay, lever, through_periods, to_tolerance
 
 _ROUGH = 1e-4
 """Error of the runs that differentiate the period map; less where friction is so dry that a step
@@ -48,28 +48,17 @@ _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
 @dataclass(frozen=True, eq=False)
 class InertialMotion(Period):
-    """A period of a gait with inertia that leaves the momenta as they are.
+    """A period of a gait with inertia that leaves the momenta as they are; the work is that against
+    friction [weight x length]."""
 
-    The work is that against friction [weight x length]; errors are those of
-    `GaitWithInertia.errors`.
-
-    Attributes
-    ----------
-    froude : float
-        Froude number L/(g T^2).
-    multipliers : (3,)
-        By what small changes of the momenta are multiplied in a period (Floquet multipliers);
-        stable if all are within 1.
-    phases, states : (n,), (7, n)
-        Where the solver stepped, and Vx, Vy, H (`colloc.mechanics.inertia`), the tail link's
-        orientation, the place of the centre of mass, and the work up to there; orientation and
-        place are seen from axes that turn evenly.
-    """
-
-    froude: float
+    froude: float  # L/(g T^2)
     multipliers: np.ndarray = field(repr=False)
+    """By what small changes of the momenta are multiplied in a period (Floquet multipliers)."""
     phases: np.ndarray = field(repr=False)
+    """Phases ``(n,)`` where the solver stepped."""
     states: np.ndarray = field(repr=False)
+    """Vx, Vy, H (`colloc.mechanics.inertia`), the tail link's orientation, the place of the centre
+    of mass, and the work up to there, ``(7, n)``; seen from axes that turn evenly."""
 
     @property
     def error(self) -> float:
@@ -476,12 +465,8 @@ def motion_from_rest(
     moving = GaitWithInertia(
         body, friction, gait, delta, regime=Slope(float(grade)) if grade else LEVEL, **how
     )
-    start, courses = np.array([0.0, 0.0, 0.0, theta, 0.0, 0.0, 0.0]), []
-    for _ in range(periods):
-        courses.append(moving.run(start, tolerance))
-        start = courses[-1].states[:, -1]
-    change = np.array([course.states[:, -1] - course.states[:, 0] for course in courses])
-    totals = [np.hypot(*change[:, _PLACE].T), change[:, _WORK], change[:, _THETA]]
-    phases = np.concatenate([k + course.phases for k, course in enumerate(courses)])
-    states = np.concatenate([course.states for course in courses], axis=1)
+    start = np.array([0.0, 0.0, 0.0, theta, 0.0, 0.0, 0.0])
+    phases, states, ends = through_periods(partial(moving.run, aim=tolerance), start, periods)
+    change = np.diff(ends)
+    totals = [np.hypot(*change[_PLACE]), change[_WORK], change[_THETA]]
     return FromRest(phases, states, np.array(totals).T)

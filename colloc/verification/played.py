@@ -11,6 +11,7 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period
 from colloc.mechanics.bodies import Body
+from colloc.motion.follow import Course
 from colloc.system.errors import NotConvergedError
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -23,47 +24,24 @@ LEAST = 1e-12  # the smallest error that is tried
 
 @dataclass(frozen=True)
 class Replay(Period):
-    """A simulated period of a gait: the quantities of a `Period`, and how far they can be trusted.
+    """A simulated period of a gait, and how far its quantities can be trusted."""
 
-    The distance is that of the centre of mass, by `colloc.gaits.period` where a turn is asked for.
-
-    Attributes
-    ----------
-    lever : float
-        Largest distance of a point of the body from its centre of mass [body lengths].
-    actuator_work : float
-        Work of the joints, from the moments of the friction forces about them; equals `work` in
-        balance.
-    residual : float
-        Largest force or torque left over, in units of the largest friction coefficient; with
-        inertia the change of the momenta in a period.
-    error : float
-        Relative error of the objective.
-    several : float
-        Part of the period at which several motions are balanced; 0 for equal coefficients.
-    shares : (n_share,)
-        Largest shares of the actuators' limits; none unless limits were given.
-    instants : int
-    tail : ((n,), (3, n))
-        Phases and tail velocities there.
-    objective : Objective
-    across : float
-        On a slope the way across the direction that counts.
-    multipliers : tuple of complex
-        With inertia, by what small changes of the momenta are multiplied in a period.
-    """
-
-    lever: float
-    actuator_work: float
+    lever: float  # largest distance of a point of the body from its centre of mass [body lengths]
+    actuator_work: float  # of the joints, by their moments; equals `work` in balance
     residual: float
-    error: float
-    several: float
+    """Largest force or torque left over, in units of the largest friction coefficient; with inertia
+    the change of the momenta in a period."""
+    error: float  # relative, of the objective
+    several: float  # part of the period at which several motions are balanced
     instants: int
     tail: tuple[np.ndarray, np.ndarray] = field(compare=False)
+    """Phases ``(n,)`` and tail velocities there ``(3, n)``."""
     shares: np.ndarray = field(default_factory=lambda: np.empty(0), compare=False)
+    """Largest shares of the actuators' limits."""
     objective: Objective = EFFICIENCY
-    across: float = 0.0
+    across: float = 0.0  # on a slope the way across the direction that counts
     multipliers: tuple[complex, ...] = ()
+    """By what small changes of the momenta are multiplied in a period with inertia."""
 
     def __repr__(self) -> str:
         value = f"{self.objective.short} = {self.value:.6g} +- {self.error * abs(self.value):.0e}"
@@ -125,6 +103,19 @@ def to_tolerance(
     raise NotConvergedError(
         f"the motion cannot be replayed to a relative error of {tolerance:.0e}."
     )
+
+
+def through_periods(
+    run: Callable[[np.ndarray], Course], start: np.ndarray, periods: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Phases, states there, and states at the ends of periods ``(n_state, periods + 1)``."""
+    courses, ends = [], [start]
+    for _ in range(periods):
+        courses.append(run(ends[-1]))
+        ends.append(courses[-1].states[:, -1])
+    phases = np.concatenate([k + course.phases for k, course in enumerate(courses)])
+    states = np.concatenate([course.states for course in courses], axis=1)
+    return phases, states, np.stack(ends, axis=1)
 
 
 def lever(body: Body, angles: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ from colloc.motion.on_slope import balance_on_slope
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion, whole_totals
-from colloc.verification.played import Path, Replay, lever, to_tolerance
+from colloc.verification.played import Path, Replay, lever, through_periods, to_tolerance
 
 _UNITS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering."""
@@ -52,49 +53,29 @@ _LONGEST = 4.0  # longest step of a replay, in instants of a uniform grid
 
 @dataclass(frozen=True, eq=False)
 class SlopeMotion:
-    """A gait on a slope, period by period.
+    """A gait on a slope, period by period."""
 
-    Attributes
-    ----------
-    grade : float
-        Tangent of the inclination.
-    course : float
-        Direction in which the gait goes on the level, from that of the tail link at phase 0 [rad].
-    headings : (n_period + 1,)
-        Directions, at the start of every period and the end of the last, in which the gait would go
-        from there on the level, from straight uphill, positive to the left [rad].
-    climb, aside : (n_period,)
-        Way of the centre of mass up the fall line, and to the left of it [body lengths along the
-        slope].
-    friction_work, joint_work : (n_period,)
-        Work against friction, and of the joints by their moments [pressing force x body length].
-    steering : (n_period,)
-        Derivative of the heading at the end of a period with respect to that at its start; always
-        positive.
-    error : float
-        Error of headings, ways and works at the end: their change where steps are allowed 30 times
-        the error.
-    several : float
-        Part of the time at which several motions are balanced, by the solver's steps; 0 for laws
-        that leave one. One of them is followed, and no error says what the others would change.
-    phases, states : (n,), (6, n)
-        Where the solver stepped, counted from the first start, and its unknowns: theta, way up and
-        aside, work against friction and of the joints, logarithm of the steering, all but theta
-        from the first start.
-    """
-
-    grade: float
+    grade: float  # tangent of the inclination
     course: float
+    """Direction of the gait on the level, from that of the tail link at phase 0 [rad]."""
     headings: np.ndarray
-    climb: np.ndarray
-    aside: np.ndarray
-    friction_work: np.ndarray
-    joint_work: np.ndarray
-    steering: np.ndarray
+    """Directions, at the ends of periods ``(n_period + 1,)``, in which the gait would go on from
+    there on the level, from straight uphill, positive to the left [rad]."""
+    climb: np.ndarray  # of the centre of mass up the fall line [body lengths], (n_period,)
+    aside: np.ndarray  # to the left of it
+    friction_work: np.ndarray  # [pressing force x body length]
+    joint_work: np.ndarray  # by the moments in the joints
+    steering: np.ndarray  # derivative of a period's last heading by its first, always positive
     error: float
+    """Error of headings, ways and works at the end: their change where steps may err 30 times as
+    much."""
     several: float
-    phases: np.ndarray
+    """Part of the time at which several motions are balanced. One of them is followed, and no error
+    says what the others would change."""
+    phases: np.ndarray  # where the solver stepped, counted from the first start, (n,)
     states: np.ndarray
+    """Theta, way up and aside, work against friction and of the joints, logarithm of the steering,
+    all but theta from the first start, ``(6, n)``."""
 
     def __repr__(self) -> str:
         count = (
@@ -194,15 +175,11 @@ class GaitOnSlope:
 
     def run(self, course: float, heading: float, periods: int, tolerance: float) -> SlopeMotion:
         """The motion through periods from a heading, without its error."""
-        start, courses = np.append(heading - course, np.zeros(5)), []
-        for _ in range(periods):
-            courses.append(self.integrate(start, tolerance))
-            start = courses[-1].states[:, -1]
-        states = np.concatenate([ran.states for ran in courses], axis=1)
-        ends = np.stack([states[:, 0], *(ran.states[:, -1] for ran in courses)], axis=1)
+        start = np.append(heading - course, np.zeros(5))
+        one = partial(self.integrate, tolerance=tolerance)
+        phases, states, ends = through_periods(one, start, periods)
         climb, aside, friction_work, joint_work, steering = np.diff(ends[1:])
         ways = climb, aside, friction_work, joint_work
-        phases = np.concatenate([k + ran.phases for k, ran in enumerate(courses)])
         at = self.slope.grade, course, ends[0] + course
         return SlopeMotion(*at, *ways, np.exp(steering), np.nan, np.nan, phases, states)
 
