@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -91,27 +92,17 @@ def solve(
         raise ProblemError(f"seconds must be positive, not {seconds:g}.")
     if output is not None and not Path(output).name:
         raise ProblemError(f"output must name a file, not {shown(str(output))}.")
-    solution = resume(
-        stated,
-        None if output is None else Path(output),
-        starts=starts or stated.starts,
-        seconds=seconds,
-        search=search,
-        progress=_reporter(verbose, progress),
-    )
-    if output is not None:
-        save_and_clear(solution, Path(output))
+    path, report = None if output is None else Path(output), _reporter(verbose, progress)
+    settings: dict[str, Any] = {"seconds": seconds, "search": search, "progress": report}
+    solution = resume(stated, path, starts=starts or stated.starts, **settings)
+    if path is not None:
+        save_and_clear(solution, path)
     return solution
 
 
 def _read(problem: Stated) -> ProblemFile:
     if isinstance(problem, Problem):
         return ProblemFile(problem, None, "")
-    if not isinstance(problem, (str, os.PathLike)):
-        raise ProblemError(
-            "problem must be a Problem or the path of a problem file, not "
-            f"{type(problem).__name__}."
-        )
     return read_problem_file(problem)
 
 
@@ -127,13 +118,7 @@ def _reporter(verbose: bool, progress: Callable[..., object] | None) -> Callable
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """Results of a search over many starts.
-
-    Attributes
-    ----------
-    problem : Problem
-    outcomes : tuple of Outcome
-        By start number.
+    """Outcomes of a search over many starts, by number.
 
     Examples
     --------
@@ -153,13 +138,8 @@ class Starts:
         return basins(self.problem, self.outcomes)
 
     def solution(self, start: int | None = None) -> Solution:
-        """Solve a start (by default the best one) again from its gait.
-
-        Raises
-        ------
-        NotConvergedError
-            If no start was certified and none is named.
-        """
+        """Solve a start again from its gait, by default the best one (`NotConvergedError` if no
+        start was certified)."""
         if start is not None:
             return reopen(self.problem, next(o for o in self.outcomes if o.start == start))
         if not self.optima:
@@ -236,16 +216,10 @@ def multistart(
     problem = _read(problem).problem
     store = Archive(problem) if archive is None else open_archive(problem, archive)
     done, report = store.done(sampler, seed, starts), _reporter(verbose, progress)
+    how: dict[str, Any] = {"workers": workers, "time_limit": time_limit, "executor": pool_for}
+    todo = (k for k in range(starts) if k not in done)
     try:
-        for outcome in run_archive(
-            store,
-            (k for k in range(starts) if k not in done),
-            sampler=sampler,
-            seed=seed,
-            workers=workers,
-            time_limit=time_limit,
-            executor=pool_for,
-        ):
+        for outcome in run_archive(store, todo, sampler=sampler, seed=seed, **how):
             report(outcome)
     finally:
         if archive is not None:

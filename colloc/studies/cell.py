@@ -72,17 +72,11 @@ def value_of(problem: Problem, gait: AnyGait, instants: tuple[int, int] = _COARS
     """Objective of a gait by replay, or 0; reduced by what an unwanted net rotation may add."""
     rotation = problem.rotation or 0.0
     try:
+        delta = delta_per_period(problem.gait, gait, problem.delta)
         period = replayer(problem.regime)(
-            problem.body,
-            problem.law,
-            gait,
-            delta_per_period(problem.gait, gait, problem.delta),
-            instants=instants[0],
-            most_instants=instants[1],
-            breaks=gait.corner_phases,
-            objective=problem.objective,
-            turn=rotation,
-        )
+            problem.body, problem.law, gait, delta, instants=instants[0], most_instants=instants[1],
+            breaks=gait.corner_phases, objective=problem.objective, turn=rotation,
+        )  # fmt: skip
     except CollocError:
         return 0.0
     turned = 0.0 if problem.rotation is None else abs(period.rotation - rotation)

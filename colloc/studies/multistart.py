@@ -22,7 +22,6 @@ from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, process_pool, run_tasks
 
-_NONE = "no optimum yet"
 _CERTIFIED = ("value", "efficiency", "distance", "work", "value_error", "efficiency_error")
 
 
@@ -67,8 +66,10 @@ def run_guess(
         elif time.perf_counter() - begin < time_limit:
             raise KeyboardInterrupt
         else:
-            where = f"the last optimum was at delta = {solution.answer.delta:.1e}"
-            message = f"gave up after {time_limit:g} s; {where if news[-1].best else _NONE}."
+            where = "no optimum yet"
+            if news[-1].best:
+                where = f"the last optimum was at delta = {solution.answer.delta:.1e}"
+            message = f"gave up after {time_limit:g} s; {where}."
             outcome = Outcome(start, TIME_LIMIT, message, guess, guess)
     except Exception as error:
         outcome = Outcome(start, ERROR, f"{type(error).__name__}: {error}", guess, guess)
@@ -114,14 +115,8 @@ def run_starts(
             "a prescribed motion is the same from every start; colloc solve measures it."
         )
     native_kernel()  # its absence is reported once for all workers
-    numbers, gaits = iter(starts), known or {}
-
-    def ready() -> Task | None:
-        number = next(numbers, None)
-        if number is None:
-            return None
-        return Task(number, (problem, sampler, seed, number, time_limit, gaits.get(number)))
-
+    tasks = (Task(k, (problem, sampler, seed, k, time_limit, (known or {}).get(k))) for k in starts)
+    ready = partial(next, tasks, None)
     for task, outcome in run_tasks(run_start, ready, workers=workers, executor=executor):
         if isinstance(outcome, Lost):
             guess = problem.guess

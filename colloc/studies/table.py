@@ -26,7 +26,7 @@ from colloc.results.solution import SOLVED, versions
 from colloc.studies.gait_class import gait_class
 from colloc.studies.run import StudyRun
 from colloc.studies.study import ARRAYS, COLUMNS, KINDS, NUMBERS, Index
-from colloc.system.store_file import Table, load_table, save_table
+from colloc.system.store_file import Table, save_table
 
 KIND, VERSION = "colloc study", 2
 NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
@@ -129,7 +129,3 @@ def save_study(
     facts = {"source": source, "command": command, "versions": json.dumps(versions())}
     stated = replace(table, attributes=facts | {"Conventions": "CF-1.8"})
     return save_table(stated, path, KIND, VERSION)
-
-
-def load_study(path: str | os.PathLike[str]) -> Table:
-    return load_table(path, KIND, VERSION)

@@ -175,19 +175,3 @@ def save_table(table: Table, path: str | os.PathLike[str], kind: str, version: i
             if dataset.dtype.kind == "f" and name in table.variables:
                 put_attribute(dataset, "_FillValue", [np.nan])
     return Path(path)
-
-
-def load_table(path: str | os.PathLike[str], kind: str, version: int) -> Table:
-    """Read what `save_table` wrote. `StoreError` if it is missing, damaged, or of another kind."""
-    with open_file(path, kind, version) as file:
-        columns = {name: array(file, name) for name in file}
-        dims = {name: tuple(attribute(file[name], "dims").split(BETWEEN_DIMS)) for name in file}
-        attributes = {name: attribute(file, name) for name in file.attrs}
-    coordinates = {name: values for name, values in columns.items() if dims[name] == (name,)}
-    for name, values in columns.items():
-        sizes = (coordinates[d].size if d in coordinates else None for d in dims[name])
-        if np.shape(values) != tuple(sizes):
-            raise StoreError(f"{path} is damaged: {name} does not fit its coordinates.")
-    variables = {name: values for name, values in columns.items() if name not in coordinates}
-    dims = {name: dims[name] for name in variables}
-    return Table(attributes["name"], coordinates, variables, dims, attributes=attributes)

@@ -10,8 +10,9 @@ from colloc.results.archive import Archive, StartName, open_archive
 from colloc.results.outcome import Outcome
 from colloc.studies.journal import NAME, Attempt, Visit, append_visits, read_journal
 from colloc.studies.run import StudyRun
-from colloc.studies.table import load_study, save_study, study_table
+from colloc.studies.table import KIND, VERSION, save_study, study_table
 from colloc.system.row_file import CACHE, put_rows, read_rows
+from colloc.system.store_file import Table, array, attribute, open_file
 from scripts.paper.array_store import read_arrays, write_arrays
 
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
@@ -102,3 +103,15 @@ class Samples:
         if kind == "journal":
             return sorted(a.key for r in read_journal(path.parent) for a in r.attempts)
         return read_rows(path, CACHE)
+
+
+def load_study(path):
+    """The table that `save_study` wrote. `StoreError` if it cannot be read."""
+    with open_file(path, KIND, VERSION) as file:
+        columns = {name: array(file, name) for name in file}
+        dims = {name: tuple(attribute(file[name], "dims").split(", ")) for name in file}
+        attributes = {name: attribute(file, name) for name in file.attrs}
+    coordinates = {name: values for name, values in columns.items() if dims[name] == (name,)}
+    variables = {name: values for name, values in columns.items() if name not in coordinates}
+    dims = {name: dims[name] for name in variables}
+    return Table(attributes["name"], coordinates, variables, dims, attributes=attributes)

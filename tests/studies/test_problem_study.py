@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from shared.store_samples import load_study
 
 from colloc import BSpline, Chain, Corners, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.commands.families import sweep as sweep_study
@@ -38,7 +39,7 @@ from colloc.studies.gait_class import (
 from colloc.studies.journal import Visit, append_visits, best_attempt, read_journal, start_key
 from colloc.studies.run import StudyRun
 from colloc.studies.study import Axis, Study, read_study_file
-from colloc.studies.table import NO_PROBLEM, load_study, save_study, study_table
+from colloc.studies.table import NO_PROBLEM, save_study, study_table
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay

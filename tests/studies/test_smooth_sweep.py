@@ -3,10 +3,10 @@
 import json
 
 import pytest
+from shared.store_samples import load_study
 
 from colloc.commands.families import sweep as main
 from colloc.commands.main import main as colloc_main
-from colloc.studies.table import load_study
 
 STUDY = """
 from colloc import Axis, Friction, Harmonic, ModalBody, Problem, Study

@@ -21,6 +21,7 @@ from functools import partial
 import h5py
 import numpy as np
 import pytest
+from shared.store_samples import load_study
 
 from colloc.commands.families import multistart
 from colloc.commands.families import sweep as sweep_study
@@ -34,7 +35,6 @@ from colloc.studies import run as study_run
 from colloc.studies import saved
 from colloc.studies import table as _  # noqa: F401  imported before any fork
 from colloc.studies.journal import read_journal
-from colloc.studies.table import load_study
 from colloc.system import task_pool
 from colloc.system.row_file import read_rows
 
