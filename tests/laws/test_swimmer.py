@@ -33,10 +33,8 @@ def square(amplitude):
     def path(t):
         side = np.minimum((np.asarray(t) * 4).astype(int), 3)
         s = np.asarray(t) * 4 - side
-        ramps = np.array([[1, 1 - 2 * 0, -1, -1], [1, -1, -1, 1]])
         start = amplitude * np.array([[-1, 1, 1, -1], [1, 1, -1, -1]])[:, side]
         step = 2 * amplitude * np.array([[1, 0, -1, 0], [0, -1, 0, 1]])[:, side]
-        del ramps
         return start + step * s, 4 * step
 
     return path

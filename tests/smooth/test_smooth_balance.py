@@ -3,7 +3,7 @@ precision at stick."""
 
 import numpy as np
 import pytest
-from scipy import integrate, optimize
+from scipy import integrate
 
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -46,17 +46,6 @@ def test_a_stretch_that_rests_is_exactly_at_rest(reference):
     assert np.all(vs[s < 0.5] == 0.0)
     assert np.all(vn[s < 0.5] == 0.0)
     assert np.abs(vn[s > 0.5]).max() > 1e-3
-
-
-def test_density_jacobian_is_the_derivative():
-    rng = np.random.default_rng(1)
-    v = rng.normal(size=(2, 6, 4))
-    direction = rng.normal(size=(2, 6, 4))
-    h = 1e-6
-    force = [np.array(ANISOTROPIC.density(*(v + sign * h * direction), 0.1)) for sign in (1, -1)]
-    numeric = -(force[0] - force[1]) / (2 * h)
-    matrix = np.array(ANISOTROPIC.density_jacobian(*v, 0.1))
-    np.testing.assert_allclose(np.einsum("ij...,j...->i...", matrix, direction), numeric, atol=1e-8)
 
 
 def test_straight_rotating_body_agrees_with_the_closed_form_of_a_link():
@@ -190,20 +179,3 @@ def test_unusable_input_is_named():
         solve_smooth(
             sine_wave(), Friction(), np.array([0.1]), 1e-6, max_iterations=1, method="fixed_point"
         ).require()
-
-
-def test_the_law_is_the_gradient_of_the_potential_when_isotropic():
-    """Perturbing the solution raises the dissipation potential: it is the minimum."""
-    motion, t, delta = sine_wave(), np.array([0.2]), 1e-2
-    solution = solve_smooth(motion, Friction(), t, delta).require()
-    panels = PanelGrid(np.linspace(0, 1, 41)[:, None])
-
-    def potential(z):
-        body = curve(
-            panels, motion.angle(panels.nodes, t), motion.rate(panels.nodes, t), 0, np.zeros((1, 1))
-        )
-        vs, vn = node_velocity(body, np.array(z)[:, None])
-        return float(np.sum(panels.weights * np.sqrt(vs**2 + vn**2 + delta**2)))
-
-    best = optimize.minimize(potential, np.zeros(3), method="BFGS", options={"gtol": 1e-7})
-    np.testing.assert_allclose(best.x, solution.z[:, 0], atol=1e-5)
