@@ -28,23 +28,13 @@ def chain_motion(
 ) -> BalancedMotion:
     """The motion of a chain; under a load the actuators' power is that of friction less the
     load's. Arguments as for `colloc.mechanics.fixed_point.solve_balance`."""
-    friction = body.law(friction)
-    moving = Moving(body, friction, angles, rates, delta, load)
-    if (library := native_kernel(body, friction)) is not None:
-        values, _ = compiled_motion(library, moving, solved, derivatives=False)
-        return BalancedMotion(values[:3], values[3:5], values[5], values[6])
-    values = np.empty((4, angles.shape[1]))
-    for link, at in groups(solved.anchor):  # seen from what rests, which loses no digits
-        there, z = moving.at(at), solved.anchor_velocity[:, at]
-        now = instant(body, friction, there.angles, there.rates, z, delta, link)
-        moments = moments_of_links(body, there.angles, now.force, there.load)
-        spent = (moments * there.rates).sum(axis=0, keepdims=True)
-        centre = body.centre_velocity(now.posture, now.velocity)
-        values[:, at] = np.concatenate([*centre, total_power(now.velocity, now.force), spent])
-    return BalancedMotion(solved.z, values[:2], values[2], values[3])
+    moving = Moving(body, body.law(friction), angles, rates, delta, load)
+    if (library := native_kernel(body, moving.friction)) is not None:
+        return _motion(compiled_motion(library, moving, solved, derivatives=False)[0])
+    return _numpy_motion(moving, solved)
 
 
-def motion_derivatives(
+def motion_and_derivatives(
     body: Body | Links,
     friction: Law,
     angles: np.ndarray,
@@ -52,21 +42,40 @@ def motion_derivatives(
     delta: float,
     solved: BalanceSolution,
     load: np.ndarray | None = None,
-) -> np.ndarray:
-    """Derivatives ``(6, 2 n_joint, n_time)`` of (tail velocity, velocity of the centre, power) with
-    respect to (angles, rates); under a load two columns more, with respect to its components."""
+) -> tuple[BalancedMotion, np.ndarray]:
+    """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (tail velocity, velocity of the
+    centre, power) with respect to (angles, rates); under a load two columns more, with respect to
+    its components."""
     y = np.concatenate([angles, rates] if load is None else [angles, rates, load])
     if not isinstance(body, Links):
-        return _derivatives(body, friction, None, pulled=False)(y, solved.z, delta)
-    friction = body.law(friction)
-    if (library := native_kernel(body, friction)) is not None:
-        moving = Moving(body, friction, angles, rates, delta, load)
-        return compiled_motion(library, moving, solved, derivatives=True)[1]
+        slopes = _derivatives(body, friction, None, pulled=False)(y, solved.z, delta)
+        return body.motion(friction, angles, rates, delta, solved), slopes
+    moving = Moving(body, body.law(friction), angles, rates, delta, load)
+    if (library := native_kernel(body, moving.friction)) is not None:
+        values, slopes = compiled_motion(library, moving, solved, derivatives=True)
+        return _motion(values), slopes
     slopes = np.empty((6, *y.shape))
     for link, at in groups(solved.anchor):
-        evaluate = _derivatives(body, friction, link, pulled=load is not None)
+        evaluate = _derivatives(body, moving.friction, link, pulled=load is not None)
         slopes[..., at] = evaluate(y[:, at], solved.anchor_velocity[:, at], delta)
-    return slopes
+    return _numpy_motion(moving, solved), slopes
+
+
+def _motion(values: np.ndarray) -> BalancedMotion:
+    return BalancedMotion(values[:3], values[3:5], values[5], values[6])
+
+
+def _numpy_motion(moving: Moving, solved: BalanceSolution) -> BalancedMotion:
+    body, friction, _, _, delta, _ = moving
+    values = np.empty((4, solved.anchor.size))
+    for link, at in groups(solved.anchor):  # seen from what rests, which loses no digits
+        there, z = moving.at(at), solved.anchor_velocity[:, at]
+        now = instant(body, friction, there.angles, there.rates, z, delta, link)
+        moments = moments_of_links(body, there.angles, now.force, there.load)
+        spent = (moments * there.rates).sum(axis=0, keepdims=True)
+        centre = body.centre_velocity(now.posture, now.velocity)
+        values[:, at] = np.concatenate([*centre, total_power(now.velocity, now.force), spent])
+    return _motion(np.concatenate([solved.z, values]))
 
 
 @lru_cache(maxsize=128)

@@ -59,7 +59,7 @@ _switched_off = False
 
 def native_kernel(body: Links = _LINKS, friction: Law = _COULOMB) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do."""
-    usable = not _switched_off and body.in_series and _parameters(body, friction)
+    usable = not _switched_off and body.in_series and _parameters(body, friction)[0]
     return library() if usable else None
 
 
@@ -132,8 +132,7 @@ def call_for_all(
 ) -> None:
     """Call a function of the kernel with the chain, its law and the time points of each piece, then
     the arguments; on several threads if there are many. `MemoryError` if it fails."""
-    parameters = _parameters(body, friction)  # kept through the calls, which read them
-    chain = body.n_link, *map(address, parameters)
+    chain, _arrays = _parameters(body, friction)  # held through the calls, which read them
 
     def call(first: int) -> int:
         return function(*chain, n_time, first, min(first + piece, n_time), *arguments)
@@ -149,13 +148,15 @@ def call_for_all(
 
 
 @lru_cache(maxsize=64)
-def _parameters(body: Links, friction: Law) -> tuple[np.ndarray, ...]:
-    """Lengths, pressures, masses, contacts with their laws; empty where the kernel lacks a law."""
+def _parameters(body: Links, friction: Law) -> tuple[tuple[int, ...], tuple[np.ndarray, ...]]:
+    """Number of links and addresses of lengths, pressures, masses and contacts with their laws, and
+    these arrays; none where the kernel lacks a law."""
     law = np.array(body.contact.kernel_numbers(friction), dtype=float)
     if not law.size:
-        return ()
+        return (), ()
     columns = body.pressure_column().ravel(), body.mass_column().ravel()
-    return np.array(body.lengths), *columns, law
+    arrays = np.array(body.lengths), *columns, law
+    return (body.n_link, *map(address, arrays)), arrays
 
 
 def _shapes(moving: Moving) -> tuple[tuple[np.ndarray, np.ndarray], tuple[int, int, float]]:

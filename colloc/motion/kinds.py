@@ -29,7 +29,7 @@ from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import ANTIPODAL, fraction
 from colloc.mechanics.balance import Moving
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Body
-from colloc.mechanics.chain_motion import motion_derivatives
+from colloc.mechanics.chain_motion import motion_and_derivatives
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
@@ -221,7 +221,7 @@ class SlowOnLevel:
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         assert along.solved is not None
-        found = motion_derivatives(
+        _, found = motion_and_derivatives(
             self.body, self.friction, shapes.angles, shapes.rates, shapes.delta, along.solved
         )
         return found, found[:, :0]

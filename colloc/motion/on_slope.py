@@ -10,7 +10,7 @@ import numpy as np
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
+from colloc.mechanics.chain_motion import motion_and_derivatives
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 
@@ -51,8 +51,7 @@ def balance_on_slope(
     """
     load = slope.pull(theta[None])
     solved = solve_balance(body, friction, *shapes, load=load, **settings)  # type: ignore[arg-type]
-    now = chain_motion(body, friction, *shapes, solved, load)
-    slopes = motion_derivatives(body, friction, *shapes, solved, load)
+    now, slopes = motion_and_derivatives(body, friction, *shapes, solved, load)
     on_load = slopes[:, _LOAD]
     # the pull turns against theta
     return OnSlope(

@@ -15,7 +15,7 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import motion_derivatives
+from colloc.mechanics.chain_motion import motion_and_derivatives
 from colloc.mechanics.friction import ClosedForm, Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.line_integrals import line_integrals
@@ -180,7 +180,7 @@ def test_slopes_of_the_motion_are_those_of_finite_differences(law):
         now = body.motion(law, y[:2], y[2:], 1e-2, solved)
         return solved, np.concatenate([now.z, now.centre, now.power[None]])
 
-    slopes = motion_derivatives(body, law, y[:2], y[2:], 1e-2, motion(y)[0])
+    _, slopes = motion_and_derivatives(body, law, y[:2], y[2:], 1e-2, motion(y)[0])
     for j, step in enumerate(h * np.eye(4)[:, :, None]):
         numeric = (motion(y + step)[1] - motion(y - step)[1]) / (2 * h)
         np.testing.assert_allclose(slopes[:, j], numeric, atol=2e-5 * np.abs(slopes).max())
@@ -238,7 +238,7 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
         found = [
             solved.z,
             body.motion(law, angles, rates, 1e-6, solved).power,
-            motion_derivatives(body, law, angles, rates, 1e-6, solved),
+            motion_and_derivatives(body, law, angles, rates, 1e-6, solved)[1],
         ]
         if law_of is Friction:
             expected = found
@@ -301,7 +301,11 @@ def test_coulomb_friction_costs_what_it_did_and_keeps_its_digits(monkeypatch):
         monkeypatch.delattr(Friction, "density")
         compiled = body.solve(law, angles, rates, 1e-4).require()
         np.testing.assert_allclose(compiled.z, expected, rtol=1e-12)
-        assert motion_derivatives(body, law, angles, rates, 1e-4, compiled).shape == (6, 4, 2)
+        assert motion_and_derivatives(body, law, angles, rates, 1e-4, compiled)[1].shape == (
+            6,
+            4,
+            2,
+        )
 
 
 def test_viscous_motion_is_linear_in_the_rates():

@@ -21,7 +21,7 @@ from colloc import (
 )
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.balance import balance_jacobian, dissipation_potential, instant
-from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
+from colloc.mechanics.chain_motion import chain_motion, motion_and_derivatives
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.native_kernel import native_kernel
 
@@ -149,7 +149,7 @@ def test_derivatives_along_shapes_rates_and_load_are_the_limit_of_differences(la
         q, r, load = y[:n], y[n : 2 * n], y[2 * n :] if size else None
         solved = solve_balance(body, law, q, r, delta, load=load, tolerance=1e-13)
         at = body, law, q, r, delta, solved, load
-        return chain_motion(*at), motion_derivatives(*at)
+        return motion_and_derivatives(*at)
 
     motion, slopes = moved(y)
     # where a part changes its sense of sliding within the step, a directional law has no derivative

@@ -126,7 +126,7 @@ WITHIN_ITS_ARRAYS = """
 import numpy as np
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics import native_kernel
-from colloc.mechanics.chain_motion import motion_derivatives
+from colloc.mechanics.chain_motion import motion_and_derivatives
 from research.guarantee.c_compiler import compiled_library
 from research.guarantee.kernel import FLAGS
 
@@ -139,7 +139,7 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
     at = rng.uniform(-3, 3, (n, 20)), rng.normal(size=(n, 20))
     for law in (Friction(), Friction(mu_t=10, mu_b=3)):
         assert native_kernel.native_kernel(body, law) is not None
-        motion_derivatives(body, law, *at, 1e-4, solve_balance(body, law, *at, 1e-4))
+        motion_and_derivatives(body, law, *at, 1e-4, solve_balance(body, law, *at, 1e-4))
         for method in ("newton", "fixed_point"):
             solve_balance(body, law, *at, 1e-2, method=method, max_iterations=20, start=np.zeros((3, 20)))
 """

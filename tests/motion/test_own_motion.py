@@ -14,7 +14,7 @@ from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, lo
 from colloc.gaits import gait_fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
-from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
+from colloc.mechanics.chain_motion import chain_motion, motion_and_derivatives
 from colloc.mechanics.densities import LENGTH, Instants
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.motion.follow import followed
@@ -114,7 +114,7 @@ class PushedMotion(SlowOnLevel):
 
     def slopes(self, shapes, along):
         at = self.body, self.friction, shapes.angles, shapes.rates, shapes.delta
-        found = motion_derivatives(*at, along.solved, self._load(shapes))[
+        found = motion_and_derivatives(*at, along.solved, self._load(shapes))[1][
             :, : 2 * self.body.n_joint
         ]
         found[5] -= self._push * found[3]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.bodies import BalancedMotion
-from colloc.mechanics.chain_motion import chain_motion, motion_derivatives
+from colloc.mechanics.chain_motion import motion_and_derivatives
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.native_kernel import numpy_instead
 
@@ -17,9 +17,9 @@ def by_both(
     the largest of an instant."""
     solved = solve_balance(body, law, angles, rates, delta, load=load)
     at = body, law, angles, rates, delta, solved, load
-    motion, slopes = chain_motion(*at), motion_derivatives(*at)
+    motion, slopes = motion_and_derivatives(*at)
     with numpy_instead():
         same = solve_balance(body, law, angles, rates, delta, load=load, start=solved.z)
-        known, reference = chain_motion(*at), motion_derivatives(*at)
+        known, reference = motion_and_derivatives(*at)
     scale = np.abs(reference).max(axis=(0, 1))
     return (solved.z, motion, slopes / scale), (same.z, known, reference / scale)

@@ -10,7 +10,7 @@ from colloc.commands.main import main as colloc_main
 from colloc.gaits.bspline import Polygon
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
-from colloc.mechanics.chain_motion import motion_derivatives
+from colloc.mechanics.chain_motion import motion_and_derivatives
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
@@ -88,7 +88,7 @@ def test_slopes_of_the_motion_are_those_of_finite_differences():
         return np.concatenate([now.z, now.centre, now.power[None]])
 
     numeric = differences(motion, np.concatenate([q, rates]))
-    slopes = motion_derivatives(
+    _, slopes = motion_and_derivatives(
         BODY, Friction(), q, rates, delta, BODY.solve(Friction(), q, rates, delta, tolerance=1e-13)
     )
     np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())

@@ -7,7 +7,7 @@ import pytest
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
-from colloc.mechanics.chain_motion import motion_derivatives
+from colloc.mechanics.chain_motion import motion_and_derivatives
 from colloc.mechanics.friction import Friction
 from colloc.reduced.linear_space import LinearSpace
 from colloc.results.distinct_optima import distance, reversed_in_time, swapped
@@ -104,7 +104,7 @@ def test_derivatives_are_those_of_finite_differences(friction):
 
     steps = h * np.eye(6)[:, :, None]
     numeric = np.stack([(motion(at + e)[1] - motion(at - e)[1]) / (2 * h) for e in steps], axis=1)
-    slopes = motion_derivatives(body, friction, at[:3], at[3:], delta, motion(at)[0])
+    _, slopes = motion_and_derivatives(body, friction, at[:3], at[3:], delta, motion(at)[0])
     np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
 
 
