@@ -293,10 +293,7 @@ def main() -> None:
         tables=False,
     )
     folder = options.output / "robustness"
-    table = Table(
-        Chain(tuple(options.lengths)) if options.lengths else Chain(),
-        options.harmonics,
-    )
+    table = Table(Chain(tuple(options.lengths)) if options.lengths else Chain(), options.harmonics)
     laws = LAWS[: options.laws]
     command = f"python -m benchmarks.robustness --starts {options.starts}"
     if options.harmonics != 1:

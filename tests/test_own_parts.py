@@ -140,9 +140,7 @@ def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "gait",
-    [Harmonic(1, "bilateral"), Polygon(3, "bilateral")],
-    ids=["series", "path"],
+    "gait", [Harmonic(1, "bilateral"), Polygon(3, "bilateral")], ids=["series", "path"]
 )
 def test_a_quantity_stated_anew_is_the_one_that_is_known(gait):
     mine = Objective("distance / mine", quantities=[Quantity("mine", DRIVEN_WORK.density)])

@@ -132,16 +132,7 @@ def test_two_that_are_taken_in_at_once_are_both_there(best, tmp_path, monkeypatc
 
     def take_in(solution):
         result = colloc.save(solution, tmp_path / f"{solution.problem.name}.h5")
-        return main(
-            [
-                "--table",
-                str(table),
-                "--add",
-                str(result),
-                "--by",
-                "colloc solve quick.py",
-            ]
-        )
+        return main(["--table", str(table), "--add", str(result), "--by", "colloc solve quick.py"])
 
     monkeypatch.setattr("benchmarks.referee.save_known", after_both_have_read)
     other = colloc.solve(

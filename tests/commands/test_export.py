@@ -195,10 +195,7 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {"friction": Viscous(normal=2, tangential=1), "objective": "towing"},
-        {"power_limit": 10.0},
-    ],
+    [{"friction": Viscous(normal=2, tangential=1), "objective": "towing"}, {"power_limit": 10.0}],
     ids=["drag", "power limit"],
 )
 def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hold(

@@ -167,11 +167,7 @@ def test_isotropic_balance_minimises_the_dissipation(case, exponent):
 
 
 @settings(tried, max_examples=25)
-@given(
-    st.lists(st.floats(-0.9, 0.9), min_size=6, max_size=6),
-    friction,
-    st.floats(-6, -2),
-)
+@given(st.lists(st.floats(-0.9, 0.9), min_size=6, max_size=6), friction, st.floats(-6, -2))
 def test_no_gait_beats_the_bound_of_the_smallest_coefficient(numbers, law, exponent):
     """d <= W / min(mu), up to the delta that a period of viscous creep can add."""
     mean, cos, sin = np.array(numbers).reshape(3, 2)

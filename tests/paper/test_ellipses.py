@@ -4,12 +4,7 @@ import numpy as np
 
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
-from scripts.models.ellipses import (
-    admissible,
-    contact_reach,
-    ellipse_angles,
-    largest_amplitude,
-)
+from scripts.models.ellipses import admissible, contact_reach, ellipse_angles, largest_amplitude
 
 T = np.linspace(0, 1, 4001)
 

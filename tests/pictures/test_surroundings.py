@@ -10,10 +10,7 @@ import pytest
 from colloc.pictures.style import save as save_figure
 from colloc.results.store import save
 
-COMMANDS = (
-    "report one.h5",
-    "animate one.h5 --periods 1 --seconds 0.2 --width 200",
-)
+COMMANDS = ("report one.h5", "animate one.h5 --periods 1 --seconds 0.2 --width 200")
 
 
 def python(*words, folder=None, **environment):
@@ -39,8 +36,7 @@ def test_commands_draw_where_the_environment_names_a_backend_that_there_is_not(
 
 
 @pytest.mark.parametrize(
-    ("before", "backend"),
-    [("", "module://no.such_name"), ("matplotlib, ", "svg")],
+    ("before", "backend"), [("", "module://no.such_name"), ("matplotlib, ", "svg")]
 )
 def test_a_script_draws_whatever_backend_is_named_and_one_that_there_is_stays(
     before, backend, three_link, tmp_path

@@ -8,16 +8,7 @@ import pytest
 from scipy.optimize import root
 from shared.instants import random_instants
 
-from colloc import (
-    Chain,
-    Elliptic,
-    Foot,
-    Friction,
-    Problem,
-    ProblemError,
-    Wheel,
-    solve_balance,
-)
+from colloc import Chain, Elliptic, Foot, Friction, Problem, ProblemError, Wheel, solve_balance
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.summary import summary_lines

@@ -4,17 +4,7 @@ the one found is better."""
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Fourier,
-    Friction,
-    Harmonic,
-    Polygon,
-    Problem,
-    ellipse,
-    load,
-    save,
-)
+from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, ellipse, load, save
 from colloc.commands.summary import summary_lines
 from colloc.commands.verify import verify
 from colloc.gaits.control_problem import control_problem
