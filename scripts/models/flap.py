@@ -43,9 +43,9 @@ class FlapBody(Chain):
         full = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
         return full if reference is None else full - full[reference]
 
-    def _path(self, reference: int | None) -> np.ndarray:
+    def weighted_path(self, reference: int | None) -> np.ndarray:
         full = 0.5 * np.eye(3)
-        return full if reference is None else full - full[reference]
+        return (full if reference is None else full - full[reference]) * self.lengths
 
     def joints(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Ends in drawing order, ``(4, n_time)``: tip of flap 1, hinge, tip of flap 2, head of the

@@ -136,25 +136,6 @@ def test_the_body_ends_where_the_samples_take_it(three_link, tmp_path):
     assert stated["end_turned_deg"] == pytest.approx(np.degrees(theta[-1]), abs=0.3)
 
 
-@pytest.mark.slow
-def test_with_inertia_the_body_ends_where_mujoco_takes_it(three_link, tmp_path):
-    mujoco = pytest.importorskip("mujoco")
-    size = {"length": 1.0, "mass": 2.0, "period": 2.0}
-    stated = three_link.export(tmp_path / "x.csv", **size, rate=500)
-    assert stated["end_includes_inertia"]
-    three_link.export(tmp_path / "x.xml", **size)
-    time, angles, _ = written(tmp_path / "x.csv")
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "x.xml"))
-    data, places = mujoco.MjData(model), []
-    for now in np.arange(time[0], 2.0 + 1e-9, model.opt.timestep):
-        data.ctrl[:] = [np.interp(now, time, row) for row in angles]
-        mujoco.mj_step(model, data)
-        places.append([*data.subtree_com[1][:2], data.qpos[2]])
-    way = np.subtract(places[-1], places[0])
-    np.testing.assert_allclose(way[:2], stated["end_body_lengths"], atol=0.01)
-    assert np.degrees(way[2]) == pytest.approx(stated["end_turned_deg"], abs=2.0)
-
-
 def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")
     assert main([str(file), "--max-speed", "2", "--rate", "100", "--periods", "2"]) == 0

@@ -45,17 +45,6 @@ def test_half_a_period_gives_what_a_replay_of_the_whole_period_gives(direct):
         assert found.work[i] == pytest.approx(exact.work, rel=1e-5)
 
 
-def test_time_error_is_of_second_order(direct):
-    gaits = _random_gaits(40, 22)
-    exact = performance(direct, gaits, instants=1600).efficiency
-    errors = [
-        np.sqrt(np.mean((performance(direct, gaits, instants=n).efficiency - exact) ** 2))
-        for n in (50, 100, 200)
-    ]
-    assert errors[1] < 6e-4
-    assert np.log2(errors[0] / errors[2]) / 2 > 1.5
-
-
 def test_map_route_converges_to_the_direct_route(known, direct):
     gaits = _random_gaits(150, 23)
     exact = performance(direct, gaits).efficiency

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import colloc
+from benchmarks.kills import command as solve_command
 from benchmarks.kills import contents
 from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.gaits.problem_file import read_problem_file
@@ -94,18 +95,7 @@ def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(
 )
 def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
     file, wanted = undisturbed
-    command = [
-        sys.executable,
-        "-m",
-        "colloc",
-        "solve",
-        file,
-        "--starts",
-        "4",
-        "--output",
-        f"{tmp_path}/",
-        "--no-figure",
-    ]
+    command = [word for word in solve_command(file, tmp_path) if word != "--quiet"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     time.sleep(1.0)
     process.send_signal(asked)
@@ -321,18 +311,7 @@ def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_the
     if held:
         put_rows(run, ROWS, {"problem": read_problem_file(file).problem.hash, **rows})
     before = run.read_bytes() if held else b""
-    command = [
-        sys.executable,
-        "-m",
-        "colloc",
-        "solve",
-        file,
-        "--starts",
-        "4",
-        "--output",
-        f"{tmp_path}/",
-        "--no-figure",
-    ]
+    command = [word for word in solve_command(file, tmp_path) if word != "--quiet"]
 
     def full():
         resource.setrlimit(resource.RLIMIT_FSIZE, (len(before),) * 2)

@@ -1,7 +1,6 @@
 """A front of two objectives: no gait of it is better in both, and its ends are the best by one
 alone."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +15,9 @@ from colloc import (
     Problem,
     ProblemError,
     evaluate,
-    load,
     pareto_front,
     replay,
 )
-from colloc.commands.main import main
 from colloc.pictures.families import front_figure
 from colloc.search.solve import solve
 from colloc.studies.pareto import Gap, ParetoFront
@@ -140,24 +137,6 @@ def test_an_objective_that_certificates_do_not_know_is_measured():
         for end in ends.points
     ]
     np.testing.assert_allclose(ends.values[:, 1], [each.value for each in driven], rtol=1e-5)
-
-
-@pytest.mark.slow
-def test_the_command_leaves_a_table_a_figure_and_results(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "p.py").write_text(
-        "from colloc import *\nPROBLEM = Problem('p', gait=Harmonic(1, 'bilateral'), delta=1e-2)\n"
-    )
-    assert main(["pareto", "p.py", "--points", "2", "--starts", "1", "--quiet"]) == 0
-    assert "p: speed against efficiency, 2 points" in capsys.readouterr().out
-    rows = list(
-        csv.DictReader((tmp_path / "results/p.front.csv").read_text(encoding="utf-8").splitlines())
-    )
-    fastest = load(rows[0]["file"])
-    assert float(rows[0]["distance / length"]) == pytest.approx(
-        fastest.certificate.value, rel=1e-12
-    )
-    assert (tmp_path / "results/p.front.png").stat().st_size > 1000
 
 
 def test_a_gait_that_turns_is_as_far_whether_its_certificate_knows_the_objective_or_not():

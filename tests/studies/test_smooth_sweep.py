@@ -54,21 +54,3 @@ def test_what_needs_free_gaits_refuses_a_prescribed_motion_in_words(tmp_path, ca
     (tmp_path / "wave.py").write_text(PRESCRIBED)
     assert colloc_main([command, str(tmp_path / "wave.py"), "--output", f"{tmp_path}/"]) == 2
     assert "prescribed motion" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_crawlers_are_swept_and_started_many_times(tmp_path, capsys):
-    (tmp_path / "p.py").write_text("""
-from colloc import *
-BODY = CrawlerBody(0.2, modes=2)
-AT = {"delta": 1e-4, "delta_start": 1e-4, "mesh_tolerance": 1e-4}
-PROBLEM = Problem("p", Corners(BODY.concertina(1.2), "antipodal"), BODY, gait=Polygon(8, "antipodal"), **AT)
-STUDY = Study("p", (Axis("mu_t", (1.0, 1.1)),), lambda mu_t: PROBLEM.with_(friction=Friction(mu_t=mu_t)), cold_starts=0)
-""")
-    for command, more in (("multistart", ("--starts", "1")), ("sweep", ())):
-        assert (
-            colloc_main([command, str(tmp_path / "p.py"), *more, "--output", f"{tmp_path}/"]) == 0
-        )
-    told = capsys.readouterr().out
-    assert "1 distinct optima" in told
-    assert "2 cells: 2 solved" in told
