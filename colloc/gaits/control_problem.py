@@ -123,12 +123,10 @@ class ControlProblem:
 
 
 def control_problem(problem: Problem) -> ControlProblem:
-    body, gait, law, aims = (
-        problem.body,
-        problem.gait,
-        problem.law,
-        (problem.objective, *(aim for aim, _ in problem.at_least)),
-    )
+    body = problem.body
+    gait = problem.gait
+    law = problem.law
+    aims = (problem.objective, *(aim for aim, _ in problem.at_least))
     limits, regime = problem.path_limits, problem.regime
     degrees = [part.degree for part in aims] + [limit.friction_degree for limit in limits.each]
     # what a gait says of its pace has no unit

@@ -93,20 +93,16 @@ class CollocatedPose:
         """Orientation and place at fractions tau of intervals k, ``(n_time,)``, by the scheme's
         polynomials."""
         weights = self._h[k][:, None] * self._scheme.integrals(tau)
-        turned, moved = (
-            (weights * self._omega[k]).sum(axis=1),
-            (weights * self.velocity[k]).sum(axis=1),
-        )
+        turned = (weights * self._omega[k]).sum(axis=1)
+        moved = (weights * self.velocity[k]).sum(axis=1)
         return self.theta[k] + turned, self.place[k] + moved
 
     def on_pose(self, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of displacements along directions `sides` ``(m,)`` (complex, size counts):
         along the orientation at the stages, ``(m, n, s)``, and the velocity in body axes, ``(m, 2,
         n, s)``."""
-        on_theta, on_centre = (
-            np.zeros((sides.size, *self._weight.shape)),
-            np.zeros((sides.size, 2, *self._weight.shape)),
-        )
+        on_theta = np.zeros((sides.size, *self._weight.shape))
+        on_centre = np.zeros((sides.size, 2, *self._weight.shape))
         for row in np.flatnonzero(sides):
             back = self._weight * np.conj(sides[row])
             along = np.conj(self._turn * back)

@@ -89,11 +89,9 @@ class MomentaAt:
     """Outputs ``(n, 9)`` for n momenta at one time, in a few microseconds."""
 
     def __init__(self, body: Chain, friction: Law, delta: float, froude: float, n: int = 1) -> None:
-        shapes, momenta, numbers = (
-            np.zeros((2, body.n_joint)),
-            np.zeros((n, len(STATES))),
-            np.array([[delta], [froude]]),
-        )
+        shapes = np.zeros((2, body.n_joint))
+        momenta = np.zeros((n, len(STATES)))
+        numbers = np.array([[delta], [froude]])
         self._given, self._out = (*shapes, momenta, *numbers), np.zeros((n, N_OUT))
         one = _function(body, friction, differentiated=False)
         self._function = one.map("momenta", "serial", n, [0, 1, 3, 4], list[int]())

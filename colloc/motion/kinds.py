@@ -344,10 +344,8 @@ class SlowOnSlope(_WithStates):
         return Along(begin, states, now.solved.z, now.now, np.full(mesh.n_point, held), slopes)
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
-        at, load = (
-            (self.friction, shapes.angles, shapes.rates, shapes.delta),
-            self._slope.pull(theta[None]),
-        )
+        at = (self.friction, shapes.angles, shapes.rates, shapes.delta)
+        load = self._slope.pull(theta[None])
         z = solve_balance(self._chain, *at, load=load).z if z is None else z
         return Instants(self.body, *at, z=z, unit=shapes.unit, load=load)
 
@@ -392,23 +390,17 @@ class WithInertia(_WithStates):
     ) -> None:
         """Wraps the quasi-static dynamics in the limit of zero mass; `image` is that of
         `momenta_image`."""
-        self.body, self.friction, self.turn, self.periods = (
-            slow.body,
-            slow.friction,
-            slow.turn,
-            slow.periods,
-        )
-        self._slow, self._regime, self._image, self._chain = (
-            slow,
-            regime,
-            image,
-            checked_mass(slow.body),
-        )
+        self.body = slow.body
+        self.friction = slow.friction
+        self.turn = slow.turn
+        self.periods = slow.periods
+        self._slow = slow
+        self._regime = regime
+        self._image = image
+        self._chain = checked_mass(slow.body)
         self._timed = ("period",) if regime.free_pace else ()
-        self.states, self.told = (
-            STATES + slow.states,
-            ("log_period",) * regime.free_pace + slow.told,
-        )
+        self.states = STATES + slow.states
+        self.told = ("log_period",) * regime.free_pace + slow.told
         self._grow = np.array([6, 7, 8] + [OMEGA] * len(slow.states))
         self.instants = slow.instants
 
@@ -467,10 +459,8 @@ class WithInertia(_WithStates):
         froude, equations = self._froude_at(shapes, begin), self._equations(mesh, shapes.unit)
         library = None if self._slow.states else native_kernel(self._chain, self.friction)
         if library is not None:
-            moving, begun = (
-                Moving(self._chain, self.friction, *shapes[:3], None),
-                np.column_stack([near, first]),
-            )
+            moving = Moving(self._chain, self.friction, *shapes[:3], None)
+            begun = np.column_stack([near, first])
             return kernel_repeating(library, moving, begun, froude, equations.scheme)
 
         def rates(states: np.ndarray) -> Rates:
@@ -529,11 +519,9 @@ class WithInertia(_WithStates):
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         """A free pace has a column after the momenta: a longer period changes them by more."""
-        froude, momenta, k = (
-            self._froude_at(shapes, along.begin),
-            along.states[: len(STATES)],
-            2 * self._chain.n_joint,
-        )
+        froude = self._froude_at(shapes, along.begin)
+        momenta = along.states[: len(STATES)]
+        k = 2 * self._chain.n_joint
         now = momenta_at(self._chain, self.friction, shapes[:3], momenta, froude)
         out, slopes = self._pulled(*now, along.states, froude)
         on_pace = np.zeros((len(out), len(self._timed), out.shape[1]))

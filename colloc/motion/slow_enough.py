@@ -172,11 +172,9 @@ def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float
     """At which inertia first changes the efficiency of a gait on a mesh by the part `loss`."""
     last = slow = gait.played(delta)
     # the change is a power of the Froude number where both are small
-    low, high, at = (
-        -np.inf,
-        np.log(_FASTEST * friction.largest),
-        np.log(_FIRST * loss * friction.largest),
-    )
+    low = -np.inf
+    high = np.log(_FASTEST * friction.largest)
+    at = np.log(_FIRST * loss * friction.largest)
     fastest, power = high, _POWER
     tried: list[tuple[float, float]] = []
     while high - low > _ACCURACY / _POWER:

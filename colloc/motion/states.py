@@ -62,10 +62,8 @@ class CollocatedStates:
         unit: float = 1.0,
     ) -> None:
         self._shape = mesh.n, mesh.scheme.s
-        self._a, self._b = (
-            unit * mesh.h[:, None, None] * mesh.scheme.A,
-            unit * mesh.h[:, None] * mesh.scheme.b,
-        )
+        self._a = unit * mesh.h[:, None, None] * mesh.scheme.A
+        self._b = unit * mesh.h[:, None] * mesh.scheme.b
         self._free = np.flatnonzero(np.zeros(0, dtype=bool) if free is None else free)
         self._image = image
 

@@ -69,10 +69,8 @@ class ActuatorRows:
         largest = found.max(axis=2)
         share, interval = np.nonzero(largest > 1.0 - _CLOSE)
         if share.size:
-            each, near = (
-                np.arange(share.size),
-                np.clip(found[share, interval].argmax(axis=1), 1, SAMPLES - 1),
-            )
+            each = np.arange(share.size)
+            near = np.clip(found[share, interval].argmax(axis=1), 1, SAMPLES - 1)
             left, right = t[interval, near - 1], t[interval, near + 1]
 
             def own(t: np.ndarray) -> np.ndarray:

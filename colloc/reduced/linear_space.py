@@ -43,10 +43,8 @@ class LinearSpace:
         self.checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
         n_joint = body.n_joint
         self._offset = gait.offset(n_joint)
-        angles, rates = (
-            gait.angle_matrix(self.mesh.times, n_joint),
-            gait.rates_on(self.mesh, n_joint),
-        )
+        angles = gait.angle_matrix(self.mesh.times, n_joint)
+        rates = gait.rates_on(self.mesh, n_joint)
         self._matrix = np.concatenate([angles, rates], axis=1)
         self.n = self._matrix.shape[2]
         self._pace = np.ones(self.mesh.n_point)
@@ -110,21 +108,17 @@ class LinearSpace:
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """Shape constraints at their worst instants in cells where they might bind, then the square
         of the shape speed."""
-        gait, n_joint, limit = (
-            self.trajectory(v),
-            self._admissible.n_joint,
-            self._admissible.joint_limit,
-        )
+        gait = self.trajectory(v)
+        n_joint = self._admissible.n_joint
+        limit = self._admissible.joint_limit
         placed, kinds, low, high, excess = list[_Placed](), dict[str, np.ndarray](), [], [], -np.inf
         for check, (cells, times) in zip(self.checks, self._peaks(v), strict=True):
             kinds[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
-            values, matrix = (
-                check_values(check, gait, times),
-                check.matrix(self._admissible.gait, times, n_joint),
-            )
+            values = check_values(check, gait, times)
+            matrix = check.matrix(self._admissible.gait, times, n_joint)
             may_move = moving(values, check, limit, times, self.mesh, cells)
             placed.append(
                 _Placed(
@@ -137,17 +131,13 @@ class LinearSpace:
                     check.offset(self._admissible.gait, n_joint),
                 )
             )
-            excess, (lower, upper) = (
-                max(excess, float(check.excess(values, limit).max())),
-                check.nearer_bounds(values, limit),
-            )
+            excess = max(excess, float(check.excess(values, limit).max()))
+            (lower, upper) = check.nearer_bounds(values, limit)
             low.append(lower)
             high.append(upper)
         kinds["shape speed"] = np.zeros(1, dtype=int)
-        lower, upper = (
-            np.concatenate([*low, [self._admissible.smallest_shape_speed**2]]),
-            np.concatenate([*high, [np.inf]]),
-        )
+        lower = np.concatenate([*low, [self._admissible.smallest_shape_speed**2]])
+        upper = np.concatenate([*high, [np.inf]])
         at_worst = remembered(partial(self._at_worst, placed))
 
         def moving_on() -> Constraints:
@@ -234,9 +224,9 @@ class SerpenoidSpace(LinearSpace):
 
     def _slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the full parameters, ``(n_full, n)``."""
-        n_own, coefficients = (
-            self._n_own,
-            self._admissible.gait.coefficient_slopes(v[: self._n_own], self._admissible.n_joint),
+        n_own = self._n_own
+        coefficients = self._admissible.gait.coefficient_slopes(
+            v[: self._n_own], self._admissible.n_joint
         )
         slopes = np.eye(self.n + len(coefficients), self.n)
         slopes[n_own:, n_own:] = np.eye(

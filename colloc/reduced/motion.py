@@ -73,12 +73,10 @@ class ReducedMotion:
     ) -> None:
         self.body, self.friction, self.shapes, self.mesh = kind.body, kind.friction, shapes, mesh
         self._space: Any = shapes  # a `SearchSpace` where actuators are limited
-        self.kind, self._integrals, self._weight, self._point_weight = (
-            kind,
-            integrals,
-            stage_weights(mesh),
-            point_weights(mesh),
-        )
+        self.kind = kind
+        self._integrals = integrals
+        self._weight = stage_weights(mesh)
+        self._point_weight = point_weights(mesh)
         self._last: _State | None = None
         self._near: tuple[_State, np.ndarray, np.ndarray] | None = None
         self.solves = 0
@@ -137,10 +135,8 @@ class ReducedMotion:
         if not s.values:
             s.values = self.kind.counted(s.passed)
             if self._integrals:
-                now, weight = (
-                    self.instants(v, delta),
-                    self.kind.periods * s.pace * self._point_weight,
-                )
+                now = self.instants(v, delta)
+                weight = self.kind.periods * s.pace * self._point_weight
                 s.values |= {each.name: float(each.at(now)[0] @ weight) for each in self._integrals}
         return s.values
 
@@ -179,11 +175,9 @@ class ReducedMotion:
     ) -> tuple[Any, ...]:
         s = self.at(v, delta)
         if t is None:
-            shapes, states, times = (
-                Moving(s.angles, s.rates, delta),
-                s.along.states,
-                self.mesh.times,
-            )
+            shapes = Moving(s.angles, s.rates, delta)
+            states = s.along.states
+            times = self.mesh.times
         else:
             times, (angles, rates) = t, self._space.at_times(v, t)
             shapes = Moving(angles, rates, delta)

@@ -79,10 +79,8 @@ class ReducedProgram:
         self._held = [name for name, value in held.items() if value is not None]
         equal, least = [held[name] for name in self._held], [value for _, value in aims.at_least]
         self._objective, self._reached = aims.objective, [aim for aim, _ in aims.at_least]
-        self._own_lower, self._own_upper = (
-            np.array([*equal, *least]),
-            np.array([*equal, *np.full(len(least), np.inf)]),
-        )
+        self._own_lower = np.array([*equal, *least])
+        self._own_upper = np.array([*equal, *np.full(len(least), np.inf)])
         self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
         self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None

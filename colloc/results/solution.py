@@ -44,12 +44,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED, INTERRUPTED = (
-    "solved",
-    "not converged",
-    "certificate failed",
-    "interrupted",
-)
+SOLVED = "solved"
+NOT_CONVERGED = "not converged"
+CERTIFICATE_FAILED = "certificate failed"
+INTERRUPTED = "interrupted"
 _HOLDS, _INSTANTS = 3.0, np.arange(2000) / 2000
 """Speed of a foot over delta below which it sticks; phases to count at."""
 _MOST_OTHERS = 4

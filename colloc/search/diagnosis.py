@@ -99,10 +99,8 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
             failed = f"{what} is {_stated_limit(program, worst)}, and {needed} {window}"
         advice = _advice(group)
     elif result.status == "still moving":
-        failed, advice = (
-            "the gait kept moving from trust region to trust region",
-            "start from a better guess",
-        )
+        failed = "the gait kept moving from trust region to trust region"
+        advice = "start from a better guess"
     else:
         what = program.control.aims.objective.name
         failed = (
@@ -154,10 +152,8 @@ def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str
     scale = np.sqrt(np.asarray(jacobian.multiply(jacobian).sum(axis=1)).ravel())
     rows = (sparse.diags(1.0 / np.maximum(scale, 1e-300)) @ jacobian).tocsr()
     # inverse iteration on rows rows' + eps: the combination of the rows that nearly vanishes
-    factors, combination = (
-        quasi_definite_factors(rows),
-        np.random.default_rng(0).normal(size=equality.size),
-    )
+    factors = quasi_definite_factors(rows)
+    combination = np.random.default_rng(0).normal(size=equality.size)
     for _ in range(_STEPS):
         combination = factors.solve(np.concatenate([np.zeros(rows.shape[1]), -combination]))[
             rows.shape[1] :

@@ -277,10 +277,8 @@ def multistart(
     problem: Problem, starts: int | None, has_time: Callable[[], bool], ahead: Ahead
 ) -> tuple[list[Candidate], int]:
     """Candidates on a coarse mesh, best first, and the number of starts, at least one."""
-    run, count = (
-        active_run(),
-        starts or OPTIONS.starts * (OPTIONS.max_starts if problem.regime.froude else 1),
-    )
+    run = active_run()
+    count = starts or OPTIONS.starts * (OPTIONS.max_starts if problem.regime.froude else 1)
     coarse = problem.with_(
         intervals=min(problem.intervals, problem.gait.intervals(problem.body.n_joint) // 2)
     )

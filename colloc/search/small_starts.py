@@ -90,12 +90,10 @@ def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
 
 def _shapes(problem: Problem) -> np.ndarray:
     """Distinct admissible mean shapes ``(n_joint, n)`` of gaits of the class."""
-    body, seeds, limit, n_joint = (
-        problem.body,
-        problem.gait.start_class,
-        problem.joint_limit,
-        problem.body.n_joint,
-    )
+    body = problem.body
+    seeds = problem.gait.start_class
+    limit = problem.joint_limit
+    n_joint = problem.body.n_joint
     rng = np.random.default_rng(2)
     drawn = rng.choice(_LEVELS, (_SHAPES, n_joint)) * widest(limit)
     none, rest = np.zeros((n_joint, 1)), seeds.offset(n_joint)[:, 0]

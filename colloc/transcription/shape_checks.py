@@ -176,10 +176,8 @@ def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> Sh
     def largest(shapes: np.ndarray) -> np.ndarray:
         """Place of the maximum, ``(n_time,)``, by a parabola."""
         heights = np.abs(rows @ shapes)
-        inner, every = (
-            np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2),
-            np.arange(heights.shape[1]),
-        )
+        inner = np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2)
+        every = np.arange(heights.shape[1])
         low, mid, high = (heights[inner + k, every] for k in (-1, 0, 1))
         offset = np.where(
             low - 2 * mid + high < -_FLAT, vertex(low, mid, high), np.sign(high - low)

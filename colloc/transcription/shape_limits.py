@@ -47,11 +47,9 @@ class ShapeLimits:
         gait = gaits.trajectory(parameters, n_joint)
         checks = shape_checks(admissible.body, far, admissible.largest_speeds, joint_map)
         peaks = near_peaks(gait, mesh, checks, admissible.joint_limit)
-        self._limit, self._p, self._first = (
-            admissible.joint_limit,
-            layout.parameters[:, 0],
-            layout.n,
-        )
+        self._limit = admissible.joint_limit
+        self._p = layout.parameters[:, 0]
+        self._first = layout.n
         self._placed, self.n_bend = list[_Placed](), 0
         bends, offsets = [np.empty((0, self._p.size))], [np.empty(0)]
         for check, (cells, times) in zip(checks, peaks, strict=True):

@@ -103,11 +103,9 @@ def followed(
     for _ in range(_STEPS):
         before, here, after = sign * heights(times)
         move = vertex(before, here, after) * step
-        last, times = (
-            times,
-            np.clip(
-                times + np.clip(move, -_LARGEST * h, _LARGEST * h), left + step, left + h - step
-            ),
+        last = times
+        times = np.clip(
+            times + np.clip(move, -_LARGEST * h, _LARGEST * h), left + step, left + h - step
         )
         if np.abs(times - last).max() < _STEP * step.min():
             break
