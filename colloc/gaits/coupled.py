@@ -56,7 +56,7 @@ class Coupled(LinearClass):
     gears: tuple[tuple[float, ...], ...] = ()
     stuck: tuple[tuple[int, float], ...] = ()
 
-    may_tell = False
+    takes_static_parameters = False
 
     def __post_init__(self) -> None:
         kind = self.gait

@@ -122,7 +122,9 @@ class ClassOfGaits:
     relative_delta = False  # delta is relative to the shape speed, as the pace does not matter
     delta_start: float | None = None  # first delta of a search; None: the body's default
     linear = True  # angles are linear in the parameters of the search
-    may_tell = False  # members can have static parameters (`colloc.gaits.told`)
+    takes_static_parameters = (
+        False  # members can have static parameters (`colloc.gaits.static_parameters`)
+    )
 
     def _check_symmetry(self) -> None:
         if self.symmetry not in SYMMETRIES:

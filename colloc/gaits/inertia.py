@@ -9,8 +9,8 @@ import numpy as np
 
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.gaits.sloped import OnSlope, Slope
+from colloc.gaits.static_parameters import WithStaticParameter, with_static_parameter
 from colloc.gaits.symmetry import ANTIPODAL, NONE
-from colloc.gaits.told import Telling, telling
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.inertia import GRAVITY, checked_mass
 from colloc.numerics.schemes import scheme
@@ -43,19 +43,19 @@ symmetry none, delta 1e-04>
     high: float
 
 
-class AtFreePace(Telling):
+class AtFreePace(WithStaticParameter):
     """Members state log(period), at first the middle of the range."""
 
-    tells = "log_period"
+    static_name = "log_period"
     pace: Free
 
     @property
-    def least_and_most(self) -> tuple[float, float]:
+    def static_bounds(self) -> tuple[float, float]:
         longest, shortest = -0.5 * np.log(self.pace)
         return shortest, longest
 
-    def said(self, gait: Any) -> float:
-        ends = self.least_and_most
+    def static_value(self, gait: Any) -> float:
+        ends = self.static_bounds
         return float(np.mean(ends) if gait.log_period is None else np.clip(gait.log_period, *ends))
 
 
@@ -101,12 +101,12 @@ class Paced(Regime):
         level = super().class_of(gait_class)
         if self.free is None:
             return level
-        if not level.may_tell or level.relative_delta or not level.linear:
+        if not level.takes_static_parameters or level.relative_delta or not level.linear:
             raise ProblemError(
                 f"a free pace is sought with a gait of a class Harmonic, not "
                 f"{type(level).__name__}."
             )
-        return telling(AtFreePace, level, pace=self.free)
+        return with_static_parameter(AtFreePace, level, pace=self.free)
 
     def describe(self) -> str:
         if self.free is not None:
@@ -195,7 +195,7 @@ class PacedOnSlope(Paced, Slope):
 
     def class_of(self, gait_class: Any) -> Any:
         self.slowly.class_of(gait_class)  # refuses what has no place on a slope
-        return telling(OnSlope, Paced(self.froude, self.free).class_of(gait_class))
+        return with_static_parameter(OnSlope, Paced(self.froude, self.free).class_of(gait_class))
 
 
 def paced_from(froude: Any, slope: Slope | None, *, timed: bool) -> Paced:

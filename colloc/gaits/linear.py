@@ -110,7 +110,7 @@ class LinearClass(ClassOfGaits):
 
     harmonics: int
     """Harmonics that resolve the functions."""
-    may_tell = True
+    takes_static_parameters = True
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """phi ``(n_function, n_time)`` at phases t, or the derivatives per period."""

@@ -15,8 +15,8 @@ import numpy as np
 
 from colloc.gaits.gait import DELTA_START
 from colloc.gaits.regime import Regime
+from colloc.gaits.static_parameters import WithStaticParameter, with_static_parameter
 from colloc.gaits.symmetry import BILATERAL, NONE
-from colloc.gaits.told import Telling, telling
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law, rate_independent
@@ -60,7 +60,7 @@ class Slope(Regime):
     def class_of(self, gait_class: Any) -> Any:
         level = super().class_of(gait_class)
         name = type(level).__name__
-        if not level.may_tell:
+        if not level.takes_static_parameters:
             raise ProblemError(
                 f"on a slope gaits say where the body points, which those of the class {name} "
                 f"cannot: take Harmonic, BSpline, "
@@ -72,7 +72,7 @@ class Slope(Regime):
                 f"symmetry='none'), which has gaits of "
                 f"symmetry {level.symmetry}, too."
             )
-        return telling(OnSlope, level)
+        return with_static_parameter(OnSlope, level)
 
     def counted(self, way: complex) -> complex:
         return way * np.exp(-1j * self.ahead)
@@ -106,11 +106,11 @@ class Slope(Regime):
         return f"slope of grade {self.grade:g}: d is {way}, W the work of the joints"
 
 
-class OnSlope(Telling):
+class OnSlope(WithStaticParameter):
     """Members state the heading of the tail link at phase 0."""
 
-    tells = "theta"
-    least_and_most = -_ANY_ANGLE, _ANY_ANGLE
+    static_name = "theta"
+    static_bounds = -_ANY_ANGLE, _ANY_ANGLE
 
     @property
     def delta_start(self) -> float:  # type: ignore[override]
@@ -130,12 +130,12 @@ class OnSlope(Telling):
         """Bilateral gaits keep every heading (docs/howto/slopes.md)."""
         return BILATERAL if self.symmetry == BILATERAL else NONE
 
-    def said(self, gait: Any) -> float:
+    def static_value(self, gait: Any) -> float:
         """NaN also where the nearest member starts in another phase."""
         return gait.theta if gait.theta is not None and self.in_phase(gait) else np.nan
 
     def parameters(self, gait: Any) -> np.ndarray:
-        return super().parameters(gait) if np.isnan(self.said(gait)) else self.nearest(gait)
+        return super().parameters(gait) if np.isnan(self.static_value(gait)) else self.nearest(gait)
 
 
 def _checked_grade(grade: object) -> float:

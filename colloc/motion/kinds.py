@@ -1,16 +1,12 @@
-r"""Kinds of motion: which states a period has besides the shape, their rates at an instant, and
-what a period comes to.
+r"""Dynamics of a gait: states of a period besides the shape, their rates, and period totals.
 
-| kind | states that are solved for | summed up |
+| dynamics | states solved for | integrated |
 |---|---|---|
-| slow, on the level | none: the balance holds instant by instant | orientation, place, work |
-| slow, on a slope | the orientation theta, on which the weight's pull depends | place, work |
-| with inertia, on the level | the momenta Vx, Vy, H, which repeat every period | orientation, place, work |
-| with inertia, on a slope | momenta and orientation | place, work |
-
-A kind answers for a balance with its derivatives, for the motion along a mesh, and for the numbers
-of a period. Whoever collocates a motion asks it, and not whether there is a slope.
-"""  # noqa: E501
+| quasi-static on level ground | none: balanced at every time | orientation, place, work |
+| quasi-static on a slope | orientation theta, on which the pull depends | place, work |
+| inertial on level ground | momenta Vx, Vy, H, periodic | orientation, place, work |
+| inertial on a slope | momenta and orientation | place, work |
+"""
 
 from __future__ import annotations
 
@@ -68,11 +64,11 @@ class Shapes(NamedTuple):
     pace: np.ndarray | float = 1.0
 
 
-class Along(NamedTuple):
+class Trajectory(NamedTuple):
     """A motion at the points of a mesh."""
 
     begin: np.ndarray
-    """Initial values of static parameters, ``(n_told,)``."""
+    """Initial values of static parameters, ``(n_static,)``."""
     states: np.ndarray
     """``(n_state, n_point)``."""
     z: np.ndarray
@@ -87,24 +83,24 @@ class Along(NamedTuple):
     """States at the edges of the mesh, ``(n_state, n + 1)``."""
 
 
-class Passed(NamedTuple):
+class PeriodTotals(NamedTuple):
     """Totals of the solved part of a period: displacement (from orientation 0, or in the plane
     where that is a state), rotation, work, static parameters; seen from axes that turn evenly."""
 
     displacement: complex
     rotation: float
     work: float
-    told: np.ndarray = np.empty(0)
+    static_parameters: np.ndarray = np.empty(0)
 
 
-class Share(NamedTuple):
+class TotalGradient(NamedTuple):
     """Gradient of a period total: along a displacement, rotation, work, and the first static
     parameter."""
 
     side: complex = 0.0
     rotation: float = 0.0
     work: float = 0.0
-    told: float = 0.0
+    static: float = 0.0
 
 
 class Kind(Protocol):
@@ -113,7 +109,7 @@ class Kind(Protocol):
     body: Body
     friction: Law
     states: tuple[str, ...]
-    told: tuple[str, ...]
+    static_parameters: tuple[str, ...]
     """Static parameters, the last gait parameters: initial values of states, log period."""
     periods: float
     lack: str
@@ -131,19 +127,19 @@ class Kind(Protocol):
         begin: np.ndarray,
         near: Near = NOWHERE,
         tolerance: float = TOLERANCE,
-    ) -> Along:
+    ) -> Trajectory:
         """Motion along a mesh from the begin of its states."""
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
         """Instants for formulas, at orientations ``(n,)`` and tail velocities ``(3, n)``, by
         default balanced ones."""
 
-    def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+    def slopes(self, shapes: Shapes, along: Trajectory) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of (tail velocity, velocity of the centre, power, rates of states) along
         (angles, rates), ``(6 + k, 2 n_joint, n_point)``, and along the states, ``(6 + k, n_state,
         n_point)``."""
 
-    def through_pose(
+    def pose_vjp(
         self,
         mesh: Mesh,
         pose: CollocatedPose,
@@ -154,21 +150,21 @@ class Kind(Protocol):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Adjoint of the orientation: add its part to `on_out` ``(m, 4 + more, n, s)``, derivatives
         of m numbers along (rotation rate, velocity of the centre, power, rates of states) at the
-        stages; return derivatives along static parameters, ``(m, n_told)``, and along the states at
-        the ends of intervals, ``(m, n_state, n)``."""
+        stages; return derivatives along static parameters, ``(m, n_static)``, and along the states
+        at the ends of intervals, ``(m, n_state, n)``."""
 
-    def counted(self, passed: Passed) -> dict[str, float]:
+    def totals(self, passed: PeriodTotals) -> dict[str, float]:
         """Totals of a whole period."""
 
-    def shares(self, passed: Passed) -> dict[str, Share]:
-        """Gradients of `counted`."""
+    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
+        """Gradients of `totals`."""
 
 
-class SlowOnLevel:
+class QuasiStatic:
     """Quasi-static on level ground: no states, distance along the direction of travel."""
 
     states: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()
+    static_parameters: tuple[str, ...] = ()
     followed: bool = False
     lack: str = "no velocity balances the body; give another guess"
 
@@ -192,7 +188,7 @@ class SlowOnLevel:
         begin: np.ndarray,
         near: Near = NOWHERE,
         tolerance: float = TOLERANCE,
-    ) -> Along:
+    ) -> Trajectory:
         at = self.friction, shapes.angles, shapes.rates, shapes.delta
         solved = self.body.solve(*at, start=near[1], tolerance=tolerance)
         if near[1] is None and solved.converged.all():
@@ -203,7 +199,7 @@ class SlowOnLevel:
                 else self.body.solve(*at, start=followed, tolerance=tolerance)
             )
         held = solved.residual < _ACCEPTED * tolerance
-        return Along(
+        return Trajectory(
             begin,
             np.empty((0, held.size)),
             solved.z,
@@ -219,14 +215,14 @@ class SlowOnLevel:
             joint_map=self._joint_map,
         )  # fmt: skip
 
-    def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+    def slopes(self, shapes: Shapes, along: Trajectory) -> tuple[np.ndarray, np.ndarray]:
         assert along.solved is not None
         _, found = motion_and_derivatives(
             self.body, self.friction, shapes.angles, shapes.rates, shapes.delta, along.solved
         )
         return found, found[:, :0]
 
-    def through_pose(
+    def pose_vjp(
         self,
         mesh: Mesh,
         pose: CollocatedPose,
@@ -238,24 +234,24 @@ class SlowOnLevel:
         on_out[:, 0] += pose.on_rates(on_theta)
         return np.empty((len(on_out), 0)), np.empty((len(on_out), 0, mesh.n))
 
-    def _axis(self, passed: Passed) -> complex:
+    def _axis(self, passed: PeriodTotals) -> complex:
         return complex(np.exp(1j * heading(self._symmetry, passed.displacement, passed.rotation)))
 
-    def counted(self, passed: Passed) -> dict[str, float]:
+    def totals(self, passed: PeriodTotals) -> dict[str, float]:
         ahead = float((passed.displacement * np.conj(self._axis(passed))).real)
         work, rotation = self.periods * passed.work, passed.rotation + self.turn
         return {"distance": self._chords * ahead, "work": work, "rotation": rotation}
 
-    def shares(self, passed: Passed) -> dict[str, Share]:
+    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
         axis = self._axis(passed)
         aside = self._chords * (passed.displacement * np.conj(axis)).imag
         # how far the axis turns with the solved part
         turns = 0.5 if self._symmetry == ANTIPODAL else 0.0
-        distance = Share(self._chords * axis, turns * aside)
+        distance = TotalGradient(self._chords * axis, turns * aside)
         return {
             "distance": distance,
-            "work": Share(work=self.periods),
-            "rotation": Share(rotation=1.0),
+            "work": TotalGradient(work=self.periods),
+            "rotation": TotalGradient(rotation=1.0),
         }
 
 
@@ -263,7 +259,7 @@ class _WithStates:
     """Adjoint of states that are solved for together."""
 
     states: tuple[str, ...]
-    told: tuple[str, ...]
+    static_parameters: tuple[str, ...]
     followed: bool = True
     _grow: np.ndarray
     """Rows of `Kind.slopes` that are the rates of the states."""
@@ -271,7 +267,7 @@ class _WithStates:
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
         return CollocatedStates(mesh, unit=unit)
 
-    def through_pose(
+    def pose_vjp(
         self,
         mesh: Mesh,
         pose: CollocatedPose,
@@ -288,7 +284,7 @@ class _WithStates:
         )
         of_states += by_states
         of_states[:, turns] += on_theta.reshape(m, 1, -1)
-        on_begin, on_rates, on_ends = self._equations(mesh).pulled_back(
+        on_begin, on_rates, on_ends = self._equations(mesh).vjp(
             on_states[self._grow, :k], of_states
         )
         on_out[:, self._grow - OMEGA] += on_rates.reshape(m, k, *on_theta.shape[1:])
@@ -296,11 +292,11 @@ class _WithStates:
         return np.concatenate([on_more, on_begin[:, turns]], axis=1), on_ends
 
 
-class SlowOnSlope(_WithStates):
+class QuasiStaticOnSlope(_WithStates):
     """Quasi-static on a slope: the orientation is a state, from straight uphill."""
 
     states: tuple[str, ...] = ("theta",)
-    told: tuple[str, ...] = ("theta",)
+    static_parameters: tuple[str, ...] = ("theta",)
     lack: str = (
         "friction does not hold the body on the slope all the way, or its joints brake; "
         "take a gentler one"
@@ -320,7 +316,7 @@ class SlowOnSlope(_WithStates):
         begin: np.ndarray,
         near: Near = NOWHERE,
         tolerance: float = TOLERANCE,
-    ) -> Along:
+    ) -> Trajectory:
         states, z = near
         z = np.zeros((3, mesh.n_point)) if z is None else z
         at = shapes.angles, shapes.rates, shapes.delta
@@ -341,7 +337,7 @@ class SlowOnSlope(_WithStates):
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, begin, states)
         slopes = now.on_shape, now.on_theta[:, None]
-        return Along(begin, states, now.solved.z, now.now, np.full(mesh.n_point, held), slopes)
+        return Trajectory(begin, states, now.solved.z, now.now, np.full(mesh.n_point, held), slopes)
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
         at = (self.friction, shapes.angles, shapes.rates, shapes.delta)
@@ -349,11 +345,11 @@ class SlowOnSlope(_WithStates):
         z = solve_balance(self._chain, *at, load=load).z if z is None else z
         return Instants(self.body, *at, z=z, unit=shapes.unit, load=load)
 
-    def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+    def slopes(self, shapes: Shapes, along: Trajectory) -> tuple[np.ndarray, np.ndarray]:
         assert along.slopes is not None
         return along.slopes
 
-    def counted(self, passed: Passed) -> dict[str, float]:
+    def totals(self, passed: PeriodTotals) -> dict[str, float]:
         """Totals; NaN where the joints brake."""
         way = self._slope.counted(passed.displacement)
         work = passed.work + self._slope.grade * passed.displacement.real
@@ -365,18 +361,18 @@ class SlowOnSlope(_WithStates):
         }
         return {name: float(value) if work > 0 else np.nan for name, value in found.items()}
 
-    def shares(self, passed: Passed) -> dict[str, Share]:
+    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
         ahead = np.exp(1j * self._slope.ahead)
-        across, turned = Share(1j * ahead), Share(rotation=1.0)
+        across, turned = TotalGradient(1j * ahead), TotalGradient(rotation=1.0)
         return {
-            "distance": Share(ahead),
-            "work": Share(self._slope.grade, work=1.0),
+            "distance": TotalGradient(ahead),
+            "work": TotalGradient(self._slope.grade, work=1.0),
             "rotation": turned,
             "across": across,
         }
 
 
-class WithInertia(_WithStates):
+class Inertial(_WithStates):
     """Momenta (and on a slope the orientation) as states, periodic over a period; in the axes of
     the tail link (`colloc.mechanics.inertia`)."""
 
@@ -386,7 +382,10 @@ class WithInertia(_WithStates):
     )
 
     def __init__(
-        self, slow: SlowOnLevel | SlowOnSlope, regime: Regime, image: np.ndarray | None = None
+        self,
+        slow: QuasiStatic | QuasiStaticOnSlope,
+        regime: Regime,
+        image: np.ndarray | None = None,
     ) -> None:
         """Wraps the quasi-static dynamics in the limit of zero mass; `image` is that of
         `momenta_image`."""
@@ -400,18 +399,19 @@ class WithInertia(_WithStates):
         self._chain = checked_mass(slow.body)
         self._timed = ("period",) if regime.free_pace else ()
         self.states = STATES + slow.states
-        self.told = ("log_period",) * regime.free_pace + slow.told
+        self.static_parameters = ("log_period",) * regime.free_pace + slow.static_parameters
         self._grow = np.array([6, 7, 8] + [OMEGA] * len(slow.states))
         self.instants = slow.instants
 
-    def counted(self, passed: Passed) -> dict[str, float]:
-        return self._slow.counted(passed) | {
-            name: float(np.exp(passed.told[0])) for name in self._timed
+    def totals(self, passed: PeriodTotals) -> dict[str, float]:
+        return self._slow.totals(passed) | {
+            name: float(np.exp(passed.static_parameters[0])) for name in self._timed
         }
 
-    def shares(self, passed: Passed) -> dict[str, Share]:
-        return self._slow.shares(passed) | {
-            name: Share(told=float(np.exp(passed.told[0]))) for name in self._timed
+    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
+        return self._slow.total_gradients(passed) | {
+            name: TotalGradient(static=float(np.exp(passed.static_parameters[0])))
+            for name in self._timed
         }
 
     def along(
@@ -421,7 +421,7 @@ class WithInertia(_WithStates):
         begin: np.ndarray,
         near: Near = NOWHERE,
         tolerance: float = TOLERANCE,
-    ) -> Along:
+    ) -> Trajectory:
         near_states = self._slow_states(mesh, shapes, begin) if near[0] is None else near[0]
         states, out, held = self._closed(mesh, shapes, near_states, begin)
         z, centre, power, rates = np.split(out, [3, 5, 6])
@@ -432,7 +432,7 @@ class WithInertia(_WithStates):
             - CollocatedStates(mesh, unit=shapes.unit).integrals(rates)[0][:, 0]
         )
         edges = np.stack([sums(row, start) for row, start in zip(gained, first, strict=True)])
-        return Along(begin, states, z, now, np.full(mesh.n_point, held), edges=edges)
+        return Trajectory(begin, states, z, now, np.full(mesh.n_point, held), edges=edges)
 
     def _slow_states(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray) -> np.ndarray:
         body, slow = self._chain, self._slow.along(mesh, shapes, begin[len(self._timed) :])
@@ -472,7 +472,7 @@ class WithInertia(_WithStates):
         return states, out, held
 
     def alone(
-        self, mesh: Mesh, shapes: Shapes, along: Along, begins: np.ndarray, near: np.ndarray
+        self, mesh: Mesh, shapes: Shapes, along: Trajectory, begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Outputs and final states of every interval from initial states ``(n_state, n)``, sought
         near states at the points; and whether they exist, ``(n,)``."""
@@ -517,7 +517,7 @@ class WithInertia(_WithStates):
         froude = float(np.exp(-2.0 * begin[0])) if self._timed else self._regime.froude
         return froude * shapes.unit**2
 
-    def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+    def slopes(self, shapes: Shapes, along: Trajectory) -> tuple[np.ndarray, np.ndarray]:
         """A free pace has a column after the momenta: a longer period changes them by more."""
         froude = self._froude_at(shapes, along.begin)
         momenta = along.states[: len(STATES)]
@@ -529,17 +529,17 @@ class WithInertia(_WithStates):
         return slopes[:, :k], np.concatenate([slopes[:, k:], on_pace], axis=1)
 
 
-def through_motion(
+def motion_vjp(
     kind: Kind,
     mesh: Mesh,
     pose: CollocatedPose,
-    shares: Iterable[Share],
+    shares: Iterable[TotalGradient],
     on_states: np.ndarray,
     by_theta: np.ndarray | float = 0.0,
     by_states: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of m period totals along (rotation rate, velocity of the centre, power, rates of
-    states) at the stages, ``(m, 4 + more, n, s)``, and those of `Kind.through_pose`; `by_theta`
+    states) at the stages, ``(m, 4 + more, n, s)``, and those of `Kind.pose_vjp`; `by_theta`
     ``(m, n, s)`` are direct derivatives along the orientation."""
     side, rotation, work, _ = (np.array(column) for column in zip(*shares, strict=True))
     weight = stage_weights(mesh)
@@ -547,41 +547,45 @@ def through_motion(
     rows = np.zeros((side.size, len(on_states[OUTPUTS]), *weight.shape))
     rows[:, 0], rows[:, 3] = (part[:, None, None] * weight for part in (rotation, work))
     rows[:, 1:3] = on_centre
-    return rows, *kind.through_pose(mesh, pose, on_theta + by_theta, rows, on_states, by_states)
+    return rows, *kind.pose_vjp(mesh, pose, on_theta + by_theta, rows, on_states, by_states)
 
 
 @singledispatch
 def kind_in(regime: Regime, of: Dynamics) -> Kind:
     """Dynamics of a regime; ``kind_in.register`` adds one."""
-    return SlowOnLevel(of.body, of.law, of.symmetry, of.turn, of.joint_map)
+    return QuasiStatic(of.body, of.law, of.symmetry, of.turn, of.joint_map)
 
 
 @kind_in.register
 def _on_slope(regime: Slope, of: Dynamics) -> Kind:
-    return SlowOnSlope(of.body, of.law, regime)
+    return QuasiStaticOnSlope(of.body, of.law, regime)
 
 
 @kind_in.register
 def _with_inertia(regime: Paced, of: Dynamics) -> Kind:
-    return WithInertia(
-        SlowOnLevel(of.body, of.law, of.symmetry, of.turn), regime, momenta_image(of.symmetry)
+    return Inertial(
+        QuasiStatic(of.body, of.law, of.symmetry, of.turn), regime, momenta_image(of.symmetry)
     )
 
 
 @kind_in.register
 def _with_inertia_on_slope(regime: PacedOnSlope, of: Dynamics) -> Kind:
-    return WithInertia(SlowOnSlope(of.body, of.law, regime), regime)
+    return Inertial(QuasiStaticOnSlope(of.body, of.law, regime), regime)
 
 
 def kind_of_motion(dynamics: Dynamics) -> Kind:
     return kind_in(dynamics.regime, dynamics)
 
 
-def begin_of(kind: Kind, gait: AnyGait) -> np.ndarray:
-    """Static parameters of a gait, ``(n_told,)``."""
-    return np.array([getattr(gait, name) for name in kind.told])
+def static_parameters_of(kind: Kind, gait: AnyGait) -> np.ndarray:
+    """Static parameters of a gait, ``(n_static,)``."""
+    return np.array([getattr(gait, name) for name in kind.static_parameters])
 
 
-def first_theta(kind: Kind, begin: np.ndarray) -> float:
+def initial_heading(kind: Kind, begin: np.ndarray) -> float:
     """Initial orientation; 0 where it is no state."""
-    return float(begin[kind.told.index("theta")]) if "theta" in kind.told else 0.0
+    return (
+        float(begin[kind.static_parameters.index("theta")])
+        if "theta" in kind.static_parameters
+        else 0.0
+    )

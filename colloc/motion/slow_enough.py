@@ -16,7 +16,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.inertia import Path, checked_mass
 from colloc.mechanics.law import Law, rate_independent
 from colloc.motion.collocated import CollocatedPose, point_weights
-from colloc.motion.kinds import OMEGA, Shapes, SlowOnLevel, WithInertia
+from colloc.motion.kinds import OMEGA, Inertial, QuasiStatic, Shapes
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import check_finite
@@ -67,8 +67,8 @@ class GaitOnMesh:
         NotConvergedError
             If none is found.
         """
-        slow = SlowOnLevel(self._body, self._friction, NONE)
-        kind = WithInertia(slow, Paced(froude)) if froude else slow
+        slow = QuasiStatic(self._body, self._friction, NONE)
+        kind = Inertial(slow, Paced(froude)) if froude else slow
         states = None if near is None or not near.states.size else near.states
         along = kind.along(
             self._mesh, Shapes(self._angles, self._rates, delta), np.empty(0), (states, None)

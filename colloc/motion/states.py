@@ -236,7 +236,7 @@ class CollocatedStates:
         image = np.eye(len(through)) if self._image is None else self._image
         return (through - image)[np.ix_(self._free, self._free)]
 
-    def pulled_back(
+    def vjp(
         self, on_states: np.ndarray, of_states: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Adjoint: derivatives of m numbers along the start ``(m, n_state)``, the rates ``(m,
@@ -244,16 +244,16 @@ class CollocatedStates:
         `of_states` ``(m, n_state, n_point)`` and the rates' derivatives `on_states` ``(n_state,
         n_state, n_point)``."""
         within = _Linear(self._a, self._b, on_states)
-        on_start, on_rates, on_ends = within.pulled_back(of_states)
+        on_start, on_rates, on_ends = within.vjp(of_states)
         if self._free.size:
             free = self._free
-            through, *_ = within.pulled_back(
+            through, *_ = within.vjp(
                 np.zeros((on_start.shape[1], *of_states.shape[1:])), np.eye(on_start.shape[1])
             )
             closing = np.zeros_like(on_start)
             closing[:, free] = -np.linalg.solve(self._open(through).T, on_start[:, free].T).T
             image = np.eye(len(through)) if self._image is None else self._image
-            on_start, on_rates, on_ends = within.pulled_back(of_states, closing)
+            on_start, on_rates, on_ends = within.vjp(of_states, closing)
             on_start -= closing @ image
         return on_start, on_rates, on_ends
 
@@ -306,7 +306,7 @@ class _Linear:
         """States ``(k, n_point)`` from those at the begins of the intervals, ``(n, k)``."""
         return self._by_point(own + (self._response @ begins[:, :, None])[:, :, 0])
 
-    def pulled_back(
+    def vjp(
         self, of_states: np.ndarray, of_end: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Adjoint: along the begin ``(m, k)``, the rates, ``H'(I - H R)'^-1``, ``(m, k, n_point)``,

@@ -15,7 +15,7 @@ from colloc.mechanics.contact import Pairs
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.sqp import remembered
 from colloc.reduced.constraints import Constraints, Function
-from colloc.reduced.pointed import pointed
+from colloc.reduced.pointed import with_heading
 from colloc.transcription.shape_checks import ShapeCheck, shape_checks
 from colloc.transcription.worst_instants import (
     check_values,
@@ -64,7 +64,7 @@ class LinearSpace:
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         v = self._admissible.gait.parameters(self._admissible.gait.through(gait))
-        return pointed(self.control, self.mesh, self, v)
+        return with_heading(self.control, self.mesh, self, v)
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         return v
@@ -90,10 +90,10 @@ class LinearSpace:
     def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
         return (self._acceleration_matrix(t) @ v).T
 
-    def accelerations_pulled_back(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+    def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
         return np.einsum("kjt,tjp->kp", on_points, self._acceleration_matrix(self.mesh.times))
 
-    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+    def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         if self._admissible.gait.relative_delta:
             _, unit, speed = self.at(v)
             on_angles, on_rates = np.split(on_shape, 2, axis=2)
@@ -214,13 +214,14 @@ class SerpenoidSpace(LinearSpace):
     ) -> None:
         super().__init__(control, edges, scheme, far)
         self._n_own = n_own = control.admissible.gait.n_own
-        told = len(kind_of_motion(control.dynamics).told)  # begins of states, which come last
-        self.own = np.concatenate([self.own[:n_own], self.own[self.own.size - told :]])
-        self.n, self.lower, self.upper = n_own + told, self.lower[self.own], self.upper[self.own]
+        n_static = len(kind_of_motion(control.dynamics).static_parameters)  # which come last
+        self.own = np.concatenate([self.own[:n_own], self.own[self.own.size - n_static :]])
+        self.n = n_own + n_static
+        self.lower, self.upper = self.lower[self.own], self.upper[self.own]
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        own, told = np.split(v, [self._n_own])
-        return np.concatenate([self._admissible.gait.full(own, self._admissible.n_joint), told])
+        own, static = np.split(v, [self._n_own])
+        return np.concatenate([self._admissible.gait.full(own, self._admissible.n_joint), static])
 
     def _slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the full parameters, ``(n_full, n)``."""
@@ -238,14 +239,14 @@ class SerpenoidSpace(LinearSpace):
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return super().at(self.full_parameters(v))
 
-    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        return super().pulled_back(self.full_parameters(v), on_shape, on_pace) @ self._slopes(v)
+    def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        return super().vjp(self.full_parameters(v), on_shape, on_pace) @ self._slopes(v)
 
     def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
         return super().accelerations(self.full_parameters(v), t)
 
-    def accelerations_pulled_back(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
-        return super().accelerations_pulled_back(v, on_points) @ self._slopes(v)
+    def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+        return super().accelerations_vjp(v, on_points) @ self._slopes(v)
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         return super().constraints(v, later).through(self.full_parameters, self._slopes)

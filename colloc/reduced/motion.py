@@ -20,13 +20,13 @@ from colloc.motion.collocated import CollocatedPose, point_weights, stage_weight
 from colloc.motion.kinds import (
     OMEGA,
     OUTPUTS,
-    Along,
+    Inertial,
     Kind,
-    Passed,
-    Share,
-    WithInertia,
-    first_theta,
-    through_motion,
+    PeriodTotals,
+    TotalGradient,
+    Trajectory,
+    initial_heading,
+    motion_vjp,
 )
 from colloc.motion.kinds import Shapes as Moving
 from colloc.motion.torques import limit_share_slopes, limit_shares
@@ -40,7 +40,7 @@ class Shapes(Protocol):
         """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` that multiplies
         velocities."""
 
-    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+    def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         """Derivatives ``(k, n)`` of k numbers, from those along ``(angles, rates)``, ``(k, n_point,
         2 n_joint)``, and along the pace, ``(k, n_point)``."""
 
@@ -54,10 +54,10 @@ class _State:
     angles: np.ndarray
     rates: np.ndarray
     pace: np.ndarray
-    along: Along
+    along: Trajectory
     out: np.ndarray
     pose: CollocatedPose
-    passed: Passed
+    passed: PeriodTotals
     values: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -87,7 +87,7 @@ class ReducedMotion:
         if last is not None and last.delta == delta and np.array_equal(last.v, v):
             return last
         angles, rates, pace = self.shapes.at(v)
-        begin = v[v.size - len(self.kind.told) :]
+        begin = v[v.size - len(self.kind.static_parameters) :]
         along = self.kind.along(
             self.mesh,
             Moving(angles, rates, delta, pace=pace),
@@ -99,10 +99,10 @@ class ReducedMotion:
         out = np.vstack([now.z[OMEGA] - self._even(pace), now.centre, now.power])
         out[:, ~along.held] = np.nan
         omega, cx, cy, power = out * pace
-        first = first_theta(self.kind, begin)
+        first = initial_heading(self.kind, begin)
         pose = CollocatedPose.on_mesh(mesh, omega, np.array([cx, cy]), first)
         work = float((self._weight * power[mesh.points]).sum())
-        passed = Passed(complex(pose.place[-1]), float(pose.theta[-1]) - first, work, begin)
+        passed = PeriodTotals(complex(pose.place[-1]), float(pose.theta[-1]) - first, work, begin)
         found = _State(v.copy(), delta, angles, rates, pace, along, out, pose, passed)
         if not self.kind.states or along.held.all():  # a search goes on from states that there are
             self._last = found
@@ -122,7 +122,9 @@ class ReducedMotion:
             if last is None:
                 return None, None
             states = last.along.states.copy()
-            for name, moved in zip(self.kind.told, begin - last.along.begin, strict=True):
+            for name, moved in zip(
+                self.kind.static_parameters, begin - last.along.begin, strict=True
+            ):
                 states[[name == state for state in self.kind.states]] += moved
             return states, last.z
         near, slopes, _ = self._near
@@ -133,7 +135,7 @@ class ReducedMotion:
         """Totals of a period and integrals by name; NaN where there is no motion."""
         s = self.at(v, delta)
         if not s.values:
-            s.values = self.kind.counted(s.passed)
+            s.values = self.kind.totals(s.passed)
             if self._integrals:
                 now = self.instants(v, delta)
                 weight = self.kind.periods * s.pace * self._point_weight
@@ -145,7 +147,7 @@ class ReducedMotion:
     ) -> np.ndarray:
         """Shares of actuator limits ``(n_share, n_time)`` at the points of the mesh, or at times of
         it."""
-        if limits.needs_forces and isinstance(self.kind, WithInertia):
+        if limits.needs_forces and isinstance(self.kind, Inertial):
             of, y = self._torque_arguments(self.kind, v, delta, t)
             return limit_shares(of, limits, y, delta)
         if t is None:
@@ -160,7 +162,7 @@ class ReducedMotion:
         """Derivatives ``(n_row, n)`` of shares of actuator limits; `rows` ``(2, n_row)`` are their
         shares and points."""
         share, point = rows
-        if limits.needs_forces and isinstance(self.kind, WithInertia):
+        if limits.needs_forces and isinstance(self.kind, Inertial):
             return self._torque_share_slopes(self.kind, limits, v, delta, rows)
         from colloc.reduced.density_slopes import density_slopes  # loads CasADi
 
@@ -171,7 +173,7 @@ class ReducedMotion:
         return self.through_points(v, delta, on_points)
 
     def _torque_arguments(
-        self, kind: WithInertia, v: np.ndarray, delta: float, t: np.ndarray | None = None
+        self, kind: Inertial, v: np.ndarray, delta: float, t: np.ndarray | None = None
     ) -> tuple[Any, ...]:
         s = self.at(v, delta)
         if t is None:
@@ -189,12 +191,12 @@ class ReducedMotion:
             if "theta" in kind.states:
                 states = np.vstack([states, self.theta(v, delta, t)])
         return kind.torque_arguments(
-            shapes, self._space.accelerations(v, times), states, s.passed.told
+            shapes, self._space.accelerations(v, times), states, s.passed.static_parameters
         )
 
     def _torque_share_slopes(
         self,
-        kind: WithInertia,
+        kind: Inertial,
         limits: PathLimits,
         v: np.ndarray,
         delta: float,
@@ -209,12 +211,12 @@ class ReducedMotion:
         on_points = np.zeros((share.size, 2 * n + 1, self.mesh.n_point))
         on_points[:, : 2 * n] = at_points[:, : 2 * n]
         on_pace = np.zeros((share.size, self.mesh.n_point))
-        by_states, of_period = at_points[:, 3 * n : 3 * n + k], [Share()] * share.size
-        if "log_period" in kind.told:
+        by_states, of_period = at_points[:, 3 * n : 3 * n + k], [TotalGradient()] * share.size
+        if "log_period" in kind.static_parameters:
             on_froude = at_points[:, -1].sum(axis=1)
-            of_period = [Share(told=-2.0 * y[-1] * each) for each in on_froude]
+            of_period = [TotalGradient(static=-2.0 * y[-1] * each) for each in on_froude]
         through = self._through(s, of_period, on_points, on_pace, by_states)
-        return through + self._space.accelerations_pulled_back(v, at_points[:, 2 * n : 3 * n])
+        return through + self._space.accelerations_vjp(v, at_points[:, 2 * n : 3 * n])
 
     def instants(self, v: np.ndarray, delta: float) -> Instants:
         s = self.at(v, delta)
@@ -231,7 +233,7 @@ class ReducedMotion:
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
         """Derivatives of `values`, ``(n,)`` each."""
         s, kind = self.at(v, delta), self.kind
-        shares, weight, n_joint = kind.shares(s.passed), self._point_weight, len(s.rates)
+        shares, weight, n_joint = kind.total_gradients(s.passed), self._point_weight, len(s.rates)
         on_points = np.zeros((len(shares) + len(self._integrals), 2 * n_joint + 1, s.pace.size))
         on_pace = np.zeros((len(on_points), s.pace.size))
         if self._integrals:
@@ -245,7 +247,7 @@ class ReducedMotion:
             on_points[row] = kind.periods * weight * s.pace * density_slopes(quantity, now)[0]
             on_pace[row] = kind.periods * weight * quantity.at(now)[0]
         found = self._through(
-            s, [*shares.values(), *(Share() for _ in self._integrals)], on_points, on_pace
+            s, [*shares.values(), *(TotalGradient() for _ in self._integrals)], on_points, on_pace
         )
         return dict(zip((*shares, *(each.name for each in self._integrals)), found, strict=True))
 
@@ -254,13 +256,15 @@ class ReducedMotion:
         points, ``(m, 2 n_joint + 1, n_point)``."""
         on_pace = np.zeros((len(on_points), on_points.shape[2]))
         if not on_points[:, -1].any():
-            return self.shapes.pulled_back(v, on_points[:, :-1].transpose(0, 2, 1), on_pace)
-        return self._through(self.at(v, delta), [Share()] * len(on_points), on_points, on_pace)
+            return self.shapes.vjp(v, on_points[:, :-1].transpose(0, 2, 1), on_pace)
+        return self._through(
+            self.at(v, delta), [TotalGradient()] * len(on_points), on_points, on_pace
+        )
 
     def _through(
         self,
         s: _State,
-        shares: Sequence[Share],
+        shares: Sequence[TotalGradient],
         on_points: np.ndarray,
         on_pace: np.ndarray,
         by_states: np.ndarray | float = 0.0,
@@ -268,7 +272,7 @@ class ReducedMotion:
         """Derivatives of numbers that depend on shapes, pace, and totals of the period."""
         mesh, kind = self.mesh, self.kind
         slopes, on_states = self._slopes(s)
-        rows, on_begin, _ = through_motion(
+        rows, on_begin, _ = motion_vjp(
             kind,
             mesh,
             s.pose,
@@ -287,10 +291,10 @@ class ReducedMotion:
         on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS]) + on_points[
             :, :-1
         ].transpose(0, 2, 1)
-        found = self.shapes.pulled_back(s.v, on_shape, on_pace)
-        if kind.told:
-            found[:, -len(kind.told) :] += on_begin
-            found[:, -len(kind.told)] += [share.told for share in shares]
+        found = self.shapes.vjp(s.v, on_shape, on_pace)
+        if kind.static_parameters:
+            found[:, -len(kind.static_parameters) :] += on_begin
+            found[:, -len(kind.static_parameters)] += [share.static for share in shares]
         return found
 
     def _slopes(self, s: _State) -> tuple[np.ndarray, np.ndarray]:

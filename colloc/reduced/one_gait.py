@@ -52,10 +52,10 @@ class OneGait:
     def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
         raise NotImplementedError  # prescribed motions have no limits of actuators
 
-    def accelerations_pulled_back(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+    def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
         raise NotImplementedError
 
-    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+    def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         return np.empty((len(on_shape), 0))
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:

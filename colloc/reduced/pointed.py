@@ -14,7 +14,7 @@ _TURNS = 0.25 * np.pi * np.array([0, 1, -1, 2, -2, 3, -3])
 """Turns [rad] tried where the body slides down."""
 
 
-def pointed(control: ControlProblem, mesh: Mesh, shapes: Shapes, v: np.ndarray) -> np.ndarray:
+def with_heading(control: ControlProblem, mesh: Mesh, shapes: Shapes, v: np.ndarray) -> np.ndarray:
     """Parameters with the initial heading last: the one that travels as asked on the level, or the
     nearest at which the body does not slide down."""
     if not np.isnan(v[-1:]).any():

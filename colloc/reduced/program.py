@@ -47,7 +47,7 @@ class SearchSpace(Shapes, Protocol):
     def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Second derivatives of the angles, ``(n_joint, n_time)``."""
 
-    def accelerations_pulled_back(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+    def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
         """Derivatives ``(k, n)`` of k numbers, from those along the accelerations at the points,
         ``(k, n_joint, n_point)``."""
 

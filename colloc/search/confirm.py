@@ -34,7 +34,7 @@ def confirm(iterate: Iterate) -> Answer:
     """The gait as a point of the full program, with measured first- and second-order conditions;
     `message` says what holds where IPOPT does not confirm it."""
     if not iterate.problem.gait.free:
-        answer = unconfirmed(iterate)
+        answer = answer_of_iterate(iterate)
         return replace(answer, status=PRESCRIBED, program=PRESCRIBED, message=iterate.message)
     active_run().report("confirm", 0, 1, iterate)
     return _confirm(iterate)
@@ -162,7 +162,7 @@ def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
     return replace(answer, history=(answer.step,))
 
 
-def unconfirmed(iterate: Iterate) -> Answer:
+def answer_of_iterate(iterate: Iterate) -> Answer:
     """The gait as the search found it, every other variable from its balance."""
     space, control = iterate.space, iterate.space.control
     mesh, layout = space.mesh, layout_of(control, space.mesh)

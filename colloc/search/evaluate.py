@@ -28,7 +28,7 @@ from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
 from colloc.search.certify import certify, goes_nowhere
-from colloc.search.confirm import unconfirmed
+from colloc.search.confirm import answer_of_iterate
 from colloc.search.iterate import evaluate_at
 from colloc.search.options import OPTIONS, TOLERANCES
 from colloc.smooth.prescribed_body import schedule
@@ -196,7 +196,7 @@ def _answer(problem: Problem, gait: AnyGait) -> Answer:
 def _measured(control: ControlProblem, mesh: Mesh, parameters: np.ndarray) -> Answer:
     space = OneGait(control, mesh.edges, mesh.scheme.name, full=parameters)
     iterate = evaluate_at(space, np.empty(0), control.problem.delta)
-    return replace(unconfirmed(iterate), status=EVALUATED, program=EVALUATED)
+    return replace(answer_of_iterate(iterate), status=EVALUATED, program=EVALUATED)
 
 
 def _errors_of_samples(
@@ -268,7 +268,7 @@ class _Series(NamedTuple):
             angles, rates = self.joint_map.joint_angles(angles), self.joint_map.joint_rates(rates)
         return angles, rates, np.ones(self.functions.shape[2])
 
-    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+    def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         both = on_shape.reshape(*on_shape.shape[:2], 2, -1)
         if self.joint_map is not None:
             both = both @ self.joint_map.matrix

@@ -17,7 +17,7 @@ from colloc.search.checkpoint import active_run
 from colloc.search.converge import optimise
 from colloc.search.iterate import Iterate
 from colloc.search.options import FINE, MEDIUM, OPTIONS, TOLERANCES
-from colloc.search.spaces import remeshed, space_of
+from colloc.search.spaces import on_mesh_of, space_of
 from colloc.smooth.panel_body import on_panels, panels_of
 from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
@@ -92,7 +92,7 @@ def _refine_once(iterate: Iterate, meshes: _Meshes) -> Iterate | None:
         (space, v), kkt = more_panels, MEDIUM
     if plan is not None:
         meshes.count, meshes.knots = meshes.count + 1, np.concatenate([meshes.knots, plan.kept])
-        space = remeshed(space, iterate.gait, plan.edges, plan.scheme)
+        space = on_mesh_of(space, iterate.gait, plan.edges, plan.scheme)
         # where the search began at the optimum, no mesh moves the gait far
         at_optimum = iterate.step.iterations == 0
         late = meshes.count > OPTIONS.meshes_of_first_aim

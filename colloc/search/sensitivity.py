@@ -32,7 +32,7 @@ from colloc.results.solution import Solution
 from colloc.search.converge import optimise
 from colloc.search.options import FINE, MEDIUM
 from colloc.search.solve import finish
-from colloc.search.spaces import remeshed, space_near, space_of, with_far
+from colloc.search.spaces import on_mesh_of, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
 from colloc.verification.played import Replay
 from colloc.verification.replay import replayer
@@ -328,7 +328,7 @@ def _on_meshes(answer: Answer) -> list[_Lagrangian]:
     def on(parts: int, later: float = 0.0) -> _Lagrangian:
         inner = edges[:-1, None] + (np.arange(parts) + later) / parts * np.diff(edges)[:, None]
         finer = np.unique([edges[0], *inner.flat, edges[-1]])
-        space = remeshed(solved.space, answer.gait, finer, answer.scheme)
+        space = on_mesh_of(solved.space, answer.gait, finer, answer.scheme)
         found = optimise(space, space.parameters(answer.gait), answer.delta, FINE)
         return _Lagrangian.at_optimum(found.space, found.v, answer.delta)
 

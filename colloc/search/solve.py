@@ -21,7 +21,7 @@ from colloc.results.solution import Solution
 from colloc.search.certify import certify, is_trivial
 from colloc.search.checkpoint import Progress, Run, active_run, checkpointed
 from colloc.search.choose import choose, is_visible_solution, passes, solution_of
-from colloc.search.confirm import confirm, unconfirmed
+from colloc.search.confirm import answer_of_iterate, confirm
 from colloc.search.descend import descend, leave_saddle
 from colloc.search.direct_nlp import solve_directly
 from colloc.search.explore import (
@@ -120,7 +120,7 @@ def _solve(
     explored = _explore(problem, starts, has_time)
     first = descend(explored.optima[0])
     if not accept(first):
-        return Solution(problem, unconfirmed(first))
+        return Solution(problem, answer_of_iterate(first))
     solutions = _finish_best(problem, (first, *explored.optima[1:]))
     if not any(map(passes, solutions)) and explored.left:
         solutions += _finish_best(problem, follow_rest(problem, explored, has_time))
@@ -238,7 +238,7 @@ def _best_so_far(problem: Problem, run: Run, why: str) -> Solution:
     else:
         guess = space_near(problem, problem.guess)
         best = run.best or evaluate_at(*guess, problem.delta_start)
-        solution = Solution(problem, unconfirmed(best))
+        solution = Solution(problem, answer_of_iterate(best))
     solution.interrupted = True
     solution.message = f"{why}; this is the best gait so far. {solution.message}".strip()
     return solution

@@ -60,7 +60,7 @@ def with_far(space: SearchSpace, far: Pairs) -> SearchSpace:
     return space_of(space.control.problem, None, space.edges, space.scheme, far)
 
 
-def remeshed(space: SearchSpace, gait: AnyGait, edges: np.ndarray, scheme: str) -> SearchSpace:
+def on_mesh_of(space: SearchSpace, gait: AnyGait, edges: np.ndarray, scheme: str) -> SearchSpace:
     """The same class on another mesh, in phases of a member."""
     return space_of(space.control.problem, gait, edges, scheme, space.far)
 

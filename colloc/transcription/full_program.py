@@ -180,7 +180,7 @@ def full_program(
     theta = pick(layout.theta[0])
     if sign is not None and aims.rotation is not None:
         program.add("rotation", theta[-1] + sign * theta[0])
-    if "theta" in kind_of_motion(control.dynamics).told:
+    if "theta" in kind_of_motion(control.dynamics).static_parameters:
         program.add("heading", theta[0] - pick(p[-1:]))
     state, rate = mesh.quadrature()
     ahead, aside, power = motion.ways()

@@ -112,7 +112,9 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
     for name, (rows, columns) in sizes.items():
         indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
         start += rows * columns
-    pace = -len(kind_of_motion(dynamics).told)  # which comes first of what a gait tells
+    pace = -len(
+        kind_of_motion(dynamics).static_parameters
+    )  # which comes first of what a gait tells
     return Layout(n=start, **indices, integrals=control.aims.integrals, pace=pace)
 
 

@@ -8,7 +8,14 @@ from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.chain import Chain
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights, sums
-from colloc.motion.kinds import OMEGA, Passed, Shapes, begin_of, first_theta, kind_of_motion
+from colloc.motion.kinds import (
+    OMEGA,
+    PeriodTotals,
+    Shapes,
+    initial_heading,
+    kind_of_motion,
+    static_parameters_of,
+)
 from colloc.numerics.mesh import Mesh
 from colloc.transcription.layout import RADIANS, Layout
 
@@ -26,9 +33,9 @@ def balanced_variables(
     kind = kind_of_motion(control.dynamics.in_speeds_of(RADIANS))
     if gait is None:
         gait = gaits.trajectory(parameters, n_joint)
-        begin = parameters[parameters.size - len(kind.told) :]
+        begin = parameters[parameters.size - len(kind.static_parameters) :]
     else:
-        begin = begin_of(kind, gait)
+        begin = static_parameters_of(kind, gait)
     x = np.zeros(layout.n)
     x[layout.parameters[:, 0]] = parameters
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
@@ -47,17 +54,19 @@ def balanced_variables(
         mesh,
         RADIANS * z[OMEGA] - turn,
         RADIANS * speed * np.array(now.centre),
-        first_theta(kind, begin),
+        initial_heading(kind, begin),
     )
     power = (weight * (speed * now.power)[points]).sum(axis=1)
-    shares = kind.shares(
-        Passed(complex(pose.place[-1]), float(pose.rotations.sum()), float(power.sum()), begin)
+    shares = kind.total_gradients(
+        PeriodTotals(
+            complex(pose.place[-1]), float(pose.rotations.sum()), float(power.sum()), begin
+        )
     )
     heading = float(np.angle(shares["distance"].side))
     ahead = (pose.place * np.exp(-1j * heading)).real
     climbed = (pose.place * np.conj(shares["work"].side)).real
     # where the orientation is no state the plane is turned so that the gait goes along +x
-    theta_0 = 0.0 if "theta" in kind.told else -heading
+    theta_0 = 0.0 if "theta" in kind.static_parameters else -heading
     x[layout.distance[0, 1:]] = ahead[1:]
     x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
     x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta

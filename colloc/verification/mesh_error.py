@@ -19,7 +19,7 @@ from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import crossing_depth, far_pairs
 from colloc.motion.collocated import CollocatedPose, stage_weights
-from colloc.motion.kinds import OMEGA, Passed, kind_of_motion, through_motion
+from colloc.motion.kinds import OMEGA, PeriodTotals, kind_of_motion, motion_vjp
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 from colloc.verification.adaptive_motion import (
@@ -117,7 +117,7 @@ def _ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 def _first_order(
     control: ControlProblem,
-    passed: Passed,
+    passed: PeriodTotals,
     period: Mapping[str, float],
     rotation: np.ndarray,
     displacement: np.ndarray,
@@ -127,7 +127,7 @@ def _first_order(
     """Relative changes of the objective by errors of intervals; `displacement` at the end."""
     kind, weights = kind_of_motion(control.dynamics), control.aims.objective.shares(period)
     value = np.zeros(rotation.size)
-    for name, share in kind.shares(passed).items():
+    for name, share in kind.total_gradients(passed).items():
         way = (np.conj(share.side) * displacement).real
         value += weights.get(name, 0.0) * (way + share.rotation * rotation + share.work * work)
     for each, error in zip(control.aims.integrals, integrals, strict=True):
@@ -176,15 +176,15 @@ def _turning(known: Known, cells: _Cells) -> np.ndarray:
 
 def _period(
     known: Known, end: complex, rotation: float, totals: np.ndarray
-) -> tuple[Passed, dict[str, float]]:
+) -> tuple[PeriodTotals, dict[str, float]]:
     """The solved part, and quantities of the period."""
     kind = kind_of_motion(known.control.dynamics)
-    passed = Passed(complex(end), float(rotation) - kind.turn, float(totals[0]))
+    passed = PeriodTotals(complex(end), float(rotation) - kind.turn, float(totals[0]))
     names = (each.name for each in known.control.aims.integrals)
     return passed, period_of(kind, passed, dict(zip(names, totals[1:], strict=True)))
 
 
-def _exact(known: Known) -> tuple[Passed, dict[str, float]]:
+def _exact(known: Known) -> tuple[PeriodTotals, dict[str, float]]:
     fine = known.fine
     return _period(known, fine.path[-1], fine.theta[-1], fine.totals[:, -1])
 
@@ -197,7 +197,9 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
-    passed = Passed(complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), along.begin)
+    passed = PeriodTotals(
+        complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), along.begin
+    )
     with_forces = iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
     integrals = {
         each.name: next(with_forces)
@@ -222,8 +224,8 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
         if not kind.states[3:]:  # an error of rotation turns everything after it
             path = place[0] + 1j * place[1]
             displacement += 1j * rotation * (path[-1] - path[1:])
-        shares, (_, on_states) = kind.shares(passed), kind.slopes(shapes, along)
-        *_, on_ends = through_motion(kind, mesh, pose, shares.values(), on_states)
+        shares, (_, on_states) = kind.total_gradients(passed), kind.slopes(shapes, along)
+        *_, on_ends = motion_vjp(kind, mesh, pose, shares.values(), on_states)
         counts = np.array([weights.get(name, 0.0) for name in shares])
         by_states = np.einsum("m,mkn,kn->n", counts, on_ends, ends - states[:, 1:])
         by_states[~solved] = 1.0

@@ -13,13 +13,13 @@ from colloc.gaits.sloped import Slope
 from colloc.motion.collocated import CollocatedPose, stage_weights
 from colloc.motion.kinds import (
     OMEGA,
-    Along,
     Kind,
-    Passed,
+    PeriodTotals,
     Shapes,
-    begin_of,
-    first_theta,
+    Trajectory,
+    initial_heading,
     kind_of_motion,
+    static_parameters_of,
 )
 from colloc.numerics.mesh import Mesh
 from colloc.verification.inertial_motion import GaitWithInertia, amplification
@@ -35,7 +35,7 @@ class ReferenceMotion(NamedTuple):
     sums: Callable[[np.ndarray], np.ndarray] | None = None
     """Quantities that forces are needed for up to ascending phases, ``(k, n)``."""
     alone: Callable[..., Any] | None = None
-    """Intervals by themselves (`colloc.motion.kinds.WithInertia.alone`); None: their errors are
+    """Intervals by themselves (`colloc.motion.kinds.Inertial.alone`); None: their errors are
     seen in the whole motion."""
 
 
@@ -74,7 +74,7 @@ class Collocated(NamedTuple):
     """A gait on a mesh."""
 
     shapes: Shapes
-    along: Along
+    along: Trajectory
     pose: CollocatedPose
     work: np.ndarray  # against friction, (n,)
     integrals: dict[str, np.ndarray]  # of intervals
@@ -88,8 +88,8 @@ def collocated(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> 
         gait(mesh.times),
     )
     shapes = Shapes(angles, rates, delta)
-    along = kind.along(mesh, shapes, begin_of(kind, gait))
-    theta = first_theta(kind, along.begin)
+    along = kind.along(mesh, shapes, static_parameters_of(kind, gait))
+    theta = initial_heading(kind, along.begin)
     pose = CollocatedPose.on_mesh(mesh, along.z[OMEGA] - kind.turn, along.now.centre, theta)
     now = kind.instants(shapes, pose.theta_on(mesh), along.z)
     work = (weights * along.now.power[mesh.points]).sum(axis=1)
@@ -98,11 +98,11 @@ def collocated(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> 
         for each in control.aims.integrals
     }
     way, turn = complex(pose.place[-1]), float(pose.rotations.sum())
-    passed = Passed(way, turn, float(work.sum()), along.begin)
+    passed = PeriodTotals(way, turn, float(work.sum()), along.begin)
     return Collocated(shapes, along, pose, work, sums, period_of(kind, passed, sums))
 
 
-def period_of(kind: Kind, passed: Passed, sums: Mapping[str, Any]) -> dict[str, float]:
+def period_of(kind: Kind, passed: PeriodTotals, sums: Mapping[str, Any]) -> dict[str, float]:
     """Quantities of a period from those of the solved part."""
     totals = {name: kind.periods * float(np.sum(part)) for name, part in sums.items()}
-    return kind.counted(passed) | totals
+    return kind.totals(passed) | totals

@@ -18,7 +18,7 @@ from colloc.mechanics.chain_motion import chain_motion, motion_and_derivatives
 from colloc.mechanics.densities import LENGTH, Instants
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.motion.follow import followed
-from colloc.motion.kinds import Along, SlowOnLevel, kind_in
+from colloc.motion.kinds import QuasiStatic, Trajectory, kind_in
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
 from colloc.verification.adaptive_motion import whole_totals
@@ -83,7 +83,7 @@ class Pushed(Regime):
         )
 
 
-class PushedMotion(SlowOnLevel):
+class PushedMotion(QuasiStatic):
     """The balance holds instant by instant, with the push; the work is that of the joints."""
 
     followed = True
@@ -103,7 +103,7 @@ class PushedMotion(SlowOnLevel):
         solved = solve_balance(*at, load=pushed, start=near[1], tolerance=tolerance)
         now = chain_motion(*at, solved, pushed)
         held = solved.residual < 1e3 * tolerance
-        return Along(
+        return Trajectory(
             begin,
             np.empty((0, held.size)),
             solved.z,

@@ -93,7 +93,7 @@ def test_the_adjoint_has_the_slopes_of_differences(k, free):
         return (weight * states).sum(), states
 
     _, states = number(0.0)
-    on_start, on_rates, _ = equations.pulled_back(on_states(mesh.times, states), weight[None])
+    on_start, on_rates, _ = equations.vjp(on_states(mesh.times, states), weight[None])
     difference = (number(1e-5)[0] - number(-1e-5)[0]) / 2e-5
     assert (on_rates[0] * more).sum() + on_start[0] @ moved == pytest.approx(difference, rel=1e-7)
     np.testing.assert_allclose(on_start[0, mask], 0.0, atol=1e-12)

@@ -12,7 +12,7 @@ from colloc.mechanics.inertia import kinetic_energy, momentum_rates
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.motion import kinds
 from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
-from colloc.motion.kinds import Shapes, begin_of, kind_of_motion
+from colloc.motion.kinds import Shapes, kind_of_motion, static_parameters_of
 from colloc.pictures.movie import pictures
 from colloc.reduced.program import ReducedProgram
 from colloc.search.spaces import space_near
@@ -99,7 +99,7 @@ def test_shooting_and_collocation_find_the_same_motion(froude):
     assert found["work"] == pytest.approx(shot.work, rel=2e-4)
     assert found["rotation"] == pytest.approx(shot.rotation, abs=2e-4)
     kind, mesh, gait = reduced.motion.kind, reduced.space.mesh, reduced.space.member(v)
-    along = kind.along(mesh, Shapes(*gait(mesh.times), 1e-2), begin_of(kind, gait))
+    along = kind.along(mesh, Shapes(*gait(mesh.times), 1e-2), static_parameters_of(kind, gait))
     largest = np.abs(shot.states[:3]).max()
     for momentum, edges in zip(shot.states[:3], along.edges, strict=True):
         np.testing.assert_allclose(

@@ -15,7 +15,7 @@ from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
-from colloc.search.confirm import unconfirmed
+from colloc.search.confirm import answer_of_iterate
 from colloc.search.converge import optimise
 from colloc.search.iterate import evaluate_at
 from colloc.search.options import COARSE
@@ -138,7 +138,7 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
         delta_start=1e-3,
     )
     solution = Solution(
-        problem, unconfirmed(evaluate_at(*space_near(problem, guess), problem.delta))
+        problem, answer_of_iterate(evaluate_at(*space_near(problem, guess), problem.delta))
     )
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (

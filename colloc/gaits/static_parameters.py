@@ -12,20 +12,20 @@ from colloc.gaits.gait import ClassOfGaits
 from colloc.mechanics.bodies import Body
 
 
-class Telling(ClassOfGaits):
+class WithStaticParameter(ClassOfGaits):
     """Base of a class with a static parameter; members whose last parameter is NaN do not state
     it."""
 
-    tells: ClassVar[str]
+    static_name: ClassVar[str]
     """Attribute of members."""
     _own: ClassVar[tuple[tuple[str, Any], ...]]
 
     @property
-    def least_and_most(self) -> tuple[float, float]:
+    def static_bounds(self) -> tuple[float, float]:
         """Bounds of the parameter."""
         raise NotImplementedError
 
-    def said(self, gait: Any) -> float:
+    def static_value(self, gait: Any) -> float:
         """The parameter of any gait; NaN if it is unknown."""
         raise NotImplementedError
 
@@ -54,30 +54,34 @@ class Telling(ClassOfGaits):
     def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
         own = self.without.bounds(body, limit)
         lower, upper = (
-            np.append(each, end) for each, end in zip(own, self.least_and_most, strict=True)
+            np.append(each, end) for each, end in zip(own, self.static_bounds, strict=True)
         )
         return lower, upper
 
     def parameters(self, gait: Any) -> np.ndarray:
-        return np.append(self.without.parameters(gait), self.said(gait))
+        return np.append(self.without.parameters(gait), self.static_value(gait))
 
     def nearest(self, gait: Any) -> np.ndarray:
-        return np.append(self.without.nearest(gait), self.said(gait))
+        return np.append(self.without.nearest(gait), self.static_value(gait))
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Any:
         gait = self.without.member(parameters[:-1], n_joint)
         return (
             gait
             if np.isnan(parameters[-1])
-            else replace(gait, **{self.tells: float(parameters[-1])})
+            else replace(gait, **{self.static_name: float(parameters[-1])})
         )
 
     def through(self, gait: Any) -> Any:
         near = self.without.through(gait)
-        return replace(near, **{self.tells: getattr(gait, self.tells)}) if gait.is_series else near
+        return (
+            replace(near, **{self.static_name: getattr(gait, self.static_name)})
+            if gait.is_series
+            else near
+        )
 
 
-def telling(kind: type[Telling], gait_class: Any, **own: Any) -> Any:
+def with_static_parameter(kind: type[WithStaticParameter], gait_class: Any, **own: Any) -> Any:
     return _made(kind, gait_class, tuple(own.items()))
 
 
