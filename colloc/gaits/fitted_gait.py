@@ -25,19 +25,15 @@ from colloc.system.errors import ProblemError
 _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
 _WORTH, _EXACT = 1.05, 1e-16  # factor and mean square [rad^2] by which scores count as equal
 _PHASES = 1024  # at which a function is sampled
-_GAP, _GAPS = 5.0, 21  # most steps from the last sample to the next period; gaps that are tried
+_GAP = 5  # most steps from the last sample to the next period
 _DRIFT = 0.1  # drift a period that still closes, of a joint's range
 _LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
-_ALIKE = 1e-3, 0.03, 0.2
+_ALIKE = 0.2
 """Excess of the mean square difference of a record from itself a period later over that several
-periods later: the first length below each is a candidate for the period."""
-_REPEATED, _SLOW, _SMALL = 2.0, 10.0, 1e-2
-"""Ratio of the score of several periods to that of one long one with as many harmonics, at most;
-for slow noise the second, up to a share of the variance."""
-_DRIFTS, _OPEN = 1.3, 4.0
-"""Ratio of the scores without and with a drift, at most: a part of a wave with noise looks like a
-drift; and the second if the record would not close else."""
-_LONG = 0.5  # share of a record beyond which a period is told without a drift
+periods later, at most."""
+_REPEATED, _DRIFTS = 10.0, 4.0
+"""Ratio of the score of several periods to that of a long one with as many harmonics, and without a
+drift to that with one, at most: a part of a wave with noise looks like a drift."""
 _ROUGH = 6  # harmonics by which the period is told
 SEVERAL = 1.1  # periods from which a record holds more than one
 _STEP = 1e-5  # relative, of differences by the period
@@ -202,12 +198,6 @@ class _Samples(NamedTuple):
         """Coefficients of the columns of a fit, ``(n_joint, n_number)``."""
         return np.linalg.lstsq(fit.columns(self.time), self.angles.T, rcond=None)[0].T
 
-    def drift_and_ranges(self, fit: _Fit) -> tuple[np.ndarray, np.ndarray]:
-        """Drift a period and range of angles of each joint, ``(n_joint,)`` each."""
-        table = self.table(fit)
-        waves = Fourier.from_table(table[:, int(fit.drifts) :]).angles(np.arange(_PHASES) / _PHASES)
-        return np.abs(table[:, 0]) * fit.drifts, np.ptp(waves, axis=1)
-
     def fits(self, fit: _Fit, fewest: int = 1, chosen: int = 0) -> list[_Fit]:
         """Scores of `fewest` to all harmonics of a fit, with `chosen` more numbers, by one QR."""
         q = np.linalg.qr(fit.columns(self.time))[0]
@@ -249,43 +239,39 @@ class _Samples(NamedTuple):
         self.check(period, harmonics)
         time, step = self.time, self.step
 
-        def fits(
-            period: float, chosen: int = 0, *, drifts: bool = False, most: int = _MOST_HARMONICS
-        ) -> list[_Fit]:
+        def up_to(most: int, period: float, chosen: int, drifts: bool) -> list[_Fit]:
             many = min(time.size, int(period / step))  # samples of a period
             most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
             return self.fits(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
 
-        def both(period: float, chosen: int) -> list[_Fit]:
-            return fits(period, chosen) + fits(period, chosen, drifts=True)
+        def fits(period: float, chosen: int) -> list[_Fit]:
+            closed = up_to(_MOST_HARMONICS, period, chosen, False)
+            return closed + up_to(_MOST_HARMONICS, period, chosen, True)
 
-        def smallest_score(period: float) -> float:
-            return _best(fits(period, most=_ROUGH))
+        def score(period: float) -> float:
+            return _best(up_to(_ROUGH, period, 0, False))
 
         def best_period(low: float, high: float) -> float:
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
-            return float(minimize_scalar(smallest_score, bounds=(low, high), **how).x)
+            return float(minimize_scalar(score, bounds=(low, high), **how).x)
 
-        candidates = both(period, 0) if period else both(time[-1], 0) + both(time[-1] + step, 0)
-        if period is None:
-            grid = time[-1] + step * np.linspace(0.0, _GAP, _GAPS)
-            gap, width = min(grid, key=smallest_score), grid[1] - grid[0]
-            candidates += both(best_period(max(gap - width, grid[0]), gap + width), 1)
-            repeats = sorted(best_period(low, high) for low, high in self.find_repeats())
-            for each in repeats:
-                candidates += fits(each, 1) if each > _LONG * time[-1] else []
-            several = [both(each, 1) for each in repeats if each <= _LONG * time[-1]]
-            best = min(map(_best, (candidates, *several)))
-            slow = min(_SLOW * best, _SMALL * float(self.angles.var(axis=1).mean()))
-            enough = max(_REPEATED * best, slow) + _EXACT
+        if period is not None:
+            candidates = fits(period, 0)
+        else:
+            # the next period begins with the last sample, or some steps later, or was recorded
+            gaps = time[-1] + step * np.arange(_GAP + 1)
+            later = min(map(best_period, gaps[:-1], gaps[1:]), key=score)
+            repeats = [best_period(*bracket) for bracket in self.find_repeats()]
+            candidates = fits(gaps[0], 0) + fits(gaps[1], 0)
+            for each in (later, *(each for each in repeats if each > 0.5 * time[-1])):
+                candidates += fits(each, 1)
+            several = [fits(each, 1) for each in repeats if each <= 0.5 * time[-1]]
+            enough = _REPEATED * min(map(_best, (candidates, *several))) + _EXACT
             candidates = next((each for each in several if _best(each) <= enough), candidates)
         closed = [fit for fit in candidates if not fit.drifts]
         if _best(closed) <= _DRIFTS * _best(candidates) + _EXACT:
             candidates = closed
-        fit = _cheapest(candidates)
-        if fit.drifts and not _closes(*self.drift_and_ranges(fit)):
-            return _cheapest(closed) if _best(closed) <= _OPEN * fit.score else fit
-        return fit
+        return _cheapest(candidates)
 
     def find_repeats(self) -> list[tuple[float, float]]:
         """Likely brackets of the period: least differences of the record from itself that much
@@ -301,24 +287,26 @@ class _Samples(NamedTuple):
         inner = np.arange(FEWEST, differs.size - 1)
         falls, rises = differs[inner] <= differs[inner - 1], differs[inner] < differs[inner + 1]
         least = inner[falls & rises]
-        brackets = set()
-        for more in _ALIKE if least.size else ():
-            first = least[np.argmax(differs[least] <= 1.5 * differs[least].min() + more)]
-            around, length, times = 0.25 * first, float(first), 1
-            while 2 * times * length + around < n - 2:
-                times *= 2
-                low, high = (round(times * length + side * around) for side in (-1, 1))
-                length = float(low + np.argmin(differs[low : high + 1])) / times
-            low, high = length - 2.0 / times, length + 2.0 / times
-            # a gap in the record may hide whole parts
-            brackets |= {(low * step / k, high * step / k) for k in (1, 2, 3) if low > k * FEWEST}
-        return sorted(brackets)
+        if not least.size:
+            return []
+        first = least[np.argmax(differs[least] <= 1.5 * differs[least].min() + _ALIKE)]
+        around, length, times = 0.25 * first, float(first), 1
+        while 2 * times * length + around < n - 2:
+            times *= 2
+            low, high = (round(times * length + side * around) for side in (-1, 1))
+            length = float(low + np.argmin(differs[low : high + 1])) / times
+        low, high = (length - 2.0 / times) * step, (length + 2.0 / times) * step
+        # a gap in the record may hide that it repeats sooner
+        return [(low / k, high / k) for k in (3, 2, 1) if low > k * FEWEST * step]
 
     def gait(self, fit: _Fit) -> FittedGait:
         """The gait without the drift of its record. `ProblemError` if that is not small."""
-        table, (drift, ranges) = self.table(fit), self.drift_and_ranges(fit)
-        gait, joint = Fourier.from_table(table[:, int(fit.drifts) :]), int(drift.argmax())
-        if not _closes(drift, ranges):
+        table = self.table(fit)
+        gait = Fourier.from_table(table[:, int(fit.drifts) :])
+        drift = np.abs(table[:, 0]) * fit.drifts  # a period
+        ranges = np.ptp(gait.angles(np.arange(_PHASES) / _PHASES), axis=1)
+        if drift.max() > _DRIFT * ranges.max():
+            joint = int(drift.argmax())
             raise ProblemError(
                 f"{self.name} does not close: after a period joint {joint + 1} is off by "
                 f"{_shown(drift[joint], self.degrees)}, and it moves through "
@@ -396,10 +384,6 @@ def _cheapest(fits: list[_Fit]) -> _Fit:
     """The fit of the fewest numbers whose score is about the best."""
     enough = max(_WORTH * _best(fits), _EXACT)
     return min(fit for fit in fits if fit.score <= enough)
-
-
-def _closes(drift: np.ndarray, ranges: np.ndarray) -> bool:
-    return bool(drift.max() <= _DRIFT * ranges.max())
 
 
 def _autocorrelation(rows: np.ndarray) -> np.ndarray:
