@@ -16,7 +16,7 @@ import pytest
 import xarray
 
 from colloc.commands.main import SUBCOMMANDS, main
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.results.store import save
 
 ROOT = Path(__file__).resolve().parents[1]

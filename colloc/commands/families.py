@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from colloc.commands import options as cli
 from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, naming_saved_files
-from colloc.commands.summary import bound_facts, kept_facts, kept_lines
+from colloc.commands.solve import bound_facts, kept_facts, kept_lines, save_and_tell
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
 from colloc.gaits.problem import Problem
@@ -160,6 +160,49 @@ def _run_starts(archive: Archive, options: argparse.Namespace) -> bool:
     except KeyboardInterrupt:
         return True
     return False
+
+
+@cli.command(
+    "open",
+    """\
+Without --start: the distinct optima of the archive. With it: that start, solved again from its gait
+(from its guess, if it had failed) and saved as a result like any other.
+
+  colloc open results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
+    cli.text("archive", "ARCHIVE.h5", "an archive that colloc multistart wrote"),
+    cli.count("--start", "N", "the start to make a result of"),
+    cli.SEED,
+    cli.choice("--sampler", SAMPLERS, "of the start", LATIN_HYPERCUBE),
+    cli.output("folder, or .h5 file (default: beside the archive)"),
+    cli.VERBOSE,
+)
+def open_archive(options: argparse.Namespace) -> int:
+    from colloc.results.archive import StartName, archive_at
+
+    archive = archive_at(options.archive)
+    problem = archive.problem
+    if options.start is None:
+        outcomes = list(archive.outcomes.values())
+        optima, facts, lines = starts_summary(problem, outcomes, archive.path)
+        cli.tell(options, facts, lines)
+        return OK if optima else NONE_FOUND
+    start = StartName(options.sampler, options.seed, options.start)
+    if start not in archive.outcomes:
+        there = sorted({f"{name.sampler} seed {name.seed}" for name in archive.outcomes})
+        raise ProblemError(
+            f"{options.archive} holds no start {options.start} of {options.sampler} seed "
+            f"{options.seed}; it holds {len(archive.outcomes)} starts of "
+            f"{', '.join(there) or 'no sampler'}."
+        )
+    name = f"{problem.name}.start-{options.start}.h5"
+    path = cli.output_path(options.output, Path(options.archive).with_name(name))
+    # slow imports only now: a bad option is refused at once
+    from colloc.studies.calls import reopen
+
+    with cli.status_line(options) as line:
+        line.say(f"{problem.name}: start {options.start}")
+        solution = reopen(problem, archive.outcomes[start])
+    return save_and_tell(options, solution, path)
 
 
 @cli.command(

@@ -26,7 +26,7 @@ SUBCOMMANDS = {
     "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
     "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
     "multistart": ("families", "solve from many random starts; distinct optima, how often found"),
-    "open": ("solve", "list the optima of an archive of starts; make a result of one start"),
+    "open": ("families", "list the optima of an archive of starts; make a result of one start"),
     "sweep": ("families", "solve a study, a grid of problems, over processes or a cluster"),
     "pareto": ("families", "trade-off (Pareto front) of two objectives, as certified gaits"),
     "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),

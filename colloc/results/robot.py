@@ -26,8 +26,7 @@ from colloc.mechanics.inertia import (
 )
 from colloc.mechanics.law import rate_independent
 from colloc.motion.torques import accelerating_torques
-from colloc.results.arc import arc
-from colloc.results.motion import Column, SampledMotion, motion_dataset, rotate
+from colloc.results.motion import Column, SampledMotion, arc, motion_dataset, rotate
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -93,7 +92,7 @@ def quasi_static_torques(
 
 
 class _MotionWithInertia:
-    """Periodic motion of a gait with inertia; the distance is the chord of `colloc.results.arc`.
+    """Periodic motion of a gait with inertia; the distance is the chord of `colloc.results.motion`.
 
     `ProblemError` if gait or body cannot have inertia, `NotConvergedError` if no motion is found.
     """

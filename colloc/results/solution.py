@@ -19,14 +19,16 @@ from colloc.mechanics.inertia import checked_mass, tail_velocity
 from colloc.motion.slow_enough import slow_enough
 from colloc.numerics.mesh import Mesh
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
-from colloc.results.arc import PHASES, Arc, arc
 from colloc.results.body_marks import footprints, part_speeds
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import (
+    PHASES,
     SAMPLES,
+    Arc,
     Column,
     SampledMotion,
+    arc,
     motion_columns,
     motion_dataset,
     motion_frame,
@@ -379,7 +381,7 @@ class Solution:
         "power", "convergence", "mesh", "shape-1-2". `ProblemError` if there is none of that name.
         """
         if ax is None:
-            return higher("pictures.solution_figure:solution_figure")(self)
+            return higher("pictures.publication:solution_figure")(self)
         return higher("pictures.publication:draw_panel")(ax, self, panel)
 
     @checked_arguments

@@ -21,7 +21,7 @@ from colloc.bounds.optimality_gap import upper_bound
 from colloc.commands import ending
 from colloc.commands.ending import exit_code
 from colloc.commands.main import main as colloc
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.gaits import gait_fields
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.kept import save_result
@@ -198,9 +198,7 @@ def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(
     assert {p.suffix for p in tmp_path.iterdir()} == {".py", ".h5"}
 
 
-@pytest.mark.parametrize(
-    "where", ["bounds.optimality_gap.upper", "pictures.solution_figure.solution"]
-)
+@pytest.mark.parametrize("where", ["bounds.optimality_gap.upper", "pictures.publication.solution"])
 def test_ctrl_c_after_the_result_is_saved_says_that_it_is(where, solve, tmp_path, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt

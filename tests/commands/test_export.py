@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from colloc.commands.results import export as main
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.laws.viscous import Viscous

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, Harmonic, PathLimit, Problem, ellipse, evaluate, replay
-from colloc.commands.summary import summary_dict, summary_lines
+from colloc.commands.solve import summary_dict, summary_lines
 from colloc.results import limit_use
 from colloc.results.checks import Check
 from colloc.results.robot import joint_torques

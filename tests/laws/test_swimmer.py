@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.peers import drag
 from colloc.bounds.optimality_gap import gap_line
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem

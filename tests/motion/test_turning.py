@@ -8,7 +8,7 @@ from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, evaluat
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.reduced.program import ReducedProgram
-from colloc.results.arc import arc
+from colloc.results.motion import arc
 from colloc.search.spaces import space_near
 from colloc.transcription.full_program import full_program
 from colloc.verification.inertial_motion import inertial_replay

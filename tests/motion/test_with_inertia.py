@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.objective import objective_from
 from colloc.mechanics.inertia import kinetic_energy, momentum_rates

@@ -19,8 +19,7 @@ from colloc.mechanics.floor_contact import Foot, Pad, Wheel
 from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import draw_allowed, draw_filmstrip, draw_lab, forbidden
 from colloc.pictures.motion_frames import foot_kinds
-from colloc.pictures.publication import panels
-from colloc.pictures.solution_figure import solution_figure
+from colloc.pictures.publication import panels, solution_figure
 from colloc.smooth.modal_body import ModalBody
 
 

@@ -9,7 +9,7 @@ import pandas
 import pytest
 
 from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate, slope_motion, solve
-from colloc.results.arc import Arc, arc
+from colloc.results.motion import Arc, arc
 
 LENGTH, MASS, FROUDE = 1.2, 3.0, 1.0
 PERIOD = (LENGTH / 9.81 / FROUDE) ** 0.5

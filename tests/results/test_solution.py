@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import instant
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.results.arc import arc
+from colloc.results.motion import arc
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.certify import certify

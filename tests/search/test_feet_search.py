@@ -11,7 +11,7 @@ from shared.instants import random_instants
 from colloc import Chain, Elliptic, Foot, Friction, Problem, ProblemError, Wheel, solve_balance
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.motion_frames import frames

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.reduced.program import ReducedProgram
 from colloc.search.converge import optimise
 from colloc.search.options import FINE

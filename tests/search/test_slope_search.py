@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, ellipse, load, save
-from colloc.commands.summary import summary_lines
+from colloc.commands.solve import summary_lines
 from colloc.commands.verify import verify
 from colloc.gaits.control_problem import control_problem
 from colloc.mechanics.bodies import FULL

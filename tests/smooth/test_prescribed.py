@@ -13,8 +13,8 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames
+from colloc.pictures.publication import solution_figure
 from colloc.pictures.report_page import report_page
-from colloc.pictures.solution_figure import solution_figure
 from colloc.results.body_marks import friction_arrows
 from colloc.results.solution import SOLVED
 from colloc.results.store import load, save

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, record
 
-from colloc.commands.solve import open_archive as show_archive
+from colloc.commands.families import open_archive as show_archive
 from colloc.results.archive import StartName, archive_at, open_archive
 from colloc.studies.journal import append_visits, read_journal
 from colloc.system.errors import CollocError, StoreError
