@@ -69,7 +69,6 @@ class Aims(NamedTuple):
     no_way_across: bool
 
     def uses(self, quantity: str) -> bool:
-        """Whether an objective or requirement uses a quantity of a period."""
         return any(
             quantity in aim.uses for aim in (self.objective, *(aim for aim, _ in self.at_least))
         )

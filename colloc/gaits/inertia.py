@@ -61,7 +61,7 @@ class AtFreePace(WithStaticParameter):
 
 @dataclass(frozen=True)
 class Paced(Regime):
-    """At a Froude number L/(g T^2), or the middle of a range of them."""
+    """Inertial regime at a Froude number L/(g T^2), or the middle of a range of them."""
 
     froude: float  # type: ignore[misc]
     free: Free | None = None

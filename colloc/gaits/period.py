@@ -1,15 +1,12 @@
-r"""What a period of a gait comes to: values of the quantities that objectives speak of, each with
-its errors.
+r"""Totals of a period, each with its errors.
 
 A period that turns the body by alpha turns everything about one point of the floor. The
-displacement of the centre of mass x then depends on the phase that the period is begun at, for the
-body wriggles about the circle that it follows. The chord of the circle's arc does not; it is the
-distance of a gait that is asked to turn:
+displacement of the centre of mass x then depends on the phase at which the period begins. The chord
+of the circle's arc does not; it is the distance of a gait that is asked to turn,
 
-    chord = (2 sin(alpha/2) / alpha) |integral of e^(-i alpha t) x'(t) dt|.
+    chord = (2 sin(alpha/2) / alpha) |integral of e^(-i alpha t) x'(t) dt|,
 
-The integral is the way as it is seen from *axes that turn evenly*, by alpha a period; for alpha = 0
-it is the displacement.
+the way as seen from *axes that turn evenly*; for alpha = 0 it is the displacement.
 """
 
 from __future__ import annotations

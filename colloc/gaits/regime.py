@@ -1,11 +1,5 @@
-"""How gaits are played, as a problem states it: slowly and on the level, unless its regime says
-otherwise.
-
-A regime says what pulls the body, which way counts, what cannot be asked, and the words of reports.
-Which states its periods have, and how they are replayed, is registered for its type
-(`colloc.motion.kinds.kind_in`); one of your own says how it is replayed (`replay`, and
-`reference`: `colloc.verification.reference_motion`).
-"""
+"""Regimes in which gaits are played: quasi-static on level ground unless a problem says
+otherwise."""
 
 from __future__ import annotations
 
@@ -77,7 +71,7 @@ class Regime:
     def in_units_of(self, unit: float) -> Self:
         return self
 
-    def counted(self, way: complex) -> complex:
+    def travel_along(self, way: complex) -> complex:
         """Distance that counts, and across it as the imaginary part."""
         return complex(abs(way))
 

@@ -74,7 +74,7 @@ class Slope(Regime):
             )
         return with_static_parameter(OnSlope, level)
 
-    def counted(self, way: complex) -> complex:
+    def travel_along(self, way: complex) -> complex:
         return way * np.exp(-1j * self.ahead)
 
     def pull(self, theta: Array) -> Array:
@@ -114,7 +114,8 @@ class OnSlope(WithStaticParameter):
 
     @property
     def delta_start(self) -> float:  # type: ignore[override]
-        """At more the body creeps down faster than it crawls up."""
+        """Smaller than on level ground: with more regularisation the body creeps down faster than
+        it crawls up."""
         return 0.2 * DELTA_START if self.relative_delta else 0.02
 
     @property

@@ -48,7 +48,7 @@ class Course(NamedTuple):
         )
 
 
-def followed(
+def integrate_period(
     rates: Callable[[float, np.ndarray, Any], tuple[np.ndarray, Any]],
     begin: np.ndarray,
     tolerance: np.ndarray | float,
@@ -77,7 +77,8 @@ def followed(
 
     Examples
     --------
-    >>> ran = followed(lambda t, s, _: (np.array([s[1], -s[0]]), None), np.array([1.0, 0.0]), 1e-8)
+    >>> ran = integrate_period(
+    ...     lambda t, s, _: (np.array([s[1], -s[0]]), None), np.array([1.0, 0.0]), 1e-8)
     >>> bool(abs(ran.states[0, -1] - np.cos(1)) < 1e-8)
     True
     """

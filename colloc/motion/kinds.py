@@ -335,7 +335,7 @@ class QuasiStaticOnSlope(_WithStates):
                 balanced,
             )
 
-        states, _, held = self._equations(mesh, shapes.unit).solved(rates, begin, states)
+        states, _, held = self._equations(mesh, shapes.unit).solve(rates, begin, states)
         slopes = now.on_shape, now.on_theta[:, None]
         return Trajectory(begin, states, now.solved.z, now.now, np.full(mesh.n_point, held), slopes)
 
@@ -351,7 +351,7 @@ class QuasiStaticOnSlope(_WithStates):
 
     def totals(self, passed: PeriodTotals) -> dict[str, float]:
         """Totals; NaN where the joints brake."""
-        way = self._slope.counted(passed.displacement)
+        way = self._slope.travel_along(passed.displacement)
         work = passed.work + self._slope.grade * passed.displacement.real
         found = {
             "distance": way.real,
@@ -423,7 +423,7 @@ class Inertial(_WithStates):
         tolerance: float = TOLERANCE,
     ) -> Trajectory:
         near_states = self._slow_states(mesh, shapes, begin) if near[0] is None else near[0]
-        states, out, held = self._closed(mesh, shapes, near_states, begin)
+        states, out, held = self._periodic_states(mesh, shapes, near_states, begin)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
@@ -441,7 +441,7 @@ class Inertial(_WithStates):
             [momenta(body, posture, body.velocity(posture, shapes.rates, slow.z)), slow.states]
         )
 
-    def _closed(
+    def _periodic_states(
         self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
         """Periodic states, outputs, and whether they exist. Where Newton's method fails from
@@ -449,7 +449,9 @@ class Inertial(_WithStates):
         found = self._newton(mesh, shapes, near, begin)
         if found[-1] or shapes.delta * shapes.unit > _VISCOUS:
             return found
-        wetter = self._closed(mesh, shapes._replace(delta=_WETTER * shapes.delta), near, begin)
+        wetter = self._periodic_states(
+            mesh, shapes._replace(delta=_WETTER * shapes.delta), near, begin
+        )
         return self._newton(mesh, shapes, wetter[0], begin) if wetter[-1] else wetter
 
     def _newton(
@@ -468,7 +470,7 @@ class Inertial(_WithStates):
             out, found = self._rates(shapes, states, froude)
             return found
 
-        states, _, held = equations.settled(rates, first, near)
+        states, _, held = equations.solve_natural(rates, first, near)
         return states, out, held
 
     def alone(
@@ -484,10 +486,10 @@ class Inertial(_WithStates):
 
     def _rates(self, shapes: Shapes, states: np.ndarray, froude: float) -> tuple[np.ndarray, Rates]:
         at = self._chain, self.friction, shapes[:3], states[: len(STATES)], froude
-        out, slopes = self._pulled(*momenta_along_states(*at), states, froude)
+        out, slopes = self._with_pull(*momenta_along_states(*at), states, froude)
         return out, Rates(out[self._grow], slopes[self._grow], bool(np.isfinite(out).all()))
 
-    def _pulled(
+    def _with_pull(
         self, out: np.ndarray, slopes: np.ndarray, states: np.ndarray, froude: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Outputs with the weight's pull, and derivatives along the orientation after the
@@ -523,7 +525,7 @@ class Inertial(_WithStates):
         momenta = along.states[: len(STATES)]
         k = 2 * self._chain.n_joint
         now = momenta_at(self._chain, self.friction, shapes[:3], momenta, froude)
-        out, slopes = self._pulled(*now, along.states, froude)
+        out, slopes = self._with_pull(*now, along.states, froude)
         on_pace = np.zeros((len(out), len(self._timed), out.shape[1]))
         on_pace[_MORE] = 2.0 * (out[_MORE] - turning(along.z, momenta))[:, None]
         return slopes[:, :k], np.concatenate([slopes[:, k:], on_pace], axis=1)

@@ -1,5 +1,4 @@
-"""How slow is slow enough: a gait played at any pace on a mesh, and what inertia changes of its
-efficiency."""
+"""Pace at which a gait is quasi-static: the effect of inertia on its efficiency."""
 
 from __future__ import annotations
 
@@ -58,7 +57,7 @@ class GaitOnMesh:
         self._body, self._friction, self._mesh, self.times = body, friction, mesh, mesh.times
         self._angles, self._rates = gait(self.times)
 
-    def played(self, delta: float, froude: float = 0.0, near: Played | None = None) -> Played:
+    def play(self, delta: float, froude: float = 0.0, near: Played | None = None) -> Played:
         """The motion in which all periods are alike, sought near another one with inertia, or the
         slow one.
 
@@ -138,7 +137,7 @@ def slow_enough(
             f"under {law.label} the pace is part of every gait: how slow is slow enough has no one "
             f"answer."
         )
-    return _refined(
+    return _on_refined_mesh(
         chain,
         law,
         gait,
@@ -148,7 +147,7 @@ def slow_enough(
     )
 
 
-def _refined(
+def _on_refined_mesh(
     body: Chain,
     friction: Law,
     gait: Path,
@@ -169,8 +168,8 @@ def _refined(
 
 
 def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float:
-    """At which inertia first changes the efficiency of a gait on a mesh by the part `loss`."""
-    last = slow = gait.played(delta)
+    """Froude number at which inertia first changes the efficiency by the part `loss`."""
+    last = slow = gait.play(delta)
     # the change is a power of the Froude number where both are small
     low = -np.inf
     high = np.log(_FASTEST * friction.largest)
@@ -178,7 +177,7 @@ def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float
     fastest, power = high, _POWER
     tried: list[tuple[float, float]] = []
     while high - low > _ACCURACY / _POWER:
-        last = gait.played(delta, float(np.exp(at)), last)
+        last = gait.play(delta, float(np.exp(at)), last)
         more = float(np.log(max(abs(1.0 - last.efficiency / slow.efficiency), 1e-12) / loss))
         if abs(more) < _ACCURACY:
             return float(np.exp(at))

@@ -79,7 +79,7 @@ class CollocatedStates:
         before = np.concatenate([np.zeros((len(rates), 1)), gained[:, :-1]], axis=1)
         return (before[:, :, None] + self._within(stages)).reshape(rates.shape), gained[:, -1]
 
-    def solved(
+    def solve(
         self,
         rates: Callable[[np.ndarray], Rates],
         start: np.ndarray,
@@ -88,7 +88,7 @@ class CollocatedStates:
         """States, start and convergence of a damped Newton's method with monotone residual; `start`
         ``(n_state,)`` is the begin (of free states a guess), `near` ``(n_state, n_point)`` an
         initial guess."""
-        x = self._begun(start, near)
+        x = self._initial_guess(start, near)
         now, residual, off = self._residual(rates, x)
         astray = 0
         for _ in range(_STEPS):
@@ -111,13 +111,13 @@ class CollocatedStates:
             x, off = trial, off_then
         return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
 
-    def settled(
+    def solve_natural(
         self, rates: Callable[[np.ndarray], Rates], start: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
         """Newton's method damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear
         Problems*, 3.3): a step is accepted if the next one, with the same derivatives, is shorter.
         For momenta, whose residual may grow on the way under steep friction."""
-        x = self._begun(start, near)
+        x = self._initial_guess(start, near)
         now, residual, off = self._residual(rates, x)
         next_step, trusted = np.zeros_like(x), np.inf
         for _ in range(_STEPS):
@@ -157,7 +157,7 @@ class CollocatedStates:
             x = trial
         return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
 
-    def _begun(self, start: np.ndarray, near: np.ndarray | None) -> np.ndarray:
+    def _initial_guess(self, start: np.ndarray, near: np.ndarray | None) -> np.ndarray:
         start = np.array(start, dtype=float)
         states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
         return np.column_stack([states, start])
@@ -204,11 +204,11 @@ class CollocatedStates:
         states, start = x[:, :-1], x[:, -1]
         now = rates(states)
         gained, whole = self.integrals(now.value)
-        residual = np.column_stack([states - start[:, None] - gained, whole + self._moved(start)])
+        residual = np.column_stack([states - start[:, None] - gained, whole + self._closure(start)])
         off = max(np.abs(residual[:, :-1]).max(), np.abs(residual[self._free, -1]).max(initial=0.0))
         return now, residual, float(off) if now.known else np.inf
 
-    def _moved(self, start: np.ndarray) -> np.ndarray:
+    def _closure(self, start: np.ndarray) -> np.ndarray:
         """``s_0 - M s_0``."""
         return start - (start if self._image is None else self._image @ start)
 

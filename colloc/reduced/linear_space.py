@@ -19,7 +19,7 @@ from colloc.reduced.pointed import with_heading
 from colloc.transcription.shape_checks import ShapeCheck, shape_checks
 from colloc.transcription.worst_instants import (
     check_values,
-    followed,
+    following_instants,
     held_shares,
     moving,
     near_peaks,
@@ -161,7 +161,7 @@ class LinearSpace:
                 cells = each.cells[which]
                 where, matrix = (self.mesh.edges[cells], self.mesh.h[cells]), matrix.copy()
                 at = each.check, each.shares[which], gait, each.times[which]
-                worst = followed(*at, cells=where, limit=self._admissible.joint_limit)
+                worst = following_instants(*at, cells=where, limit=self._admissible.joint_limit)
                 matrix[which] = each.check.matrix(
                     self._admissible.gait, worst, self._admissible.n_joint
                 )

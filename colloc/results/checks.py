@@ -13,7 +13,7 @@ from colloc.gaits.period import Period
 
 @dataclass(frozen=True)
 class Check:
-    """One line of a certificate."""
+    """A line of a certificate: the measured value, the largest one allowed, and the meaning."""
 
     name: str
     value: float
@@ -87,7 +87,7 @@ class Certificate(Period):
 
     @property
     def replayed(self) -> bool:
-        """Whether there was a replay; if not, all numbers are NaN."""
+        """False if there was no replay; then all numbers are NaN."""
         return bool(self.instants)
 
     @property

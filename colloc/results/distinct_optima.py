@@ -90,7 +90,7 @@ def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
 
 
 def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, friction: Law) -> bool:
-    """Whether two gaits, each by its value and its path, are the same."""
+    """True if two gaits, each by its value and its path, are the same."""
     (one, path), (other, near) = a, b
     close = abs(one - other) <= SAME_VALUE * max(abs(one), abs(other))
     return close and distance(path, near, body, friction) < SAME_GAIT

@@ -42,30 +42,7 @@ _LONGEST_MESSAGE = 1000
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What became of one start.
-
-    Attributes
-    ----------
-    start : int
-        Its number.
-    status : str
-        One of `STATUSES`; only "solved" (certified by replay) is a success.
-    message : str
-        What went wrong, if something did.
-    guess, gait : Fourier, Combination or Corners
-        Where the search began and ended.
-    efficiency, efficiency_error, distance, work : float
-        Replayed and, failing that, collocated; NaN if there is none.
-    delta : float
-        In the units of the problem, the smallest at which an optimum was found; NaN if none.
-    iterations : int
-    seconds : float
-        Wall time, certificate included.
-    cpu_seconds : float
-        Processor time of the same, which other work on the machine does not lengthen as much.
-    value, value_error : float
-        Of the problem's objective; by default those of the efficiency.
-    """
+    """Outcome of one start."""
 
     start: int
     status: str

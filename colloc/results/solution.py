@@ -176,13 +176,12 @@ class Solution:
 
     @property
     def turning_radius(self) -> float:
-        """Of the circle about which the gait crawls [body lengths]; infinite where it is asked to
-        crawl straight on."""
+        """Radius of the circle about which the gait crawls [body lengths]; infinite straight on."""
         return self.arc.radius
 
     @property
     def turning(self) -> str:
-        """How the gait turns, in words; "" where it is asked to crawl straight on."""
+        """Turn of the gait in words; "" straight on."""
         if self.problem.rotation == 0:
             return ""
         side = "counter-clockwise" if self.rotation > 0 else "clockwise"
@@ -256,7 +255,7 @@ class Solution:
 
     @property
     def standing(self) -> list[str]:
-        """What the gait is the best of, and what else the search met."""
+        """Number of starts, and other gaits that the search met."""
         if self.answer.program in (PRESCRIBED, EVALUATED):
             return ["none: the gait was given"]
         if self.starts == 1 or not self.others:
@@ -346,8 +345,7 @@ class Solution:
         )
 
     def holding(self, motion: SampledMotion) -> np.ndarray:
-        """Which feet of the body hold at instants of its motion, slower than 3 delta, ``(n_foot,
-        n_time)``; no rows for a body that has none."""
+        """Sticking feet, slower than 3 delta, ``(n_foot, n_time)``; no rows without feet."""
         body = self.problem.body
         if not footprints(body, motion.angles).size:
             return np.zeros((0, motion.t.size), dtype=bool)
@@ -356,14 +354,13 @@ class Solution:
 
     @property
     def share_held(self) -> np.ndarray:
-        """Of a period, for which each foot holds, ``(n_foot,)``, from the tail."""
+        """Fraction of the period for which each foot sticks, ``(n_foot,)``, from the tail."""
         stands = footprints(self.problem.body, self.gait.angles(_INSTANTS[:1])).size
         return self.holding(self.sample(_INSTANTS)).mean(axis=1) if stands else np.empty(0)
 
     @property
     def travels(self) -> str:
-        """Which way the body points as it travels, on average: "head first", "tail first" or
-        "sideways"."""
+        """Average direction of travel: "head first", "tail first" or "sideways"."""
         motion = self.sample(_INSTANTS)
         return direction_of_travel(motion.centre, motion.tail)
 
@@ -465,7 +462,6 @@ class Solution:
         return motion_columns(motion, self.power(motion), self.problem.body)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: verdict, numbers and checks."""
         return higher("pictures.solution_card:solution_card")(self)
 
 

@@ -25,7 +25,7 @@ _MOMENT = 0.1  # longest time for which Ctrl-C is held back [s]
 
 
 class Ahead:
-    """One process for each other processor, begun when there is enough left to do."""
+    """Processes, one for each other processor, begun when there is enough left to do."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem, self._run = problem, active_run()
@@ -46,8 +46,7 @@ class Ahead:
         self._pool, self.count = process_pool(count), count
 
     def takes(self, number: int) -> bool:
-        """Whether a piece of work of this number is for another process: the search does its own
-        share."""
+        """True for pieces of work of other processes: the search does its own share."""
         return number % (self.count + 1) > 0
 
     def submit(self, function: Callable[..., object], *arguments: Any) -> None:

@@ -21,7 +21,7 @@ _FINE_PHASES = 20000
 
 
 def is_trivial(answer: Answer) -> bool:
-    """Whether a gait goes nowhere and does not turn, as a retraced one."""
+    """True for a gait that goes nowhere and does not turn, as a retraced one."""
     problem = answer.problem
     if problem.regime.slides:
         return control_problem(problem).in_units(answer.value) < TOLERANCES.zero_value
@@ -29,7 +29,7 @@ def is_trivial(answer: Answer) -> bool:
 
 
 def goes_nowhere(answer: Answer) -> bool:
-    """Whether the distance on the level is negligible for the work; the gait may turn."""
+    """True if the distance on level ground is negligible for the work; the gait may turn."""
     return abs(answer.efficiency) * answer.problem.law.smallest < TOLERANCES.zero_value
 
 
@@ -181,7 +181,6 @@ def _first_order(answer: Answer) -> tuple[Check, ...]:
 
 
 def _second_order(answer: Answer) -> Check:
-    """Whether the gait is a local optimum, in the space of its class."""
     second = answer.second_order
     if second.why_not:
         return Check("second order", 0.0, TOLERANCES.saddle, second.why_not)
@@ -317,8 +316,8 @@ def _requirements(problem: Problem, fine: Replay) -> list[Check]:
 
 
 def _one_motion(problem: Problem, fine: Replay) -> Check:
-    """How far the objective depends on which of several balanced motions the body takes: where the
-    law leaves it open no mesh decides it, and as much is allowed as delta may change."""
+    """Change of the objective by other balanced motions: where the law leaves it open no mesh
+    decides it, and as much is allowed as delta may change."""
     if not problem.regime.others_measured:
         meaning = (
             "part of the period at which several motions are balanced; what they would "

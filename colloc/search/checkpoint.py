@@ -42,23 +42,19 @@ _PROBLEM = "problem"
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """How far a solve has come.
+    """Progress of a solve.
 
     Attributes
     ----------
     stage : str
         "explore", "follow", "descend", "refine", "confirm" or "certify".
     done, count : int
-        Of starts, of gaits followed to the final delta, of levels of delta, or of meshes. Fewer may
-        be enough: nobody knows how long a stage will take.
+        Starts, gaits followed to the final delta, levels of delta, or meshes; fewer may be enough.
     best : Iterate, optional
-        The best gait so far; one that shrank as far as the problem allows only if none of finite
-        size is known.
+        The best gait so far; one that shrank only if none of finite size is known.
     seconds : float
-        Since the solve began.
     round : int
-        Counts from 1 how often the stages were begun: again for a second gait that may be the
-        answer, at a smaller delta, or off a saddle.
+        Times the stages were begun: again for another gait, a smaller delta, or off a saddle.
     """
 
     stage: str

@@ -28,7 +28,7 @@ FINER = "a smaller mesh_tolerance"
 
 
 def passes(solution: Solution) -> bool:
-    """Whether the first-order conditions and every check of the certificate hold."""
+    """True if the first-order conditions and every check of the certificate hold."""
     return solution.answer.optimal and solution.certificate.passed
 
 

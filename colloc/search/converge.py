@@ -48,8 +48,6 @@ class ActiveSetProgram(NonlinearProgram, Protocol):
 
 
 class Subproblem(NamedTuple):
-    """Where a program settled."""
-
     v: np.ndarray
     objective: float
     conditions: Stationarity

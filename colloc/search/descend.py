@@ -69,7 +69,7 @@ def leave_saddle(iterate: Iterate) -> Iterate | None:
 
 
 def regularisation_dominated(iterate: Iterate) -> bool:
-    """Whether the gait loses half of its value at the next delta, as slow parts of a retraced gait
+    """True if the gait loses half of its value at the next delta, as slow parts of a retraced gait
     do."""
     drier = ReducedProgram(iterate.space, OPTIONS.delta_ratio * iterate.delta)
     kept = (1 - OPTIONS.lost) * abs(iterate.objective)

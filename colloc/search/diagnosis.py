@@ -39,7 +39,7 @@ _STEPS, _SHARE = 2, 0.1
 
 
 def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
-    """What a constraint row states, and its phase."""
+    """Meaning of a constraint row, and its phase."""
     name, rows = next((n, s) for n, s in program.groups.items() if s.start <= row < s.stop)
     index, mesh, count = row - rows.start, program.mesh, rows.stop - rows.start
     body, aims = program.control.dynamics.body, program.control.aims
@@ -82,7 +82,7 @@ def time_window(program: FullProgram, excess: np.ndarray, group: str) -> tuple[f
 
 
 def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
-    """What failed where, and what to try next."""
+    """Sentences on the worst violated row, and what to try next."""
     worst = int(np.argmax(result.excess))
     if result.excess[worst] > TOLERANCES.violation:
         what, when = row_meaning(program, worst)

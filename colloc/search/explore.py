@@ -70,12 +70,12 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
-    """Where many starts led.
+    """Distinct optima of many starts.
 
     Attributes
     ----------
     optima : tuple of Iterate
-        Distinct gaits at the final delta, best first, before their meshes are refined.
+        At the final delta, best first, before their meshes are refined.
     starts : int
     others : tuple of Alternative
         All distinct gaits met, best first.
@@ -256,7 +256,7 @@ def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
 
 
 def same_gait(problem: Problem, a: Iterate, b: Iterate) -> bool:
-    """Whether two gaits are one, modulo start phase and the symmetries of body and friction."""
+    """True if two gaits are one, modulo start phase and the symmetries of body and friction."""
     if abs(a.objective - b.objective) > SAME_VALUE * max(abs(a.objective), abs(b.objective)):
         return False  # before the paths are transformed
     one, other = ((each.objective, fourier_series(problem, each.gait)) for each in (a, b))
@@ -264,12 +264,12 @@ def same_gait(problem: Problem, a: Iterate, b: Iterate) -> bool:
 
 
 def is_finite(iterate: Iterate) -> bool:
-    """Whether a person sees the gait move: it did not shrink."""
+    """True if a person sees the gait move: it did not shrink."""
     return is_visible(iterate.gait)
 
 
 def is_member(iterate: Iterate) -> bool:
-    """Whether a gait is about one of its class; else its value means nothing."""
+    """True for a gait about in its class; the value of others means nothing."""
     return iterate.violation <= COARSE
 
 

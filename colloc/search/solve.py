@@ -1,7 +1,8 @@
-"""From a problem to a certified solution: explore, descend, refine, confirm, certify, choose.
+"""Stages from a problem to a certified solution: explore, descend, refine, confirm, certify,
+choose.
 
-Each stage is a function of one value that returns the next one, in a module of its name. Here is
-decided what is tried again, how long all of it may take, and what an interrupt leaves.
+Each stage is a function of one value that returns the next one, in a module of its name. Retries,
+time limits and interrupts are decided here.
 """
 
 from __future__ import annotations

@@ -56,12 +56,10 @@ def space_near(
 
 
 def with_far(space: SearchSpace, far: Pairs) -> SearchSpace:
-    """The same class on the same mesh with other pairs of links kept apart."""
     return space_of(space.control.problem, None, space.edges, space.scheme, far)
 
 
 def on_mesh_of(space: SearchSpace, gait: AnyGait, edges: np.ndarray, scheme: str) -> SearchSpace:
-    """The same class on another mesh, in phases of a member."""
     return space_of(space.control.problem, gait, edges, scheme, space.far)
 
 

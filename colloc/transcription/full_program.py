@@ -497,7 +497,6 @@ class _Links(_Motion):
         return local, gather, q, r, moment
 
     def _paces(self) -> tuple[bool, np.ndarray]:
-        """Whether the pace is free, and its parameter at every point, ``(1 or 0, n_point)``."""
         free = [self.layout.pace] if self.dynamics.regime.free_pace else []
         paces = np.repeat(self.layout.parameters[free], self.mesh.n_point, axis=1)
         return bool(free), paces.reshape(len(free), self.mesh.n_point)

@@ -1,5 +1,4 @@
-"""Where each decision variable of a collocated problem sits in the vector x, and its unit of time.
-No CasADi."""
+"""Indices of the decision variables of a full program in the vector x."""
 
 from __future__ import annotations
 

@@ -78,7 +78,6 @@ class ShapeCheck:
         return np.asarray(gait.rates(times) if self.derivative else gait.angles(times))
 
     def matrix(self, gait_class: Any, times: np.ndarray, n_joint: int) -> np.ndarray:
-        """The same of a linear class, ``(n_time, n_joint, n_parameter)``."""
         matrix = gait_class.rate_matrix if self.derivative else gait_class.angle_matrix
         return np.asarray(matrix(times, n_joint))
 

@@ -81,7 +81,7 @@ def moving(
     return np.flatnonzero(near & (share > _STEP) & (share < 1 - _STEP))
 
 
-def followed(
+def following_instants(
     check: ShapeCheck,
     shares: np.ndarray,
     gait: AnyGait,

@@ -24,7 +24,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_mass, kinetic_energy, momenta, tail_velocity
 from colloc.mechanics.law import Law
 from colloc.motion.compiled_momenta import MomentaAt
-from colloc.motion.follow import ONE_SIDED, STEP, Course, followed
+from colloc.motion.follow import ONE_SIDED, STEP, Course, integrate_period
 from colloc.motion.torques import joint_torques
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
@@ -135,7 +135,7 @@ class GaitWithInertia:
         def rates(t: float, states: np.ndarray, _: None) -> tuple[np.ndarray, None]:
             return self._rates(t, states.reshape(begin.shape)).ravel(), None
 
-        return followed(rates, begin.ravel(), aim, self.breaks)
+        return integrate_period(rates, begin.ravel(), aim, self.breaks)
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
         """Outputs of `colloc.motion.compiled_momenta`, with the weight's pull, ``(n, 9)``."""
@@ -157,7 +157,7 @@ class GaitWithInertia:
         """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the
         last."""
         change = states[:, -1] - states[:, 0]
-        way = self.regime.counted(complex(*change[_PLACE]))
+        way = self.regime.travel_along(complex(*change[_PLACE]))
         return {
             "distance": chord_per_way(self.turn) * way.real,
             "work": float(change[_WORK] + self.regime.grade * change[_PLACE][0]),
@@ -396,7 +396,7 @@ def inertial_replay(
         instants=phases.size,
         tail=(phases, z),
         objective=objective,
-        across=regime.counted(complex(*change[_PLACE])).imag,
+        across=regime.travel_along(complex(*change[_PLACE])).imag,
         shares=shares,
         multipliers=tuple(map(complex, ran.multipliers)),
     )

@@ -34,7 +34,7 @@ from colloc.mechanics.densities import (
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.motion.follow import Course, followed
+from colloc.motion.follow import Course, integrate_period
 from colloc.motion.on_slope import balance_on_slope
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
@@ -117,7 +117,7 @@ class GaitOnSlope:
     def integrate(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
         """The unknowns of `SlopeMotion` through a period, from the first of them at its begin."""
         start = np.append(begin, np.zeros(6 - begin.size))
-        return followed(self._rates, start, tolerance * _UNITS, self.breaks, longest)
+        return integrate_period(self._rates, start, tolerance * _UNITS, self.breaks, longest)
 
     def _rates(
         self, t: float, state: np.ndarray, near: np.ndarray | None
@@ -286,7 +286,7 @@ def slope_replay(
     def run(aim: float) -> tuple[tuple[Course, float], dict[str, float]]:
         ran = on.integrate(np.array([gait.theta]), aim, _LONGEST / instants)
         theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
-        way, work = slope.counted(complex(climb, aside)), float(spent + slope.grade * climb)
+        way, work = slope.travel_along(complex(climb, aside)), float(spent + slope.grade * climb)
         numbers = {"distance": way.real, "work": work, "rotation": float(theta)}
         sums = on.totals(ran, with_forces, np.ones(1))[:, 0].tolist()
         names = (each.name for each in with_forces)

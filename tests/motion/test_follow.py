@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from colloc.motion.follow import followed
+from colloc.motion.follow import integrate_period
 from colloc.system.errors import NotConvergedError
 
 TURN = np.array([[0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -26,7 +26,7 @@ def turning(t, state, asked):
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
 def test_three_states_are_those_of_the_closed_form_within_the_tolerance(tolerance):
-    ran = followed(turning, BEGIN, tolerance)
+    ran = integrate_period(turning, BEGIN, tolerance)
     assert np.abs(ran.states - exact(ran.phases)).max() < tolerance
     t = np.linspace(0, 1, 33)
     assert np.abs(ran.at(t) - exact(t)).max() < tolerance
@@ -41,7 +41,7 @@ def test_a_jump_of_the_rates_is_met_from_both_sides():
         seen.append(t)
         return np.array([-1.0 if t < 0.3 else 3.0]), None
 
-    ran = followed(rates, np.zeros(1), 1e-6, breaks=(0.3,))
+    ran = integrate_period(rates, np.zeros(1), 1e-6, breaks=(0.3,))
     assert 0.3 not in seen
     np.testing.assert_allclose(
         ran.at(np.array([0.15, 0.3, 0.65])), [[-0.15, -0.3, 0.75]], atol=1e-9
@@ -64,11 +64,11 @@ def test_where_one_method_gives_up_or_asks_without_end_another_goes_on(monkeypat
     solve_ivp = scipy.integrate.solve_ivp
     monkeypatch.setattr(scipy.integrate, "solve_ivp", gives_up)
     if others:
-        ran = followed(turning, BEGIN, 1e-7)
+        ran = integrate_period(turning, BEGIN, 1e-7)
         assert np.abs(ran.states - exact(ran.phases)).max() < 1e-7
     else:
         with pytest.raises(NotConvergedError, match="could not be followed beyond phase 1"):
-            followed(turning, BEGIN, 1e-7)
+            integrate_period(turning, BEGIN, 1e-7)
 
 
 def test_two_threads_follow_what_one_follows_and_leave_warnings_as_they_were():
@@ -83,11 +83,11 @@ def test_two_threads_follow_what_one_follows_and_leave_warnings_as_they_were():
 
         if k:
             begun[0].wait()
-        states = followed(rates, BEGIN, 1e-7).states
+        states = integrate_period(rates, BEGIN, 1e-7).states
         ended.set()
         return states
 
-    alone, before = followed(turning, BEGIN, 1e-7).states, list(warnings.filters)
+    alone, before = integrate_period(turning, BEGIN, 1e-7).states, list(warnings.filters)
     with ThreadPoolExecutor(2) as threads:
         for states in threads.map(thread, (0, 1)):
             np.testing.assert_array_equal(states, alone)

@@ -17,7 +17,7 @@ from colloc.gaits.regime import Regime
 from colloc.mechanics.chain_motion import chain_motion, motion_and_derivatives
 from colloc.mechanics.densities import LENGTH, Instants
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.motion.follow import followed
+from colloc.motion.follow import integrate_period
 from colloc.motion.kinds import QuasiStatic, Trajectory, kind_in
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
@@ -152,7 +152,7 @@ class Gait:
         ), solved.z
 
     def run(self, error):
-        return followed(self.rates, np.zeros(5), error, longest=4e-3)
+        return integrate_period(self.rates, np.zeros(5), error, longest=4e-3)
 
 
 PROBLEM = Problem(

@@ -60,7 +60,7 @@ def test_they_converge_to_the_differential_equation_with_the_order_of_the_scheme
     for n in (10, 20):
         mesh = Mesh(scheme("gauss-2"), np.linspace(0.0, 1.0, n + 1))
         equations = CollocatedStates(mesh, np.full(k, free))
-        states, found, held = equations.solved(on_mesh(mesh, ode), 0 * start if free else start)
+        states, found, held = equations.solve(on_mesh(mesh, ode), 0 * start if free else start)
         assert held
         end = found + equations.integrals(ode[0](mesh.times, states))[1]
         errors.append(np.abs(end - exact).max())
@@ -88,7 +88,7 @@ def test_the_adjoint_has_the_slopes_of_differences(k, free):
         def at(s):
             return Rates(rates(mesh.times, s) + size * more, on_states(mesh.times, s))
 
-        states, _, held = equations.solved(at, start + size * moved)
+        states, _, held = equations.solve(at, start + size * moved)
         assert held
         return (weight * states).sum(), states
 
@@ -105,10 +105,10 @@ def test_half_a_period_and_its_image_are_the_whole():
     half, whole = (
         Mesh(scheme("gauss-4"), np.linspace(0.0, end, n + 1)) for end, n in ((0.5, 20), (1.0, 40))
     )
-    first, start, held = CollocatedStates(half, np.full(2, True), image).solved(
+    first, start, held = CollocatedStates(half, np.full(2, True), image).solve(
         on_mesh(half, ode), np.zeros(2)
     )
-    both, again, _ = CollocatedStates(whole, np.full(2, True)).solved(
+    both, again, _ = CollocatedStates(whole, np.full(2, True)).solve(
         on_mesh(whole, ode), np.zeros(2)
     )
     assert held
@@ -121,4 +121,4 @@ def test_where_states_grow_beyond_all_numbers_no_motion_is_found_and_none_is_war
     mesh = Mesh(scheme("gauss-2"), np.linspace(0.0, 1.0, 301))
     growth, equations = 3.46 * mesh.n, CollocatedStates(mesh, free=np.ones(1, dtype=bool))
     slope = np.full((1, 1, mesh.n_point), growth)
-    assert not equations.solved(lambda s: Rates(growth * s + 1.0, slope), np.zeros(1))[2]
+    assert not equations.solve(lambda s: Rates(growth * s + 1.0, slope), np.zeros(1))[2]
