@@ -14,7 +14,7 @@ import numpy as np
 
 from colloc.gaits.gait import DELTA_START
 from colloc.gaits.harmonic import Harmonic, series_of
-from colloc.gaits.linear import Combination, LinearClass
+from colloc.gaits.linear import LinearClass
 from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, symmetric_samples
 from colloc.numerics.mesh import Mesh
@@ -127,7 +127,7 @@ class Splines(LinearClass):
         return np.diff(corners) / corners[-1], self.rate_matrix(middles, n_joint)
 
     def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
-        return Combination(self, (self._basis(n_joint) @ parameters).reshape(n_joint, -1))
+        return super().member(parameters, n_joint)
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Any:
         gait = self.trajectory(parameters, n_joint)

@@ -329,9 +329,7 @@ class _Samples(NamedTuple):
     def uncertainty(self, fit: _Fit, table: np.ndarray) -> Uncertainty:
         """Covariance of a least-squares fit, and of the period if it was told from the samples.
 
-        Harmonics up to twice the highest are in it, as large as the samples leave open. Where they
-        hold more of the residuals than their share, noise is slower than the samples, and as much
-        of it is in the others.
+        Harmonics up to twice the highest are in it, as large as the samples leave open.
         """
         time, first = self.time, int(fit.drifts)
         most = min(time.size - first, round(fit.period / self.step))
@@ -345,9 +343,7 @@ class _Samples(NamedTuple):
         columns, left = twice.columns(time), (residuals**2).sum(axis=1)
         freedom = max(time.size - used.shape[1], 1)
         u, s, v = np.linalg.svd(columns, full_matrices=False)
-        seen = ((residuals @ u) ** 2).sum() / (left.sum() + 1e-300)
-        share = seen * freedom / max(columns.shape[1] - table.shape[1], 1)
-        deviation = np.sqrt(left / freedom * max(share, _correlation_time(residuals))) + 1e-300
+        deviation = np.sqrt(left / freedom * _correlation_time(residuals)) + 1e-300
         root = (v.T / s)[first:].T  # a row for each direction
         shape = -1, len(table), root.shape[1]
         directions = np.einsum("j,jk,ri->jrki", deviation, np.eye(len(table)), root).reshape(shape)

@@ -212,9 +212,6 @@ class Harmonic(LinearClass):
         n = 4 * self.harmonics + 4  # means of products are exact
         return np.arange(n) / n
 
-    def check_joints(self, n_joint: int) -> None:
-        pass
-
     def _basis(self, n_joint: int) -> np.ndarray:
         columns = []
         for function in range(2 * self.harmonics + 1):

@@ -90,13 +90,8 @@ def one_sided(limit: Limit) -> bool:
 
 def widest(limit: Limit) -> float:
     """The largest magnitude that the limits allow."""
-    return max(of_each_angle(limit, 1))
-
-
-def of_each_angle(limit: Limit, n_joint: int) -> tuple[float, ...]:
-    """The largest magnitude of each joint angle."""
-    each = limit if isinstance(limit, tuple) else (limit,) * n_joint
-    return tuple(float(np.abs(joint).max()) for joint in each)
+    each = limit if isinstance(limit, tuple) else (limit,)
+    return max(float(np.abs(joint).max()) for joint in each)
 
 
 def of_each(limit: Limit | None, n_joint: int) -> tuple[float, ...]:
