@@ -28,7 +28,8 @@ def implicit_derivatives(
         adjoint = ca.solve(ca.jacobian(residual, z).T, ca.jacobian(out, z).T)
         slope -= ca.jacobian(residual, y).T @ adjoint
     flat = ca.vec(ca.densify(slope))
-    function: Any = ca.Function("derivatives", [y, z, parameter], [flat], {"cse": True})
+    # sharing subexpressions makes it no faster, and takes seconds for a body of many panels
+    function: Any = ca.Function("derivatives", [y, z, parameter], [flat])
 
     def evaluate(y: np.ndarray, z: np.ndarray, parameter: float) -> np.ndarray:
         return np.asarray(function(y, z, parameter).full()).reshape(-1, n_y, y.shape[1])

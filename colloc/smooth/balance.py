@@ -65,11 +65,12 @@ class PanelBatch:
         self, fields: PanelFields, friction: Law, members: np.ndarray, reference: int
     ) -> None:
         grid, *rows = fields
-        self.panels = PanelGrid(grid.edges[:, members], grid.order)
+        self.panels = grid if grid.fixed else PanelGrid(grid.edges[:, members], grid.order)
         self.angle, self.rate, self.edge_rate = (row[:, members] for row in rows)
         self.friction, self.reference = friction, reference
         anchor_rate = self.edge_rate[reference : reference + 1]
-        self.curve = curve(self.panels, self.angle, self.rate, reference, anchor_rate)
+        now = curve(self.panels, self.angle, self.rate, reference, anchor_rate)
+        self.curve = now._replace(weight=np.broadcast_to(now.weight, self.angle.shape))
 
     def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
         """Nodes ``(9, n_node, n)``, curve, then velocity; net force and potential at z."""
@@ -196,6 +197,8 @@ def solve_smooth(
     max_iterations: int = 2000,
     regions: tuple[tuple[float, float], ...] = (),
     method: str = "auto",
+    grid: PanelGrid | None = None,
+    start: np.ndarray | None = None,
     slide: np.ndarray | None = None,
 ) -> SmoothSolution:
     """Velocities that put a smooth body in force and torque balance at phases t ``(n_time,)``.
@@ -203,8 +206,9 @@ def solve_smooth(
     panels, order: equal panels to start from, besides the motion's breaks, and Gauss nodes a panel.
     quadrature_tolerance: largest difference in force, torque or power between a panel and its
     halves; 0 keeps the first panels. regions: arcs whose power is reported separately; their ends
-    should be breaks. method: "auto", "newton" or "fixed_point". slide: tail velocities ``(3,
-    n_time)`` to slide with, instead of those that balance. Others as of `solve_balance`.
+    should be breaks. method: "auto", "newton" or "fixed_point". grid: panels that are the same at
+    all times, instead of such that adapt. start: tail velocities ``(3, n_time)`` to start from;
+    slide: to slide with, instead of those that balance. Others as of `solve_balance`.
     """
     check_finite(positive=True, delta=delta)
     t = np.atleast_1d(np.asarray(t, dtype=float))
@@ -212,21 +216,23 @@ def solve_smooth(
     z, centre, force = np.zeros((3, n)), np.zeros((2, n)), np.zeros((3, n))
     power, bending, inside, slowest, residual, error = np.zeros((6, n))
     used, steps = np.zeros((2, n), dtype=int)
-    active, edges = np.arange(n), motion.first_edges(t, panels)
+    active, edges = np.arange(n), motion.first_edges(t, panels) if grid is None else grid.edges
     anchor, velocity = np.full(n, len(edges) // 2), np.zeros((3, n))
-    if slide is not None:
-        anchor, velocity = np.full(n, TAIL), slide.copy()
+    tail = start if slide is None else slide
+    if tail is not None:
+        anchor, velocity = np.full(n, TAIL), tail.copy()
         velocity[2] += motion.rate(np.zeros((1, n)), t)[0]
     for level in range(_REFINEMENTS + 1):
         # work in units of the largest rate: the law is homogeneous once delta scales along
         unit = np.ones(active.size) if friction.degree is None else None
-        fields, speed = _motion_fields(motion, t[active], PanelGrid(edges, order), unit)
+        panel_grid = PanelGrid(edges, order) if grid is None else grid
+        fields, speed = _motion_fields(motion, t[active], panel_grid, unit)
         d, make = relative_delta(delta, speed), partial(PanelBatch, fields, friction)
         state = starting_state(anchor, velocity / speed)
         if slide is not None:
             state.residual[:] = 0.0
         else:
-            if level == 0:
+            if level == 0 and tail is None:
                 state = _with_slowest_anchors(state, make, d, max_iterations, method)
             solve(state, make, ANCHOR_MOVES, d, tolerance, max_iterations, method)
         velocity, split = state.velocity * speed, np.zeros((len(edges) - 1, active.size), bool)
@@ -244,6 +250,8 @@ def solve_smooth(
             inside[at], bending[at] = (sums[3] * is_inside).sum(axis=0) * spent, bent * spent
             slow = batch.panel_speed(moved).min(axis=0)
             slowest[at] = slow * fast
+            if grid is not None:
+                continue
             missed = _panel_error(motion, t[at], batch, moved, dry, fast)
             error[at] = missed.max(axis=0)
             # two stretches at rest know each other's velocity to rounding only: no refinement
@@ -255,7 +263,7 @@ def solve_smooth(
         used[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
 
         more = split.any(axis=0) & (used[active] < _MOST_PANELS) & (state.residual <= tolerance)
-        if quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
+        if grid is not None or quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
             break
         anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
         active, velocity = active[more], velocity[:, more]

@@ -50,6 +50,11 @@ class PanelGrid:
         return len(self.edges) - 1
 
     @property
+    def fixed(self) -> bool:
+        """Whether the panels are the same at all times."""
+        return self.edges.shape[1] == 1
+
+    @property
     def gauss(self) -> Scheme:
         return scheme(f"gauss-{self.order}")
 

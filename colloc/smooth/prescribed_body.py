@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Body, Defaults, Sliding
+from colloc.mechanics.bodies import Body, Defaults, Sliding
 from colloc.mechanics.law import Law
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.smooth.smooth_body import SmoothBody
@@ -52,25 +52,8 @@ class PrescribedBody(SmoothBody):
     def sliding(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray
     ) -> Sliding:
-        slid = self.on_adaptive_panels(friction, angles, rates, float(np.max(delta)), slide=z)
+        slid = self.on_panels(friction, angles, rates, float(np.max(delta)), slide=z)
         return Sliding(slid.force, slid.centre, slid.power[None])
-
-    def solve(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *,
-        start: np.ndarray | None = None, tolerance: float = 1e-11,
-    ) -> BalanceSolution:  # fmt: skip
-        s = self.on_adaptive_panels(friction, angles, rates, delta, tolerance=tolerance)
-        tail = np.zeros(s.t.size, dtype=int)
-        return BalanceSolution(
-            s.z, s.residual, s.iterations, s.residual <= tolerance, tail, s.z
-        )  # fmt: skip
-
-    def motion(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float,
-        solved: BalanceSolution,
-    ) -> BalancedMotion:  # fmt: skip
-        slid = self.on_adaptive_panels(friction, angles, rates, delta, slide=solved.z)
-        return BalancedMotion(solved.z, slid.centre, slid.power, slid.bending_power)
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         return np.array([1.0, 0.0]), np.array([0.0, 1.0])

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion, Body, BoundedAngles
+from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Body, BoundedAngles
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.balance import TAIL, SmoothSolution, solve_smooth
@@ -38,10 +40,16 @@ class SmoothBody(Body):
         none = np.empty((0, self.n_joint))
         return BoundedAngles(none, (), fine=lambda angles: self.tangent(_FINE, angles))
 
-    def on_adaptive_panels(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, **settings
+    def on_panels(
+        self,
+        friction: Law,
+        angles: np.ndarray,
+        rates: np.ndarray,
+        delta: float,
+        quadrature_tolerance: float = _REPLAY_TOLERANCE,
+        **settings: Any,
     ) -> SmoothSolution:
-        """The balance on panels that adapt; settings as of `solve_smooth`."""
+        """The balance on panels; those adapt, unless settings of `solve_smooth` have a grid."""
 
         def at(t: np.ndarray) -> np.ndarray:  # the phase counts the shapes
             return t.astype(int)
@@ -51,8 +59,45 @@ class SmoothBody(Body):
             lambda s, t: self.turning(s, angles[:, at(t)], rates[:, at(t)]),
             lambda t: self.breaks(angles[:, at(t)]),
         )
-        settings = {"quadrature_tolerance": _REPLAY_TOLERANCE} | settings
-        return solve_smooth(motion, friction, np.arange(angles.shape[1]), delta, **settings)
+        return solve_smooth(
+            motion, friction, np.arange(angles.shape[1]), delta,
+            quadrature_tolerance=quadrature_tolerance, **settings,
+        )  # fmt: skip
+
+    @property
+    def _search_grid(self) -> PanelGrid | None:
+        """Fixed panels of a search; None where they adapt."""
+        return None
+
+    def solve(
+        self,
+        friction: Law,
+        angles: np.ndarray,
+        rates: np.ndarray,
+        delta: float,
+        *,
+        start: np.ndarray | None = None,
+        tolerance: float = 1e-11,
+    ) -> BalanceSolution:
+        grid = self._search_grid
+        slid = self.on_panels(
+            friction, angles, rates, delta, tolerance=tolerance, grid=grid,
+            start=None if grid is None else start,
+        )  # fmt: skip
+        converged, tail = slid.residual <= tolerance, np.zeros(slid.t.size, dtype=int)
+        return BalanceSolution(slid.z, slid.residual, slid.iterations, converged, tail, slid.z)
+
+    def motion(
+        self,
+        friction: Law,
+        angles: np.ndarray,
+        rates: np.ndarray,
+        delta: float,
+        solved: BalanceSolution,
+    ) -> BalancedMotion:
+        grid = self._search_grid
+        slid = self.on_panels(friction, angles, rates, delta, slide=solved.z, grid=grid)
+        return BalancedMotion(solved.z, slid.centre, slid.power, slid.bending_power)
 
     def _curve(self, angles: np.ndarray) -> Curve:
         zero = np.zeros((1, 1))
@@ -79,7 +124,7 @@ def accurate_motion(
     """The motion for a certificate, and its residual ``(n_time,)``: of smooth bodies on panels that
     adapt, whatever those of a search."""
     if isinstance(body, SmoothBody):
-        slid = body.on_adaptive_panels(friction, angles, rates, delta).require()
+        slid = body.on_panels(friction, angles, rates, delta).require()
         motion = BalancedMotion(slid.z, slid.centre, slid.power, slid.bending_power)
         return motion, slid.residual
     solved = body.solve(friction, angles, rates, delta, start=start).require()
