@@ -9,7 +9,6 @@ from colloc import (
     Friction,
     Harmonic,
     Objective,
-    Polygon,
     Problem,
     ellipse,
     load,
@@ -21,47 +20,26 @@ from colloc.gaits.objective import SPEED
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
+from tests.shared.cases import cases
 
 THRIFT = "sqrt(distance) / (work + 0.1 * length)"
 TURNED = "(distance + rotation**2) / (work + length)"
+DRIVEN, ANY = "distance / (driven_work + length)", {"efficiency": 0.0}
 FREE = {"rotation": None, "at_least": {"distance": 0.2, TURNED: 0.01}}
-CASES = {
-    "speed": {"gait": Harmonic(2, "none"), "objective": "speed"},
-    "turning": {"gait": Harmonic(2, "none"), "objective": "turning", **FREE},
-    "expression": {
-        "gait": Harmonic(1, "antipodal"),
-        "objective": THRIFT,
-        "at_least": {"efficiency": 0.1},
-    },
-    "driven": {"gait": Harmonic(1, "none"), "objective": "driven efficiency"},
-    "driven bilateral polygon": {
-        "gait": Polygon(4, "bilateral"),
-        "objective": "distance / (driven_work + length)",
-    },
-    "driven polygon": {
-        "gait": Polygon(4, "none"),
-        "objective": "driven efficiency",
-        "at_least": {"distance / work": 0.0},
-    },
-    "polygon": {"gait": Polygon(4, "none"), "objective": TURNED, **FREE},
-    "actuators": {"gait": Harmonic(2, "none"), "torque_limit": 0.05, "power_limit": (0.4, 0.9)},
-    "actuated bilateral polygon": {
-        "gait": Polygon(5, "bilateral"),
-        "torque_limit": 0.06,
-        "at_least": {"efficiency": 0.0},
-    },
-    "actuated polygon": {
-        "gait": Polygon(4, "none"),
-        "objective": TURNED,
-        "torque_limit": (0.05, 0.06),
-        **FREE,
-    },
-    "bilateral polygon": {
-        "gait": Polygon(6, "bilateral", "side"),
-        "objective": "speed",
-        "at_least": {THRIFT: 0.1},
-    },
-}
+CASES = """
+speed: gait=Harmonic(2), objective="speed"
+turning: gait=Harmonic(2), objective="turning", **FREE
+expression: gait=Harmonic(1, "antipodal"), objective=THRIFT, at_least={"efficiency": 0.1}
+driven: gait=Harmonic(1), objective="driven efficiency"
+driven bilateral polygon: gait=Polygon(4, "bilateral"), objective=DRIVEN
+driven polygon: gait=Polygon(4), objective="driven efficiency", at_least={"distance / work": 0.0}
+polygon: gait=Polygon(4), objective=TURNED, **FREE
+actuators: gait=Harmonic(2), torque_limit=0.05, power_limit=(0.4, 0.9)
+actuated bilateral polygon: gait=Polygon(5, "bilateral"), torque_limit=0.06, at_least=ANY
+actuated polygon: gait=Polygon(4), objective=TURNED, torque_limit=(0.05, 0.06), **FREE
+bilateral polygon: gait=Polygon(6, "bilateral", "side"), objective="speed", at_least={THRIFT: 0.1}
+"""
+CASES = cases(CASES, globals())
 SKEW = Fourier([0.5, 0.5], [[1.0], [0.2]], [[0.0], [1.0]])
 DELTA = 0.1
 

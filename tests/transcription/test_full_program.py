@@ -5,33 +5,15 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Coupled,
-    Elliptic,
-    Foot,
-    Fourier,
-    Friction,
-    Harmonic,
-    ModalBody,
-    Objective,
-    Pad,
-    Polygon,
-    Problem,
-    Quantity,
-    Serpenoid,
-    Viscous,
-    Wheel,
-    ellipse,
-)
-from colloc.gaits.bspline import BSpline
-from colloc.gaits.inertia import Free
+import colloc
+from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Quantity, Wheel, ellipse
 from colloc.mechanics.actuators import joint_moments
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver, solve_in_regions
 from colloc.search.spaces import program_of, space_near
 from colloc.transcription.full_program import ACTUATORS, AT_LEAST, full_program
 from colloc.transcription.layout import RADIANS
+from tests.shared.cases import cases
 from tests.shared.differences import assert_derivatives_are_differences
 
 SKEW = Chain((0.3, 0.25, 0.45))
@@ -44,64 +26,42 @@ PARTS = (
     Pad(2, 0.2, 0.6),
     *(Foot(2, 0.9, offset=y) for y in (0.05, -0.05)),
 )
-CASES = {
-    "lying": {"body": SKEW},
-    "symmetric": {"gait": Harmonic(2, "bilateral"), "guess": ellipse(0.0, 1.3, 0.8)},
-    "antipodal": {"body": SKEW, "gait": Harmonic(3, "antipodal"), "guess": ellipse(0, 1.3, 0.8)},
-    "elliptic": {"friction": Elliptic(mu_t=1.7, mu_f=1.0, mu_b=1.3)},
-    "viscous": {"friction": Viscous(normal=2.0, tangential=1.0)},
-    "feet, wheels and pads": {"body": Chain(SKEW.lengths, feet=PARTS)},
-    "width": {"body": Chain(SKEW.lengths, width=0.05)},
-    "weights": {"body": Chain(SKEW.lengths, weights=(0.5, 0.2, 0.3))},
-    "spline": {"gait": BSpline(8)},
-    "polygon": {"gait": Polygon(4), "guess": ellipse(0.1, 1.6, 1.1)},
-    "bilateral polygon": {"gait": Polygon(5, "bilateral"), "guess": ellipse(0.1, 1.6, 1.1)},
-    "polygon of three joints": {
-        "body": Chain((0.25,) * 4),
-        "gait": Polygon(6, "antipodal"),
-        "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]]),
-    },
-    "polygon by the velocity map": {
-        "gait": Polygon(4),
-        "guess": ellipse(0.1, 1.6, 1.1),
-        "formulation": "implicit velocity",
-    },
-    "polygon with motors": {
-        "gait": Polygon(4),
-        "guess": ellipse(0.1, 1.6, 1.1),
-        "torque_limit": 0.05,
-        "objective": "driven efficiency",
-    },
-    "coupled": {
-        "body": Chain((0.25,) * 4),
-        "gait": Coupled(Harmonic(1), gears=((1, 0), (0.5, 0.5), (0, 1))),
-        "guess": None,
-        "torque_limit": 0.05,
-    },
-    "stuck": {
-        "body": Chain((0.25,) * 4),
-        "gait": Coupled(Harmonic(1), stuck={1: 0.4}),
-        "guess": None,
-    },
-    "serpenoid": {"body": Chain((0.2,) * 5), "gait": Serpenoid(), "guess": None},
-    "uphill": {"grade": 0.1, "towards": 0.4},
-    "uphill, any way": {"grade": 0.1},
-    "inertia": {"froude": 0.3, "body": SKEW},
-    "inertia on feet": {
-        "froude": 0.3,
-        "body": Chain(SKEW.lengths, feet=PARTS, masses=(0.2, 0.3, 0.5)),
-    },
-    "inertia uphill": {"froude": 0.3, "grade": 0.1},
-    "free pace": {"froude": Free(0.01, 1.0), "objective": "distance / (work + 0.1 * period)"},
-    "turning": {"rotation": None, "objective": "turning", "gait": Harmonic(1)},
-    "actuators": {"torque_limit": 0.05, "power_limit": 0.4},
-    "quantities": {"objective": Objective("distance / (work + heat)", quantities=(HEAT,))},
-    "driven": {"objective": "driven efficiency", "grade": 0.1},
-    "at least": {"at_least": {"distance": 0.1, "efficiency": 0.2}},
-    "joint speeds": {"speed_limit": 9.0},
-    "modes": {"body": ModalBody(3), "gait": Harmonic(1, "antipodal"), "guess": None},
-    "velocity map": {"formulation": "implicit velocity", "body": SKEW},
-}
+CASES = """
+lying: body=SKEW
+symmetric: gait=Harmonic(2, "bilateral"), guess=ellipse(0.0, 1.3, 0.8)
+antipodal: body=SKEW, gait=Harmonic(3, "antipodal"), guess=ellipse(0, 1.3, 0.8)
+elliptic: friction=Elliptic(mu_t=1.7, mu_f=1.0, mu_b=1.3)
+viscous: friction=Viscous(normal=2.0, tangential=1.0)
+feet, wheels and pads: body=Chain(SKEW.lengths, feet=PARTS)
+width: body=Chain(SKEW.lengths, width=0.05)
+weights: body=Chain(SKEW.lengths, weights=(0.5, 0.2, 0.3))
+spline: gait=BSpline(8)
+polygon: gait=Polygon(4), guess=WIDE
+bilateral polygon: gait=Polygon(5, "bilateral"), guess=WIDE
+polygon of three joints: body=FOUR, gait=Polygon(6, "antipodal"), guess=WAVE
+polygon by the velocity map: gait=Polygon(4), guess=WIDE, formulation="implicit velocity"
+polygon with motors: gait=Polygon(4), guess=WIDE, torque_limit=0.05, objective="driven efficiency"
+coupled: body=FOUR, gait=Coupled(Harmonic(1), gears=GEARS), guess=None, torque_limit=0.05
+stuck: body=FOUR, gait=Coupled(Harmonic(1), stuck={1: 0.4}), guess=None
+serpenoid: body=Chain((0.2,) * 5), gait=Serpenoid(), guess=None
+uphill: grade=0.1, towards=0.4
+uphill, any way: grade=0.1
+inertia: froude=0.3, body=SKEW
+inertia on feet: froude=0.3, body=Chain(SKEW.lengths, feet=PARTS, masses=(0.2, 0.3, 0.5))
+inertia uphill: froude=0.3, grade=0.1
+free pace: froude=Free(0.01, 1.0), objective="distance / (work + 0.1 * period)"
+turning: rotation=None, objective="turning", gait=Harmonic(1)
+actuators: torque_limit=0.05, power_limit=0.4
+quantities: objective=Objective("distance / (work + heat)", quantities=(HEAT,))
+driven: objective="driven efficiency", grade=0.1
+at least: at_least={"distance": 0.1, "efficiency": 0.2}
+joint speeds: speed_limit=9.0
+modes: body=ModalBody(3), gait=Harmonic(1, "antipodal"), guess=None
+velocity map: formulation="implicit velocity", body=SKEW
+"""
+FOUR, GEARS, WIDE = Chain((0.25,) * 4), ((1, 0), (0.5, 0.5), (0, 1)), ellipse(0.1, 1.6, 1.1)
+WAVE = colloc.Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])
+CASES = cases(CASES, globals())
 
 
 def stated(case, **changes):
@@ -229,7 +189,9 @@ def test_functions_grow_neither_with_the_mesh_nor_with_the_links():
         lengths = np.linspace(1.0, 2.0, links)
         parts = (*(lengths / lengths.sum())[:-1],)
         body = Chain((*parts, 1.0 - sum(parts)))
-        guess = Fourier(np.zeros(links - 1), np.full((links - 1, 1), 0.3), np.zeros((links - 1, 1)))
+        guess = colloc.Fourier(
+            np.zeros(links - 1), np.full((links - 1, 1), 0.3), np.zeros((links - 1, 1))
+        )
         full = program_of(Problem("p", guess, body, gait=Harmonic(1), intervals=intervals))
         return sorted(
             each.function.functions[0].n_instructions()
