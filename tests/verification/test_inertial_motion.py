@@ -175,10 +175,10 @@ def test_slow_motion_is_the_limit():
     slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2, tolerance=1e-7).efficiency
     mesh = Mesh(scheme(SCHEME), np.linspace(0, 1, 401))
     on_mesh = GaitOnMesh(CHAIN, ISOTROPIC, GAIT, mesh)
-    near = on_mesh.played(1e-2)
+    near = on_mesh.play(1e-2)
     assert near.efficiency == pytest.approx(slow, rel=1e-5)
     off = [
-        1 - on_mesh.played(1e-2, froude, near).efficiency / near.efficiency
+        1 - on_mesh.play(1e-2, froude, near).efficiency / near.efficiency
         for froude in (1.6e-3, 4e-4, 1e-4)
     ]
     assert off[0] > 3.5 * off[1] > 3.5**2 * off[2] > 0
