@@ -80,7 +80,7 @@ class Basis(LinearClass):
 
     @property
     def _whole(self) -> bool:
-        """Whether a column is angles of all joints."""
+        # columns are angles of all joints
         return isinstance(self.columns[0][0], tuple)
 
     @property

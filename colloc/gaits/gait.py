@@ -205,7 +205,7 @@ class ClassOfGaits:
         raise NotImplementedError
 
     def in_phase(self, gait: Any) -> bool:
-        """Whether a gait starts in the phase in which members do."""
+        """True if a gait starts in the phase in which members do."""
         return True
 
     def through(self, gait: Any) -> Any:

@@ -85,8 +85,8 @@ def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
 
 
 def initial_member(gait_class: Any, wave: Fourier) -> Any:
-    """What stands for a wave in a class: itself, or the nearest member of its shape speed; all
-    functions of the class at once if it has nothing of the wave."""
+    """The gait that stands for a wave in a class: itself, or the nearest member as fast, or if
+    there is none all its functions at once."""
     by_path = gait_class.relative_delta or not isinstance(gait_class, LinearClass)
     if by_path or isinstance(gait_class, Harmonic):
         return wave

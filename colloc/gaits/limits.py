@@ -84,7 +84,7 @@ def range_of(limit: Any) -> tuple[float, float]:
 
 
 def one_sided(limit: Limit) -> bool:
-    """Whether a joint may bend farther to one side than to the other."""
+    """True if a joint may bend farther to one side than to the other."""
     return isinstance(limit, tuple) and any(isinstance(joint, tuple) for joint in limit)
 
 

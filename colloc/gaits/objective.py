@@ -186,16 +186,16 @@ class Objective:
 
     @property
     def short(self) -> str:
-        """For one line about a result: ``d/W``."""
+        """Symbol, such as ``d/W``."""
         return _SHORT.get(self.name, self.name)
 
     @property
     def label(self) -> str:
-        """For axes and tables: ``efficiency d/W``."""
+        """Name and symbol, such as ``efficiency d/W``."""
         return f"{self.name} {self.short}" if self.short != self.name else self.name
 
     def fields(self) -> dict[str, Any]:
-        """As plain text (JSON)."""
+        """Plain dictionary (JSON)."""
         more = (
             {"quantities": [each.fields() for each in self.quantities]} if self.quantities else {}
         )

@@ -456,7 +456,7 @@ class Problem:
         return (self.objective, *(aim for aim, _ in self.at_least))
 
     def uses(self, quantity: str) -> bool:
-        """Whether one of the `aims` depends on a quantity."""
+        """True if one of the `aims` depends on a quantity."""
         return any(quantity in aim.uses for aim in self.aims)
 
     @property
@@ -466,7 +466,7 @@ class Problem:
 
     @property
     def keeps_heading(self) -> bool:
-        """Whether the body is its own mirror image in every shape, and so never turns."""
+        """True if the body is its own mirror image in every shape, and so never turns."""
         return (
             self.body.n_joint == 1
             and self.law.reversible
@@ -517,7 +517,7 @@ class Problem:
 
 
 def _retraces(problem: Problem) -> bool:
-    """Whether every gait of a class goes back the way it came: the rates of a random member have
+    """True if every gait of a class goes back the way it came: the rates of a random member have
     one direction."""
     gaits, n_joint = problem.gait, problem.body.n_joint
     if not isinstance(gaits, LinearClass):

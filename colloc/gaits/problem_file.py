@@ -45,7 +45,7 @@ class Reference:
     source: str
 
     def verdict(self, efficiency: float) -> str:
-        """Whether an efficiency agrees with it, in words."""
+        """Compare an efficiency with it, in words."""
         verb = (
             "agrees with" if abs(efficiency - self.efficiency) <= self.tolerance else "DIFFERS from"
         )

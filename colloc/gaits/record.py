@@ -63,7 +63,7 @@ class _Column(NamedTuple):
 
     @property
     def skeleton(self) -> tuple[str, ...]:
-        """What names of one set of columns have in common."""
+        """The pattern of the names of one set of columns."""
         words = (word for word in self.words if word not in _ANGLES)
         return tuple("#" if word.isdecimal() else word for word in words)
 
@@ -76,7 +76,7 @@ class _Column(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """By the name "time", "count", "other", "place", or "angle" if nothing else."""
+        """One of "time", "count", "other", "place" and, if nothing else, "angle"."""
         words, unit = set(self.words), self.words[-2:]
         all_units = all(re.fullmatch(_WORDS["unit of time"], word) for word in words)
         if self.speaks_of("time") or (words and all_units):

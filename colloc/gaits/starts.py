@@ -51,12 +51,12 @@ def largest_amplitude(problem: Problem, gait: AnyGait) -> float:
 
 
 def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:
-    """Whether a gait is as slow as ``smallest_shape_speed`` allows, which then decided its size."""
+    """True if a gait is as slow as ``smallest_shape_speed`` allows, which then decided its size."""
     return gait.shape_speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
 
 
 def is_visible(gait: AnyGait) -> bool:
-    """Whether a person sees a gait move: a joint swings by 9 degrees or more to either side."""
+    """True if a person sees a gait move: a joint swings by 9 degrees or more to either side."""
     return bool(np.ptp(gait.angles(_PERIOD), axis=1).max() >= 2 * _VISIBLE)
 
 
