@@ -89,7 +89,6 @@ class Optimum(NamedTuple):
     top: float  # the largest ratio met anywhere
     summit: CoulombMotion  # its motion
     samples: int  # motions evaluated
-    rounds: int
     converged: bool
     measure: Measure  # multipliers of the last program
 
@@ -227,5 +226,5 @@ def exchanged_optimum(
             space = with_more_knots(space, program.measure(), intervals)
             program, quiet, surprise = program.moved_to(space), 0, _UNKNOWN
     assert held <= top
-    converged, measure = quiet == 2, program.measure()
-    return Optimum(space, free, program.best.value, top, best, seen, count, converged, measure)
+    at, converged, measure = (top, best, seen), quiet == 2, program.measure()
+    return Optimum(space, free, program.best.value, *at, converged, measure)

@@ -165,12 +165,6 @@ class Measure(NamedTuple):
     heading: np.ndarray  # of the middle link [rad], (n,)
     weight: np.ndarray  # share of the work, of sum 1, (n,)
 
-    def efficiency(self) -> float:
-        """Distance over work: up to smoothing and tolerances the value of the program."""
-        u, v = self.motion.velocity
-        way = np.cos(self.heading) * u - np.sin(self.heading) * v
-        return float(self.weight / self.motion.power @ way)
-
 
 def worth(space: PotentialSpace, measure: Measure) -> float:
     """What the functions of a space gain over those that the measure closes for, up to a factor:

@@ -23,7 +23,6 @@ class Scheme:
 
     name: str
     c: np.ndarray
-    order: int
     A: np.ndarray = field(init=False)  # (s, s)
     b: np.ndarray = field(init=False)  # (s,)
 
@@ -103,13 +102,11 @@ def scheme(name: str) -> Scheme:
 @lru_cache
 def _known(name: str) -> Scheme | None:
     if name == "trapezoid":
-        return Scheme(name, np.array([0.0, 1.0]), 2)
+        return Scheme(name, np.array([0.0, 1.0]))
     if name == "hermite-simpson":
-        return Scheme(name, np.array([0.0, 0.5, 1.0]), 4)
+        return Scheme(name, np.array([0.0, 0.5, 1.0]))
     match = re.fullmatch(r"(gauss|radau)-(\d{1,3})", name)
     if not match or not 1 <= int(match[2]) <= _LARGEST:
         return None
     s = int(match[2])
-    if match[1] == "gauss":
-        return Scheme(name, 0.5 * (_gauss_rule(s)[0] + 1.0), 2 * s)
-    return Scheme(name, _radau_nodes(s), 2 * s - 1)
+    return Scheme(name, 0.5 * (_gauss_rule(s)[0] + 1.0) if match[1] == "gauss" else _radau_nodes(s))

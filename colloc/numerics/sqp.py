@@ -141,7 +141,6 @@ class SqpResult:
     v: np.ndarray  # (n,)
     objective: float
     iterations: int
-    evaluations: int
     on_edge: bool  # v lies on the edge of the box around the start
     curvature: np.ndarray  # model of the Lagrangian's second derivatives, (n, n)
 
@@ -178,14 +177,14 @@ def minimised(
     Powell, 1978).
     """
     if not v.size:
-        return SqpResult(v, program.objective(v), 0, 1, False, np.empty((0, 0)))
+        return SqpResult(v, program.objective(v), 0, False, np.empty((0, 0)))
     v = np.clip(v, program.lower, program.upper)
     lower, upper = np.maximum(program.lower, v - radius), np.minimum(program.upper, v + radius)
     here, fresh = _Point.at(program, v), curvature is None
     b = np.eye(v.size) if curvature is None else curvature
     price, feasible = np.zeros(here.rows.size), max(accuracy, _FEASIBLE)
     gradient, slopes = program.gradient(here.v), program.row_slopes(here.v)
-    count, evaluations = 0, 1
+    count = 0
     with interruptible():
         while count < iterations and not interrupted():
             count += 1
@@ -198,8 +197,7 @@ def minimised(
                 if abs(change) + violations < accuracy and here.outside.sum() < feasible:
                     break
                 model = change - step.share * price @ here.outside
-                there, trials = _line_search(program, here, step.d, price, model)
-                evaluations += trials
+                there = _line_search(program, here, step.d, price, model)
             if step is None or there is None:
                 if fresh:
                     break
@@ -214,22 +212,21 @@ def minimised(
     at_low = (program.lower < lower - _EDGE) & (here.v < lower + _EDGE)
     at_high = (program.upper > upper + _EDGE) & (here.v > upper - _EDGE)
     on_edge = bool((at_low | at_high).any())
-    return SqpResult(here.v, here.objective, count, evaluations, on_edge, b)
+    return SqpResult(here.v, here.objective, count, on_edge, b)
 
 
 def _line_search(
     program: NonlinearProgram, here: _Point, d: np.ndarray, price: np.ndarray, model: float
-) -> tuple[_Point | None, int]:
-    """First point along a step with a tenth of the model's decrease, if any; and the number of
-    trials."""
+) -> _Point | None:
+    """First point along a step with a tenth of the model's decrease, if there is one."""
     merit, size = here.objective + price @ here.outside, 1.0
-    for trial in range(1, _MOST_TRIALS + 1):
+    for _ in range(_MOST_TRIALS):
         there = _Point.at(program, here.v + size * d)
         change = there.objective + price @ there.outside - merit
         if change <= 0.1 * size * model:
-            return there, trial
+            return there
         size *= min(max(0.5 * size * model / (size * model - change), 0.1), 0.5)
-    return None, _MOST_TRIALS
+    return None
 
 
 def _bfgs(b: np.ndarray, s: np.ndarray, y: np.ndarray) -> np.ndarray:
