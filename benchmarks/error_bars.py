@@ -30,8 +30,8 @@ from colloc.results.solution import Solution
 from colloc.search.explore import first_optimum
 from colloc.search.solve import confirm_optimum
 from colloc.system.errors import NotConvergedError
-from colloc.verification.played import Path as GaitPath
 from colloc.verification.replay import replay
+from colloc.verification.replay_record import Path as GaitPath
 from scripts.program import add_to_record, command_line, read_record
 
 DELTA = 1e-4

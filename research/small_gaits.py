@@ -12,8 +12,8 @@ from colloc.bounds.coulomb_motion import (
     CoulombMotion,
     admissible,
     balanced_motion,
-    drawn_in,
     fundamental,
+    move_inside,
     one_joint,
     random_directions,
     two_resting,
@@ -117,7 +117,7 @@ def small_gait(
         value = max(value, new_value)
         way = heading_of(motion, weights)
         more = columns.climbed(motion, heading, multipliers, np.pi / directions)
-        motion = motion.joined(more)
+        motion = motion.join(more)
         if best_mixture(motion, way)[0] >= best_mixture(motion, heading)[0]:
             heading = way
         if best_mixture(motion, heading)[0] < value + _GAIN:
@@ -146,7 +146,7 @@ def best_small_gait(
     axis = np.linspace(-joint_limit, joint_limit, steps + 1)
     shapes = np.stack([a.ravel() for a in np.meshgrid(*[axis] * body.n_joint, indexing="ij")])
     shapes = shapes[:, fundamental(body, shapes)]
-    shapes = drawn_in(body, shapes, np.zeros_like(shapes), _EDGE)
+    shapes = move_inside(body, shapes, np.zeros_like(shapes), _EDGE)
 
     def value_at(shape: np.ndarray, directions: int, headings: int, rounds: int) -> float:
         try:

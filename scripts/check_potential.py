@@ -19,7 +19,7 @@ import numpy as np
 
 from colloc.bounds.coulomb_motion import CoulombMotion
 from colloc.bounds.potential import PotentialSpace, largest_ratios
-from colloc.bounds.sampling import Domain, summits_met
+from colloc.bounds.sampling import Domain, climb_from_lattice
 from colloc.bounds.spline import TensorSpline
 from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.chain import Chain
@@ -103,8 +103,8 @@ def domain_of(options: argparse.Namespace) -> Domain:
 def largest_ratio(
     domain: Domain, space: PotentialSpace, free: np.ndarray, **settings: int
 ) -> tuple[float, CoulombMotion]:
-    """The largest ratio that `summits_met` finds, and its motion."""
-    reached, summit = summits_met(domain, space, free, **settings)
+    """The largest ratio that `climb_from_lattice` finds, and its motion."""
+    reached, summit = climb_from_lattice(domain, space, free, **settings)
     best = int(np.argmax(reached))
     return float(reached[best]), summit.take(np.array([best]))
 
@@ -117,7 +117,7 @@ def largest_random_ratio(kept: Kept, count: int, seed: int) -> float:
         angles = rng.uniform(-kept.domain.joint_limit, kept.domain.joint_limit, (2, _AT_ONCE))
         angles = angles[:, kept.domain.holds(angles)][:, :left]
         way = rng.uniform(0.0, 2.0 * np.pi, angles[0].shape)
-        motion, _ = kept.domain.solved(angles, np.stack([np.cos(way), np.sin(way)]))
+        motion, _ = kept.domain.motions(angles, np.stack([np.cos(way), np.sin(way)]))
         top, left = (
             max(top, largest_ratios(kept.space, kept.free, motion).max()),
             left - angles.shape[1],

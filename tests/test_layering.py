@@ -26,7 +26,9 @@ ONLY = {
 COLLOCATED = re.compile(
     r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|transcription|reduced|search)\b"
 )
-ADAPTIVE = "played replay panels adaptive_motion slope inertial_motion dry_balance dry_friction"
+ADAPTIVE = (
+    "replay_record replay panels adaptive_motion slope inertial_motion dry_balance dry_friction"
+)
 
 
 def imported(path):

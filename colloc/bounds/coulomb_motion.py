@@ -42,7 +42,7 @@ class CoulombMotion(NamedTuple):
     def take(self, chosen: np.ndarray) -> CoulombMotion:
         return CoulombMotion(*(each[..., chosen] for each in self))
 
-    def joined(self, other: CoulombMotion) -> CoulombMotion:
+    def join(self, other: CoulombMotion) -> CoulombMotion:
         return CoulombMotion(
             *(np.concatenate(pair, axis=-1) for pair in zip(self, other, strict=True))
         )
@@ -111,7 +111,7 @@ def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarr
     return uncrossed & (gap(body, angles) >= body.width - margin) if body.width else uncrossed
 
 
-def drawn_in(
+def move_inside(
     body: Chain, shapes: np.ndarray, towards: np.ndarray, margin: float = 0.0
 ) -> np.ndarray:
     """Move shapes ``(n_joint, n)`` towards admissible ones until they are admissible too."""

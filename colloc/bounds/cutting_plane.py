@@ -20,7 +20,7 @@ from colloc.bounds.potential import (
     largest_ratios,
     with_more_knots,
 )
-from colloc.bounds.sampling import Domain, near_the_top, summits_met
+from colloc.bounds.sampling import Domain, climb_from_lattice, near_the_top
 from colloc.system.errors import NotConvergedError
 
 _LARGEST_CUT = 500
@@ -108,14 +108,14 @@ class _Program:
         self._solve(held)
 
     @classmethod
-    def begun(cls, samples: Samples, rng: np.random.Generator, smoothing: float) -> _Program:
+    def from_samples(cls, samples: Samples, rng: np.random.Generator, smoothing: float) -> _Program:
         """Begin with random samples at headings all round."""
         chosen = np.sort(rng.permutation(samples.motion.size)[: 3 * samples.space.size])
         headings = np.arange(12) * (np.pi / 6)
         held = [(chosen, np.full(chosen.size, heading)) for heading in headings]
         return cls(samples, held, rng, smoothing)
 
-    def moved_to(self, space: PotentialSpace) -> _Program:
+    def with_space(self, space: PotentialSpace) -> _Program:
         """The same inequalities for other potentials."""
         samples = Samples(space, self.samples.motion)
         return _Program(samples, [(self.index, self.heading)], self.rng, self.smoothing)
@@ -159,7 +159,7 @@ class _Program:
 
     def add(self, motion: CoulombMotion) -> None:
         if motion.size:
-            self.samples = self.samples.joined(motion)
+            self.samples = self.samples.join(motion)
 
 
 def exchanged_optimum(
@@ -182,7 +182,9 @@ def exchanged_optimum(
     `tolerance`. `smoothing` weighs the roughness, about 0.2: 1e-5 costs 1e-6 of the bound.
     """
     rng = np.random.default_rng(0)
-    program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng, smoothing)
+    program = _Program.from_samples(
+        Samples(space, domain.lattice(shapes, directions)), rng, smoothing
+    )
     spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
     seen, quiet, surprise = program.samples.motion.size, 0, _UNKNOWN
     for count in range(1, rounds + 1):
@@ -198,7 +200,7 @@ def exchanged_optimum(
         last = quiet > 0 or count == rounds
         shift = max((count * _GOLDEN) % 1.0, 0.01)
         fresh = domain.lattice(shapes * (1 + last), directions * (1 + last), shift)
-        pooled = fresh.joined(program.samples.motion)
+        pooled = fresh.join(program.samples.motion)
         values = np.concatenate([ratio(fresh), program.samples.ratio(free)[0]])
         chosen = near_the_top(pooled, values, level, spacing, starts * (1 + 2 * last))
         steps = 0.5 * spacing, 0.5 * turn, _CLIMB_STEPS
@@ -215,7 +217,9 @@ def exchanged_optimum(
         if (quiet == 2 and not coarse) or count == rounds:
             # what a check finds is no more than a sample that was missing
             finer = {"shapes": 3 * shapes, "directions": 2 * directions, "starts": 2 * starts}
-            checked, motion = summits_met(domain, space, free, seed=count, level=level, **finer)
+            checked, motion = climb_from_lattice(
+                domain, space, free, seed=count, level=level, **finer
+            )
             if checked.max() > top:
                 top, best = float(checked.max()), motion.take(np.array([int(np.argmax(checked))]))
             quiet = quiet if top <= level + 2 * tolerance else 0
@@ -224,7 +228,7 @@ def exchanged_optimum(
             program.add(motion.take(np.flatnonzero(checked > level + tolerance)))
         if coarse and surprise < max(_RIPE, tolerance):
             space = with_more_knots(space, program.measure(), intervals)
-            program, quiet, surprise = program.moved_to(space), 0, _UNKNOWN
+            program, quiet, surprise = program.with_space(space), 0, _UNKNOWN
     assert held <= top
     at, converged, measure = (top, best, seen), quiet == 2, program.measure()
     return Optimum(space, free, program.best.value, *at, converged, measure)

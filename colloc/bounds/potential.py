@@ -87,10 +87,10 @@ class Samples:
         self.value = space.spline.matrix(motion.angles)
         self.slope = space.spline.slope(motion.angles, motion.rates)
 
-    def joined(self, motion: CoulombMotion) -> Samples:
+    def join(self, motion: CoulombMotion) -> Samples:
         new = Samples(self.space, motion)
         both = Samples.__new__(Samples)
-        both.space, both.motion = self.space, self.motion.joined(motion)
+        both.space, both.motion = self.space, self.motion.join(motion)
         both.value = sparse.vstack([self.value, new.value], format="csr")
         both.slope = sparse.vstack([self.slope, new.slope], format="csr")
         return both

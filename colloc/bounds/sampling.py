@@ -11,8 +11,8 @@ from colloc.bounds.coulomb_motion import (
     CoulombMotion,
     admissible,
     all_motions,
-    drawn_in,
     fundamental,
+    move_inside,
     one_joint,
     random_directions,
     two_resting,
@@ -61,7 +61,7 @@ class Domain:
         inside = (np.abs(angles) <= self.joint_limit + 1e-12).all(axis=0)
         return inside & admissible(self.body, angles, _EDGE)
 
-    def solved(self, angles: np.ndarray, rates: np.ndarray) -> tuple[CoulombMotion, np.ndarray]:
+    def motions(self, angles: np.ndarray, rates: np.ndarray) -> tuple[CoulombMotion, np.ndarray]:
         """All balanced motions, and the column each belongs to; not those in which all feet stick,
         which pay nothing: those beside them say what a potential may gain there."""
         motion, source = all_motions(self.body, self.friction, angles, rates, _DELTA)
@@ -81,14 +81,14 @@ class Domain:
         rng = np.random.default_rng(round(1e9 * shift))
         if n_joint > 2:
             every = np.repeat(angles, directions, axis=1)
-            motion, _ = self.solved(every, random_directions(n_joint, every.shape[1], rng))
+            motion, _ = self.motions(every, random_directions(n_joint, every.shape[1], rng))
         else:
             rates = unit_directions(n_joint, directions, half, shift)
-            motion, _ = self.solved(*_pairs(angles, rates))
-        motion = motion.joined(self.solved(*_pairs(finer, one_joint(n_joint, half)))[0])
+            motion, _ = self.motions(*_pairs(angles, rates))
+        motion = motion.join(self.motions(*_pairs(finer, one_joint(n_joint, half)))[0])
         resting, rates = two_resting(self.body, finer, rng)
-        motion = motion.joined(self.solved(resting, rates)[0])
-        return motion if half else motion.joined(self.solved(resting, -rates)[0])
+        motion = motion.join(self.motions(resting, rates)[0])
+        return motion if half else motion.join(self.motions(resting, -rates)[0])
 
     def _shapes(self, steps: int, shift: float) -> np.ndarray:
         """Shapes ``(n_joint, n)`` without mirror images, with those where a joint is at its limit,
@@ -108,7 +108,9 @@ class Domain:
             holds = [np.delete(held, end, axis=joint) for end in (-1, 0)]
             for a, b in ((0, 1), (1, 0)):
                 touches = holds[a] & ~holds[b]
-                shapes.append(drawn_in(self.body, ends[b][:, touches], ends[a][:, touches], _EDGE))
+                shapes.append(
+                    move_inside(self.body, ends[b][:, touches], ends[a][:, touches], _EDGE)
+                )
         angles = np.concatenate(shapes, axis=1)
         return angles[:, fundamental(self.body, angles)]
 
@@ -118,7 +120,7 @@ class Domain:
         angles = rng.uniform(-1.0, 1.0, (self.body.n_joint, count))
         special = (rng.random(angles.shape) < _SPECIAL) & (np.arange(count) % 2 == 1)
         angles = self.joint_limit * np.where(special, np.rint(angles), angles)
-        return drawn_in(self.body, angles, np.zeros_like(angles), _EDGE)
+        return move_inside(self.body, angles, np.zeros_like(angles), _EDGE)
 
     def summits(
         self,
@@ -148,7 +150,7 @@ class Domain:
             rates = top.rates[:, :, None] + turn * move[n_joint:]
             rates = (rates / np.sqrt((rates**2).sum(axis=0))).reshape(n_joint, -1)
             tried = np.flatnonzero(self.holds(angles))
-            motion, source = self.solved(angles[:, tried], rates[:, tried])
+            motion, source = self.motions(angles[:, tried], rates[:, tried])
             height = np.full(angles.shape[1], -np.inf)
             place = np.zeros(angles.shape[1], dtype=int)
             reached = value(motion)
@@ -160,7 +162,7 @@ class Domain:
             up = height[choice] > best
             order = np.arange(top.size)
             order[up] = top.size + np.arange(up.sum())
-            top = top.joined(motion.take(place[choice[up]])).take(order)
+            top = top.join(motion.take(place[choice[up]])).take(order)
             best = np.where(up, height[choice], best)
             size = np.where(up, _GROW * size, _SHRINK * size)
         return top
@@ -200,7 +202,7 @@ def near_the_top(
     return near[np.sort(first)][:count]
 
 
-def summits_met(
+def climb_from_lattice(
     domain: Domain,
     space: PotentialSpace,
     free: np.ndarray,

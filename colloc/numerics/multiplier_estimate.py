@@ -24,7 +24,7 @@ def quasi_definite_factors(jacobian: sparse.csr_matrix) -> SuperLU:
     )
 
 
-def estimated_multipliers(jacobian: sparse.csr_matrix, gradient: np.ndarray) -> np.ndarray:
+def least_squares_multipliers(jacobian: sparse.csr_matrix, gradient: np.ndarray) -> np.ndarray:
     """Multipliers ``(m,)`` that minimise ``|gradient + J' multipliers|``, J ``(m, n)``."""
     m, n = jacobian.shape
     factors = quasi_definite_factors(jacobian)

@@ -162,7 +162,7 @@ class _Point:
         return cls(v, value if np.isfinite(value) else _NOWHERE, rows, outside)
 
 
-def minimised(
+def minimize(
     program: NonlinearProgram,
     v: np.ndarray,
     radius: float,
@@ -242,7 +242,7 @@ def _bfgs(b: np.ndarray, s: np.ndarray, y: np.ndarray) -> np.ndarray:
     return b - np.outer(bs, bs) / sbs + np.outer(y, y) / sy
 
 
-def remembered(function: Callable[[np.ndarray], Value]) -> Callable[[np.ndarray], Value]:
+def keep_last(function: Callable[[np.ndarray], Value]) -> Callable[[np.ndarray], Value]:
     """Keep the last value of a function for calls at the same point."""
     last: dict[bytes, Value] = {}
 

@@ -13,7 +13,7 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import widest
 from colloc.mechanics.contact import Pairs
 from colloc.motion.kinds import kind_of_motion
-from colloc.numerics.sqp import remembered
+from colloc.numerics.sqp import keep_last
 from colloc.reduced.constraints import Constraints, Function
 from colloc.reduced.pointed import with_heading
 from colloc.transcription.shape_checks import ShapeCheck, shape_checks
@@ -51,7 +51,7 @@ class LinearSpace:
         self._speed = (_MeanSpeed if gait.relative_delta else _RootMeanSquareSpeed)(gait, n_joint)
         self.lower, self.upper = gait.bounds(body, widest(limit))
         self.own = np.arange(self.n)
-        self._peaks = remembered(
+        self._peaks = keep_last(
             lambda v: near_peaks(self.trajectory(v), self.mesh, self.checks, limit)
         )
 
@@ -138,7 +138,7 @@ class LinearSpace:
         kinds["shape speed"] = np.zeros(1, dtype=int)
         lower = np.concatenate([*low, [self._admissible.smallest_shape_speed**2]])
         upper = np.concatenate([*high, [np.inf]])
-        at_worst = remembered(partial(self._at_worst, placed))
+        at_worst = keep_last(partial(self._at_worst, placed))
 
         def moving_on() -> Constraints:
             return Constraints(kinds, lower, upper, excess, *self._rows(at_worst))

@@ -17,7 +17,7 @@ from colloc.gaits.linear import enclosed_area
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
-from colloc.numerics.sqp import minimised
+from colloc.numerics.sqp import minimize
 from colloc.reduced.program import ReducedProgram
 from colloc.search.checkpoint import checkpointed
 from colloc.search.spaces import space_near
@@ -84,4 +84,4 @@ def project_to_zero_rotation(
     # limits of the angles are kept by the search that begins here
     program.place_rows(np.zeros_like(v))
     projection = _Projection(program, v, enclosed_area(seeds, problem.body.n_joint))
-    return space.member(minimised(projection, v, np.inf, _ACCURACY, _STEPS).v)
+    return space.member(minimize(projection, v, np.inf, _ACCURACY, _STEPS).v)

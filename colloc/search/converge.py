@@ -18,7 +18,7 @@ from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.contact import Pairs, far_pairs, link_width, overlapping_pairs
 from colloc.numerics.kinks import stationarity_around
-from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
+from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimize, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.search.checkpoint import checkpointed
 from colloc.search.iterate import STATIONARY, Iterate, iterate_at
@@ -66,7 +66,7 @@ def solve_subproblems(
         if len(ends) > 1:
             # with the instants fixed, rounds overshoot where they move far with the gait
             program.follow_worst()
-        result = minimised(program, v, OPTIONS.radius, objective_accuracy(kkt), curvature=hessian)
+        result = minimize(program, v, OPTIONS.radius, objective_accuracy(kkt), curvature=hessian)
         v, iterations = result.v, iterations + result.iterations
         admissible = program.place_rows(v) <= TOLERANCES.violation
         conditions = stationarity(program, v)

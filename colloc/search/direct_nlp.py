@@ -19,7 +19,7 @@ from colloc.search.ipopt import Solver, solve_in_regions
 from colloc.search.options import OPTIONS
 from colloc.search.spaces import space_near, with_whole_turns
 from colloc.transcription.full_program import full_program
-from colloc.verification.refinement import planned_mesh
+from colloc.verification.refinement import plan_mesh
 
 _ITERATIONS = 1500  # on each mesh, at most: from a guess IPOPT may need five hundred
 
@@ -42,7 +42,7 @@ def solve_directly(problem: Problem) -> Answer:
     for done in range(OPTIONS.meshes if problem.mesh_tolerance > 0 else 0):
         run.report("refine", done, OPTIONS.meshes)
         gait, control = answer.gait, space.control
-        plan = planned_mesh(
+        plan = plan_mesh(
             control,
             control.in_phases(space.mesh, gait),
             gait,

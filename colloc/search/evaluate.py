@@ -33,7 +33,7 @@ from colloc.search.iterate import evaluate_at
 from colloc.search.options import OPTIONS, TOLERANCES
 from colloc.smooth.prescribed_body import schedule
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.verification.refinement import planned_mesh
+from colloc.verification.refinement import plan_mesh
 
 _PHASES = 256
 _ROUGHLY = 1.25
@@ -182,7 +182,7 @@ def _answer(problem: Problem, gait: AnyGait) -> Answer:
     first, answer = mesh, _measured(control, mesh, parameters)
     meshes = OPTIONS.meshes if problem.mesh_tolerance > 0 and not goes_nowhere(answer) else 0
     for _ in range(meshes):
-        plan = planned_mesh(control, mesh, member, problem.delta, problem.mesh_tolerance)
+        plan = plan_mesh(control, mesh, member, problem.delta, problem.mesh_tolerance)
         if plan is None:
             break
         mesh = Mesh(scheme(plan.scheme), plan.edges)

@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.numerics.multiplier_estimate import estimated_multipliers
+from colloc.numerics.multiplier_estimate import least_squares_multipliers
 from colloc.numerics.repeated import as_sparse
-from colloc.numerics.sqp import remembered
+from colloc.numerics.sqp import keep_last
 from colloc.search.options import TOLERANCES
 from colloc.system.interruption import interrupted, interruptible
 from colloc.transcription.full_program import FullProgram
@@ -101,7 +101,7 @@ class Solver:
         # held here: CasADi does not keep it alive
         self._stop = StopRequest(self._nlp.expressions)
         self._settings = settings | {**self._nlp.functions, "iteration_callback": self._stop}
-        self._values_and_slopes = remembered(self._evaluated)
+        self._values_and_slopes = keep_last(self._evaluated)
 
     @cached_property
     def _solver(self) -> ca.Function:
@@ -164,7 +164,7 @@ class Solver:
         _, gradient, _, jacobian = self._values_and_slopes(np.append(x, delta))
         lam_g = np.where(t.row_lower == t.row_upper, 0.0, lam_g)
         gradient = gradient + jacobian.T @ lam_g + lam_x
-        lam_g[equality] = estimated_multipliers(jacobian[equality][:, free], gradient[free])
+        lam_g[equality] = least_squares_multipliers(jacobian[equality][:, free], gradient[free])
         return lam_x, lam_g
 
     def equality_jacobian(

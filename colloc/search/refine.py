@@ -20,7 +20,7 @@ from colloc.search.options import FINE, MEDIUM, OPTIONS, TOLERANCES
 from colloc.search.spaces import on_mesh_of, space_of
 from colloc.smooth.panel_body import on_panels, panels_of
 from colloc.system.errors import NotConvergedError
-from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
+from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, plan_mesh
 
 
 @dataclass(eq=False)
@@ -40,7 +40,7 @@ class _Meshes:
         late = max(0, self.count - OPTIONS.meshes_of_first_aim)
         control = iterate.space.control
         mesh = control.in_phases(iterate.space.mesh, gait)
-        return planned_mesh(
+        return plan_mesh(
             control,
             mesh,
             gait,

@@ -18,7 +18,7 @@ from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
 from colloc.motion.followed_motion import on_one_branch
 from colloc.numerics.schemes import Scheme, scheme
-from colloc.verification.played import Path
+from colloc.verification.replay_record import Path
 
 PANEL_RULE = scheme("gauss-5")
 _TO_MIDDLE = PANEL_RULE.integrals(np.array([0.5]))[0]

@@ -17,8 +17,8 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.dry_balance import dry_balance
-from colloc.verification.played import Path
 from colloc.verification.replay import replay
+from colloc.verification.replay_record import Path
 
 DRY = 1e-6  # delta of the replay that is corrected, over the largest mean rate
 OPEN = 1e-2  # velocities known less well than this, over the largest rate, count as open

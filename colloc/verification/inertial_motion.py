@@ -29,7 +29,14 @@ from colloc.motion.torques import joint_torques
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.played import Numbers, Path, Replay, lever, through_periods, to_tolerance
+from colloc.verification.replay_record import (
+    Numbers,
+    Path,
+    Replay,
+    lever,
+    through_periods,
+    to_tolerance,
+)
 
 _ROUGH = 1e-4
 """Error of the runs that differentiate the period map; less where friction is so dry that a step

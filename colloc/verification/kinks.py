@@ -13,7 +13,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 from colloc.verification.adaptive_motion import FineMotion, rates_at
-from colloc.verification.played import Path
+from colloc.verification.replay_record import Path
 
 SLOW = 30.0
 """A point counts as at rest below this many delta."""

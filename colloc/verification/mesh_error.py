@@ -27,7 +27,7 @@ from colloc.verification.adaptive_motion import (
     rates_at,
     totals_along,
 )
-from colloc.verification.reference_motion import collocated, period_of, reference_motion
+from colloc.verification.reference_motion import collocate, period_of, reference_motion
 
 FINER = 0.05
 """What the panels may miss, over the error they measure or the tolerance."""
@@ -192,7 +192,7 @@ def _exact(known: Known) -> tuple[PeriodTotals, dict[str, float]]:
 def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     """`MeshError` but for the violation."""
     (control, gait, delta, exact), kind = known, kind_of_motion(known.control.dynamics)
-    aims, seen = control.aims, collocated(control, mesh, gait, delta)
+    aims, seen = control.aims, collocate(control, mesh, gait, delta)
     shapes, along, pose = seen[:3]
     at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]

@@ -46,7 +46,7 @@ class Panels(NamedTuple):
     def take(self, chosen: np.ndarray) -> Panels:
         return Panels(*(a[chosen] for a in self))
 
-    def joined(self, other: Panels) -> Panels:
+    def join(self, other: Panels) -> Panels:
         both = Panels(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
         return both.take(np.argsort(both.left))
 

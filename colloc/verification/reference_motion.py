@@ -23,7 +23,7 @@ from colloc.motion.kinds import (
 )
 from colloc.numerics.mesh import Mesh
 from colloc.verification.inertial_motion import GaitWithInertia, amplification
-from colloc.verification.played import LEAST
+from colloc.verification.replay_record import LEAST
 from colloc.verification.slope import GaitOnSlope
 
 
@@ -45,7 +45,7 @@ def reference_motion(
     """The motion of a gait, delta per period, to a relative error of the objective; a regime of
     one's own has it as ``reference``, by an error of the states."""
     dynamics, kind = control.dynamics, kind_of_motion(control.dynamics)
-    on_mesh, regime = collocated(control, mesh, gait, delta), dynamics.regime
+    on_mesh, regime = collocate(control, mesh, gait, delta), dynamics.regime
     counts = sum(map(abs, control.aims.objective.shares(on_mesh.period).values()))
     error = tolerance / counts if np.isfinite(counts) else tolerance
     if hasattr(regime, "reference"):
@@ -81,7 +81,7 @@ class Collocated(NamedTuple):
     period: dict[str, float]
 
 
-def collocated(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> Collocated:
+def collocate(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> Collocated:
     kind, weights, (angles, rates) = (
         kind_of_motion(control.dynamics),
         stage_weights(mesh),

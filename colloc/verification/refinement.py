@@ -68,7 +68,7 @@ def kink_knots(
     return np.array(knots)
 
 
-def moved_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np.ndarray:
+def move_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np.ndarray:
     """Move the nearest inner knots onto the kinks; one farther than `snap` spacings gets its
     own."""
     free, spacing = edges[1:-1].copy(), np.median(np.diff(edges))
@@ -83,7 +83,7 @@ def moved_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np
     return knots[keep]
 
 
-def planned_mesh(
+def plan_mesh(
     control: ControlProblem,
     mesh: Mesh,
     gait: AnyGait,
@@ -129,7 +129,7 @@ def planned_mesh(
         on_knots = kinks[:0] if switches else kinks
         first = np.union1d(mesh.edges if keeps else coarse_edges(control, mesh.edges), knots)
         targets = np.union1d(on_knots, _knots_left(mesh, on_knots))
-        edges = moved_knots(first, targets, 0.0 if keeps else _SNAP)
+        edges = move_knots(first, targets, 0.0 if keeps else _SNAP)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
         plan = _split(known, rule, edges, on_knots, budget=budget, **asked)
         best = plan if best is None else _fewest([best, plan])

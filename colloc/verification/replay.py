@@ -44,7 +44,7 @@ from colloc.verification.panels import (
     poses,
     remaining_error,
 )
-from colloc.verification.played import Path, Replay, lever
+from colloc.verification.replay_record import Path, Replay, lever
 
 MOST_INSTANTS = 10_000_000
 """Of a first grid, which fill a gigabyte."""
@@ -223,7 +223,7 @@ def replay(
         else:  # the branch on which the body is before
             start = old.z[:, :-1] if sense == FORWARDS else old.z[:, 1:]
         halves = old.halves(solver.values(middles, start.reshape(-1, 3).T), changed[chosen])
-        panels = panels.take(np.setdiff1d(order, chosen)).joined(halves)
+        panels = panels.take(np.setdiff1d(order, chosen)).join(halves)
     several, others = _others(panels, float(np.abs(place - place[-1]).max()))
     known = panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)
     known[np.isin(panels.left, breaks), 0] += ONE_SIDED

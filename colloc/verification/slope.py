@@ -39,7 +39,7 @@ from colloc.motion.on_slope import balance_on_slope
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion, whole_totals
-from colloc.verification.played import Path, Replay, lever, through_periods, to_tolerance
+from colloc.verification.replay_record import Path, Replay, lever, through_periods, to_tolerance
 
 _UNITS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
-from colloc.verification.played import Path
+from colloc.verification.replay_record import Path
 
 _PHASES = np.linspace(0.0, 1.0, 20001)
 MOST_SAMPLES = 2_000_000

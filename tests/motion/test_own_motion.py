@@ -22,9 +22,9 @@ from colloc.motion.kinds import QuasiStatic, Trajectory, kind_in
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
 from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.played import Replay, to_tolerance
 from colloc.verification.reference_motion import ReferenceMotion
 from colloc.verification.replay import replay, replayer
+from colloc.verification.replay_record import Replay, to_tolerance
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from colloc.numerics.quadratic_step import quadratic_step
-from colloc.numerics.sqp import minimised, stationarity
+from colloc.numerics.sqp import minimize, stationarity
 
 
 class Program:
@@ -39,7 +39,7 @@ def hock_schittkowski_71():
 
 def test_a_textbook_program_with_equation_inequality_and_bounds():
     program = hock_schittkowski_71()
-    found = minimised(program, np.array([1.0, 5.0, 5.0, 1.0]), np.inf, 1e-12)
+    found = minimize(program, np.array([1.0, 5.0, 5.0, 1.0]), np.inf, 1e-12)
     conditions = stationarity(program, found.v)
     assert found.objective == pytest.approx(17.0140173, abs=1e-7)
     assert max(conditions.kkt_error, conditions.violation, conditions.complementarity) < 1e-6
@@ -54,10 +54,10 @@ def test_known_curvature_saves_iterations_and_changes_no_answer():
         lambda x: np.ones((1, 12)),
         [1.0], [1.0], 12,
     )  # fmt: skip
-    first = minimised(program, np.ones(12), np.inf, 1e-12)
+    first = minimize(program, np.ones(12), np.inf, 1e-12)
     beside = first.v + 0.1 * np.sin(np.arange(12.0))
-    again = minimised(program, beside, np.inf, 1e-12, curvature=first.curvature)
-    anew = minimised(program, beside, np.inf, 1e-12)
+    again = minimize(program, beside, np.inf, 1e-12, curvature=first.curvature)
+    anew = minimize(program, beside, np.inf, 1e-12)
     assert again.objective == pytest.approx(first.objective, abs=1e-10)
     assert again.iterations <= 0.7 * anew.iterations
 
@@ -72,7 +72,7 @@ def test_rows_that_contradict_each_other_where_they_are_linearised_are_approache
         lambda x: np.array([[2 * x[0], 2 * x[1]], [1.0, 0.0]]),
         [1.0, 0.5], [1.0, np.inf], 2,
     )  # fmt: skip
-    found = minimised(program, np.array([0.0, 1e-3]), 2.0, 1e-12)
+    found = minimize(program, np.array([0.0, 1e-3]), 2.0, 1e-12)
     assert found.v == pytest.approx([0.5, np.sqrt(0.75)], abs=1e-8)
 
 
@@ -83,7 +83,7 @@ def test_a_kink_of_the_objective_is_found():
         lambda x: np.array([np.sign(x[0]), 2 * (x[1] - 1)]),
         lambda x: np.zeros(0), lambda x: np.zeros((0, 2)), [], [], 2,
     )  # fmt: skip
-    found = minimised(program, np.array([0.7, -0.4]), np.inf, 1e-10)
+    found = minimize(program, np.array([0.7, -0.4]), np.inf, 1e-10)
     assert found.objective < 1e-3
 
 
@@ -103,7 +103,7 @@ def of_one(f, slope, lower=-np.inf, upper=np.inf):
 
 
 def test_where_no_step_is_an_improvement_the_start_is_what_is_found():
-    found = minimised(of_one(lambda x: x[0], lambda x: -np.ones(1)), np.array([0.3]), 1.0, 1e-12)
+    found = minimize(of_one(lambda x: x[0], lambda x: -np.ones(1)), np.array([0.3]), 1.0, 1e-12)
     assert (found.v[0], found.objective, found.iterations) == (0.3, 0.3, 1)
 
 
@@ -118,7 +118,7 @@ def test_steps_that_lead_away_from_what_a_row_asks_for_are_cut():
         [0.0],
         1,
     )
-    assert minimised(program, np.array([3.0]), np.inf, 1e-12).v[0] == pytest.approx(0.0, abs=1e-9)
+    assert minimize(program, np.array([3.0]), np.inf, 1e-12).v[0] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_only_the_box_has_an_edge_and_the_bounds_of_a_program_have_none(
             -bound,
             bound,
         )
-        found = minimised(mirrored, np.array([0.4 * way]), 0.5, 1e-12)
+        found = minimize(mirrored, np.array([0.4 * way]), 0.5, 1e-12)
         assert (found.v[0], found.on_edge) == (pytest.approx(way * v), on_edge)
 
 
@@ -167,7 +167,7 @@ def test_multipliers_and_violations_are_those_of_bounds_by_hand():
 
 def test_the_box_is_kept_and_its_edge_is_told():
     program = hock_schittkowski_71()
-    found = minimised(program, np.array([1.0, 4.0, 4.5, 2.0]), 0.1, 1e-12)
+    found = minimize(program, np.array([1.0, 4.0, 4.5, 2.0]), 0.1, 1e-12)
     assert found.on_edge
     assert np.abs(found.v - [1.0, 4.0, 4.5, 2.0]).max() <= 0.1 + 1e-12
 

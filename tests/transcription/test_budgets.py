@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Harmonic, Problem, ellipse, solve_balance
-from colloc.numerics.multiplier_estimate import estimated_multipliers, quasi_definite_factors
+from colloc.numerics.multiplier_estimate import least_squares_multipliers, quasi_definite_factors
 from colloc.search.ipopt import Solver
 from colloc.search.spaces import program_of
 from tests.shared.laws import coulomb
@@ -28,7 +28,7 @@ def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_m
         x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
         jacobian, _ = solver.equality_jacobian(x, 0.1)
         gradient = np.random.default_rng(1).normal(size=jacobian.shape[1])
-        left = gradient + jacobian.T @ estimated_multipliers(jacobian, gradient)
+        left = gradient + jacobian.T @ least_squares_multipliers(jacobian, gradient)
         # what is left is orthogonal to every equation
         assert np.abs(jacobian @ left).max() < 1e-8 * np.abs(gradient).max()
         fill.append(quasi_definite_factors(jacobian).L.nnz)

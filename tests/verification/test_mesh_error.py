@@ -23,7 +23,7 @@ from colloc.verification import refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
 from colloc.verification.kinks import kink_phases
 from colloc.verification.mesh_error import constraint_violation, gait_motion, mesh_error
-from colloc.verification.refinement import kink_knots, moved_knots, planned_mesh
+from colloc.verification.refinement import kink_knots, move_knots, plan_mesh
 from colloc.verification.replay import replay
 from tests.shared.stages import answer_near
 
@@ -190,23 +190,23 @@ def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards
     in the gait."""
     stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
     monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.array([kink]))
-    plan = planned_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-4)
+    plan = plan_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-4)
     assert (kink in plan.edges) == held
 
 
 def test_knots_move_onto_kinks_and_keep_the_rest():
     edges = np.linspace(0, 1, 11)
-    moved = moved_knots(edges, np.array([0.31, 0.55]))
+    moved = move_knots(edges, np.array([0.31, 0.55]))
     np.testing.assert_allclose(moved, [0, 0.1, 0.2, 0.31, 0.4, 0.5, 0.55, 0.6, 0.7, 0.8, 0.9, 1])
-    assert moved_knots(edges, np.array([])).size == 11
+    assert move_knots(edges, np.array([])).size == 11
 
 
 def test_knots_on_kinks_save_points(monkeypatch):
     stated = problem("gauss-7", intervals=16)
     mesh = control_problem(stated).mesh()
-    with_knots = planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6)
+    with_knots = plan_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6)
     monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.empty(0))
-    without = planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6)
+    without = plan_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6)
     points = [(plan.edges.size - 1) * scheme(plan.scheme).s for plan in (with_knots, without)]
     assert points[0] < 0.9 * points[1]
     fine = gait_motion(control_problem(stated), GAIT, DELTA, mesh, 1e-7)
@@ -218,7 +218,7 @@ def test_knots_on_kinks_save_points(monkeypatch):
 def test_planned_meshes_are_as_accurate_as_they_say(name):
     stated = problem(name)
     for tolerance in (1e-4, 1e-6):
-        plan = planned_mesh(
+        plan = plan_mesh(
             control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, tolerance
         )
         assert plan.reached
@@ -230,7 +230,7 @@ def test_planned_meshes_are_as_accurate_as_they_say(name):
             0.1 * tolerance,
         )
         assert abs(error.total) <= error.estimate <= 1.1 * tolerance
-        again = planned_mesh(
+        again = plan_mesh(
             control_problem(stated),
             Mesh(scheme(plan.scheme), plan.edges),
             GAIT,
@@ -244,7 +244,7 @@ def test_a_nested_mesh_has_every_knot_of_the_one_before():
     stated = problem("gauss-3")
     mesh = control_problem(stated).mesh()
     plan, free = (
-        planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6, nested=nested)
+        plan_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6, nested=nested)
         for nested in (True, False)
     )
     assert np.isin(mesh.edges, plan.edges).all()
@@ -260,15 +260,13 @@ def test_a_nested_mesh_has_every_knot_of_the_one_before():
 
 def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     stated = problem("gauss-2", mesh_tolerance=1e-7, intervals=20)
-    plan = planned_mesh(
+    plan = plan_mesh(
         control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-7, most_points=60
     )
     assert not plan.reached
     assert plan.estimate > 1e-7
-    small = planned_mesh
-    monkeypatch.setattr(
-        refine, "planned_mesh", lambda *a, **k: small(*a, **{**k, "most_points": 60})
-    )
+    small = plan_mesh
+    monkeypatch.setattr(refine, "plan_mesh", lambda *a, **k: small(*a, **{**k, "most_points": 60}))
     solution = solve(stated, 1)
     assert solution.status == "certificate failed"
     assert "mesh error" in solution.message

@@ -8,8 +8,8 @@ from benchmarks.stated_errors import motion, random_case, slope
 from colloc import Chain, Fourier, Friction, Harmonic, Problem
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.objective import EFFICIENCY
-from colloc.verification.played import to_tolerance
 from colloc.verification.reference_motion import reference_motion
+from colloc.verification.replay_record import to_tolerance
 
 LEANING = Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 
