@@ -170,22 +170,6 @@ def test_a_balanced_body_pays_with_its_joints_what_friction_takes_whatever_end_i
         )
 
 
-@each
-def test_slopes_of_the_motion_are_those_of_finite_differences(law):
-    body, (angles, rates), h = Chain(), instants(7, 3), 1e-6
-    y = np.concatenate([angles, rates])
-
-    def motion(y):
-        solved = body.solve(law, y[:2], y[2:], 1e-2, tolerance=1e-13)
-        now = body.motion(law, y[:2], y[2:], 1e-2, solved)
-        return solved, np.concatenate([now.z, now.centre, now.power[None]])
-
-    _, slopes = motion_and_derivatives(body, law, y[:2], y[2:], 1e-2, motion(y)[0])
-    for j, step in enumerate(h * np.eye(4)[:, :, None]):
-        numeric = (motion(y + step)[1] - motion(y - step)[1]) / (2 * h)
-        np.testing.assert_allclose(slopes[:, j], numeric, atol=2e-5 * np.abs(slopes).max())
-
-
 @each_associated
 def test_an_associated_law_is_the_gradient_of_a_convex_function(law):
     velocity, h = moving_links(8), 1e-6

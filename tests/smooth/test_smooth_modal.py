@@ -229,11 +229,3 @@ def test_unusable_problems_are_refused(changes, message):
 def test_unusable_bodies_are_refused(changes, message):
     with pytest.raises(ProblemError, match=message):
         ModalBody(**changes)
-
-
-@pytest.mark.parametrize("basis", ["legendre", "fourier"])
-def test_a_body_named_from_its_other_end_has_the_same_tangents_there(basis):
-    body, s = ModalBody(modes=4, basis=basis), np.linspace(0, 1, 31)[:, None]
-    amplitudes = np.random.default_rng(3).normal(size=(4, 1))
-    there = body.tangent(1 - s, amplitudes)
-    np.testing.assert_allclose(body.tangent(s, body.reversal @ amplitudes), there, atol=1e-12)
