@@ -103,6 +103,21 @@ def study_file(folder, text=FILE):
     return path
 
 
+def test_a_grid_of_a_million_cells_makes_its_problems_as_it_reaches_them(fake, tmp_path):
+    made = []
+
+    def counted(x, y):
+        made.append((x, y))
+        return problem(x, y)
+
+    axes = tuple(Axis(name, tuple(1.0 + k / 1000 for k in range(1000))) for name in "xy")
+    run = StudyRun(grid(axes=axes, problem=counted, cold_starts=0), tmp_path)
+    cells = run.run(executor=ThreadPoolExecutor)
+    assert [next(cells).cell for _ in range(3)] == [(0, 0), (1, 0), (0, 1)]
+    cells.close()
+    assert len(made) < 30
+
+
 def test_starts_travel_from_the_value_before_and_between_all_texts():
     kinds = Axis("kind", ("a", "b", "c"))
     study = grid(axes=(Axis("x", (1.0, 2.0, 3.0)), kinds, Axis("y", (1.0, 2.0), travels=False)))
