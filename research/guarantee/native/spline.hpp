@@ -1,4 +1,4 @@
-/* Tensor products of cubic B-splines at a point: colloc/numerics/spline.py. */
+/* Tensor products of cubic B-splines at a point: colloc/bounds/spline.py. */
 
 #pragma once
 
