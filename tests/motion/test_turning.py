@@ -4,7 +4,7 @@ every way to it agrees."""
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, evaluate, replay
+from colloc import Chain, Fourier, Friction, Problem, evaluate, replay
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.reduced.program import ReducedProgram
@@ -13,6 +13,7 @@ from colloc.search.spaces import space_near
 from colloc.transcription.full_program import full_program
 from colloc.verification.inertial_motion import inertial_replay
 from colloc.verification.mesh_error import mesh_error
+from tests.shared.cases import cases
 
 DELTA = 0.3
 BODY, FRICTION = Chain(), Friction()
@@ -96,14 +97,12 @@ def test_the_chord_tends_to_the_displacement_as_the_turn_tends_to_nothing():
     assert off[2] == pytest.approx(off[1] / 10, rel=0.05)
 
 
-CASES = {
-    "series": {"gait": Harmonic(1)},
-    "with inertia": {"gait": Harmonic(1), "froude": 0.05},
-    "polygon of unequal friction": {
-        "gait": Polygon(4, "none"),
-        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
-    },
-}
+CASES = """
+series: gait=Harmonic(1)
+with inertia: gait=Harmonic(1), froude=0.05
+polygon of unequal friction: gait=Polygon(4), friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3)
+"""
+CASES = cases(CASES, globals())
 
 
 def stated(case, turn, intervals=24):

@@ -7,6 +7,7 @@ import pytest
 from colloc import BSpline, Chain, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.search.spaces import space_near
+from tests.shared.cases import cases
 from tests.shared.stages import answer_near
 
 FOUR = {
@@ -14,22 +15,20 @@ FOUR = {
     "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]]),
 }
 WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0.9], [-0.2]])}
-CASES = {
-    "harmonics": {"gait": Harmonic(2, "none"), "friction": Friction(mu_t=0.5, mu_f=1, mu_b=5)},
-    "bilateral harmonics": {"gait": Harmonic(2, "bilateral")},
-    "antipodal harmonics": {
-        "gait": Harmonic(1, "antipodal"),
-        "friction": Friction(mu_t=1.7, mu_f=1, mu_b=1.3),
-        "guess": ellipse(0, 1.3, 0.8),
-    },
-    "shared nodes": {"gait": Harmonic(1, "none"), "scheme": "hermite-simpson"},
-    "splines of three joints": {"gait": BSpline(6), **WAVE},
-    "polygon": {"gait": Polygon(4, "none"), "friction": Friction(mu_t=3, mu_f=1, mu_b=2)},
-    "bilateral polygon": {"gait": Polygon(5, "bilateral")},
-    "polygon that ends its intervals with nodes": {"gait": Polygon(4), "scheme": "radau-3"},
-    "antipodal polygon of three joints": {"gait": BSpline(6, 1, "antipodal"), **WAVE},
-    "polygon with an axis through sides": {"gait": Polygon(4, "bilateral", "side"), **FOUR},
-}
+CASES = """
+harmonics: gait=Harmonic(2), friction=Friction(mu_t=0.5, mu_f=1, mu_b=5)
+bilateral harmonics: gait=Harmonic(2, "bilateral")
+antipodal harmonics: gait=Harmonic(1, "antipodal"), friction=ROUGH, guess=ellipse(0, 1.3, 0.8)
+shared nodes: gait=Harmonic(1), scheme="hermite-simpson"
+splines of three joints: gait=BSpline(6), **WAVE
+polygon: gait=Polygon(4), friction=Friction(mu_t=3, mu_f=1, mu_b=2)
+bilateral polygon: gait=Polygon(5, "bilateral")
+polygon that ends its intervals with nodes: gait=Polygon(4), scheme="radau-3"
+antipodal polygon of three joints: gait=BSpline(6, 1, "antipodal"), **WAVE
+polygon with an axis through sides: gait=Polygon(4, "bilateral", "side"), **FOUR
+"""
+ROUGH = Friction(mu_t=1.7, mu_f=1, mu_b=1.3)
+CASES = cases(CASES, globals())
 DELTA = 0.05
 
 

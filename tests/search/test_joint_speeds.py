@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import BSpline, Chain, Friction, Harmonic, Problem, Serpenoid
+from colloc import Chain, Friction, Harmonic, Problem, Serpenoid
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
+from tests.shared.cases import cases
 
 T = np.linspace(0, 1, 20001)
 FAR = {"objective": "distance", "friction": Friction(mu_t=2, mu_f=1, mu_b=1.5)}
@@ -23,35 +24,24 @@ def slow():
     return solve(Problem("slow", gait=Harmonic(1, "bilateral"), speed_limit=12), starts=4)
 
 
-@pytest.mark.parametrize(
-    ("gait", "limit", "more"),
-    [
-        (Harmonic(2, "bilateral"), (8.0, 8.0), FAR),
-        (BSpline(8, symmetry="bilateral"), 8.0, FAR),
-        (
-            Serpenoid(1),
-            3.0,
-            {"body": Chain((0.2,) * 5), "friction": Friction(mu_t=3, mu_f=1, mu_b=1)},
-        ),
-        (Harmonic(1, "antipodal"), 10.0, {"froude": 0.05}),
-        (
-            Harmonic(1),
-            6.0,
-            {
-                "grade": 0.05,
-                "friction": Friction(mu_t=3, mu_f=1, mu_b=1.5),
-                "objective": "distance",
-            },
-        ),
-    ],
-    ids=["harmonics", "splines", "serpenoid", "inertia", "slope"],
-)
-def test_the_fastest_instants_are_as_fast_as_allowed(gait, limit, more):
+CASES = """
+harmonics: gait=Harmonic(2, "bilateral"), speed_limit=(8.0, 8.0), **FAR
+splines: gait=BSpline(8, symmetry="bilateral"), speed_limit=8.0, **FAR
+serpenoid: gait=Serpenoid(1), speed_limit=3.0, body=Chain((0.2,) * 5), friction=Friction(mu_t=3)
+inertia: gait=Harmonic(1, "antipodal"), speed_limit=10.0, froude=0.05
+slope: gait=Harmonic(1), speed_limit=6.0, grade=0.05, friction=UNEVEN, objective="distance"
+"""
+UNEVEN = Friction(mu_t=3, mu_f=1, mu_b=1.5)
+CASES = cases(CASES, globals())
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_fastest_instants_are_as_fast_as_allowed(case):
     """Also between the points of the mesh, of any class paced by time, and of motions with
     states."""
-    found = solve(Problem("limited", gait=gait, speed_limit=limit, **more), starts=1)
+    found = solve(Problem("limited", **CASES[case]), starts=1)
     assert found.status == "solved"
-    share = fastest(found) / np.broadcast_to(limit, found.problem.body.n_joint)
+    share = fastest(found) / np.broadcast_to(found.problem.speed_limit, found.problem.body.n_joint)
     assert share.max() == pytest.approx(1.0, abs=1e-5)
 
 
