@@ -86,7 +86,7 @@ _GONE = {
 
 
 @functools.cache
-def _checked(function: Callable[..., object]) -> Callable[..., object]:
+def _check_arguments(function: Callable[..., object]) -> Callable[..., object]:
     from colloc.system.arguments import checked_arguments
 
     checked = checked_arguments(function)
@@ -102,7 +102,7 @@ def __getattr__(name: str) -> object:
     # PEP 562: imported on first use, so that the NumPy part never loads CasADi
     if name in _HOME:
         value = getattr(importlib.import_module(_HOME[name]), name)
-        return _checked(value) if isinstance(value, FunctionType) else value
+        return _check_arguments(value) if isinstance(value, FunctionType) else value
     if name == "__version__":
         from colloc.system.versions import version_of
 

@@ -33,7 +33,7 @@ def refusal(problem: Problem) -> str:
             f"on feet no upper bound is computed for {problem.law.label}: its motions are not "
             f"unique; there is 1/min(mu)."
         )
-    if not _bounded(problem):
+    if not _compute_bound(problem):
         return "upper bounds are of the efficiency, on the level, of gaits that do not turn."
     if problem.body.n_link > MOST_LINKS:
         return (
@@ -66,7 +66,7 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
         return efficiency_bound(*domain) if compute else None
 
 
-def _bounded(problem: Problem) -> bool:
+def _compute_bound(problem: Problem) -> bool:
     # work that depends on the pace has no bound per distance, nor has a body that coasts
     dry = problem.regime.slow_on_level and rate_independent(problem.law)
     return dry and problem.objective == EFFICIENCY and problem.rotation == 0
@@ -78,7 +78,7 @@ def gap_line(
     """Efficiency, upper bound and gap; without a bound 1/min(mu), with the hint to ask for one."""
     if bound is not None:
         return f"  {bound.report(efficiency)}"
-    if not _bounded(problem):
+    if not _compute_bound(problem):
         return f"  no upper bound on the {problem.objective.name} is known"
     limit = 1.0 / problem.law.smallest
     tighter = "" if asked or refusal(problem) else "; --bound computes a tighter one"

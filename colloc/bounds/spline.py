@@ -54,7 +54,7 @@ class TensorSpline:
         return np.array([-self.limit, *self.graded, self.limit])
 
     @cached_property
-    def extended(self) -> np.ndarray:
+    def extend(self) -> np.ndarray:
         beyond = np.arange(1, DEGREE + 1) * (self.knots[1] - self.knots[0])
         return np.concatenate([self.knots[0] - beyond[::-1], self.knots, self.knots[-1] + beyond])
 
@@ -74,7 +74,7 @@ class TensorSpline:
         return self.cell(angle)[:, None] + np.arange(DEGREE + 1)
 
     def _pieces(self, angle: np.ndarray, order: int) -> np.ndarray:
-        every = BSpline(self.extended, np.eye(self.per_joint), DEGREE)(angle, nu=order)
+        every = BSpline(self.extend, np.eye(self.per_joint), DEGREE)(angle, nu=order)
         return np.take_along_axis(every, self._local(angle), axis=1)
 
     def matrix(

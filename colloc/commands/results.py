@@ -15,7 +15,7 @@ from colloc.system.errors import ProblemError
 _PACE = ("period", "max_speed", "max_torque")
 
 
-def _written(path: Path) -> tuple[dict[str, Any], str]:
+def _write(path: Path) -> tuple[dict[str, Any], str]:
     size = path.stat().st_size
     return {"status": "written", "file": str(path), "bytes": size}, f"{size / 1000:.0f} kB"
 
@@ -57,7 +57,7 @@ def report(options: argparse.Namespace) -> int:
 
             line.say("drawing the figures")
             figures = [*map(str, save_panels(solution, path.with_suffix("")))]
-    facts, kilobytes = _written(path)
+    facts, kilobytes = _write(path)
     lines = [f"saved {path} ({kilobytes}, self-contained)", *(f"  {each}" for each in figures)]
     cli.tell(options, facts | {"figures": figures}, lines)
     return OK
@@ -91,7 +91,7 @@ def animate(options: argparse.Namespace) -> int:
 
     settings = cli.values(options, "periods", "seconds", "fps", "width", "from_rest")
     write_movie(solution, path, **settings, arrows=not options.no_arrows, quiet=cli.quiet(options))
-    facts, kilobytes = _written(path)
+    facts, kilobytes = _write(path)
     cli.tell(options, facts, [f"saved {path} ({kilobytes})"])
     return OK
 

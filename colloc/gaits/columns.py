@@ -178,11 +178,11 @@ def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
         raise ProblemError("gait.columns must be finite numbers.")
     if max(np.ptp(each, axis=-1).max() for each in arrays) == 0:
         raise ProblemError("gait.columns do not change over time: nothing would move.")
-    return tuple(_nested(each.tolist()) for each in arrays)
+    return tuple(_nested_tuple(each.tolist()) for each in arrays)
 
 
-def _nested(values: list) -> tuple:
-    return tuple(_nested(value) if isinstance(value, list) else value for value in values)
+def _nested_tuple(values: list) -> tuple:
+    return tuple(_nested_tuple(value) if isinstance(value, list) else value for value in values)
 
 
 def _read(path: Path) -> list[np.ndarray]:

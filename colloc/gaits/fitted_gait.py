@@ -75,7 +75,7 @@ class FittedGait:
         if not self.samples:
             return "the series as it was given"
         plural = "s" * (self.gait.n_harmonic > 1)
-        rms, largest = (_shown(a, self.degrees, ".1e") for a in (self.rms, self.largest))
+        rms, largest = (_format(a, self.degrees, ".1e") for a in (self.rms, self.largest))
         text = f"{self.taken}; " if self.taken else ""
         if self.centre:
             text += f"all joints move about {self.centre}°, which servos may count from; "
@@ -83,11 +83,11 @@ class FittedGait:
         if self.periods > SEVERAL:
             text += f" of {self.periods:.3g} periods of {self.period:.4g}"
         if self.drift:
-            text += f", a drift of {_shown(self.drift, self.degrees)} a period taken out"
+            text += f", a drift of {_format(self.drift, self.degrees)} a period taken out"
         return f"{text}: off by {rms} r.m.s., {largest} at most"
 
 
-def _shown(angle: float, degrees: bool, digits: str = ".3g") -> str:
+def _format(angle: float, degrees: bool, digits: str = ".3g") -> str:
     return f"{np.degrees(angle):{digits}}°" if degrees else f"{angle:{digits}} rad"
 
 
@@ -309,9 +309,9 @@ class _Samples(NamedTuple):
             joint = int(drift.argmax())
             raise ProblemError(
                 f"{self.name} does not close: after a period joint {joint + 1} is off by "
-                f"{_shown(drift[joint], self.degrees)}, and it moves through "
-                f"{_shown(ranges[joint], self.degrees)}. Give one whole period, or say how long it "
-                f"is (period=, --period)."
+                f"{_format(drift[joint], self.degrees)}, and it moves "
+                f"through {_format(ranges[joint], self.degrees)}. Give one whole period, or say "
+                f"how long it is (period=, --period)."
             )
         off = gait.angles(self.time / fit.period) - self.angles
         return FittedGait(

@@ -83,9 +83,9 @@ def _plain(value: Any) -> Any:
     return fields(value) if dataclasses.is_dataclass(value) else value
 
 
-def _revived(value: Any) -> Any:
+def _revive(value: Any) -> Any:
     if isinstance(value, list) and any(isinstance(part, dict) for part in value):
-        return tuple(map(_revived, value))
+        return tuple(map(_revive, value))
     if isinstance(value, dict) and KIND in value:
         return _from([*LAWS, *PARTS, *CLASSES, *BODIES], value)
     return value
@@ -99,7 +99,7 @@ def _from(kinds: Sequence[type], stated: dict[str, Any]) -> Any:
     kind = next((kind for kind in reversed(kinds) if kind.__name__ == name), None)
     if kind is None:
         raise KeyError(f"{name} is none of {', '.join(kind.__name__ for kind in kinds)}")
-    return kind(**{name: _revived(value) for name, value in values.items()})
+    return kind(**{name: _revive(value) for name, value in values.items()})
 
 
 def gait_from(stated: dict[str, Any]) -> AnyGait:

@@ -122,7 +122,7 @@ class Fourier(GaitFunction):
         """The gait with all angles multiplied by a factor about their mean."""
         return Fourier(self.mean, factor * self.cos, factor * self.sin)
 
-    def resized(self, n_harmonic: int) -> Fourier:
+    def resize(self, n_harmonic: int) -> Fourier:
         """The gait with harmonics added (zero) or cut."""
         keep = min(n_harmonic, self.n_harmonic)
         cos, sin = np.zeros((2, self.n_joint, n_harmonic))
@@ -239,13 +239,13 @@ class Harmonic(LinearClass):
     def parameters(self, gait: Fourier) -> np.ndarray:
         """Parameters of the member nearest to a series, after shifting its start phase if that is
         free."""
-        gait = gait.resized(self.harmonics)
+        gait = gait.resize(self.harmonics)
         if self.symmetry != BILATERAL:
             gait = shift_phase(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
         return self.nearest(gait)
 
     def nearest(self, gait: Fourier) -> np.ndarray:
-        table = gait.resized(self.harmonics).table
+        table = gait.resize(self.harmonics).table
         return np.linalg.lstsq(self._basis(gait.n_joint), table.ravel(), rcond=None)[0]
 
     def in_phase(self, gait: Fourier) -> bool:
@@ -280,7 +280,7 @@ class Harmonic(LinearClass):
         return Fourier(table[:, 0], cos * fall, sin * fall)
 
     def perturb(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Fourier:
-        series = self.through(gait).resized(self.harmonics)
+        series = self.through(gait).resize(self.harmonics)
         steps = step / np.arange(1, self.harmonics + 1) ** fall
         moved = Fourier(
             series.mean + step * rng.normal(size=series.mean.shape),

@@ -123,12 +123,12 @@ class Objective:
         return formula(self.expression, self._names)
 
     @property
-    def _known(self) -> dict[str, Quantity]:
+    def _known_word(self) -> dict[str, Quantity]:
         return INTEGRALS | {each.name: each for each in self.quantities}
 
     @property
     def _names(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys([*QUANTITIES, *self._known]))
+        return tuple(dict.fromkeys([*QUANTITIES, *self._known_word]))
 
     @property
     def _samples(self) -> list[dict[str, float]]:
@@ -143,7 +143,7 @@ class Objective:
     @cached_property
     def integrals(self) -> tuple[Quantity, ...]:
         """Its variables that are integrals of functions of an instant."""
-        return tuple(self._known[name] for name in self.uses if name in self._known)
+        return tuple(self._known_word[name] for name in self.uses if name in self._known_word)
 
     @cached_property
     def degree(self) -> float | None:

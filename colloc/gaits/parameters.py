@@ -83,7 +83,7 @@ def parameters(problem: Problem) -> list[Parameter]:
             new = partial(_change_coefficient, problem.friction, field)
             add(_COEFFICIENTS[field], value, "friction", new)
     for law in dict.fromkeys(foot.friction for foot in feet if foot.friction is not None):
-        which = _counted("foot", [k for k, foot in enumerate(feet) if foot.friction == law])
+        which = _count_from("foot", [k for k, foot in enumerate(feet) if foot.friction == law])
         for field, value in _coefficients(law):
             new = partial(_change_friction_of_feet, feet, law, field)
             add_of_body(f"{_COEFFICIENTS[field]} of {which}", value, "feet", new)
@@ -119,7 +119,7 @@ def _add_links(chain: Chain, mirrored: bool, add: Callable[..., None]) -> None:
             links = sorted({k, count - 1 - k}) if mirrored else [k]
             if len(links) < count:
                 new = partial(_change_shares, shares, links)
-                add(f"{words} of {_counted('link', links)}", shares[k], field, new)
+                add(f"{words} of {_count_from('link', links)}", shares[k], field, new)
 
 
 def _add_feet(
@@ -137,7 +137,7 @@ def _add_feet(
         return tuple(replace(foot, weight=weight) for foot, weight in each)
 
     for group in _feet_alike(feet, n_link, mirrored):
-        which, first = _counted("foot", sorted(group)), min(group)
+        which, first = _count_from("foot", sorted(group)), min(group)
         if any(group.values()):
             new = partial(move, group)
             add(f"place of {which}", feet[first].place, "feet", new, relative=False)
@@ -197,7 +197,7 @@ def _change_shares(shares: Sequence[float], which: Sequence[int], by: float) -> 
     return tuple(share * (1 + by if k in which else factor) for k, share in enumerate(shares))
 
 
-def _counted(what: str, which: Sequence[int]) -> str:
+def _count_from(what: str, which: Sequence[int]) -> str:
     """ "link 2" or "links 1 and 3", counted from 1 at the tail."""
     *others, last = (str(k + 1) for k in which)
     many = {"foot": "feet"}.get(what, f"{what}s")

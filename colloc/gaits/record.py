@@ -153,7 +153,7 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
         mixed = _names(joints, in_degrees)
         angle_unit = f"radians (but {mixed} degrees)" if mixed else "radians"
     plural = "s" * (n_joint > 1)
-    facts = [f"read {n_joint} joint{plural} {how} from {_listed(joints)}, {angle_unit}"]
+    facts = [f"read {n_joint} joint{plural} {how} from {_list_names(joints)}, {angle_unit}"]
     facts += [f"time {unit}{even}", *table.notes, *notes]
     stated = re.search(r"^#\s*period_s:\s*([\d.eE+-]+)\s*$", table.preamble, re.M)
     return Record(
@@ -170,7 +170,7 @@ def _names(columns: list[_Column], which: np.ndarray) -> str:
     return ", ".join(columns[j].name for j in np.flatnonzero(which))
 
 
-def _listed(columns: list[_Column]) -> str:
+def _list_names(columns: list[_Column]) -> str:
     return " ... ".join(dict.fromkeys((columns[0].name, columns[-1].name)))
 
 
@@ -202,7 +202,7 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
     places = [column for column in columns if column.kind == "place"]
     if not angles and places:
         raise ProblemError(
-            f"{path}: its columns {_listed(places)} look like positions of points of the body: "
+            f"{path}: its columns {_list_names(places)} look like positions of points of the body: "
             f"turn them into joint angles first, each the direction of a link less that of the "
             f"link behind it."
         )
@@ -223,8 +223,8 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
     full = [each for each in numbered if len(each) == n_joint]
     if len(full) > 1:
         raise ProblemError(
-            f"{path}: two sets of columns may be the {n_joint} joints, {_listed(full[0])}, and "
-            f"{_listed(full[1])}: leave one of them out."
+            f"{path}: two sets of columns may be the {n_joint} joints, {_list_names(full[0])}, and "
+            f"{_list_names(full[1])}: leave one of them out."
         )
     beyond = next((each for each in numbered if len(each) == n_joint + 1), None)
     if full:
@@ -232,7 +232,7 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
         beyond = full[0] if of_links else None
     if beyond:
         raise ProblemError(
-            f"{path}: {_listed(beyond)} are {len(beyond)} columns of angles, and the body has "
+            f"{path}: {_list_names(beyond)} are {len(beyond)} columns of angles, and the body has "
             f"{n_joint} joints: if they are directions of links, write what each has beyond the "
             f"one behind it; {_CALLED}."
         )

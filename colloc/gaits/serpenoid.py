@@ -147,7 +147,7 @@ class Serpenoid(Harmonic):
         """Parameters of the wave nearest to a series, after shifting its start phase if that is
         free."""
         lag, start = self._lag_and_start(gait)
-        gait = gait.resized(self.harmonics)
+        gait = gait.resize(self.harmonics)
         if abs(start) > SAME_START:
             gait = shift_phase(gait, -start / (2 * np.pi))
         wave = _at_the_middle(gait, lag)
@@ -164,7 +164,7 @@ class Serpenoid(Harmonic):
     def _lag_and_start(self, gait: Fourier) -> tuple[float, float]:
         """Lag of the wave nearest to a gait, and by how much it starts off the phase of members
         [rad]."""
-        lag, gait = getattr(gait, "lag", None), gait.resized(self.harmonics)
+        lag, gait = getattr(gait, "lag", None), gait.resize(self.harmonics)
         if lag is None:
             lag = self._nearest_lag(gait)
         first = _at_the_middle(gait, lag)[0]

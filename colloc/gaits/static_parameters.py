@@ -39,7 +39,7 @@ class WithStaticParameter(ClassOfGaits):
         return self.without.level
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made, (type(self).__bases__[0], self.without, self._own)
+        return _make, (type(self).__bases__[0], self.without, self._own)
 
     def series(self, harmonics: int) -> Any:
         return self.without.series(harmonics)
@@ -82,10 +82,10 @@ class WithStaticParameter(ClassOfGaits):
 
 
 def with_static_parameter(kind: type[WithStaticParameter], gait_class: Any, **own: Any) -> Any:
-    return _made(kind, gait_class, tuple(own.items()))
+    return _make(kind, gait_class, tuple(own.items()))
 
 
-def _made(kind: Any, gait_class: Any, own: tuple[tuple[str, Any], ...]) -> Any:
+def _make(kind: Any, gait_class: Any, own: tuple[tuple[str, Any], ...]) -> Any:
     without: Any = type(gait_class)
     return _type(kind, without, own)(
         **{f.name: getattr(gait_class, f.name) for f in fields(gait_class)}

@@ -109,7 +109,7 @@ def _width_excess(body: Links, end: int, link: int, angles: Array) -> tuple[Arra
     return both, both  # one condition alone is the smaller of two that are the same
 
 
-def _subtended(angle: Array, link: float, middle: float) -> Array:
+def _subtended_angle(angle: Array, link: float, middle: float) -> Array:
     if link == middle:
         return 0.5 * angle
     xp = namespace(angle)
@@ -121,7 +121,7 @@ def crossing_sums(body: Links, angles: Array, i: int) -> tuple[Array, Array]:
     cross."""
     before, middle, after = body.lengths[i : i + 3]
     a, b = angles[i : i + 1, :], angles[i + 1 : i + 2, :]
-    return b + _subtended(a, before, middle), a + _subtended(b, after, middle)
+    return b + _subtended_angle(a, before, middle), a + _subtended_angle(b, after, middle)
 
 
 def crossing_bounds(body: Links, angles: Array) -> Array | None:

@@ -112,7 +112,7 @@ def _solve(
     )
     z = np.stack(np.split(solved.z, count, axis=1))
     found = ((solved.residual <= _ACCEPTED) | solved.converged).reshape(count, -1)
-    repeated = _repeated(np.where(found[:, None], z, np.nan), _speed(moving.rates))
+    repeated = _repeat(np.where(found[:, None], z, np.nan), _speed(moving.rates))
     new = np.flatnonzero(found & ~repeated)
     return z, np.sign(_determinant(tiled, solved, new)).reshape(count, -1)
 
@@ -150,7 +150,7 @@ def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
 def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
     """Solutions without repetitions, in their order, and no longer than needed."""
     z = np.where(sign[:, None] == 0, np.nan, z)
-    again = _repeated(z, speed)
+    again = _repeat(z, speed)
     z, sign = np.where(again[:, None], np.nan, z), np.where(again, 0.0, sign)
     order = np.argsort(sign == 0, axis=0, kind="stable")
     z, sign = np.take_along_axis(z, order[:, None], axis=0), np.take_along_axis(sign, order, axis=0)
@@ -158,7 +158,7 @@ def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
     return Branches(z[:most], sign[:most])
 
 
-def _repeated(z: np.ndarray, speed: np.ndarray) -> np.ndarray:
+def _repeat(z: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Velocities ``(n, 3, n_time)`` that equal one before, ``(n, n_time)``; NaN equals none."""
     return np.stack(
         [(np.abs(z[:i] - z[i]).max(axis=1) < DISTINCT * speed).any(axis=0) for i in range(len(z))]

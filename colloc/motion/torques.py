@@ -139,7 +139,7 @@ def limit_shares(
     """Shares of limits ``(n_share, n_time)`` at (angles, rates, accelerations, states, Froude
     number)."""
     values, _ = _shares(*motion, limits, len(y[3]))
-    return np.asarray(values(_stacked(y), delta).full())
+    return np.asarray(values(_stack(y), delta).full())
 
 
 def limit_share_slopes(
@@ -147,10 +147,10 @@ def limit_share_slopes(
 ) -> np.ndarray:
     """Derivatives of the shares, ``(n_share, 3 n_joint + n_state + 1, n_time)``."""
     _, slopes = _shares(*motion, limits, len(y[3]))
-    rows = _stacked(y)
+    rows = _stack(y)
     return np.asarray(slopes(rows, delta).full()).reshape(-1, *rows.shape)
 
 
-def _stacked(y: tuple) -> np.ndarray:
+def _stack(y: tuple) -> np.ndarray:
     *rows, froude = y
     return np.concatenate([*rows, np.full((1, rows[0].shape[1]), froude)])

@@ -64,7 +64,7 @@ def _derivative(node: ast.expr, name: str) -> ast.expr:
         return ast.Constant(1.0)
     a, b, da = node.left, node.right, _derivative(node.left, name)
     if isinstance(node.op, ast.Pow):
-        n = _evaluate(_compiled(b), {})
+        n = _evaluate(_compile(b), {})
         if n == 0:
             return ast.Constant(0.0)
         return _template("n * a ** m * da", a=a, da=da, n=ast.Constant(n), m=ast.Constant(n - 1.0))
@@ -81,12 +81,12 @@ class Formula:
 
     @cached_property
     def _code(self) -> CodeType:
-        return _compiled(self.tree.body)
+        return _compile(self.tree.body)
 
     @cached_property
     def _derivatives(self) -> dict[str, CodeType]:
         names = self.names - {*FUNCTIONS, "sum"}
-        return {name: _compiled(_derivative(self.tree.body, name)) for name in names}
+        return {name: _compile(_derivative(self.tree.body, name)) for name in names}
 
     def __call__(self, at: Mapping[str, Array]) -> Array:
         return _evaluate(self._code, at)
@@ -96,7 +96,7 @@ class Formula:
         return {name: _evaluate(code, at) for name, code in self._derivatives.items()}
 
 
-def _compiled(node: ast.expr) -> CodeType:
+def _compile(node: ast.expr) -> CodeType:
     return compile(ast.fix_missing_locations(ast.Expression(node)), "<formula>", "eval")
 
 
@@ -136,7 +136,7 @@ def formula(
         for node in ast.walk(tree):
             if not isinstance(node, ast.BinOp) or _has_name(node):
                 continue
-            if not isinstance(_evaluate(_compiled(node), {}), float):
+            if not isinstance(_evaluate(_compile(node), {}), float):
                 raise ArithmeticError  # a root of a negative number
         parsed = Formula(written, names, tree)
         _ = parsed._code  # which says if it is nested too deeply

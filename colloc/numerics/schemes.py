@@ -90,7 +90,7 @@ def _radau_nodes(s: int) -> np.ndarray:
 def scheme(name: str) -> Scheme:
     """The scheme "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N nodes;
     `ProblemError` for any other name."""
-    known = _known(name) if isinstance(name, str) else None
+    known = _known_schemes(name) if isinstance(name, str) else None
     if known is None:
         raise ProblemError(
             f"unknown scheme {name!r}; choose trapezoid, hermite-simpson, gauss-N or radau-N with "
@@ -100,7 +100,7 @@ def scheme(name: str) -> Scheme:
 
 
 @lru_cache
-def _known(name: str) -> Scheme | None:
+def _known_schemes(name: str) -> Scheme | None:
     if name == "trapezoid":
         return Scheme(name, np.array([0.0, 1.0]))
     if name == "hermite-simpson":

@@ -177,7 +177,7 @@ def _table(archive: Archive, command: str) -> Table:
         series = [fourier_series(problem, getattr(o, which)) for o in outcomes]
         longest = max(each.n_harmonic for each in series)
         for part, dims in _SERIES.items():
-            values = [getattr(each.resized(longest), part) for each in series]
+            values = [getattr(each.resize(longest), part) for each in series]
             columns[f"{which}_{part}"] = values, ("start", *dims)
     return Table(
         problem.name,

@@ -97,7 +97,7 @@ class CollocatedMotion:
         period, phase = np.divmod(t, 1.0)
         symmetry, body = self.problem.gait.motion_symmetry, self.problem.body
         solved, second = reduced(symmetry, phase)
-        z, theta, centre, end = self._interpolated(solved)
+        z, theta, centre, end = self._interpolate(solved)
         angles, rates = self.gait(phase)
         if symmetry == BILATERAL and isinstance(body, Chain):
             # seen from the head the body repeats itself with reversed rates
@@ -120,7 +120,7 @@ class CollocatedMotion:
             t, angles, rates, z, theta, centre, centre - rotate(body.centre(angles), theta)
         )
 
-    def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def _interpolate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """z, theta and centre of mass at phases of the solved part, and its displacement."""
         mesh, z_points = self.mesh, self._points[2]
         k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)

@@ -46,7 +46,7 @@ def reversed_in_time(gait: Fourier) -> Fourier:
     return Fourier(gait.mean, gait.cos, -gait.sin)
 
 
-def swapped(gait: Fourier, body: Body) -> Fourier:
+def swap_ends(gait: Fourier, body: Body) -> Fourier:
     """Gait with tail and head exchanged: -q_(n+1-j)(t) for chains."""
     return Fourier(*(body.reversal @ rows for rows in (gait.mean, gait.cos, gait.sin)))
 
@@ -59,7 +59,7 @@ def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
             continue
         image = gait.mirrored if mirror else gait
         image = reversed_in_time(image) if reversal else image
-        result.append(swapped(image, body) if swap else image)
+        result.append(swap_ends(image, body) if swap else image)
     return result
 
 
@@ -67,7 +67,7 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
     """Root-mean-square distance [rad] of two closed paths of joint angles, at the best relative
     start phase."""
     n = max(a.n_harmonic, b.n_harmonic)
-    a, b = a.resized(n), b.resized(n)
+    a, b = a.resize(n), b.resize(n)
     k = np.arange(1, n + 1)
     # sum over joints of conj(a_k) b_k: shifting b by phase x multiplies it by exp(i k x)
     overlap = np.sum((a.cos + 1j * a.sin) * (b.cos - 1j * b.sin), axis=0)

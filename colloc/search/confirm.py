@@ -126,7 +126,7 @@ def _solve_within(
             return program, result, ""
         program, x = program.moved_to(result.x)
         again = Solver(program, CONFIRMING).solve_within(x, delta, None, radius)
-        result = again.accumulated(result)
+        result = again.accumulate(result)
     if result.optimal:
         ended = f"IPOPT, begun there, moved the gait beyond its limits {rounds} times"
         return program, result, ended

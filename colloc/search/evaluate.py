@@ -104,7 +104,7 @@ def evaluate(
         _check_centre(problem, fitted, gait)
     # refuses one that does not say a pace which the problem leaves open
     problem.regime.at(fitted.gait)
-    solution = _evaluated(problem, fitted)
+    solution = _evaluate_fit(problem, fitted)
     solution.seconds = time.monotonic() - begin
     return solution
 
@@ -121,7 +121,7 @@ def _check_centre(problem: Problem, fitted: FittedGait, given: Given) -> None:
         )
 
 
-def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
+def _evaluate_fit(problem: Problem, fitted: FittedGait) -> Solution:
     gait_class: AnyClass = Harmonic(fitted.gait.n_harmonic)
     gait: AnyGait = fitted.gait
     if isinstance(problem.gait, Coupled):
@@ -179,7 +179,7 @@ def _answer(problem: Problem, gait: AnyGait) -> Answer:
     begin, parameters = time.perf_counter(), problem.gait.parameters(gait)
     control = control_problem(problem)
     member, mesh, message = control.admissible.member(parameters), control.mesh(), ""
-    first, answer = mesh, _measured(control, mesh, parameters)
+    first, answer = mesh, _answer_on_mesh(control, mesh, parameters)
     meshes = OPTIONS.meshes if problem.mesh_tolerance > 0 and not goes_nowhere(answer) else 0
     for _ in range(meshes):
         plan = plan_mesh(control, mesh, member, problem.delta, problem.mesh_tolerance)
@@ -188,12 +188,12 @@ def _answer(problem: Problem, gait: AnyGait) -> Answer:
         mesh = Mesh(scheme(plan.scheme), plan.edges)
         message = "" if plan.reached else f"the mesh is accurate to {plan.estimate:.0e} only."
     if mesh is not first:
-        answer = _measured(control, mesh, parameters)
+        answer = _answer_on_mesh(control, mesh, parameters)
     answer = replace(answer, message=message, seconds=time.perf_counter() - begin)
     return replace(answer, history=(answer.step,))
 
 
-def _measured(control: ControlProblem, mesh: Mesh, parameters: np.ndarray) -> Answer:
+def _answer_on_mesh(control: ControlProblem, mesh: Mesh, parameters: np.ndarray) -> Answer:
     space = OneGait(control, mesh.edges, mesh.scheme.name, full=parameters)
     iterate = evaluate_at(space, np.empty(0), control.problem.delta)
     return replace(answer_of_iterate(iterate), status=EVALUATED, program=EVALUATED)
@@ -232,7 +232,7 @@ def _errors_of_samples(
             period["work"],
         ]
 
-    v = gait.resized(highest).table.ravel()
+    v = gait.resize(highest).table.ravel()
     known, period, slopes = values(v), motion.values(v, delta), motion.gradients(v, delta)
     by_aim = [
         aim.gradient(period, slopes) + np.zeros_like(v) for aim in (aims.objective, EFFICIENCY)
@@ -247,7 +247,7 @@ def _errors_of_samples(
     noise = samples.factor * (noise + np.abs(bent).max(axis=0))
     lack, missed = np.zeros(4), ""
     if richer is not None:
-        lack = np.abs(values(richer.resized(highest).table.ravel()) - known)
+        lack = np.abs(values(richer.resize(highest).table.ravel()) - known)
         missed = (
             f", and lack of fit: {richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
         )

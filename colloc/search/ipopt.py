@@ -66,7 +66,7 @@ class NlpResult:
     excess: np.ndarray
     """Violation of each constraint, ``(m,)``."""
 
-    def accumulated(self, earlier: NlpResult) -> NlpResult:
+    def accumulate(self, earlier: NlpResult) -> NlpResult:
         """This result with the iterations and seconds of an earlier solve added."""
         return replace(
             self,
@@ -101,7 +101,7 @@ class Solver:
         # held here: CasADi does not keep it alive
         self._stop = StopRequest(self._nlp.expressions)
         self._settings = settings | {**self._nlp.functions, "iteration_callback": self._stop}
-        self._values_and_slopes = keep_last(self._evaluated)
+        self._values_and_slopes = keep_last(self._evaluate)
 
     @cached_property
     def _solver(self) -> ca.Function:
@@ -125,7 +125,7 @@ class Solver:
             np.minimum(upper[own], x[own] + radius),
         )
         limits = {"lbx": lower, "ubx": upper, "lbg": t.row_lower, "ubg": t.row_upper}
-        lam_x, lam_g = multipliers or self._completed(
+        lam_x, lam_g = multipliers or self._complete(
             x, delta, np.zeros_like(x), np.zeros_like(t.row_lower)
         )
         duals = {"lam_x0": lam_x, "lam_g0": lam_g}
@@ -135,9 +135,9 @@ class Solver:
         seconds = time.perf_counter() - start
         stats = self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
-        return self._measured(x, lam_x, lam_g, delta, (lower, upper), stats, seconds)
+        return self._result(x, lam_x, lam_g, delta, (lower, upper), stats, seconds)
 
-    def _evaluated(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
+    def _evaluate(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
         """Objective, gradient ``(n,)``, rows ``(m,)`` and Jacobian ``(m, n)`` at ``(x, delta)``."""
         x, delta = at[:-1], at[-1] / self.program.delta_unit
         f, gradient = self._nlp.functions["grad_f"](x, delta)
@@ -149,12 +149,12 @@ class Solver:
     ) -> NlpResult:
         """First-order conditions at x ``(n,)``, from multipliers of bounds and inequalities; those
         of the equations are the ones closest to stationarity."""
-        multipliers = self._completed(x, delta, lam_x, lam_g)
+        multipliers = self._complete(x, delta, lam_x, lam_g)
         bounds = self.program.lower, self.program.upper
         nothing = {"return_status": "measured", "iter_count": 0}
-        return self._measured(x, *multipliers, delta, bounds, nothing, 0.0)
+        return self._result(x, *multipliers, delta, bounds, nothing, 0.0)
 
-    def _completed(
+    def _complete(
         self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's
@@ -176,7 +176,7 @@ class Solver:
         jacobian = self._values_and_slopes(np.append(x, delta))[3]
         return jacobian[equality][:, t.lower < t.upper], equality
 
-    def _measured(
+    def _result(
         self,
         x: np.ndarray,
         lam_x: np.ndarray,
@@ -227,7 +227,7 @@ def solve_in_regions(
     p = program.layout.parameters[:, 0]
     for _ in range(_REGIONS):
         last = Solver(program, options).solve_within(x, delta, None, radius)
-        result = last if result is None else last.accumulated(result)
+        result = last if result is None else last.accumulate(result)
         if not result.optimal or np.abs(result.x[p] - x[p]).max() < _INSIDE * radius:
             return program, result
         program, x = program.moved_to(result.x)

@@ -13,7 +13,7 @@ from colloc.mechanics.law import Law
 from colloc.motion.collocated import CollocatedPose
 from colloc.numerics.mesh import uniform_mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.distinct_optima import phase_distance, reversed_in_time, swapped
+from colloc.results.distinct_optima import phase_distance, reversed_in_time, swap_ends
 from colloc.smooth.smooth_body import SmoothBody
 
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
@@ -92,7 +92,7 @@ def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     """Classify a gait of a body with at least two joints or modes."""
     amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
     close = _SAME * max(amplitude, 1e-12)
-    image = reversed_in_time(swapped(gait, body)) if body.reversal is not None else None
+    image = reversed_in_time(swap_ends(gait, body)) if body.reversal is not None else None
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
     retraced = phase_distance(gait, reversed_in_time(gait)) < close
     return GaitClass(

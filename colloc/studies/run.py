@@ -234,11 +234,11 @@ class _Wavefront:
     def finish(self, chunk: Any) -> None:
         """Release the chunks after one of which all others before them are finished, too."""
         self._finished.add(chunk)
-        for following in self._shifted(chunk, 1):
-            if self._finished.issuperset(self._shifted(following, -1)):
+        for following in self._shift(chunk, 1):
+            if self._finished.issuperset(self._shift(following, -1)):
                 self._released.append(following)
 
-    def _shifted(self, chunk: Index, by: int) -> Iterator[Index]:
+    def _shift(self, chunk: Index, by: int) -> Iterator[Index]:
         for a, goes in enumerate(self._travels):
             if goes and 0 <= (i := chunk[a] + by) < self._counts[a]:
                 yield (*chunk[:a], i, *chunk[a + 1 :])

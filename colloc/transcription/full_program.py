@@ -340,7 +340,7 @@ class _Links(_Motion):
         """Local variables, ``(n_local, n_part * n_point)``, part by part."""
         return np.stack([row[parts].ravel() for row in rows])
 
-    def _given(self, **columns: np.ndarray) -> tuple[list[Any], ca.SX, np.ndarray]:
+    def _part_numbers(self, **columns: np.ndarray) -> tuple[list[Any], ca.SX, np.ndarray]:
         shared, symbols, values = [], [], []
         for name, column in columns.items():
             column = np.ravel(column)
@@ -356,7 +356,7 @@ class _Links(_Motion):
     def _halves(self, inertial: bool) -> np.ndarray:
         """l/2 w sin phi, l/2 w cos phi; with inertia l/2 cos phi, l/2 sin phi, too."""
         local = ca.SX.sym("link", 2)
-        (length,), given, values = self._given(length=self.chain.length_column())
+        (length,), given, values = self._part_numbers(length=self.chain.length_column())
         phi, w = ca.vertsplit(local)
         half = 0.5 * length * ca.vertcat(ca.sin(phi), ca.cos(phi))
         out = ca.vertcat(half * w, half[[1, 0]]) if inertial else half * w
@@ -367,7 +367,7 @@ class _Links(_Motion):
         """Force in the plane, moment and power of parts under one law."""
         layout, contact = self.layout, self.chain.contact
         law, rows, links = group.law, group.rows, np.array(contact.links)[group.rows]
-        (along, offset, cos, sin, length, pressure), given, values = self._given(
+        (along, offset, cos, sin, length, pressure), given, values = self._part_numbers(
             along=contact.along[rows],
             offset=contact.offset[rows],
             cos=contact.cos[rows],
@@ -416,7 +416,7 @@ class _Links(_Motion):
         pull = self.dynamics.regime.pull(local[0])
         if pull is None:
             return None
-        (mass,), given, values = self._given(mass=self.chain.mass_column())
+        (mass,), given, values = self._part_numbers(mass=self.chain.mass_column())
         c, s = ca.cos(local[0]), ca.sin(local[0])
         force = mass * ca.vertcat(c * pull[0] - s * pull[1], s * pull[0] + c * pull[1])
         tail = np.repeat(layout.directions[:1], self.chain.n_link, axis=0)
@@ -428,7 +428,7 @@ class _Links(_Motion):
         """l/2 e x N of the forces at joints on one of their links."""
         layout, local = self.layout, ca.SX.sym("joint", 3)
         lengths = self.chain.length_column()[link]
-        (length,), given, values = self._given(length=lengths)
+        (length,), given, values = self._part_numbers(length=lengths)
         phi, nx, ny = ca.vertsplit(local)
         gather = np.concatenate(
             [
@@ -442,7 +442,7 @@ class _Links(_Motion):
     def _swing(self) -> np.ndarray:
         """J w + m x cross v of every link."""
         layout, local = self.layout, ca.SX.sym("link", 5)
-        (mass, inertia), given, values = self._given(
+        (mass, inertia), given, values = self._part_numbers(
             mass=self.chain.mass_column(),
             inertia=self.chain.inertia_column(),
         )

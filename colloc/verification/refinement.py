@@ -117,7 +117,7 @@ def plan_mesh(
     if kind_of_motion(control.dynamics).followed:
         uniform = np.linspace(0.0, gaits.fraction, control.intervals + 1)
         first = np.union1d(mesh.edges if nested else uniform, knots)
-        return _fewest(_halved(known, rule, first, budget=most_points, **asked) for rule in rules)
+        return _fewest(_halve(known, rule, first, budget=most_points, **asked) for rule in rules)
     kinks = kink_knots(control, gait, delta, fine)
     # where the rates jump edges may be added, not moved
     keeps = nested or gaits.relative_delta or not gaits.free
@@ -216,7 +216,7 @@ def _split(
     return MeshPlan(rule.name, edges, estimate, estimate <= tolerance, kept)
 
 
-def _halved(
+def _halve(
     known: Known,
     rule: Scheme,
     edges: np.ndarray,

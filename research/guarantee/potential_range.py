@@ -77,7 +77,7 @@ class PotentialRange:
             self.spline.intervals,
             np.vectorize(Fraction, otypes=[object]),
         )
-        tables, knots = {}, exact(self.spline.extended)
+        tables, knots = {}, exact(self.spline.extend)
         for k, c in self.c.items():
             parts = exact(np.stack([c.real, c.imag], axis=-1)).reshape(n, n, 2)
             for order in _ORDERS:
@@ -115,7 +115,7 @@ class PotentialRange:
             "colloc_harmonic",
             m,
             spline.per_joint,
-            spline.extended,
+            spline.extend,
             coefficients,
             k,
             *rows,

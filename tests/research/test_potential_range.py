@@ -63,7 +63,7 @@ def test_what_is_stated_of_a_harmonic_and_of_its_gain_holds_what_they_are_in_fra
     potential, cells
 ):
     points, z = cells.points[:, ::5], motions_at(cells.points[:, ::5]).velocity
-    knots = [Fraction(x) for x in potential.spline.extended]
+    knots = [Fraction(x) for x in potential.spline.extend]
     for k, c in potential.c.items():
         table = c.reshape(potential.spline.per_joint, -1)
         stated = potential._harmonic(k, points, z)

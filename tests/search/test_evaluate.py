@@ -230,7 +230,7 @@ def test_19_of_20_records_are_within_what_a_series_says_its_coefficients_are_off
     for _ in range(300):
         noise = 0.02 * rng.normal(size=true.shape)
         fitted = fitted_gait(true + noise, 2, period=samples, harmonics=2)
-        off = fitted.gait.table - GAIT.resized(2).table
+        off = fitted.gait.table - GAIT.resize(2).table
         stated, few = fitted.uncertainty, fitted.gait.n_harmonic * 2 + 1
         deviation = np.linalg.norm(stated.directions[:, :, :few], axis=0)
         inside.append(np.abs(off) <= stated.factor * deviation)

@@ -10,7 +10,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain_motion import motion_and_derivatives
 from colloc.mechanics.friction import Friction
 from colloc.reduced.linear_space import LinearSpace
-from colloc.results.distinct_optima import distance, reversed_in_time, swapped
+from colloc.results.distinct_optima import distance, reversed_in_time, swap_ends
 from colloc.results.store import load, save
 from colloc.search.solve import solve
 from colloc.search.spaces import program_of
@@ -150,7 +150,7 @@ def test_a_gait_seen_from_the_other_end_backwards_in_time_is_the_same_gait(basis
         np.arange(40) / 40,
     )
     gait = wave(body, 0.8)
-    image = reversed_in_time(swapped(gait, body))
+    image = reversed_in_time(swap_ends(gait, body))
     powers = []
     for g in (gait, image):
         q, rates = g.angles(t), g.rates(t)

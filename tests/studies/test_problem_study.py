@@ -21,7 +21,7 @@ from colloc.commands.families import sweep_summary
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.linear import Combination
-from colloc.results.distinct_optima import reversed_in_time, swapped
+from colloc.results.distinct_optima import reversed_in_time, swap_ends
 from colloc.results.outcome import CRASHED, PASSED_OVER, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
@@ -467,7 +467,7 @@ def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_en
     found = gait_class(gait, body, friction)
     assert found.symmetry == symmetry
     assert not found.retraced
-    for other in (reversed_in_time(gait), swapped(gait, body)):
+    for other in (reversed_in_time(gait), swap_ends(gait, body)):
         image = gait_class(other, body, friction)
         assert (image.kind, image.symmetry, image.winding) == (found.kind, symmetry, -found.winding)
         assert (image.wave, image.forward) == pytest.approx((-found.wave, -found.forward), abs=1e-4)
