@@ -355,6 +355,25 @@ def test_what_a_problem_file_raises_is_told_even_if_it_cannot_say_itself(tmp_pat
         colloc.load_problem(tmp_path / "y.py")
 
 
+@pytest.mark.parametrize("first", ["", "from __future__ import annotations\n"])
+def test_a_problem_file_may_define_dataclasses(first, tmp_path):
+    """As classes of gaits and laws of one's own are; they look for the module they stand in."""
+    text = """from dataclasses import dataclass
+from colloc import Harmonic, Problem
+@dataclass(frozen=True)
+class Size:
+    links: int = 3
+PROBLEM = Problem("sized", gait=Harmonic(1, "bilateral"))
+"""
+    (tmp_path / "sized.py").write_text(first + text, encoding="utf-8")
+    assert colloc.load_problem(tmp_path / "sized.py").name == "sized"
+
+
+def test_a_wheel_with_another_law_is_told_to_be_a_foot():
+    with pytest.raises(colloc.ProblemError, match="take Foot"):
+        colloc.Wheel(0, friction=colloc.Friction())
+
+
 def test_a_problem_file_with_a_byte_order_mark_is_read(tmp_path):
     text = "from colloc import *\nPROBLEM = Problem('x')\n"
     (tmp_path / "x.py").write_bytes(b"\xef\xbb\xbf" + text.encode())

@@ -8,6 +8,7 @@ import os
 import pprint
 import sys
 import traceback
+import types
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -140,10 +141,13 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
         raise ProblemError(
             f"{path} is no text in UTF-8 (byte {error.start}), so no {kind} file."
         ) from None
-    names: dict[str, object] = {"__name__": f"colloc_{kind}", "__file__": str(path)}
+    module = types.ModuleType(f"colloc_{kind}")
+    module.__file__ = str(path)
+    names = vars(module)
     try:
+        sys.modules[module.__name__] = module  # where dataclasses of the file look for their names
         with contextlib.redirect_stdout(sys.stderr):  # standard output is for results
-            exec(compile(source, str(path), "exec"), names)
+            exec(compile(source, str(path), "exec", dont_inherit=True), names)
     except SyntaxError as error:
         where = "" if error.lineno is None else f", line {error.lineno}"
         raise ProblemError(f"{path}{where}: {error.msg}.") from None

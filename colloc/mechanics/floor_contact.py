@@ -191,6 +191,11 @@ def Wheel(
             raise ProblemError(
                 f"the coefficient {name} of a wheel must be positive and finite, not {value!r}."
             )
+    if "friction" in foot:
+        raise ProblemError(
+            "the friction of a wheel is stated by rolling and sideways; for another law of its own "
+            "take Foot(link, place, friction=...)."
+        )
     friction = Friction(mu_t=sideways, mu_f=rolling, mu_b=rolling)
     return Foot(link, place, friction=friction, angle=angle, **foot)
 

@@ -3,22 +3,27 @@ r"""The full nonlinear program of a problem, by direct collocation: what IPOPT i
 Decision variables are the gait's parameters p; at every point of the mesh and link of a chain its
 direction phi, rotation rate w, midpoint velocity v, the friction f and couple c on it, and the
 force N and moment M at the joint behind it; the tail's orientation theta; distance D and work W.
-Components of v, f and N are those in the axes of the plane, rates are per radian of phase. With
-link i of length l_i, e_i = (cos phi_i, sin phi_i), and the class of gaits q = Phi(t) p::
+Components of v, f and N are those in the axes of the plane; rates, with a prime, are per radian of
+phase; delta is the sliding speed below which friction is smoothed. With link i of length l_i and
+mass m_i, e_i = (cos phi_i, sin phi_i), n_i = (-sin phi_i, cos phi_i), and joint angles q = Phi(t) p
++ rest::
 
+    max  objective(D, W, ...)
     phi_0 = theta,   phi_i - phi_(i-1) = Phi_i p,   w_i - w_(i-1) = Phi_i' p       the gait
-    v_i - v_(i-1) = l_(i-1)/2 w_(i-1) e'_(i-1) + l_i/2 w_i e'_i                   links are joined
+    v_i - v_(i-1) = l_(i-1)/2 w_(i-1) n_(i-1) + l_i/2 w_i n_i                     links are joined
     f_i, c_i = friction(v_i, w_i, phi_i; delta)                                   on what touches
     N_i - N_(i+1) + f_i + m_i g = 0                                               force balance
     M_i - M_(i+1) + c_i - l_i/2 e_i x (N_i + N_(i+1)) = 0                         torque balance
     theta' = w_0,   D' = sum m_i v_i . ahead,   W' = - sum (f_i . v_i + c_i w_i)  collocated
+    N = 0, M = 0 at both free ends;   D(0) = W(0) = 0;   theta(end) = +-theta(0)  boundary
 
-theta, and distances of gaits that turn, are seen from axes that turn evenly. The first orientation
-is free on level ground, so maximising D turns the motion ahead. A load g is that of a slope. With
-inertia the momenta m of the body take the place of N and M::
+Friction is stated as (f - friction)/(its secant), which is mild where the law is nearly a step.
+theta, and distances of gaits that turn, are seen from axes that turn evenly. *Ahead* is +x on level
+ground, where the first orientation is free, so that maximising D turns the motion there. A load g
+is that of a slope. With inertia the momenta P of the body take the place of N and M::
 
-    m = (sum m_i v_i in the tail's axes, sum J_i w_i + m_i x_i x v_i)
-    m' = (sum f_i + m_i g, sum c_i + x_i x f_i) / Fr + turning of the axes        collocated
+    P = (sum m_i v_i in the tail's axes, sum J_i w_i + m_i x_i x v_i)
+    P' = (sum f_i + m_i g, sum c_i + x_i x f_i) / Fr + turning of the axes        collocated
 
 with x_i the midpoints seen from the centre of mass; where torques are limited they follow from
 q'', variables too, and the momenta (`colloc.motion.torques`). Other bodies, and the formulation
@@ -27,8 +32,9 @@ Z(q, r), the velocity that balances them, in place of friction and balance
 (`colloc.transcription.velocity_map`).
 
 Inequalities are the limits of the shape, each at the worst instant of the mesh cells in which it
-may bind for a given gait; what actuators can do, at every point; and the mean shape speed. All
-rows are linear in the variables and in small functions of one link, one contact, one check.
+may bind for a given gait; what actuators can do, at every point; and the mean shape speed. Every
+row is a sparse matrix times (variables, outputs of functions of one link, contact or check that
+are repeated over parts and points: `colloc.numerics.repeated`).
 """
 
 from __future__ import annotations
