@@ -396,7 +396,7 @@ class Inertial(_WithStates):
         self._slow = slow
         self._regime = regime
         self._image = image
-        self._chain = checked_mass(slow.body)
+        self.chain = checked_mass(slow.body)
         self._timed = ("period",) if regime.free_pace else ()
         self.states = STATES + slow.states
         self.static_parameters = ("log_period",) * regime.free_pace + slow.static_parameters
@@ -435,7 +435,7 @@ class Inertial(_WithStates):
         return Trajectory(begin, states, z, now, np.full(mesh.n_point, held), edges=edges)
 
     def _slow_states(self, mesh: Mesh, shapes: Shapes, begin: np.ndarray) -> np.ndarray:
-        body, slow = self._chain, self._slow.along(mesh, shapes, begin[len(self._timed) :])
+        body, slow = self.chain, self._slow.along(mesh, shapes, begin[len(self._timed) :])
         posture = body.posture(shapes.angles)
         return np.concatenate(
             [momenta(body, posture, body.velocity(posture, shapes.rates, slow.z)), slow.states]
@@ -458,10 +458,10 @@ class Inertial(_WithStates):
         self, mesh: Mesh, shapes: Shapes, near: np.ndarray, begin: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
         out, first = near, np.append(near[: len(STATES), 0], begin[len(self._timed) :])
-        froude, equations = self._froude_at(shapes, begin), self._equations(mesh, shapes.unit)
-        library = None if self._slow.states else native_kernel(self._chain, self.friction)
+        froude, equations = self.froude_at(shapes, begin), self._equations(mesh, shapes.unit)
+        library = None if self._slow.states else native_kernel(self.chain, self.friction)
         if library is not None:
-            moving = Moving(self._chain, self.friction, *shapes[:3], None)
+            moving = Moving(self.chain, self.friction, *shapes[:3], None)
             begun = np.column_stack([near, first])
             return kernel_repeating(library, moving, begun, froude, equations.scheme)
 
@@ -478,14 +478,14 @@ class Inertial(_WithStates):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Outputs and final states of every interval from initial states ``(n_state, n)``, sought
         near states at the points; and whether they exist, ``(n,)``."""
-        equations, froude = self._equations(mesh, shapes.unit), self._froude_at(shapes, along.begin)
+        equations, froude = self._equations(mesh, shapes.unit), self.froude_at(shapes, along.begin)
         states, ends, found = equations.alone(
             lambda states: self._rates(shapes, states, froude)[1], begins, near
         )
         return self._rates(shapes, states, froude)[0], ends, found
 
     def _rates(self, shapes: Shapes, states: np.ndarray, froude: float) -> tuple[np.ndarray, Rates]:
-        at = self._chain, self.friction, shapes[:3], states[: len(STATES)], froude
+        at = self.chain, self.friction, shapes[:3], states[: len(STATES)], froude
         out, slopes = self._with_pull(*momenta_along_states(*at), states, froude)
         return out, Rates(out[self._grow], slopes[self._grow], bool(np.isfinite(out).all()))
 
@@ -507,24 +507,16 @@ class Inertial(_WithStates):
             mesh, np.array([name in STATES for name in self.states]), self._image, unit
         )
 
-    def torque_arguments(
-        self, shapes: Shapes, accelerations: np.ndarray, states: np.ndarray, begin: np.ndarray
-    ) -> tuple[Any, ...]:
-        """Body, law and regime, with what joint torques depend on
-        (`colloc.motion.torques.limit_shares`)."""
-        y = (shapes.angles, shapes.rates, accelerations, states, self._froude_at(shapes, begin))
-        return (self._chain, self.friction, self._regime), y
-
-    def _froude_at(self, shapes: Shapes, begin: np.ndarray) -> float:
+    def froude_at(self, shapes: Shapes, begin: np.ndarray) -> float:
         froude = float(np.exp(-2.0 * begin[0])) if self._timed else self._regime.froude
         return froude * shapes.unit**2
 
     def slopes(self, shapes: Shapes, along: Trajectory) -> tuple[np.ndarray, np.ndarray]:
         """A free pace has a column after the momenta: a longer period changes them by more."""
-        froude = self._froude_at(shapes, along.begin)
+        froude = self.froude_at(shapes, along.begin)
         momenta = along.states[: len(STATES)]
-        k = 2 * self._chain.n_joint
-        now = momenta_at(self._chain, self.friction, shapes[:3], momenta, froude)
+        k = 2 * self.chain.n_joint
+        now = momenta_at(self.chain, self.friction, shapes[:3], momenta, froude)
         out, slopes = self._with_pull(*now, along.states, froude)
         on_pace = np.zeros((len(out), len(self._timed), out.shape[1]))
         on_pace[_MORE] = 2.0 * (out[_MORE] - turning(along.z, momenta))[:, None]

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from colloc.mechanics.densities import Instants, PathLimits, Quantity
+from colloc.mechanics.inertia import STATES
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
 from colloc.motion.kinds import (
     OMEGA,
@@ -148,8 +149,8 @@ class ReducedMotion:
         """Shares of actuator limits ``(n_share, n_time)`` at the points of the mesh, or at times of
         it."""
         if limits.needs_forces and isinstance(self.kind, Inertial):
-            of, y = self._torque_arguments(self.kind, v, delta, t)
-            return limit_shares(of, limits, y, delta)
+            y = self._torque_arguments(self.kind, v, delta, t)
+            return limit_shares(self.kind.chain, self.friction, limits, y, delta)
         if t is None:
             return np.asarray(limits.at(self.instants(v, delta)))
         angles, rates = self._space.at_times(v, t)
@@ -174,49 +175,50 @@ class ReducedMotion:
 
     def _torque_arguments(
         self, kind: Inertial, v: np.ndarray, delta: float, t: np.ndarray | None = None
-    ) -> tuple[Any, ...]:
-        s = self.at(v, delta)
-        if t is None:
-            shapes = Moving(s.angles, s.rates, delta)
-            states = s.along.states
-            times = self.mesh.times
-        else:
+    ) -> np.ndarray:
+        """(angles, rates, accelerations, momenta, Froude number) that joint torques depend on."""
+        s, mesh = self.at(v, delta), self.mesh
+        times, angles, rates, momenta = mesh.times, s.angles, s.rates, s.along.states
+        if t is not None:
             times, (angles, rates) = t, self._space.at_times(v, t)
-            shapes = Moving(angles, rates, delta)
-            k = np.clip(np.searchsorted(self.mesh.edges, t, side="right") - 1, 0, self.mesh.n - 1)
-            tau = (t - self.mesh.edges[k]) / self.mesh.h[k]
-            momenta = s.along.states[: len(s.along.edges), self.mesh.points]
-            nodes = np.concatenate([s.along.edges[:, :-1, None], momenta], axis=2)
-            states = np.einsum("nj,anj->an", self.mesh.scheme.with_begin(tau), nodes[:, k])
-            if "theta" in kind.states:
-                states = np.vstack([states, self.theta(v, delta, t)])
-        return kind.torque_arguments(
-            shapes, self._space.accelerations(v, times), states, s.passed.static_parameters
+            k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
+            weights = mesh.scheme.with_begin((t - mesh.edges[k]) / mesh.h[k])
+            at_stages = s.along.states[: len(STATES), mesh.points]
+            nodes = np.concatenate([s.along.edges[:, :-1, None], at_stages], axis=2)
+            momenta = np.einsum("nj,anj->an", weights, nodes[:, k])
+        froude = kind.froude_at(Moving(angles, rates, delta), s.passed.static_parameters)
+        accelerations = self._space.accelerations(v, times)
+        rows = (
+            angles,
+            rates,
+            accelerations,
+            momenta[: len(STATES)],
+            np.full((1, times.size), froude),
         )
+        return np.concatenate(rows)
 
     def _torque_share_slopes(
-        self,
-        kind: Inertial,
-        limits: PathLimits,
-        v: np.ndarray,
-        delta: float,
-        rows: np.ndarray,
+        self, kind: Inertial, limits: PathLimits, v: np.ndarray, delta: float, rows: np.ndarray
     ) -> np.ndarray:
-        of, y = self._torque_arguments(kind, v, delta)
-        share, point = rows
-        slopes = limit_share_slopes(of, limits, (*(row[:, point] for row in y[:-1]), y[-1]), delta)
-        s, n, k, each = self.at(v, delta), len(y[0]), len(kind.states), np.arange(share.size)
-        at_points = np.zeros((share.size, slopes.shape[1], self.mesh.n_point))
+        y, (share, point) = self._torque_arguments(kind, v, delta), rows
+        s, n, n_row = self.at(v, delta), len(self.at(v, delta).angles), share.size
+        slopes = limit_share_slopes(kind.chain, self.friction, limits, y[:, point], delta)
+        at_points = np.zeros((n_row, len(y), self.mesh.n_point))
+        each = np.arange(n_row)
         at_points[each, :, point] = slopes[share, :, each]
-        on_points = np.zeros((share.size, 2 * n + 1, self.mesh.n_point))
-        on_points[:, : 2 * n] = at_points[:, : 2 * n]
-        on_pace = np.zeros((share.size, self.mesh.n_point))
-        by_states, of_period = at_points[:, 3 * n : 3 * n + k], [TotalGradient()] * share.size
-        if "log_period" in kind.static_parameters:
-            on_froude = at_points[:, -1].sum(axis=1)
-            of_period = [TotalGradient(static=-2.0 * y[-1] * each) for each in on_froude]
-        through = self._through(s, of_period, on_points, on_pace, by_states)
-        return through + self._space.accelerations_vjp(v, at_points[:, 2 * n : 3 * n])
+        on_shape, on_accelerations, on_states, on_froude = np.split(
+            at_points, [2 * n, 3 * n, 3 * n + len(STATES)], axis=1
+        )
+        no_pace = np.zeros((n_row, self.mesh.n_point))
+        on_points = np.concatenate([on_shape, no_pace[:, None]], axis=1)
+        by_states = np.zeros((n_row, len(kind.states), self.mesh.n_point))
+        by_states[:, : len(STATES)] = on_states
+        totals = [TotalGradient()] * n_row
+        if "log_period" in kind.static_parameters:  # Fr = exp(-2 log_period)
+            on_log_period = (-2.0 * y[-1] * on_froude[:, 0]).sum(axis=1)
+            totals = [TotalGradient(static=value) for value in on_log_period]
+        through = self._through(s, totals, on_points, no_pace, by_states)
+        return through + self._space.accelerations_vjp(v, on_accelerations)
 
     def instants(self, v: np.ndarray, delta: float) -> Instants:
         s = self.at(v, delta)

@@ -50,10 +50,11 @@ class OneGait:
         return *self._gait(self.mesh.times), np.ones(self.mesh.n_point)
 
     def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
-        raise NotImplementedError  # prescribed motions have no limits of actuators
+        n_joint = self.control.admissible.n_joint
+        return (self.control.admissible.gait.angle_matrix(t, n_joint, 2) @ self._full).T
 
     def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
-        raise NotImplementedError
+        return np.empty((len(on_points), 0))
 
     def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         return np.empty((len(on_shape), 0))

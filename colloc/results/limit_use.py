@@ -66,13 +66,14 @@ def lines(solution: Solution) -> list[str]:
 
 
 def _beyond_any_gait(problem: Problem) -> Iterator[str]:
-    """Limits that cannot bind: torques by statics, speeds of a Fourier series by Bernstein's
-    inequality, powers by both."""
+    """Limits that cannot bind: torques by statics where no link is accelerated, speeds of a Fourier
+    series by Bernstein's inequality, powers by both."""
     if problem.joint_map is not None:  # motors share what their joints need
         return
     n, gait = problem.body.n_joint, problem.gait
     torque, speed = np.full(n, np.inf), np.full(n, np.inf)
-    if isinstance(problem.body, Chain) and rate_independent(problem.law):
+    quasi_static = not problem.froude
+    if quasi_static and isinstance(problem.body, Chain) and rate_independent(problem.law):
         torque = largest_moments(problem.body, problem.friction, problem.grade)
     if isinstance(gait.level, Harmonic) and problem.body.bounded_angles.rows.shape == (n, n):
         speed = 2 * math.pi * gait.harmonics * _half_ranges(problem)

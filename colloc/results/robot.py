@@ -25,7 +25,7 @@ from colloc.mechanics.inertia import (
     tail_velocity,
 )
 from colloc.mechanics.law import rate_independent
-from colloc.motion.torques import accelerating_torques
+from colloc.motion.torques import joint_torques as inertial_torques
 from colloc.results.motion import Column, SampledMotion, arc, motion_dataset, rotate
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.arguments import check_finite
@@ -68,8 +68,7 @@ def joint_torques(
     posture = body.posture(angles)
     states = momenta(body, posture, body.velocity(posture, rates, z))
     how: Any = {"delta": solution.delta_per_period, "froude": froude}
-    inertial = accelerating_torques(body, law, solution.gait, t, states, load, **how)
-    return quasi_static_torques(solution, angles, rates, load, z) + problem.of_motors(inertial)
+    return problem.of_motors(inertial_torques(body, law, solution.gait, t, states, **how))
 
 
 def quasi_static_torques(

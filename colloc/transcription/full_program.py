@@ -493,13 +493,9 @@ class _Links(_Motion):
         q, r = ca.diff(phi), ca.diff(w)
         if not inertial:
             return local, gather, q, r, rest if with_moments else None
-        states = rest[n : n + len(STATES)]
-        if self.dynamics.regime.pull(phi[0]) is not None:
-            states = ca.vertcat(states, phi[0])
-        torques = torque_function(
-            self.chain, self.dynamics.law, self.dynamics.regime, states.numel()
-        )
-        moment = torques(q, r, rest[:n], states, self.delta, self._froude(local, free))
+        momenta = rest[n : n + len(STATES)]
+        torques = torque_function(self.chain, self.dynamics.law)
+        moment = torques(q, r, rest[:n], momenta, self.delta, self._froude(local, free))
         return local, gather, q, r, moment
 
     def _paces(self) -> tuple[bool, np.ndarray]:

@@ -386,9 +386,8 @@ def inertial_replay(
     change = states[:, -1] - states[:, 0]
     shares = np.empty(0)
     if limits is not None and limits.names:
-        load = regime.pull(states[None, _THETA])
         at: Any = {"delta": delta, "froude": regime.froude}
-        moments = joint_torques(chain, friction, moving.path, phases, states[_MOMENTA], load, **at)
+        moments = joint_torques(chain, friction, moving.path, phases, states[_MOMENTA], **at)
         now = Instants(chain, friction, angles, rates, delta, moments=moments)
         shares = limits.sizes(limits.at(now)).max(axis=1)
     return Replay(

@@ -6,11 +6,17 @@ import pytest
 
 import colloc
 from colloc.gaits.control_problem import control_problem
-from colloc.gaits.regime import LEVEL
-from colloc.gaits.sloped import Slope
-from colloc.mechanics.inertia import kinetic_energy, momentum_rates, tail_velocity
+from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.inertia import (
+    inertial_moments,
+    kinetic_energy,
+    momentum_rates,
+    tail_velocity,
+)
+from colloc.mechanics.links import LinkVelocity
 from colloc.motion.torques import joint_torques, torque_function
 from colloc.reduced.program import ReducedProgram
+from colloc.results.limit_use import lines
 from colloc.results.robot import joint_torques as sheet_torques
 from colloc.search.spaces import program_of, space_near
 
@@ -24,19 +30,34 @@ def states(n):
     return np.random.default_rng(0).normal(size=(3, n))
 
 
-@pytest.mark.parametrize("regime", [LEVEL, Slope(0.2)], ids=["level", "slope"])
-def test_torques_by_derivatives_agree_with_those_by_differences_in_time(regime):
+def test_torques_by_derivatives_agree_with_those_by_differences_in_time():
     t, h = np.linspace(0.03, 0.9, 7), 1e-4
-    theta = np.zeros((0, t.size)) if regime is LEVEL else np.linspace(-2, 2, t.size)[None]
-    load = None if regime is LEVEL else regime.pull(theta)
     (angles, rates), accelerations = GAIT(t), (GAIT(t + h)[1] - GAIT(t - h)[1]) / (2 * h)
     momenta = states(t.size)
-    function = torque_function(CHAIN, FLOOR, regime, 3 + len(theta))
-    found = function(
-        angles, rates, accelerations, np.vstack([momenta, theta]), DELTA, FROUDE
-    ).full()
-    wanted = joint_torques(CHAIN, FLOOR, GAIT, t, momenta, load, delta=DELTA, froude=FROUDE)
+    function = torque_function(CHAIN, FLOOR)
+    found = function(angles, rates, accelerations, momenta, DELTA, FROUDE).full()
+    wanted = joint_torques(CHAIN, FLOOR, GAIT, t, momenta, delta=DELTA, froude=FROUDE)
     np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+def test_a_uniform_pull_takes_no_torque():
+    """What it does to the joints of a body at rest, less what its acceleration of all links does."""
+    angles, pull = GAIT(np.linspace(0.03, 0.9, 7))[0], np.random.default_rng(1).normal(size=(2, 7))
+    none = np.zeros((len(CHAIN.contact.force_names), 7))
+    falls = (pull[0] * c + pull[1] * s for c, s in zip(*directions(angles), strict=True))
+    aside = (pull[1] * c - pull[0] * s for c, s in zip(*directions(angles), strict=True))
+    growth = LinkVelocity(np.array([*falls]), np.array([*aside]), np.zeros((3, 7)))
+    still = LinkVelocity(*np.zeros((3, 3, 7)))
+    against = joint_moments(CHAIN, angles, none, pull)
+    np.testing.assert_allclose(
+        against + inertial_moments(CHAIN, angles, still, growth), 0.0, atol=1e-14
+    )
+
+
+def directions(angles):
+    """Cosines and sines of the links' directions from that of the tail link."""
+    turns = np.cumsum(np.vstack([np.zeros(angles.shape[1]), angles]), axis=0)
+    return np.cos(turns), np.sin(turns)
 
 
 def test_joints_do_the_work_of_friction_and_what_the_kinetic_energy_grows_by():
@@ -51,7 +72,7 @@ def test_joints_do_the_work_of_friction_and_what_the_kinetic_energy_grows_by():
         return kinetic_energy(CHAIN, q, r, tail_velocity(CHAIN, q, r, then))[0]
 
     growth = (energy(h) - energy(-h)) / (2 * h)
-    torques = joint_torques(CHAIN, FLOOR, GAIT, t, momenta, None, **at)
+    torques = joint_torques(CHAIN, FLOOR, GAIT, t, momenta, **at)
     np.testing.assert_allclose(
         (torques * rates).sum(axis=0), now.power[0] + FROUDE * growth, atol=1e-6
     )
@@ -116,6 +137,13 @@ def test_a_gait_whose_motors_limit_it_is_certified_and_uses_all_that_it_may():
     most = [np.abs(sheet_torques(each, np.arange(2000) / 2000)).max() for each in (strong, weak)]
     assert most[0] > 0.21
     assert most[1] == pytest.approx(0.2, rel=1e-3)
+    (used,) = lines(weak)  # statics say nothing of what accelerates links
+    assert "torque 100 % of 0.2" in used
+    again = colloc.evaluate(problem, weak.gait)
+    assert again.status == "solved", again.message
+    assert again.value == pytest.approx(weak.value, rel=1e-5)
+    beyond = colloc.evaluate(problem, strong.gait)
+    assert [check.name for check in beyond.certificate.failures] == ["actuators"]
 
 
 def test_where_torques_are_infinite_or_unknown_limits_are_refused():
