@@ -15,6 +15,7 @@ from colloc.commands import options as cli
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, naming_saved_files
 from colloc.commands.ending import INTERRUPTED as CODE_INTERRUPTED
 from colloc.gaits.gait_fields import fields
+from colloc.gaits.inertia import Free
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
 from colloc.results import limit_use
@@ -116,6 +117,11 @@ def _quantities(solution: Solution) -> list[str]:
         rows.append(("dry friction", f"between {low:.8f} and {high:.8f}, with no delta"))
     for each in problem.integrals:
         rows.append((each.name.replace("_", " "), f"{period.values[each.name]:.6f}"))
+    if isinstance(problem.froude, Free):
+        pace, (low, high) = solution.froude, problem.froude
+        ends = ((low, ", the slowest allowed"), (high, ", the fastest allowed"))
+        end = next((text for x, text in ends if math.isclose(pace, x, rel_tol=1e-5)), "")
+        rows.append(("pace", f"Froude number {pace:.4g}{end}"))
     with suppress(NotConvergedError):  # a body that slides down a slope
         if problem.froude:
             what = f"({problem.objective.short} of the same gait without inertia)"

@@ -101,9 +101,8 @@ def test_it_is_certified_kept_and_told(tmp_path):
     kept = colloc.load(colloc.save(found, tmp_path / "free.h5"))
     assert kept.problem.froude == colloc.Free(0.01, 1.0)
     assert (kept.froude, kept.problem.hash) == (found.froude, found.problem.hash)
-    told = "\n".join(summary_lines(kept, None, verbose=True))
-    assert "best Froude number from 0.01 to 1" in told
-    assert f"Froude number {found.froude:.4g}" in told
+    assert f"  pace            Froude number {found.froude:.4g}" in summary_lines(kept, None)
+    assert "best Froude number from 0.01 to 1" in "\n".join(summary_lines(kept, None, verbose=True))
 
 
 def test_a_gait_is_played_at_the_pace_whose_period_it_says():
