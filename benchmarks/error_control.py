@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.tables import cached
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.results.solution import Solution
 from colloc.search.explore import first_optimum
 from colloc.search.solve import confirm_optimum

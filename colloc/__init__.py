@@ -64,7 +64,7 @@ _NAMES = {
     "verification.replay": "replay",
     "verification.slope": "slope_motion",
     "verification.inertial_motion": "inertial_motion motion_from_rest",
-    "motion.slow_enough": "slow_enough",
+    "dynamics.slow_enough": "slow_enough",
     "mechanics.fixed_point": "solve_balance",
     "system.errors": "CollocError NotConvergedError ProblemError StoreError",
 }

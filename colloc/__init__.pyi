@@ -46,7 +46,7 @@ from colloc.verification.replay import replay as replay
 from colloc.verification.slope import slope_motion as slope_motion
 from colloc.verification.inertial_motion import inertial_motion as inertial_motion
 from colloc.verification.inertial_motion import motion_from_rest as motion_from_rest
-from colloc.motion.slow_enough import slow_enough as slow_enough
+from colloc.dynamics.slow_enough import slow_enough as slow_enough
 from colloc.mechanics.fixed_point import solve_balance as solve_balance
 from colloc.system.errors import (
     CollocError as CollocError,

@@ -21,10 +21,10 @@ ONLY = {
     "matplotlib": {"pictures"},
     "jinja2": {"pictures"},
     "h5py": {"system", "results"},
-    "casadi": {"numerics", "motion", "transcription", "reduced", "search"},
+    "casadi": {"numerics", "dynamics", "transcription", "reduced", "search"},
 }
 COLLOCATED = re.compile(
-    r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|transcription|reduced|search)\b"
+    r"colloc\.(dynamics\.(collocated|states|kinds|control_problem)|numerics\.mesh|transcription|reduced|search)\b"
 )
 ADAPTIVE = (
     "replay_record replay panels adaptive_motion slope inertial_motion dry_balance dry_friction"

@@ -208,7 +208,7 @@ def compiled_motion(
 def kernel_momenta(
     library: ctypes.CDLL, moving: Moving, states: np.ndarray, froude: float, *, columns: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Outputs of `colloc.motion.compiled_momenta` ``(9, n_time)``, and derivatives ``(9, columns,
+    """Outputs of `colloc.dynamics.compiled_momenta` ``(9, n_time)``, and derivatives ``(9, columns,
     n_time)``."""
     n_time, (_held, shapes) = moving.angles.shape[1], _shapes(moving)
     states = np.ascontiguousarray(states, dtype=float)
@@ -229,7 +229,7 @@ def kernel_repeating(
     scheme: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray, bool]:
     """Periodic momenta ``(3, n_time)`` at the points of a collocation `scheme`
-    (`colloc.motion.states.CollocatedStates.scheme`), their outputs ``(9, n_time)``, and whether
+    (`colloc.dynamics.states.CollocatedStates.scheme`), their outputs ``(9, n_time)``, and whether
     there are any; from an initial guess whose last column is the start."""
     n_time, (_held, shapes) = moving.angles.shape[1], _shapes(moving)
     a, b, image = (np.ascontiguousarray(each, dtype=float) for each in scheme)

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.pictures.figure import (
     draw_angles,
     draw_filmstrip,

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
+from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import widest
 from colloc.mechanics.contact import Pairs
-from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.sqp import keep_last
 from colloc.reduced.constraints import Constraints, Function
 from colloc.reduced.pointed import with_heading

@@ -2,7 +2,7 @@
 gradients.
 
 Every equation of the collocation fixes one unknown: the balance the tail velocity, its rotation
-rate the orientation, both the displacement (`colloc.motion.collocated`) and the work ``W = sum_ki
+rate the orientation, both the displacement (`colloc.dynamics.collocated`) and the work ``W = sum_ki
 h_k b_i P_ki``. What is left is a program of the gait's parameters alone. Gradients take one adjoint
 sweep.
 """
@@ -15,10 +15,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from colloc.mechanics.densities import Instants, PathLimits, Quantity
-from colloc.mechanics.inertia import STATES
-from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
-from colloc.motion.kinds import (
+from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights
+from colloc.dynamics.kinds import (
     OMEGA,
     OUTPUTS,
     Inertial,
@@ -29,8 +27,10 @@ from colloc.motion.kinds import (
     initial_heading,
     motion_vjp,
 )
-from colloc.motion.kinds import Shapes as Moving
-from colloc.motion.torques import limit_share_slopes, limit_shares
+from colloc.dynamics.kinds import Shapes as Moving
+from colloc.dynamics.torques import limit_share_slopes, limit_shares
+from colloc.mechanics.densities import Instants, PathLimits, Quantity
+from colloc.mechanics.inertia import STATES
 from colloc.numerics.mesh import Mesh
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.contact import Pairs
 from colloc.reduced.constraints import Constraints

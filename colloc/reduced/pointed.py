@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
+from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.regime import LEVEL
-from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.motion import ReducedMotion, Shapes
 

@@ -7,12 +7,12 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
+from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import Objective
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import Pairs
-from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.actuator_rows import ActuatorRows
 from colloc.reduced.constraints import Constraints

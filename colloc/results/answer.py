@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
@@ -83,7 +83,7 @@ class Answer:
     scheme : str
     x, lam_x : (n,)
         Variables of the motion (`colloc.transcription.layout`) and multipliers of their bounds;
-        work and forces are in units of `colloc.gaits.control_problem`.
+        work and forces are in units of `colloc.dynamics.control_problem`.
     lam_g : (m,)
         Multipliers of the constraints.
     value, distance, work : float

@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from colloc.dynamics.collocated import CollocatedPose
+from colloc.dynamics.heading import whole_turns
 from colloc.gaits.gait import finite_array
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
@@ -15,8 +17,6 @@ from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import Sliding
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.inertia import about_tail, checked_mass, turning
-from colloc.motion.collocated import CollocatedPose
-from colloc.motion.heading import whole_turns
 from colloc.numerics.mesh import Mesh
 from colloc.results.motion import RigidMotion, SampledMotion, rotate
 from colloc.transcription.layout import RADIANS, Layout

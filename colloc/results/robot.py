@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from colloc.dynamics.torques import joint_torques as inertial_torques
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -25,7 +26,6 @@ from colloc.mechanics.inertia import (
     tail_velocity,
 )
 from colloc.mechanics.law import rate_independent
-from colloc.motion.torques import joint_torques as inertial_torques
 from colloc.results.motion import Column, SampledMotion, arc, motion_dataset, rotate
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.arguments import check_finite

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from colloc.dynamics.slow_enough import slow_enough
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Sliding
 from colloc.mechanics.inertia import checked_mass, tail_velocity
-from colloc.motion.slow_enough import slow_enough
 from colloc.numerics.mesh import Mesh
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.body_marks import footprints, part_speeds

@@ -19,7 +19,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh

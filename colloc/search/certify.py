@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import BALANCED, Chain

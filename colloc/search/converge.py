@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.contact import Pairs, far_pairs, link_width, overlapping_pairs
 from colloc.numerics.kinks import stationarity_around

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer, Step

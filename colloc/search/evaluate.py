@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem, control_problem
+from colloc.dynamics.control_problem import ControlProblem, control_problem
+from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.coupled import Coupled
 from colloc.gaits.fitted_gait import FittedGait, Given, Uncertainty, fitted_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait
@@ -19,7 +20,6 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.joint_map import JointMap
-from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.reduced.motion import ReducedMotion

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
+from colloc.dynamics.heading import whole_turns
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.prescribed import Prescribed
@@ -12,7 +13,6 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.serpenoid import Serpenoid
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.contact import Pairs
-from colloc.motion.heading import whole_turns
 from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
 from colloc.reduced.one_gait import OneGait
 from colloc.reduced.program import SearchSpace

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.dynamics.collocated import CollocatedPose
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.motion.collocated import CollocatedPose
 from colloc.numerics.mesh import uniform_mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.distinct_optima import phase_distance, reversed_in_time, swap_ends

@@ -26,7 +26,7 @@ is that of a slope. With inertia the momenta P of the body take the place of N a
     P' = (sum f_i + m_i g, sum c_i + x_i x f_i) / Fr + turning of the axes        collocated
 
 with x_i the midpoints seen from the centre of mass; where torques are limited they follow from
-q'', variables too, and the momenta (`colloc.motion.torques`). Other bodies, and the formulation
+q'', variables too, and the momenta (`colloc.dynamics.torques`). Other bodies, and the formulation
 "implicit velocity", have shape coordinates q, rates r and tail velocity z as variables, and z =
 Z(q, r), the velocity that balances them, in place of friction and balance
 (`colloc.transcription.velocity_map`).
@@ -48,7 +48,10 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
+from colloc.dynamics.heading import closing_sign, momenta_image
+from colloc.dynamics.kinds import kind_of_motion
+from colloc.dynamics.torques import torque_function
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import widest
 from colloc.gaits.period import chord_per_way
@@ -59,9 +62,6 @@ from colloc.mechanics.densities import Instants
 from colloc.mechanics.inertia import STATES, turning
 from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.link_friction import LinkForce
-from colloc.motion.heading import closing_sign, momenta_image
-from colloc.motion.kinds import kind_of_motion
-from colloc.motion.torques import torque_function
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.repeated import Nlp, Repeated, Rows, nonlinear_program
 from colloc.transcription.layout import RADIANS, Layout, layout_of

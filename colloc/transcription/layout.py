@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
+from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
 from colloc.mechanics.links import Links
-from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 
 RADIANS = 2 * np.pi

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
 from colloc.mechanics.contact import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.repeated import Rows

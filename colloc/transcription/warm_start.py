@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
-from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.chain import Chain
-from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights, sums
-from colloc.motion.kinds import (
+from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights, sums
+from colloc.dynamics.control_problem import ControlProblem
+from colloc.dynamics.kinds import (
     OMEGA,
     PeriodTotals,
     Shapes,
@@ -16,6 +14,8 @@ from colloc.motion.kinds import (
     kind_of_motion,
     static_parameters_of,
 )
+from colloc.gaits.gait_fields import AnyGait
+from colloc.mechanics.chain import Chain
 from colloc.numerics.mesh import Mesh
 from colloc.transcription.layout import RADIANS, Layout
 

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.dynamics.followed_motion import on_one_branch
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
-from colloc.motion.followed_motion import on_one_branch
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.replay_record import Path
 

@@ -14,6 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.dynamics.compiled_momenta import MomentaAt
+from colloc.dynamics.follow import ONE_SIDED, STEP, Course, integrate_period
+from colloc.dynamics.torques import joint_torques
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
 from colloc.gaits.regime import LEVEL, Regime
@@ -23,9 +26,6 @@ from colloc.mechanics.densities import LENGTH, Instants, PathLimits, Quantity, q
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_mass, kinetic_energy, momenta, tail_velocity
 from colloc.mechanics.law import Law
-from colloc.motion.compiled_momenta import MomentaAt
-from colloc.motion.follow import ONE_SIDED, STEP, Course, integrate_period
-from colloc.motion.torques import joint_torques
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import whole_totals
@@ -145,7 +145,7 @@ class GaitWithInertia:
         return integrate_period(rates, begin.ravel(), aim, self.breaks)
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
-        """Outputs of `colloc.motion.compiled_momenta`, with the weight's pull, ``(n, 9)``."""
+        """Outputs of `colloc.dynamics.compiled_momenta`, with the weight's pull, ``(n, 9)``."""
         angles, rates = self.path(np.array([t]))
         now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
         if self.regime.slides:

@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.gaits.control_problem import Admissible, ControlProblem
+from colloc.dynamics.collocated import CollocatedPose, stage_weights
+from colloc.dynamics.control_problem import Admissible, ControlProblem
+from colloc.dynamics.kinds import OMEGA, PeriodTotals, kind_of_motion, motion_vjp
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import crossing_depth, far_pairs
-from colloc.motion.collocated import CollocatedPose, stage_weights
-from colloc.motion.kinds import OMEGA, PeriodTotals, kind_of_motion, motion_vjp
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 from colloc.verification.adaptive_motion import (

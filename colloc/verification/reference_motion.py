@@ -7,11 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
-from colloc.gaits.inertia import Paced
-from colloc.gaits.sloped import Slope
-from colloc.motion.collocated import CollocatedPose, stage_weights
-from colloc.motion.kinds import (
+from colloc.dynamics.collocated import CollocatedPose, stage_weights
+from colloc.dynamics.control_problem import ControlProblem
+from colloc.dynamics.kinds import (
     OMEGA,
     Kind,
     PeriodTotals,
@@ -21,6 +19,8 @@ from colloc.motion.kinds import (
     kind_of_motion,
     static_parameters_of,
 )
+from colloc.gaits.inertia import Paced
+from colloc.gaits.sloped import Slope
 from colloc.numerics.mesh import Mesh
 from colloc.verification.inertial_motion import GaitWithInertia, amplification
 from colloc.verification.replay_record import LEAST
@@ -35,7 +35,7 @@ class ReferenceMotion(NamedTuple):
     sums: Callable[[np.ndarray], np.ndarray] | None = None
     """Quantities that forces are needed for up to ascending phases, ``(k, n)``."""
     alone: Callable[..., Any] | None = None
-    """Intervals by themselves (`colloc.motion.kinds.Inertial.alone`); None: their errors are
+    """Intervals by themselves (`colloc.dynamics.kinds.Inertial.alone`); None: their errors are
     seen in the whole motion."""
 
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.control_problem import ControlProblem
+from colloc.dynamics.control_problem import ControlProblem
+from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.gait_fields import AnyGait
-from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.adaptive_motion import FineMotion

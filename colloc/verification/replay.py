@@ -2,7 +2,7 @@
 
 It shares nothing with collocation but the friction law: velocities by the NumPy solver at five
 instants of panels (`colloc.verification.panels`). Where several balance an instant, it follows one
-branch in time, and says how far the others would lead (`colloc.motion.followed_motion`).
+branch in time, and says how far the others would lead (`colloc.dynamics.followed_motion`).
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from colloc.dynamics.follow import ONE_SIDED
+from colloc.dynamics.followed_motion import FORWARDS, followed_motion
 from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import chord_per_way
@@ -31,8 +33,6 @@ from colloc.mechanics.densities import (
 )
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
-from colloc.motion.follow import ONE_SIDED
-from colloc.motion.followed_motion import FORWARDS, followed_motion
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
 from colloc.verification.panels import (

@@ -8,10 +8,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from colloc.dynamics.follow import Course
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period
 from colloc.mechanics.bodies import Body
-from colloc.motion.follow import Course
 from colloc.system.errors import NotConvergedError
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

@@ -19,6 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from colloc.dynamics.follow import Course, integrate_period
+from colloc.dynamics.on_slope import balance_on_slope
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.mechanics.bodies import Body
@@ -34,8 +36,6 @@ from colloc.mechanics.densities import (
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.motion.follow import Course, integrate_period
-from colloc.motion.on_slope import balance_on_slope
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import PANEL_RULE, fine_motion, whole_totals

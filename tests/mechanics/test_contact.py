@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, replay
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     crossing_depth,

@@ -12,7 +12,7 @@ from colloc import Chain, Elliptic, Foot, Friction, Problem, ProblemError, Wheel
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.solve import summary_lines
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.motion_frames import frames
 from colloc.results.body_marks import friction_arrows

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from colloc import Friction, Harmonic, PathLimit, Problem, ellipse
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near

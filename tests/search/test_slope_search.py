@@ -7,7 +7,7 @@ import pytest
 from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, ellipse, load, save
 from colloc.commands.solve import summary_lines
 from colloc.commands.verify import verify
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram
 from colloc.search.certify import gait_certificate

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
+from colloc.dynamics.torques import joint_torques, torque_function
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.inertia import (
     inertial_moments,
@@ -14,7 +15,6 @@ from colloc.mechanics.inertia import (
     tail_velocity,
 )
 from colloc.mechanics.links import LinkVelocity
-from colloc.motion.torques import joint_torques, torque_function
 from colloc.reduced.program import ReducedProgram
 from colloc.results.limit_use import lines
 from colloc.results.robot import joint_torques as sheet_torques

@@ -4,7 +4,7 @@ and what they beat."""
 import numpy as np
 import pytest
 
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain_motion import motion_and_derivatives

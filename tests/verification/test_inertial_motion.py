@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import colloc
+from colloc.dynamics.slow_enough import SCHEME, GaitOnMesh
 from colloc.mechanics.inertia import momentum_rates
-from colloc.motion.slow_enough import SCHEME, GaitOnMesh
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.verification.inertial_motion import GaitWithInertia, PeriodicRun

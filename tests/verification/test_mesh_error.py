@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.error_control import CASES, case_problem, held, outcome
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import instant

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.stated_errors import motion, random_case, slope
 from colloc import Chain, Fourier, Friction, Harmonic, Problem
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.objective import EFFICIENCY
 from colloc.verification.reference_motion import reference_motion
 from colloc.verification.replay_record import to_tolerance

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
+from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.inertia import PacedOnSlope
 from colloc.gaits.sloped import Slope
-from colloc.motion.kinds import kind_of_motion
 from colloc.pictures.robot_model import mjcf
 from colloc.reduced.motion import ReducedMotion
 from colloc.results.robot import joint_torques

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, load, save
+from colloc.dynamics.follow import integrate_period
+from colloc.dynamics.kinds import QuasiStatic, Trajectory, kind_in
 from colloc.gaits import gait_fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
 from colloc.mechanics.chain_motion import chain_motion, motion_and_derivatives
 from colloc.mechanics.densities import LENGTH, Instants
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.motion.follow import integrate_period
-from colloc.motion.kinds import QuasiStatic, Trajectory, kind_in
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
 from colloc.verification.adaptive_motion import whole_totals

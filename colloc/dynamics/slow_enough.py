@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.dynamics.collocated import CollocatedPose, point_weights
+from colloc.dynamics.kinds import OMEGA, Inertial, QuasiStatic, Shapes
 from colloc.gaits.inertia import Paced
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
@@ -14,8 +16,6 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.inertia import Path, checked_mass
 from colloc.mechanics.law import Law, rate_independent
-from colloc.motion.collocated import CollocatedPose, point_weights
-from colloc.motion.kinds import OMEGA, Inertial, QuasiStatic, Shapes
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import check_finite

@@ -16,7 +16,13 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from colloc.gaits.control_problem import Dynamics
+from colloc.dynamics.collocated import CollocatedPose, stage_weights, sums
+from colloc.dynamics.compiled_momenta import momenta_along_states, momenta_at
+from colloc.dynamics.control_problem import Dynamics
+from colloc.dynamics.followed_motion import on_one_branch
+from colloc.dynamics.heading import heading, momenta_image
+from colloc.dynamics.on_slope import balance_on_slope
+from colloc.dynamics.states import CollocatedStates, Rates
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.inertia import Paced, PacedOnSlope
 from colloc.gaits.period import chord_per_way
@@ -32,12 +38,6 @@ from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
 from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import kernel_repeating, native_kernel
-from colloc.motion.collocated import CollocatedPose, stage_weights, sums
-from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
-from colloc.motion.followed_motion import on_one_branch
-from colloc.motion.heading import heading, momenta_image
-from colloc.motion.on_slope import balance_on_slope
-from colloc.motion.states import CollocatedStates, Rates
 from colloc.numerics.mesh import Mesh
 
 _MORE = slice(-len(STATES), None)

@@ -6,13 +6,13 @@ import pytest
 
 import colloc
 from colloc.commands.solve import summary_lines
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics import kinds
+from colloc.dynamics.compiled_momenta import momenta_along_states, momenta_at
+from colloc.dynamics.control_problem import control_problem
+from colloc.dynamics.kinds import Shapes, kind_of_motion, static_parameters_of
 from colloc.gaits.objective import objective_from
 from colloc.mechanics.inertia import kinetic_energy, momentum_rates
 from colloc.mechanics.native_kernel import numpy_instead
-from colloc.motion import kinds
-from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
-from colloc.motion.kinds import Shapes, kind_of_motion, static_parameters_of
 from colloc.pictures.movie import pictures
 from colloc.reduced.program import ReducedProgram
 from colloc.search.spaces import space_near

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from colloc.motion.follow import integrate_period
+from colloc.dynamics.follow import integrate_period
 from colloc.system.errors import NotConvergedError
 
 TURN = np.array([[0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, Problem, evaluate, replay
-from colloc.gaits.control_problem import control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.reduced.program import ReducedProgram
 from colloc.results.motion import arc

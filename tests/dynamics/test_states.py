@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from colloc.motion.states import CollocatedStates, Rates
+from colloc.dynamics.states import CollocatedStates, Rates
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
