@@ -1,7 +1,7 @@
 """References at any precision, in mpmath: textbook antiderivatives and plain Newton, nothing shared
 with colloc.
 
-The closed forms of `colloc.mechanics.link_friction` are arranged to lose no digits; these are not:
+The closed forms of `colloc.mechanics.friction` are arranged to lose no digits; these are not:
 they are what an integral table says (asinh), and digits are bought with precision instead.
 `quadrature_moments` checks them by quadrature.
 """

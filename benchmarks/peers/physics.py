@@ -2,7 +2,7 @@
 for any array library.
 
 `m` is a module with sin, cos, sqrt and log: numpy, casadi, or the tool's own. The closed form is
-the one of `mechanics.link_friction` without its case distinctions: 1 - q is lowered by one part in
+the one of `mechanics.friction` without its case distinctions: 1 - q is lowered by one part in
 1e6, which changes forces by less than 1e-6 and keeps every expression smooth. Phase runs over
 0..pi, half a period; delta is per radian of phase.
 """

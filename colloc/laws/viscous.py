@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from colloc.mechanics.friction import LineIntegrals, LinkForce, line_integrals, power
 from colloc.mechanics.law import Matrix
-from colloc.mechanics.line_integrals import LineIntegrals, line_integrals
-from colloc.mechanics.link_friction import LinkForce, power
 from colloc.numerics.arrays import Array
 from colloc.system.arguments import check_positive, named_arguments
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from colloc.mechanics.balance import total_power
 from colloc.mechanics.floor_contact import whole_links
+from colloc.mechanics.friction import LinkForce
 from colloc.mechanics.law import Law
-from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import Links
 from colloc.numerics.arrays import Array, namespace
 

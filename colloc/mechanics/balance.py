@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.mechanics.friction import LinkForce, power
 from colloc.mechanics.law import Law
-from colloc.mechanics.link_friction import LinkForce, power
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
 

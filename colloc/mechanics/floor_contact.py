@@ -14,10 +14,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.friction import Friction, LinkForce, line_integrals
 from colloc.mechanics.law import Law
-from colloc.mechanics.line_integrals import line_integrals
-from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments, shown
 from colloc.system.errors import ProblemError

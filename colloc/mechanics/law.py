@@ -1,7 +1,7 @@
 """The law of friction at a point that slides along and across the body with velocity (vs, vn).
 
 Arrays are two-dimensional, ``(n_part, n_time)``, NumPy or CasADi; forces are per length. Integrals
-along links follow from it (`colloc.mechanics.line_integrals`).
+along links follow from it (`colloc.mechanics.friction`).
 """
 
 from __future__ import annotations

@@ -59,9 +59,8 @@ from colloc.mechanics.bodies import FULL
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import Instants
+from colloc.mechanics.friction import LinkForce, line_integrals
 from colloc.mechanics.inertia import STATES, turning
-from colloc.mechanics.line_integrals import line_integrals
-from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.repeated import Nlp, Repeated, Rows, nonlinear_program
 from colloc.transcription.layout import RADIANS, Layout, layout_of

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import link_force
+from colloc.mechanics.friction import Friction, line_integrals
 from scripts.paper.rows import Row, number_row, statement_row
 from scripts.paper.study import PaperStudy
 
@@ -57,7 +56,7 @@ def static(study: PaperStudy) -> Iterator[Row]:
         )
     length = np.array([[1 / 3]])
     zero, turn = np.zeros((1, 1)), np.ones((1, 1))
-    couple = -float(link_force(zero, zero, turn, length, 1e-9, Friction()).couple[0, 0])
+    couple = -float(line_integrals(Friction()).force(zero, zero, turn, length, 1e-9).couple[0, 0])
     yield Row(
         "torque of a link of length 1/3 that turns about its middle",
         "1/36",

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks import reference
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import link_dissipation, link_force, link_moments, power
+from colloc.mechanics.friction import Friction, line_integrals, power
 
+COULOMB = line_integrals(Friction())
 LENGTH = 1 / 3
 SPEEDS = (0.0, 1e-300, 1e-160, 1e-14, 1e-9, 1e-4, 1.0, 1e4)
 
@@ -22,7 +22,7 @@ def column(*values):
 def relative_error(vs, vn, w, delta):
     """Largest error of the three moments, over the integral of |sigma|^j / r from above."""
     exact = reference.link_moments(vs, vn, w, LENGTH, delta)
-    found = link_moments(*column(vs, vn, w), LENGTH, delta)
+    found = COULOMB.moments(*column(vs, vn, w), LENGTH, delta)
     scales = (exact[0], exact[0] * LENGTH / 2, exact[2])
     return max(
         abs(float((mp.mpf(f.item()) - e) / s)) for f, e, s in zip(found, exact, scales, strict=True)
@@ -58,15 +58,12 @@ def test_pure_translation_and_near_it(w, delta):
     nothing."""
     for vs, vn in ((0.0, 0.0), (3.0, 4.0), (0.0, 1e-9), (1e-13, 0.0)):
         root = np.sqrt(vs**2 + vn**2 + delta**2)
-        moments = link_moments(*column(vs, vn, w), LENGTH, delta)
-        np.testing.assert_allclose(moments.I0, LENGTH / root, rtol=1e-14)
-        np.testing.assert_allclose(moments.I2, LENGTH**3 / (12 * root), rtol=1e-14)
-        assert (
-            abs(moments.I1.item())
-            <= abs(w * vn) * LENGTH**3 / (12 * root**3) * (1 + 1e-10) + 5e-324
-        )
-        force = link_force(
-            *column(vs, vn, w), LENGTH, delta, Friction(mu_t=2.0, mu_f=1.0, mu_b=3.0)
+        I0, I1, I2 = COULOMB.moments(*column(vs, vn, w), LENGTH, delta)
+        np.testing.assert_allclose(I0, LENGTH / root, rtol=1e-14)
+        np.testing.assert_allclose(I2, LENGTH**3 / (12 * root), rtol=1e-14)
+        assert abs(I1.item()) <= abs(w * vn) * LENGTH**3 / (12 * root**3) * (1 + 1e-10) + 5e-324
+        force = line_integrals(Friction(mu_t=2.0, mu_b=3.0)).force(
+            *column(vs, vn, w), LENGTH, delta
         )
         np.testing.assert_allclose(force.tangential, -LENGTH * vs / root, rtol=1e-14, atol=0)
         np.testing.assert_allclose(force.normal, -2 * LENGTH * vn / root, rtol=1e-14, atol=0)
@@ -76,10 +73,10 @@ def test_turning_about_an_end_or_the_midpoint():
     """Exact values for a rigid link that pivots, in the dry limit: force mu, or none, and couples
     of l/2 and l/4."""
     w, delta = 2.0, 1e-13
-    pivot_at_end = link_force(*column(0.0, w * LENGTH / 2, w), LENGTH, delta, Friction())
+    pivot_at_end = COULOMB.force(*column(0.0, w * LENGTH / 2, w), LENGTH, delta)
     np.testing.assert_allclose(pivot_at_end.normal, -LENGTH, rtol=1e-12)
     np.testing.assert_allclose(pivot_at_end.couple, 0.0, atol=1e-12)
-    pivot_at_middle = link_force(*column(0.0, 0.0, w), LENGTH, delta, Friction())
+    pivot_at_middle = COULOMB.force(*column(0.0, 0.0, w), LENGTH, delta)
     assert pivot_at_middle.normal.item() == 0.0
     np.testing.assert_allclose(pivot_at_middle.couple, -(LENGTH**2) / 4, rtol=1e-12)
 
@@ -91,12 +88,12 @@ def test_forces_never_exceed_their_coefficients_nor_dissipation_its_speed():
     )
     friction = Friction(mu_t=2.0, mu_f=1.0, mu_b=5.0)
     for delta in (1.0, 1e-7, 1e-14):
-        force = link_force(vs, vn, w, LENGTH, delta, friction)
+        force = line_integrals(friction).force(vs, vn, w, LENGTH, delta)
         assert np.all(np.abs(force.tangential) <= np.where(vs > 0, 1.0, 5.0) * LENGTH * (1 + 1e-13))
         assert np.all(np.abs(force.normal) <= 2 * LENGTH * (1 + 1e-13))
         assert np.all(np.abs(force.couple) <= 2 * LENGTH**2 / 4 * (1 + 1e-13))
         work = power(vs, vn, w, force)
         assert np.all(work >= 0)
         assert np.all(
-            work <= friction.largest * link_dissipation(vs, vn, w, LENGTH, delta) * (1 + 1e-12)
+            work <= friction.largest * COULOMB.potential(vs, vn, w, LENGTH, delta) * (1 + 1e-12)
         )

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from colloc import Chain, Fourier, Friction, replay, solve_balance
 from colloc.mechanics.balance import balance_jacobian, instant, total_power
+from colloc.mechanics.friction import line_integrals
 
 tried = settings(derandomize=True, max_examples=60, deadline=None, database=None)
 PI = np.pi
@@ -151,15 +152,13 @@ def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed(case, 
 def test_isotropic_balance_minimises_the_dissipation(case, exponent):
     """Doing better than any other rigid velocity is what the balance means there; the other is
     drawn close and far."""
-    from colloc.mechanics.link_friction import link_dissipation
-
     body, angles, rates = case
     delta = 10.0**exponent
     z = solved(body, Friction(), angles, rates, delta)
 
     def potential(at):
         velocity = body.velocity(body.posture(angles), rates, at)
-        return link_dissipation(*velocity, body.length_column(), delta).sum()
+        return line_integrals(Friction()).potential(*velocity, body.length_column(), delta).sum()
 
     rng = np.random.default_rng(0)
     for size in (1e-6, 1e-3, 1.0):

@@ -16,9 +16,8 @@ from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.chain_motion import motion_and_derivatives
-from colloc.mechanics.friction import ClosedForm, Friction
+from colloc.mechanics.friction import ClosedForm, Friction, line_integrals
 from colloc.mechanics.law import Law
-from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.modal_body import ModalBody

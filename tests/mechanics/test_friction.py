@@ -6,15 +6,10 @@ import itertools
 import numpy as np
 import pytest
 
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import (
-    link_dissipation,
-    link_force,
-    link_force_jacobian,
-    link_moments,
-    power,
-)
+from colloc.mechanics.friction import Friction, line_integrals, power
 from colloc.system.errors import ProblemError
+
+COULOMB = line_integrals(Friction())
 
 
 def graded_quadrature(vs, vn, w, length, delta, order, weight):
@@ -52,7 +47,7 @@ def random_links(seed, count):
 
 def test_moments_agree_with_graded_quadrature_over_all_regimes():
     vs, vn, w, length, delta = random_links(1, 4000)
-    moments = link_moments(vs, vn, w, length, delta)
+    moments = COULOMB.moments(vs, vn, w, length, delta)
     for order, closed in enumerate(moments):
         reference, magnitude = graded_quadrature(
             vs, vn, w, length, delta, order, lambda r, y: 1 / r
@@ -62,7 +57,7 @@ def test_moments_agree_with_graded_quadrature_over_all_regimes():
 
 def test_normal_force_and_couple_agree_with_graded_quadrature():
     vs, vn, w, length, delta = random_links(2, 3000)
-    force = link_force(vs, vn, w, length, delta, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0))
+    force = line_integrals(Friction(mu_t=2.0)).force(vs, vn, w, length, delta)
     for order, closed in ((0, force.normal), (1, force.couple)):
         reference, magnitude = graded_quadrature(
             vs, vn, w, length, delta, order, lambda r, y: -2.0 * y / r
@@ -79,17 +74,17 @@ def test_isotropic_force_is_minus_the_gradient_of_the_dissipation_and_its_jacobi
         step = 1e-5 * np.linalg.norm([*v, delta])
 
         def potential(x, d=delta):
-            return link_dissipation(*(np.array([[c]]) for c in x), length, d).item()
+            return COULOMB.potential(*(np.array([[c]]) for c in x), length, d).item()
 
         def force(x, d=delta):
             return np.array(
-                [c.item() for c in link_force(*(np.array([[c]]) for c in x), length, d, Friction())]
+                [c.item() for c in COULOMB.force(*(np.array([[c]]) for c in x), length, d)]
             )
 
         shifts = step * np.eye(3)
         gradient = np.array([potential(v + h) - potential(v - h) for h in shifts]) / (2 * step)
         hessian = np.array([force(v - h) - force(v + h) for h in shifts]) / (2 * step)
-        blocks = link_force_jacobian(*(np.array([[c]]) for c in v), length, delta, Friction())
+        blocks = COULOMB.jacobian(*(np.array([[c]]) for c in v), length, delta)
         jacobian = np.array([[np.asarray(entry).item() for entry in row] for row in blocks])
         np.testing.assert_allclose(gradient, -force(v), atol=1e-8 * max(1, np.abs(force(v)).max()))
         np.testing.assert_allclose(hessian, jacobian, atol=1e-7 * np.abs(jacobian).max())
@@ -102,7 +97,7 @@ def test_isotropic_force_is_minus_the_gradient_of_the_dissipation_and_its_jacobi
 )
 def test_pure_translation_gives_coulomb_friction_in_the_limit(vs, vn, known):
     law, at = Friction(mu_t=2.0, mu_f=1.5, mu_b=7.0), (np.array([v]) for v in (vs, vn, 0.0))
-    force = link_force(*at, 0.5, 1e-9, law)
+    force = line_integrals(law).force(*at, 0.5, 1e-9)
     np.testing.assert_allclose(np.ravel(force), [*known, 0.0], rtol=1e-12, atol=1e-15)
 
 
@@ -110,8 +105,8 @@ def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed():
     vs, vn, w, length, _ = random_links(7, 2000)
     delta = np.full(2000, 1e-12)
     friction = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
-    work = power(vs, vn, w, link_force(vs, vn, w, length, delta, friction))
-    speed = link_dissipation(vs, vn, w, length, delta)
+    work = power(vs, vn, w, line_integrals(friction).force(vs, vn, w, length, delta))
+    speed = COULOMB.potential(vs, vn, w, length, delta)
     moving = speed > 1e-9
     assert np.all(work[moving] >= friction.smallest * speed[moving] * (1 - 1e-2))
     assert np.all(work >= 0)

@@ -7,8 +7,7 @@ from scipy import integrate
 
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import link_force
+from colloc.mechanics.friction import Friction, line_integrals
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.curve import PanelGrid, curve, node_velocity, resultant
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
@@ -55,7 +54,7 @@ def test_straight_rotating_body_agrees_with_the_closed_form_of_a_link():
     z = np.array([[0.3], [0.2], [-1.1]])
     vs, vn = node_velocity(body, z)
     got = resultant(body, *ANISOTROPIC.density(vs, vn, 0.05))
-    link = link_force(z[:1], z[1:2], z[2:], np.ones((1, 1)), 0.05, ANISOTROPIC)
+    link = line_integrals(ANISOTROPIC).force(z[:1], z[1:2], z[2:], np.ones((1, 1)), 0.05)
     np.testing.assert_allclose(got, np.concatenate(link), atol=1e-13)
 
 
