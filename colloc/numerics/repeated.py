@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -28,14 +28,10 @@ class LocalFunction:
     solved: ca.SX | None = None
     equations: ca.SX | None = None
 
-    @property
-    def n_out(self) -> int:
-        return int(self.out.shape[0])
-
     @cached_property
     def derivatives(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Weights ``(n_out, 1)``, sparse Jacobian, upper triangle of the weighted sum's Hessian."""
-        weight = ca.SX.sym("weight", self.n_out)
+        weight = ca.SX.sym("weight", self.out.shape[0])
         total = ca.dot(weight, self.out)
         jacobian = ca.jacobian(self.out, self.local)
         if self.solved is None or self.equations is None:
@@ -67,8 +63,7 @@ class LocalFunction:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Repeated:
+class Repeated(NamedTuple):
     """A local function at instances; `gather` ``(n_local, n_instance)``: indices of the local
     variables among those of the program. `solve` takes local variables and delta, MX both, to what
     is solved."""
@@ -78,76 +73,8 @@ class Repeated:
     values: np.ndarray
     solve: Callable[[ca.MX, ca.MX], ca.MX] | None = None
 
-    @property
-    def n_instance(self) -> int:
-        return self.gather.shape[1]
 
-    @property
-    def n_out(self) -> int:
-        return self.function.n_out * self.n_instance
-
-
-class Rows:
-    """Rows of a program, by name, as sparse matrices over ``[x; y; 1]``."""
-
-    def __init__(self, n: int) -> None:
-        self.n, self.width = n, n
-        self.repeated: list[Repeated] = []
-        self.rows: list[sparse.csr_matrix] = []
-        self.lower: list[np.ndarray] = []
-        self.upper: list[np.ndarray] = []
-        self.groups: dict[str, slice] = {}
-        self._m = 0
-
-    def repeat(
-        self,
-        local: ca.SX,
-        out: ca.SX,
-        gather: np.ndarray,
-        given: ca.SX | None = None,
-        values: np.ndarray | None = None,
-        *,
-        delta: ca.SX,
-    ) -> np.ndarray:
-        """Add a function at many instances; indices of its outputs ``(n_out, n_instance)``."""
-        given = ca.SX(0, 1) if given is None else given
-        values = np.empty((0, gather.shape[1])) if values is None else values
-        return self.add_repeated(Repeated(LocalFunction(local, given, delta, out), gather, values))
-
-    def add_repeated(self, repeated: Repeated) -> np.ndarray:
-        self.repeated.append(repeated)
-        places = self.width + np.arange(repeated.n_out).reshape(repeated.n_instance, -1).T
-        self.width += repeated.n_out
-        return places
-
-    def close(self) -> None:
-        """Add the column of constants: no function is added from here on."""
-        self.width += 1
-
-    def pick(self, places: np.ndarray) -> sparse.csr_matrix:
-        """Rows that are variables or outputs."""
-        places = np.asarray(places).ravel()
-        entries = np.ones(places.size), (np.arange(places.size), places)
-        return sparse.csr_matrix(entries, shape=(places.size, self.width))
-
-    def constant(self, values: np.ndarray) -> sparse.csr_matrix:
-        """Rows that are numbers ``(n_row,)``."""
-        last = np.full(values.size, self.width - 1)
-        entries = values, (np.arange(values.size), last)
-        return sparse.csr_matrix(entries, shape=(values.size, self.width))
-
-    def add(self, name: str, rows: sparse.spmatrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
-        """Add ``lower <= rows <= upper``; by default the rows vanish."""
-        m = rows.shape[0]
-        self.rows.append(sparse.csr_matrix(rows))
-        self.lower.append(np.zeros(m) + lower)
-        self.upper.append(np.zeros(m) + upper)
-        self.groups[name] = slice(self._m, self._m + m)
-        self._m += m
-
-
-@dataclass(frozen=True, eq=False)
-class Nlp:
+class Nlp(NamedTuple):
     """A nonlinear program in x and the parameter delta: expressions x, p, f, g; functions grad_f,
     jac_g, hess_lag."""
 
@@ -155,59 +82,118 @@ class Nlp:
     functions: dict[str, ca.Function]
 
 
-def nonlinear_program(
-    n: int, repeated: Sequence[Repeated], rows: sparse.spmatrix, objective: sparse.spmatrix
-) -> Nlp:
-    x, delta = ca.MX.sym("x", n), ca.MX.sym("delta")
-    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows.shape[0])
-    every = sparse.csr_matrix(sparse.vstack([objective, rows]))
-    on_x, on_y, constant = (
-        every[:, a:b] for a, b in ((0, n), (n, every.shape[1] - 1), (every.shape[1] - 1, None))
-    )
-    weights = _dm(on_y.T) @ ca.vertcat(lam_f, lam_g)
-    outputs, slopes, curvatures = [], [], []
-    jac_places, hess_places, start = [], [], 0
-    for part in repeated:
-        n_out, n_instance = part.function.n_out, part.n_instance
-        local = ca.reshape(x[part.gather.ravel(order="F").tolist()], *part.gather.shape)
-        arguments = [local, ca.DM(part.values), ca.repmat(delta, 1, n_instance)]
-        arguments += [] if part.solve is None else [part.solve(local, delta)]
-        own = ca.reshape(weights[start : start + part.n_out], n_out, n_instance)
-        value, slope, curvature = part.function.functions
-        outputs.append(ca.vec(value.map(n_instance)(*arguments)))
-        slopes.append(ca.vec(slope.map(n_instance)(*arguments)))
-        curvatures.append(ca.vec(curvature.map(n_instance)(*arguments, own)))
-        _, jacobian, upper = part.function.derivatives
-        row, column = (np.array(k, dtype=int) for k in jacobian.sparsity().get_triplet())
-        out = start + row[:, None] + n_out * np.arange(n_instance)
-        jac_places.append((out, part.gather[column], np.ones(out.shape)))
-        row, column = (np.array(k, dtype=int) for k in upper.sparsity().get_triplet())
-        a, b = part.gather[row], part.gather[column]
-        # one variable in the place of two local ones has both of their mixed derivatives
-        twice = np.where((a == b) & (row != column)[:, None], 2.0, 1.0)
-        hess_places.append((np.minimum(a, b), np.maximum(a, b), twice))
-        start += part.n_out
-    y = ca.vertcat(*outputs)
-    values = _dm(on_x) @ x + _dm(on_y) @ y + _dm(constant)
-    whole = _dm(on_x) + _dm(on_y) @ _matrix((start, n), jac_places, ca.vertcat(*slopes))
-    hessian = _matrix((n, n), hess_places, ca.vertcat(*curvatures))
-    f, g = values[0], values[1:]
-    gradient, jac_g = ca.densify(whole[0, :].T), whole[1:, :]
-    ins = ["x", "p"]
-    return Nlp(
-        {"x": x, "p": delta, "f": f, "g": g},
-        {
-            "grad_f": ca.Function("nlp_grad_f", [x, delta], [f, gradient], ins, ["f", "grad_f_x"]),
-            "jac_g": ca.Function("nlp_jac_g", [x, delta], [g, jac_g], ins, ["g", "jac_g_x"]),
-            "hess_lag": ca.Function(
-                "nlp_hess_l",
-                [x, delta, lam_f, lam_g],
-                [hessian],
-                [*ins, "lam_f", "lam_g"],
-                ["triu_hess_gamma_x_x"],
-            ),
-        },
-    )
+class Program:
+    """Rows of a program in x ``(n,)``, by name: sparse matrices over ``[x; y; 1]``. All functions
+    are repeated before the first row is made."""
+
+    def __init__(self, n: int) -> None:
+        self.n, self._n_y = n, 0
+        self.delta = ca.SX.sym("delta")
+        self.repeated: list[Repeated] = []
+        self.rows: list[sparse.csr_matrix] = []
+        self.groups: dict[str, slice] = {}
+        self.row_lower, self.row_upper = np.empty(0), np.empty(0)
+        self.objective: sparse.csr_matrix | None = None
+
+    def repeat(
+        self,
+        function: Callable[..., ca.SX],
+        variables: Sequence[np.ndarray],
+        given: Sequence[np.ndarray] = (),
+    ) -> np.ndarray:
+        """Add a function at many instances; indices of its outputs ``(n_out, n_instance)``.
+
+        Its arguments are, of each instance, variables, by their indices ``(n_instance,)`` or ``(k,
+        n_instance)``, then numbers, given for so many successive instances each.
+        """
+        gather = np.vstack(variables)
+        local = [ca.SX.sym("x", 1 if each.ndim == 1 else len(each)) for each in variables]
+        numbers, symbols, values = [], [], []
+        for column in map(np.ravel, given):
+            if np.ptp(column) == 0.0:
+                numbers.append(float(column[0]))
+                continue
+            symbols.append(ca.SX.sym("given"))
+            numbers.append(symbols[-1])
+            values.append(np.repeat(column, gather.shape[1] // column.size))
+        out = function(*local, *numbers)
+        columns = ca.vertcat(*local), ca.vertcat(ca.SX(0, 1), *symbols), self.delta, out
+        numeric = np.reshape(values, (len(values), gather.shape[1]))
+        return self.add_repeated(Repeated(LocalFunction(*columns), gather, numeric))
+
+    def add_repeated(self, repeated: Repeated) -> np.ndarray:
+        n_out, n_instance = repeated.function.out.shape[0], repeated.gather.shape[1]
+        start, self._n_y = self.n + self._n_y, self._n_y + n_out * n_instance
+        self.repeated.append(repeated)
+        return start + np.arange(n_out * n_instance).reshape(n_instance, n_out).T
+
+    def pick(self, places: np.ndarray) -> sparse.csr_matrix:
+        """Rows that are variables or outputs."""
+        places = np.ravel(places)
+        entries = np.ones(places.size), (np.arange(places.size), places)
+        return sparse.csr_matrix(entries, shape=(places.size, self.n + self._n_y + 1))
+
+    def constant(self, values: np.ndarray) -> sparse.csr_matrix:
+        """Rows that are numbers ``(n_row,)``."""
+        return sparse.diags(values) @ self.pick(np.full(values.size, self.n + self._n_y))
+
+    def add(self, name: str, rows: sparse.spmatrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
+        """Add ``lower <= rows <= upper``; by default the rows vanish."""
+        m = rows.shape[0]
+        self.groups[name] = slice(self.row_lower.size, self.row_lower.size + m)
+        self.rows.append(sparse.csr_matrix(rows))
+        self.row_lower = np.append(self.row_lower, np.zeros(m) + lower)
+        self.row_upper = np.append(self.row_upper, np.zeros(m) + upper)
+
+    @cached_property
+    def nlp(self) -> Nlp:
+        n, m = self.n, self.row_lower.size
+        x, delta = ca.MX.sym("x", n), ca.MX.sym("delta")
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)
+        every = sparse.csr_matrix(sparse.vstack([self.objective, *self.rows]))
+        on_x, on_y, constant = (
+            every[:, a:b] for a, b in ((0, n), (n, n + self._n_y), (n + self._n_y, None))
+        )
+        weights = _dm(on_y.T) @ ca.vertcat(lam_f, lam_g)
+        outputs, slopes, curvatures = [], [], []
+        jac_places, hess_places, start = [], [], 0
+        for function, gather, values, solve in self.repeated:
+            n_out, n_instance = function.out.shape[0], gather.shape[1]
+            local = ca.reshape(x[gather.ravel(order="F").tolist()], *gather.shape)
+            arguments = [local, ca.DM(values), ca.repmat(delta, 1, n_instance)]
+            arguments += [] if solve is None else [solve(local, delta)]
+            own = ca.reshape(weights[start : start + n_out * n_instance], n_out, n_instance)
+            value, slope, curvature = function.functions
+            outputs.append(ca.vec(value.map(n_instance)(*arguments)))
+            slopes.append(ca.vec(slope.map(n_instance)(*arguments)))
+            curvatures.append(ca.vec(curvature.map(n_instance)(*arguments, own)))
+            _, jacobian, upper = function.derivatives
+            row, column = (np.array(k, dtype=int) for k in jacobian.sparsity().get_triplet())
+            out = start + row[:, None] + n_out * np.arange(n_instance)
+            jac_places.append((out, gather[column], np.ones(out.shape)))
+            row, column = (np.array(k, dtype=int) for k in upper.sparsity().get_triplet())
+            a, b = gather[row], gather[column]
+            # one variable in the place of two local ones has both of their mixed derivatives
+            twice = np.where((a == b) & (row != column)[:, None], 2.0, 1.0)
+            hess_places.append((np.minimum(a, b), np.maximum(a, b), twice))
+            start += n_out * n_instance
+        values = _dm(on_x) @ x + _dm(on_y) @ ca.vertcat(*outputs) + _dm(constant)
+        slope_of_y = _matrix((start, n), jac_places, ca.vertcat(*slopes))
+        whole = _dm(on_x) + _dm(on_y) @ slope_of_y
+        hessian = _matrix((n, n), hess_places, ca.vertcat(*curvatures))
+        f, g, gradient, jac_g = values[0], values[1:], ca.densify(whole[0, :].T), whole[1:, :]
+        ins, multipliers = ["x", "p"], ["lam_f", "lam_g"]
+        return Nlp(
+            {"x": x, "p": delta, "f": f, "g": g},
+            {
+                "grad_f": ca.Function("grad_f", [x, delta], [f, gradient], ins, ["f", "grad_f_x"]),
+                "jac_g": ca.Function("jac_g", [x, delta], [g, jac_g], ins, ["g", "jac_g_x"]),
+                "hess_lag": ca.Function(
+                    "hess_lag", [x, delta, lam_f, lam_g], [hessian], [*ins, *multipliers],
+                    ["triu_hess_gamma_x_x"],
+                ),
+            },
+        )  # fmt: skip
 
 
 def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:

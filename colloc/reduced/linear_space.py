@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,13 +15,12 @@ from colloc.mechanics.contact import Pairs
 from colloc.numerics.sqp import keep_last
 from colloc.reduced.constraints import Constraints, Function
 from colloc.reduced.pointed import with_heading
-from colloc.transcription.shape_checks import ShapeCheck, shape_checks
-from colloc.transcription.worst_instants import (
-    check_values,
+from colloc.transcription.shape_constraints import (
+    Placed,
     following_instants,
-    held_shares,
     moving,
     near_peaks,
+    shape_checks,
 )
 
 
@@ -109,28 +107,17 @@ class LinearSpace:
         """Shape constraints at their worst instants in cells where they might bind, then the square
         of the shape speed."""
         gait = self.trajectory(v)
-        n_joint = self._admissible.n_joint
-        limit = self._admissible.joint_limit
-        placed, kinds, low, high, excess = list[_Placed](), dict[str, np.ndarray](), [], [], -np.inf
+        gaits, limit = self._admissible.gait, self._admissible.joint_limit
+        placed = list[tuple[Placed, np.ndarray]]()
+        kinds, low, high, excess = dict[str, np.ndarray](), [], [], -np.inf
         for check, (cells, times) in zip(self.checks, self._peaks(v), strict=True):
             kinds[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
-            values = check_values(check, gait, times)
-            matrix = check.matrix(self._admissible.gait, times, n_joint)
-            may_move = moving(values, check, limit, times, self.mesh, cells)
-            placed.append(
-                _Placed(
-                    check,
-                    held_shares(check, gait, times),
-                    matrix,
-                    times,
-                    cells,
-                    may_move,
-                    check.offset(self._admissible.gait, n_joint),
-                )
-            )
+            each = Placed.at(check, cells, times, gaits, gait)
+            values = check.along(check.of(gait, times))
+            placed.append((each, moving(each, values, limit, self.mesh)))
             excess = max(excess, float(check.excess(values, limit).max()))
             (lower, upper) = check.nearer_bounds(values, limit)
             low.append(lower)
@@ -143,29 +130,27 @@ class LinearSpace:
         def moving_on() -> Constraints:
             return Constraints(kinds, lower, upper, excess, *self._rows(at_worst))
 
-        return Constraints(kinds, lower, upper, excess, *self._rows(lambda v: placed), moving_on)
+        at_once = self._rows(lambda v: [each for each, _ in placed])
+        return Constraints(kinds, lower, upper, excess, *at_once, moving_on)
 
-    def _rows(self, placed: Callable[[np.ndarray], list[_Placed]]) -> tuple[Function, Function]:
+    def _rows(self, placed: Callable[[np.ndarray], list[Placed]]) -> tuple[Function, Function]:
         speed = self._speed
         return (
             lambda v: np.concatenate([*(each.value(v) for each in placed(v)), [speed.square(v)]]),
             lambda v: np.vstack([*(each.slope(v) for each in placed(v)), speed.slope(v)]),
         )
 
-    def _at_worst(self, placed: list[_Placed], v: np.ndarray) -> list[_Placed]:
+    def _at_worst(self, placed: list[tuple[Placed, np.ndarray]], v: np.ndarray) -> list[Placed]:
         """Constraints at the worst instants of v in the cells where they were placed."""
         gait, found = self.trajectory(v), []
-        for each in placed:
-            which, matrix = each.moving, each.matrix
+        gaits, limit = self._admissible.gait, self._admissible.joint_limit
+        for each, which in placed:
             if which.size:
-                cells = each.cells[which]
-                where, matrix = (self.mesh.edges[cells], self.mesh.h[cells]), matrix.copy()
-                at = each.check, each.shares[which], gait, each.times[which]
-                worst = following_instants(*at, cells=where, limit=self._admissible.joint_limit)
-                matrix[which] = each.check.matrix(
-                    self._admissible.gait, worst, self._admissible.n_joint
-                )
-            found.append(each._replace(matrix=matrix))
+                worst = following_instants(each, which, gait, self.mesh, limit)
+                matrix = each.matrix.copy()
+                matrix[which] = each.check.matrix(gaits, worst, self._admissible.n_joint)
+                each = each._replace(matrix=matrix)
+            found.append(each)
         return found
 
 
@@ -250,31 +235,3 @@ class SerpenoidSpace(LinearSpace):
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         return super().constraints(v, later).through(self.full_parameters, self._slopes)
-
-
-class _Placed(NamedTuple):
-    """A constraint at one instant in each of some mesh cells; `matrix` ``(n, n_joint,
-    n_parameter)`` gives the shapes there."""
-
-    check: ShapeCheck
-    shares: np.ndarray
-    matrix: np.ndarray
-    times: np.ndarray
-    cells: np.ndarray
-    moving: np.ndarray
-    offset: np.ndarray
-
-    def shapes(self, v: np.ndarray) -> np.ndarray:
-        return np.asarray((self.matrix @ v).T + self.offset)
-
-    def value(self, v: np.ndarray) -> np.ndarray:
-        return self.check.cut(self.shapes(v), self.shares)[0]
-
-    def slope(self, v: np.ndarray) -> np.ndarray:
-        if self.check.row is not None:
-            return self.check.row @ self.matrix
-        return np.einsum(
-            "jt,tjp->tp",
-            self.check.slope(self.shapes(v), self.shares[None]).full(),
-            self.matrix,
-        )

@@ -26,8 +26,7 @@ from colloc.search.iterate import NOT_STATIONARY, STATIONARY, Iterate
 from colloc.search.options import COARSE, MEDIUM, OPTIONS, TOLERANCES, max_rounds
 from colloc.search.spaces import with_far, with_whole_turns
 from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram, full_program
-from colloc.transcription.layout import distance_and_work, layout_of
-from colloc.transcription.warm_start import balanced_variables
+from colloc.transcription.layout import balanced_variables, distance_and_work, layout_of
 
 
 def confirm(iterate: Iterate) -> Answer:

@@ -39,10 +39,10 @@ are repeated over parts and points: `colloc.numerics.repeated`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import Any, cast
+import copy
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -56,78 +56,19 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import widest
 from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.friction import LinkForce, line_integrals
 from colloc.mechanics.inertia import STATES, turning
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.repeated import Nlp, Repeated, Rows, nonlinear_program
-from colloc.transcription.layout import RADIANS, Layout, layout_of
-from colloc.transcription.shape_limits import ShapeLimits
+from colloc.numerics.repeated import Program, Repeated
+from colloc.transcription.layout import RADIANS, balanced_variables, layout_of
+from colloc.transcription.shape_constraints import ShapeLimits
 from colloc.transcription.velocity_map import BalancedVelocity, velocity_map
-from colloc.transcription.warm_start import balanced_variables
 
 ACTUATORS, AT_LEAST, SHAPE_SPEED = "actuators", "at least", "shape speed"
-
-
-@dataclass(frozen=True, eq=False)
-class FullProgram:
-    """A nonlinear program ``min f(x), lower <= x <= upper, row_lower <= g(x) <= row_upper``;
-    `groups` are the rows of a name, `cells` the mesh cells of a path constraint."""
-
-    control: ControlProblem
-    mesh: Mesh
-    far: Pairs
-    layout: Layout
-    groups: dict[str, slice]
-    cells: dict[str, np.ndarray]
-    lower: np.ndarray
-    upper: np.ndarray
-    row_lower: np.ndarray
-    row_upper: np.ndarray
-    repeated: tuple[Repeated, ...]
-    rows: sparse.csr_matrix
-    objective: sparse.csr_matrix
-    limits: ShapeLimits
-    velocity: BalancedVelocity | None = None
-    """Kept alive here for the functions that call it."""
-
-    @property
-    def n(self) -> int:
-        return self.lower.size
-
-    @property
-    def delta_unit(self) -> float:
-        return 1.0 if self.control.admissible.gait.relative_delta else RADIANS
-
-    @cached_property
-    def nlp(self) -> Nlp:
-        return nonlinear_program(self.n, self.repeated, self.rows, self.objective)
-
-    def member(self, x: np.ndarray) -> AnyGait:
-        return self.control.admissible.member(x[self.layout.parameters[:, 0]])
-
-    def moved_to(self, x: np.ndarray) -> tuple[FullProgram, np.ndarray]:
-        """The program with path constraints at the worst instants of variables x, and its variables
-        there."""
-        p, edges, scheme = self.layout.parameters[:, 0], self.mesh.edges, self.mesh.scheme.name
-        program = full_program(self.control, x[p], edges, scheme, self.far)
-        for name in ("rotation", ACTUATORS):
-            if name in self.groups:
-                rows = self.groups[name]
-                program = program.with_bounds(name, self.row_lower[rows], self.row_upper[rows])
-        return program, np.concatenate([x[: self.layout.n], program.limits.bends(x[p])])
-
-    def with_bounds(self, name: str, lower: np.ndarray, upper: np.ndarray) -> FullProgram:
-        low, high = self.row_lower.copy(), self.row_upper.copy()
-        low[self.groups[name]], high[self.groups[name]] = lower, upper
-        return replace(self, row_lower=low, row_upper=high)
-
-    def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
-        """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
-        motion = balanced_variables(self.control, self.layout, self.mesh, parameters, delta)
-        return np.concatenate([motion, self.limits.bends(parameters)])
+_Shape = tuple[ca.SX, ca.SX, ca.SX | None]
+"""Joint angles, rates and moments of a point."""
 
 
 def full_program(
@@ -139,176 +80,189 @@ def full_program(
 ) -> FullProgram:
     """The program on the first mesh, or on given edges and scheme, with path constraints at the
     worst instants of a gait and pairs of links `far` kept from crossing."""
-    mesh = control.mesh(edges, scheme)
-    layout, admissible, aims = layout_of(control, mesh), control.admissible, control.aims
-    gaits, n_joint, fraction = admissible.gait, admissible.n_joint, admissible.gait.fraction
-    turn = control.dynamics.turn
-    p = layout.parameters[:, 0]
-    limits = ShapeLimits(control, mesh, layout, parameters, far)
-    program = Rows(layout.n + limits.n_bend)
-
-    # the motion: link by link, or by the velocity map
-    lifted = control.formulation == FULL
-    motion = (_Links if lifted else _Mapped)(program, control, mesh, layout)
-
-    # functions of a whole period
-    delta = ca.SX.sym("delta")
-    names = sorted({name for aim in (aims.objective, *dict(aims.at_least)) for name in aim.uses})
-    parts = {name: ca.SX.sym(name, 1 + (name == "rotation")) for name in names}
-    period = {name: part / fraction for name, part in parts.items()}
-    for name, value in {
-        "distance": lambda part: chord_per_way(turn) * part / fraction,
-        "rotation": lambda part: part[0] - part[1] + turn,
-        "period": ca.exp,
-    }.items():
-        if name in parts:
-            period[name] = value(parts[name])
-    values = ca.vertcat(*(aim(period) for aim in (aims.objective, *dict(aims.at_least))))
-    of_period = program.repeat(
-        ca.vertcat(*parts.values()), values, layout.of_period(names), delta=delta
-    )
-    w = ca.SX.sym("p", p.size)
-    speed = program.repeat(w, _square_of_speed(gaits, w, n_joint), p[:, None], delta=delta)
-    if not gaits.linear:
-        given = ca.vertcat(*(a for row in gaits.coefficients(w, n_joint) for a in row))
-        left = w[gaits.n_own : gaits.n_own + given.numel()] - given
-        members = program.repeat(w, left, p[:, None], delta=delta)
-    crossing = limits.repeat(program)
-    sums = motion.totals()
-    program.close()
-
-    # rows
-    pick = program.pick
-    state, rate = mesh.integration()
-    motion.add_rows(state, rate)
-    sign = closing_sign(gaits.closing_symmetry)
-    theta = pick(layout.theta[0])
-    if sign is not None and aims.rotation is not None:
-        program.add("rotation", theta[-1] + sign * theta[0])
-    if "theta" in kind_of_motion(control.dynamics).static_parameters:
-        program.add("heading", theta[0] - pick(p[-1:]))
-    state, rate = mesh.quadrature()
-    ahead, aside, power = motion.ways()
-    program.add("distance", state @ pick(layout.distance[0]) - RADIANS * rate @ ahead)
-    program.add("work", state @ pick(layout.work[0]) - RADIANS * rate @ power)
-    integral = sparse.csr_matrix(rate.sum(axis=0))
-    for quantity, total, gained in zip(aims.integrals, layout.totals, sums, strict=True):
-        program.add(quantity.name, pick(total) - RADIANS * integral @ pick(gained))
-    if aims.no_way_across:
-        program.add("across", integral @ aside)
-    if not gaits.linear:
-        program.add("members", pick(members))
-    cells = limits.add_rows(program, crossing)
-    program.add(SHAPE_SPEED, pick(speed), admissible.smallest_shape_speed**2, np.inf)
-    if aims.at_least:
-        least = np.array([value for _, value in aims.at_least])
-        program.add(AT_LEAST, pick(of_period[1:]), least, np.inf)
-    motion.add_limits()
-
-    lower, upper = np.full(program.n, -np.inf), np.full(program.n, np.inf)
-    lower[p], upper[p] = gaits.bounds(admissible.body, widest(admissible.joint_limit))
-    if isinstance(body := control.dynamics.body, Chain) and lifted:
-        most = body.contact.largest_forces(control.dynamics.law)
-        lower[layout.friction], upper[layout.friction] = -most, most
-    for total in (layout.distance, layout.work):
-        lower[total[0, 0]] = upper[total[0, 0]] = 0.0
-    return FullProgram(
-        control, mesh, far, layout, program.groups, cells, lower, upper,
-        np.concatenate(program.lower), np.concatenate(program.upper), tuple(program.repeated),
-        sparse.vstack(program.rows).tocsr(), -pick(of_period[0]), limits, motion.velocity,
-    )  # fmt: skip
+    kind = _Links if control.formulation == FULL else _Mapped
+    return kind(control, control.mesh(edges, scheme), parameters, far)
 
 
-class _Motion:
-    """The equations of motion of a body at the points of a mesh."""
+class FullProgram(Program):
+    """A nonlinear program ``min f(x), lower <= x <= upper, row_lower <= g(x) <= row_upper``;
+    `groups` are the rows of a name, `cells` the mesh cells of a path constraint."""
 
     velocity: BalancedVelocity | None = None
 
-    def __init__(self, program: Rows, control: ControlProblem, mesh: Mesh, layout: Layout) -> None:
-        self.program, self.control, self.mesh, self.layout = program, control, mesh, layout
-        self.dynamics = control.dynamics.in_speeds_of(RADIANS)
+    def __init__(
+        self, control: ControlProblem, mesh: Mesh, parameters: np.ndarray, far: Pairs
+    ) -> None:
+        self.control, self.mesh, self.far = control, mesh, far
+        self.layout = layout = layout_of(control, mesh)
+        self.limits = limits = ShapeLimits(control, mesh, layout, parameters, far)
+        super().__init__(layout.n + limits.n_bend)
+        self.dynamics, admissible = control.dynamics.in_speeds_of(RADIANS), control.admissible
+        aims, gaits, n_joint = control.aims, admissible.gait, admissible.n_joint
+        self.relative, pick, p = gaits.relative_delta, self.pick, layout.parameters
         self.sites = np.empty(mesh.n_point, dtype=int)
         self.sites[mesh.points] = mesh.sites
-        gait, n_joint = control.admissible.gait, control.admissible.n_joint
-        # (joint, point), as index arrays are picked
-        self.Phi, self.Phi_t = (
-            sparse.csr_matrix(matrix.transpose(1, 0, 2).reshape(-1, matrix.shape[2]))
-            for matrix in (
-                gait.angle_matrix(mesh.times, n_joint),
-                gait.rates_on(mesh, n_joint) / RADIANS,
-            )
-        )
-        self.offset = np.repeat(gait.offset(n_joint)[:, 0], mesh.n_point)
-        self.delta, self.relative = ca.SX.sym("delta"), gait.relative_delta
+
+        # the functions that are repeated: of links or points, of the period, of the gait
         if self.relative and self.dynamics.turn:
-            self.lengths = self._lengths_of_sides()
+            shares, rates = gaits.side_rates(n_joint)
+            self.sides = self.repeat(partial(_lengths_of_sides, shares, rates), [p])
         self.functions()
+        objectives = aims.objective, *dict(aims.at_least)
+        names = sorted({name for aim in objectives for name in aim.uses})
+
+        def period(*parts: ca.SX) -> ca.SX:
+            totals = {name: part / gaits.fraction for name, part in zip(names, parts, strict=True)}
+            for name, part in zip(names, parts, strict=True):
+                if name == "distance":
+                    totals[name] = chord_per_way(self.dynamics.turn) * part / gaits.fraction
+                elif name == "rotation":
+                    totals[name] = part[0] - part[1] + self.dynamics.turn
+                elif name == "period":
+                    totals[name] = ca.exp(part)
+            return ca.vertcat(*(aim(totals) for aim in objectives))
+
+        of_period = self.repeat(period, [layout.total(name)[:, None] for name in names])
+        speed = self.repeat(partial(_square_of_speed, gaits, n_joint), [p])
+        if not gaits.linear:
+
+            def deviation(w: ca.SX) -> ca.SX:
+                given = ca.vertcat(*(a for row in gaits.coefficients(w, n_joint) for a in row))
+                return w[gaits.n_own : gaits.n_own + given.numel()] - given
+
+            members = self.repeat(deviation, [p])
+        crossing = limits.repeat(self)
+        actuators = control.actuators
+        shares_used = self.at_points(actuators) if actuators.names else None
+        densities = [self.at_points(quantity) for quantity in aims.integrals]
+
+        # the gait, links, friction and balance
+        matrices = gaits.angle_matrix(mesh.times, n_joint), gaits.rates_on(mesh, n_joint) / RADIANS
+        angles, rates = (
+            sparse.csr_matrix(matrix.transpose(1, 0, 2).reshape(-1, matrix.shape[2])) @ pick(p)
+            for matrix in matrices  # (joint, point), as index arrays are picked
+        )
+        self.equations(angles, rates, np.repeat(gaits.offset(n_joint)[:, 0], mesh.n_point))
+
+        # what grows along the mesh, and the boundary
+        sign, theta = closing_sign(gaits.closing_symmetry), pick(layout.theta[0])
+        if sign is not None and aims.rotation is not None:
+            self.add("rotation", theta[-1] + sign * theta[0])
+        if "theta" in kind_of_motion(control.dynamics).static_parameters:
+            self.add("heading", theta[0] - pick(p[-1]))
+        state, rate = mesh.quadrature()
+        ahead, aside, power = self.ways()
+        self.add("distance", state @ pick(layout.distance) - RADIANS * rate @ ahead)
+        self.add("work", state @ pick(layout.work) - RADIANS * rate @ power)
+        integral = sparse.csr_matrix(rate.sum(axis=0))
+        for quantity, total, gained in zip(aims.integrals, layout.totals, densities, strict=True):
+            self.add(quantity.name, pick(total) - RADIANS * integral @ pick(gained))
+        if aims.no_way_across:
+            self.add("across", integral @ aside)
+
+        # inequalities
+        if not gaits.linear:
+            self.add("members", pick(members))
+        self.cells = limits.add_rows(self, crossing)
+        self.add(SHAPE_SPEED, pick(speed), admissible.smallest_shape_speed**2, np.inf)
+        if aims.at_least:
+            least = np.array([value for _, value in aims.at_least])
+            self.add(AT_LEAST, pick(of_period[1:]), least, np.inf)
+        if shares_used is not None:
+            least = np.tile(actuators.least, mesh.n_point)
+            self.add(ACTUATORS, pick(shares_used.ravel(order="F")), least, 1.0)
+        self.objective = -pick(of_period[0])
+
+        self.lower, self.upper = np.full(self.n, -np.inf), np.full(self.n, np.inf)
+        bounds = gaits.bounds(admissible.body, widest(admissible.joint_limit))
+        self.lower[p[:, 0]], self.upper[p[:, 0]] = bounds
+        if layout.friction.size:
+            most = self.dynamics.body.contact.largest_forces(control.dynamics.law)  # type: ignore[attr-defined]
+            self.lower[layout.friction], self.upper[layout.friction] = -most, most
+        for total in (layout.distance, layout.work):
+            self.lower[total[0, 0]] = self.upper[total[0, 0]] = 0.0
 
     def functions(self) -> None:
+        """Add the functions of a link or a point."""
         raise NotImplementedError
 
-    def of_points(self, size: int) -> sparse.csr_matrix:
-        return self.spread(np.ones((1, size)))
-
-    def spread(self, matrix: np.ndarray) -> sparse.csr_matrix:
-        return sparse.csr_matrix(sparse.kron(matrix, sparse.eye(self.mesh.n_point)))
-
-    def at_points(self, formulas: Sequence[Any]) -> np.ndarray:
-        """Values of formulas at every point, ``(n_value, n_point)``."""
-        body, law = self.dynamics.body, self.dynamics.law
-        local, gather, q, r, moment = self.joints(any(each.needs_forces for each in formulas))
-        slow = self.delta * ca.norm_2(r) if self.relative else self.delta
-        now = Instants(
-            body, law, q, r, slow, unit=RADIANS, moments=moment,
-            joint_map=self.dynamics.joint_map,
-        )  # fmt: skip
-        out = ca.vertcat(*(each.at(now) for each in formulas))
-        return self.program.repeat(local, out, gather, delta=self.delta)
-
-    def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
-        """Local variables of a point, and angles, rates and moments of them."""
+    def shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
+        """Variables of a point, and its shape from them."""
         raise NotImplementedError
 
-    def totals(self) -> list[np.ndarray]:
-        """Densities of integrals, and shares of actuator limits, at the points."""
-        actuators = self.control.actuators
-        self.limited = self.at_points([actuators]) if actuators.names else None
-        return [self.at_points([quantity]) for quantity in self.control.aims.integrals]
+    def equations(self, angles: Any, rates: Any, offset: np.ndarray) -> None:
+        """Add the equations of motion of a gait with such angles, but for the offset, and rates."""
+        raise NotImplementedError
 
-    def add_limits(self) -> None:
-        if self.limited is not None:
-            least = np.tile(self.control.actuators.least, self.mesh.n_point)
-            self.program.add(
-                ACTUATORS, self.program.pick(self.limited.ravel(order="F")), least, 1.0
-            )
+    def ways(self) -> tuple[Any, Any, Any]:
+        """Rows of the velocities ahead and across, and of the power, at the points."""
+        raise NotImplementedError
 
-    def add_orientation(self, spin: np.ndarray, state: Any, rate: Any) -> None:
+    def at_points(self, formula: Any) -> np.ndarray:
+        """Values of a formula at every point, ``(n_value, n_point)``."""
+        variables, shape = self.shape(formula.needs_forces)
+
+        def value(*local: ca.SX) -> ca.SX:
+            q, r, moments = shape(*local)
+            slow = self.delta * ca.norm_2(r) if self.relative else self.delta
+            body, law, _, _, _, joint_map = self.dynamics
+            how: Any = {"unit": RADIANS, "moments": moments, "joint_map": joint_map}
+            return formula.at(Instants(body, law, q, r, slow, **how))
+
+        return self.repeat(value, variables)
+
+    def add_orientation(self, spin: np.ndarray) -> None:
         """theta' = w_0, less the turning of the axes."""
-        pick, theta = self.program.pick, self.layout.theta[0]
-        rows = state @ pick(theta) - RADIANS * rate @ pick(spin)
-        if self.relative and self.dynamics.turn:  # the axes turn evenly along the path
-            gait, mesh = self.control.admissible.gait, self.mesh
-            corners = gait.corners_in_time
+        mesh, turn, (state, rate) = self.mesh, self.dynamics.turn, self.mesh.integration()
+        rows = state @ self.pick(self.layout.theta) - RADIANS * rate @ self.pick(spin)
+        if self.relative and turn:  # the axes turn evenly along the path
+            corners = self.control.admissible.gait.corners_in_time
             side = np.searchsorted(corners, mesh.edges[:-1], side="right") - 1
             side = np.repeat(side, mesh.scheme.s)
-            share = sparse.diags(self.dynamics.turn * corners[-1] / np.diff(corners)[side])
-            rows = rows + rate @ share @ pick(self.lengths[side])
-            self.program.add("orientation", rows)
+            share = sparse.diags(turn * corners[-1] / np.diff(corners)[side])
+            self.add("orientation", rows + rate @ share @ self.pick(self.sides[side]))
             return
-        even = -self.dynamics.turn * np.asarray(rate.sum(axis=1)).ravel()
-        self.program.add("orientation", rows, even, even)
+        even = -turn * np.asarray(rate.sum(axis=1)).ravel()
+        self.add("orientation", rows, even, even)
 
-    def _lengths_of_sides(self) -> np.ndarray:
-        """Length of every side of a polygon over that of all, ``(n_side, 1)``."""
-        gait, p = self.control.admissible.gait, self.layout.parameters
-        shares, rates = gait.side_rates(self.control.admissible.n_joint)
-        w = ca.SX.sym("p", p.size)
-        sides = zip(shares, rates, strict=True)
-        lengths = ca.vertcat(*(share * ca.norm_2(ca.DM(each) @ w) for share, each in sides))
-        return self.program.repeat(w, lengths / ca.sum1(lengths), p, delta=self.delta)
+    @property
+    def delta_unit(self) -> float:
+        return 1.0 if self.relative else RADIANS
+
+    def member(self, x: np.ndarray) -> AnyGait:
+        return self.control.admissible.member(x[self.layout.parameters[:, 0]])
+
+    def moved_to(self, x: np.ndarray) -> tuple[FullProgram, np.ndarray]:
+        """The program with path constraints at the worst instants of variables x, and its variables
+        there."""
+        p = x[self.layout.parameters[:, 0]]
+        program = type(self)(self.control, self.mesh, p, self.far)
+        for name in ("rotation", ACTUATORS):
+            if name in self.groups:
+                rows = self.groups[name]
+                program = program.with_bounds(name, self.row_lower[rows], self.row_upper[rows])
+        return program, np.concatenate([x[: self.layout.n], program.limits.bends(p)])
+
+    def with_bounds(self, name: str, lower: np.ndarray, upper: np.ndarray) -> FullProgram:
+        program, rows = copy.copy(self), self.groups[name]
+        program.row_lower, program.row_upper = self.row_lower.copy(), self.row_upper.copy()
+        program.row_lower[rows], program.row_upper[rows] = lower, upper
+        return program
+
+    def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
+        """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
+        motion = balanced_variables(self.control, self.layout, self.mesh, parameters, delta)
+        return np.concatenate([motion, self.limits.bends(parameters)])
 
 
-def _square_of_speed(gaits: AnyClass, p: ca.SX, n_joint: int) -> ca.SX:
+def _lengths_of_sides(shares: np.ndarray, rates: np.ndarray, p: ca.SX) -> ca.SX:
+    """Length of every side of a polygon over that of all."""
+    sides = zip(shares, rates, strict=True)
+    lengths = ca.vertcat(*(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides))
+    return lengths / ca.sum1(lengths)
+
+
+def _square_of_speed(gaits: AnyClass, n_joint: int, p: ca.SX) -> ca.SX:
     """Square of the root-mean-square shape speed, or of the mean one where the pace does not
     matter."""
     if not gaits.relative_delta:
@@ -318,311 +272,244 @@ def _square_of_speed(gaits: AnyClass, p: ca.SX, n_joint: int) -> ca.SX:
     return sum(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides) ** 2
 
 
-class _Links(_Motion):
-    """A chain, link by link."""
+class _Links(FullProgram):
+    """A chain, link by link. Parts (links, joints or contacts) come one after the other, each at
+    all points."""
 
     def functions(self) -> None:
-        self.chain = cast(Chain, self.dynamics.body)
-        inertial = bool(self.layout.momenta.size)
-        self.halves = self._halves(inertial)
+        chain: Any = self.dynamics.body
+        self.chain, layout = chain, self.layout
+        inertial, lengths = bool(layout.momenta.size), chain.length_column()
+        phi, w, vx, vy = (
+            part.ravel() for part in (layout.directions, layout.spins, layout.vx, layout.vy)
+        )
+
+        def half(phi: ca.SX, w: ca.SX, length: Any) -> ca.SX:
+            """l/2 w sin phi, l/2 w cos phi; with inertia l/2 cos phi, l/2 sin phi, too."""
+            half = 0.5 * length * ca.vertcat(ca.sin(phi), ca.cos(phi))
+            return ca.vertcat(half * w, half[[1, 0]]) if inertial else half * w
+
+        self.halves = self.repeat(half, [phi, w], [lengths])
         if self.relative:
-            w = ca.SX.sym("w", self.chain.n_link)
-            self.speed = self.program.repeat(
-                w, ca.norm_2(ca.diff(w)), self.layout.spins, delta=self.delta
-            )
-        self.contacts = [(group.rows, self._contact(group, inertial)) for group in self._groups()]
-        self.load = self._load()
-        joint = np.arange(self.chain.n_joint)
-        if inertial:
-            self.swing, self.change = self._swing(), self._change()
-        else:
-            self.levers = [self._lever(joint, joint + side) for side in (0, 1)]
+            self.speed = self.repeat(lambda w: ca.norm_2(ca.diff(w)), [layout.spins])
+        groups = chain.contact.groups(self.dynamics.law)
+        self.contacts = [(group.rows, self._contact(group)) for group in groups]
 
-    def _groups(self) -> list[Any]:
-        return self.chain.contact.groups(self.dynamics.law)
+        def load(theta: ca.SX, vx: ca.SX, vy: ca.SX, mass: Any) -> ca.SX:
+            """m g in the plane, and its power."""
+            pull: Any = self.dynamics.regime.pull(theta)
+            c, s = ca.cos(theta), ca.sin(theta)
+            force = mass * ca.vertcat(c * pull[0] - s * pull[1], s * pull[0] + c * pull[1])
+            return ca.vertcat(force, ca.dot(force, ca.vertcat(vx, vy)))
 
-    def _instances(self, rows: Sequence[np.ndarray], parts: Any) -> np.ndarray:
-        """Local variables, ``(n_local, n_part * n_point)``, part by part."""
-        return np.stack([row[parts].ravel() for row in rows])
+        self.load = None
+        if self.dynamics.regime.pull(ca.SX.sym("theta")) is not None:
+            tail = np.tile(layout.directions[0], chain.n_link)
+            self.load = self.repeat(load, [tail, vx, vy], [chain.mass_column()])
 
-    def _part_numbers(self, **columns: np.ndarray) -> tuple[list[Any], ca.SX, np.ndarray]:
-        shared, symbols, values = [], [], []
-        for name, column in columns.items():
-            column = np.ravel(column)
-            if np.ptp(column) == 0.0:
-                shared.append(float(column[0]))
-                continue
-            symbols.append(ca.SX.sym(name))
-            shared.append(symbols[-1])
-            values.append(np.repeat(column, self.mesh.n_point))
-        size = self.mesh.n_point * np.size(next(iter(columns.values())))
-        return shared, ca.vertcat(ca.SX(0, 1), *symbols), np.reshape(values, (len(values), size))
+        def lever(phi: ca.SX, nx: ca.SX, ny: ca.SX, length: Any) -> ca.SX:
+            """l/2 e x N of the force at a joint on one of its links."""
+            return 0.5 * length * (ca.cos(phi) * ny - ca.sin(phi) * nx)
 
-    def _halves(self, inertial: bool) -> np.ndarray:
-        """l/2 w sin phi, l/2 w cos phi; with inertia l/2 cos phi, l/2 sin phi, too."""
-        local = ca.SX.sym("link", 2)
-        (length,), given, values = self._part_numbers(length=self.chain.length_column())
-        phi, w = ca.vertsplit(local)
-        half = 0.5 * length * ca.vertcat(ca.sin(phi), ca.cos(phi))
-        out = ca.vertcat(half * w, half[[1, 0]]) if inertial else half * w
-        gather = self._instances([self.layout.directions, self.layout.spins], slice(None))
-        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
-
-    def _contact(self, group: Any, inertial: bool) -> np.ndarray:
-        """Force in the plane, moment and power of parts under one law."""
-        layout, contact = self.layout, self.chain.contact
-        law, rows, links = group.law, group.rows, np.array(contact.links)[group.rows]
-        (along, offset, cos, sin, length, pressure), given, values = self._part_numbers(
-            along=contact.along[rows],
-            offset=contact.offset[rows],
-            cos=contact.cos[rows],
-            sin=contact.sin[rows],
-            length=contact.length[rows],
-            pressure=contact.pressure[rows],
-        )
-        n_part, places = len(contact.parts), [layout.friction[rows]]
-        places.append(layout.friction[[n_part + row for row in rows]])
-        if group.pads:
-            places.append(layout.friction[contact.couples(rows)])
-        moving = [layout.directions, layout.spins, layout.vx, layout.vy]
-        moving += [layout.x, layout.y] if inertial else []
-        if self.relative:
-            places.append(np.repeat(layout.speed, len(links), axis=0))
-        gather = np.concatenate(
-            [self._instances(moving, links), np.stack([part.ravel() for part in places])]
-        )
-        local = ca.SX.sym("contact", gather.shape[0])
-        slow = self.delta * local[-1] if self.relative else self.delta
-        (phi, w, vx, vy), force = ca.vertsplit(local)[:4], ca.vertsplit(local)[len(moving) :]
-        c, s = ca.cos(phi), ca.sin(phi)
-        us, un = vx * c + vy * s - offset * w, vy * c - vx * s + along * w
-        vs, vn = cos * us + sin * un, cos * un - sin * us
-        if group.pads:
-            pressed = LinkForce(*(each / pressure for each in force[:3]))
-            laws = line_integrals(law).scaled_laws(vs, vn, w, length, slow, pressed)
-        else:
-            density = law.density(vs, vn, slow)
-            secant = law.density_secant(vs, vn, slow)
-            laws = [(force[k] / pressure - density[k]) / secant[k][k] for k in range(2)]
-        couple = force[2] if group.pads else 0.0
-        fs, fn = cos * force[0] - sin * force[1], sin * force[0] + cos * force[1]
-        fx, fy = c * fs - s * fn, s * fs + c * fn
-        moment = along * fn - offset * fs + couple
-        if inertial:
-            x, y = ca.vertsplit(local)[4:6]
-            moment += x * fy - y * fx
-        power = -(force[0] * vs + force[1] * vn + couple * w)
-        out = ca.vertcat(fx, fy, moment, power, *laws)
-        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
-
-    def _load(self) -> np.ndarray | None:
-        """m g in the plane of every link, and its power."""
-        layout, local = self.layout, ca.SX.sym("link", 3)
-        pull = self.dynamics.regime.pull(local[0])
-        if pull is None:
-            return None
-        (mass,), given, values = self._part_numbers(mass=self.chain.mass_column())
-        c, s = ca.cos(local[0]), ca.sin(local[0])
-        force = mass * ca.vertcat(c * pull[0] - s * pull[1], s * pull[0] + c * pull[1])
-        tail = np.repeat(layout.directions[:1], self.chain.n_link, axis=0)
-        gather = self._instances([tail, layout.vx, layout.vy], slice(None))
-        out = ca.vertcat(force, ca.dot(force, local[1:]))
-        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
-
-    def _lever(self, joint: np.ndarray, link: np.ndarray) -> np.ndarray:
-        """l/2 e x N of the forces at joints on one of their links."""
-        layout, local = self.layout, ca.SX.sym("joint", 3)
-        lengths = self.chain.length_column()[link]
-        (length,), given, values = self._part_numbers(length=lengths)
-        phi, nx, ny = ca.vertsplit(local)
-        gather = np.concatenate(
-            [
-                self._instances([layout.directions], link),
-                self._instances([layout.joint_fx, layout.joint_fy], joint),
-            ]
-        )
-        out = 0.5 * length * (ca.cos(phi) * ny - ca.sin(phi) * nx)
-        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
-
-    def _swing(self) -> np.ndarray:
-        """J w + m x cross v of every link."""
-        layout, local = self.layout, ca.SX.sym("link", 5)
-        (mass, inertia), given, values = self._part_numbers(
-            mass=self.chain.mass_column(),
-            inertia=self.chain.inertia_column(),
-        )
-        w, vx, vy, x, y = ca.vertsplit(local)
-        rows = [layout.spins, layout.vx, layout.vy, layout.x, layout.y]
-        gather, out = self._instances(rows, slice(None)), inertia * w + mass * (x * vy - y * vx)
-        return self.program.repeat(local, out, gather, given, values, delta=self.delta)
-
-    def _change(self) -> np.ndarray:
-        """Velocity of the centre of mass in tail axes, and the rates of the momenta."""
-        layout, (free, paces) = self.layout, self._paces()
-        gather = np.concatenate(
-            [
-                layout.directions[:1],
-                layout.spins[:1],
-                layout.centre,
-                layout.momenta[:, self.sites],
-                paces,
-            ]
-        )
-        local = ca.SX.sym("point", gather.shape[0])
-        phi, w, vx, vy, fx, fy, moment = ca.vertsplit(local)[:7]
-        momenta = local[7 : 7 + len(STATES)]
-        c, s = ca.cos(phi), ca.sin(phi)
-        pushed = ca.vertcat(c * fx + s * fy, c * fy - s * fx, moment) / self._froude(local, free)
-        changes = pushed + turning(ca.vertcat(0, 0, w), momenta)
-        out = ca.vertcat(c * vx + s * vy, c * vy - s * vx, changes)
-        return self.program.repeat(local, out, gather, delta=self.delta)
-
-    def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
-        layout, n = self.layout, self.chain.n_joint
-        rows = [layout.directions, layout.spins]
-        inertial = with_moments and bool(layout.momenta.size)
-        if inertial:
-            free, paces = self._paces()
-            rows += [layout.accelerations, layout.momenta[:, self.sites], paces]
-        elif with_moments:
-            rows.append(layout.moments)
-        gather = np.concatenate(rows)
-        local = ca.SX.sym("point", gather.shape[0])
-        phi, w, rest = local[: n + 1], local[n + 1 : 2 * n + 2], local[2 * n + 2 :]
-        q, r = ca.diff(phi), ca.diff(w)
         if not inertial:
-            return local, gather, q, r, rest if with_moments else None
-        momenta = rest[n : n + len(STATES)]
-        torques = torque_function(self.chain, self.dynamics.law)
-        moment = torques(q, r, rest[:n], momenta, self.delta, self._froude(local, free))
-        return local, gather, q, r, moment
+            forces = layout.joint_fx.ravel(), layout.joint_fy.ravel()
+            links = slice(None, -1), slice(1, None)
+            self.levers = [
+                self.repeat(lever, [layout.directions[k].ravel(), *forces], [lengths[k]])
+                for k in links
+            ]
+            return
 
-    def _paces(self) -> tuple[bool, np.ndarray]:
-        free = [self.layout.pace] if self.dynamics.regime.free_pace else []
+        def swing(w: ca.SX, vx: ca.SX, vy: ca.SX, x: ca.SX, y: ca.SX, mass: Any, J: Any) -> ca.SX:
+            """J w + m x cross v."""
+            return J * w + mass * (x * vy - y * vx)
+
+        place = layout.x.ravel(), layout.y.ravel()
+        inertia = chain.mass_column(), chain.inertia_column()
+        self.swing = self.repeat(swing, [w, vx, vy, *place], inertia)
+
+        def change(tail: ca.SX, centre: ca.SX, momenta: ca.SX, pace: ca.SX) -> ca.SX:
+            """Velocity of the centre of mass in tail axes, and the rates of the momenta."""
+            (phi, w), (vx, vy, fx, fy, moment) = ca.vertsplit(tail), ca.vertsplit(centre)
+            c, s = ca.cos(phi), ca.sin(phi)
+            pushed = ca.vertcat(c * fx + s * fy, c * fy - s * fx, moment) / self._froude(pace)
+            changes = pushed + turning(ca.vertcat(0, 0, w), momenta)
+            return ca.vertcat(c * vx + s * vy, c * vy - s * vx, changes)
+
+        tail = np.stack([layout.directions[0], layout.spins[0]])
+        self.change = self.repeat(change, [tail, layout.centre, *self._momenta_and_pace()])
+
+    def _contact(self, group: Any) -> np.ndarray:
+        """Force in the plane, moment and power of parts under one law."""
+        layout, contact, law, rows = self.layout, self.chain.contact, group.law, group.rows
+        links, n_part = np.array(contact.links)[rows], len(contact.parts)
+        moving = [layout.directions, layout.spins, layout.vx, layout.vy, layout.x, layout.y]
+        forces = [layout.friction[rows], layout.friction[[n_part + row for row in rows]]]
+        if group.pads:
+            forces.append(layout.friction[contact.couples(rows)])
+        speed = np.repeat(layout.speed, len(links), axis=0)
+
+        def function(moving: ca.SX, force: ca.SX, speed: ca.SX, *numbers: Any) -> ca.SX:
+            (phi, w, vx, vy, *place), force = ca.vertsplit(moving), ca.vertsplit(force)
+            along, offset, cos, sin, length, pressure = numbers
+            slow = self.delta * speed if self.relative else self.delta
+            c, s = ca.cos(phi), ca.sin(phi)
+            us, un = vx * c + vy * s - offset * w, vy * c - vx * s + along * w
+            vs, vn = cos * us + sin * un, cos * un - sin * us
+            if group.pads:
+                pressed = LinkForce(*(each / pressure for each in force))
+                laws = line_integrals(law).scaled_laws(vs, vn, w, length, slow, pressed)
+            else:
+                density = law.density(vs, vn, slow)
+                secant = law.density_secant(vs, vn, slow)
+                laws = [(force[k] / pressure - density[k]) / secant[k][k] for k in range(2)]
+            couple = force[2] if group.pads else 0.0
+            fs, fn = cos * force[0] - sin * force[1], sin * force[0] + cos * force[1]
+            fx, fy = c * fs - s * fn, s * fs + c * fn
+            moment = along * fn - offset * fs + couple
+            if place:
+                moment += place[0] * fy - place[1] * fx
+            power = -(force[0] * vs + force[1] * vn + couple * w)
+            return ca.vertcat(fx, fy, moment, power, *laws)
+
+        instances = [
+            np.stack([part[links].ravel() for part in moving if part.size]),
+            np.stack([part.ravel() for part in forces]),
+            speed.reshape(-1, len(links) * self.mesh.n_point),
+        ]
+        names = ("along", "offset", "cos", "sin", "length", "pressure")
+        return self.repeat(function, instances, [getattr(contact, name)[rows] for name in names])
+
+    def _momenta_and_pace(self) -> list[np.ndarray]:
+        """Momenta and a free log period at the points."""
+        free = [self.layout.pace] * self.dynamics.regime.free_pace
         paces = np.repeat(self.layout.parameters[free], self.mesh.n_point, axis=1)
-        return bool(free), paces.reshape(len(free), self.mesh.n_point)
+        return [self.layout.momenta[:, self.sites], paces]
 
-    def _froude(self, local: ca.SX, free: bool) -> Any:
-        """Froude number for time in radians; a free log period is the last local variable."""
-        return (ca.exp(-2.0 * local[-1]) if free else self.dynamics.regime.froude) * RADIANS**2
+    def _froude(self, pace: ca.SX) -> Any:
+        """Froude number for time in radians."""
+        return (ca.exp(-2.0 * pace) if pace.size1() else self.dynamics.regime.froude) * RADIANS**2
+
+    def shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
+        layout = self.layout
+        links = [layout.directions, layout.spins]
+        if not with_moments:
+            return links, lambda phi, w: (ca.diff(phi), ca.diff(w), None)
+        if not layout.momenta.size:
+            moments = [*links, layout.moments]
+            return moments, lambda phi, w, moments: (ca.diff(phi), ca.diff(w), moments)
+        torques = torque_function(self.chain, self.dynamics.law)
+
+        def shape(phi: ca.SX, w: ca.SX, rates: ca.SX, momenta: ca.SX, pace: ca.SX) -> _Shape:
+            q, r = ca.diff(phi), ca.diff(w)
+            return q, r, torques(q, r, rates, momenta, self.delta, self._froude(pace))
+
+        return [*links, layout.accelerations, *self._momenta_and_pace()], shape
+
+    def _at_points(self, matrix: np.ndarray) -> sparse.csr_matrix:
+        """A matrix over parts, applied at every point."""
+        return sparse.csr_matrix(sparse.kron(matrix, sparse.eye(self.mesh.n_point)))
 
     def _on_links(self, output: int) -> sparse.csr_matrix:
         """Sum over the contacts of each link."""
-        n_link = self.chain.n_link
         links, total = np.array(self.chain.contact.links), 0
         for rows, outputs in self.contacts:
-            to_links = 1.0 * (links[rows] == np.arange(n_link)[:, None])
-            total = total + self.spread(to_links) @ self.program.pick(outputs[output])
+            to_links = 1.0 * (links[rows] == np.arange(self.chain.n_link)[:, None])
+            total = total + self._at_points(to_links) @ self.pick(outputs[output])
         return total
 
-    def add_rows(self, state: Any, rate: Any) -> None:
-        program, layout, pick = self.program, self.layout, self.program.pick
-        n_link = self.chain.n_link
-        p, theta = pick(layout.parameters), pick(layout.theta[0, self.sites])
+    def equations(self, angles: Any, rates: Any, offset: np.ndarray) -> None:
+        layout, pick, n_link = self.layout, self.pick, self.chain.n_link
         phi, w, vx, vy = map(pick, (layout.directions, layout.spins, layout.vx, layout.vy))
-        diff = np.diff(np.eye(n_link), axis=0)
-        d, both = self.spread(diff), self.spread(np.abs(diff))  # of neighbours, at their joint
-        # outputs are ordered instance by instance, instances part by part
-        sin, cos = (pick(row) for row in self.halves[:2])
-        program.add("tail", phi[: self.mesh.n_point] - theta)
-        program.add("angles", d @ phi - self.Phi @ p, self.offset, self.offset)
-        program.add("rates", d @ w - self.Phi_t @ p)
+        difference = np.diff(np.eye(n_link), axis=0)  # of the links at a joint
+        d, both = self._at_points(difference), self._at_points(np.abs(difference))
+        halves = [pick(row) for row in self.halves]
+        self.add("tail", phi[: self.mesh.n_point] - pick(layout.theta[0, self.sites]))
+        self.add("angles", d @ phi - angles, offset, offset)
+        self.add("rates", d @ w - rates)
         if self.relative:
-            program.add("speed", pick(layout.speed) - pick(self.speed))
-        program.add("velocity x", d @ vx + both @ sin)
-        program.add("velocity y", d @ vy - both @ cos)
+            self.add("speed", pick(layout.speed) - pick(self.speed))
+        self.add("velocity x", d @ vx + both @ halves[0])
+        self.add("velocity y", d @ vy - both @ halves[1])
         for k, (_, outputs) in enumerate(self.contacts):
-            program.add(f"force law {k + 1}", pick(outputs[4:]))
-        loads = [self._on_links(k) for k in range(2)]
+            self.add(f"force law {k + 1}", pick(outputs[4:]))
+        fx, fy, moment = map(self._on_links, range(3))
         if self.load is not None:
-            loads = [force + pick(self.load[k]) for k, force in enumerate(loads)]
-        moment = self._on_links(2)
+            fx, fy = fx + pick(self.load[0]), fy + pick(self.load[1])
         if layout.momenta.size:
-            self._add_momenta(loads, moment, state, rate)
+            for axis, place, half in (("x", layout.x, 2), ("y", layout.y, 3)):
+                mass = self._at_points(self.chain.mass_column().T)
+                self.add(f"place {axis}", d @ pick(place) - both @ halves[half])
+                self.add(f"centre {axis}", mass @ pick(place))
+            self._add_momenta([mass @ vx, mass @ vy], [fx, fy, moment])
         else:
-            up = self.spread(diff.T)
-            program.add("force x", up @ pick(layout.joint_fx) + loads[0])
-            program.add("force y", up @ pick(layout.joint_fy) + loads[1])
+            up = self._at_points(difference.T)
+            self.add("force x", up @ pick(layout.joint_fx) + fx)
+            self.add("force y", up @ pick(layout.joint_fy) + fy)
+            sides = (np.eye(n_link)[:, k : n_link - 1 + k] for k in (0, 1))
             lever = sum(
-                self.spread(np.eye(n_link)[:, side : n_link - 1 + side]) @ pick(self.levers[side])
-                for side in (0, 1)
+                self._at_points(side) @ pick(each)
+                for side, each in zip(sides, self.levers, strict=True)
             )
-            program.add("torque", up @ pick(layout.moments) + moment - lever)
-        self.add_orientation(layout.spins[0], state, rate)
+            self.add("torque", up @ pick(layout.moments) + moment - lever)
+        self.add_orientation(layout.spins[0])
 
-    def _add_momenta(
-        self, loads: list[sparse.csr_matrix], moment: sparse.csr_matrix, state: Any, rate: Any
-    ) -> None:
-        program, layout, pick = self.program, self.layout, self.program.pick
-        n_link = self.chain.n_link
-        mass, every = self.spread(self.chain.mass_column().T), self.of_points(n_link)
-        diff = np.diff(np.eye(n_link), axis=0)
-        d, both = self.spread(diff), self.spread(np.abs(diff))
-        for axis, place, half in (("x", layout.x, 2), ("y", layout.y, 3)):
-            program.add(f"place {axis}", d @ pick(place) - both @ pick(self.halves[half]))
-            program.add(f"centre {axis}", mass @ pick(place))
-        sums = [mass @ pick(layout.vx), mass @ pick(layout.vy)]
-        sums += [every @ load for load in (*loads, moment)]
-        for name, row, total in zip(
-            ("speed x", "speed y", "force x", "force y", "torque"), layout.centre, sums, strict=True
-        ):
-            program.add(name, pick(row) - total)
+    def _add_momenta(self, velocity: list[Any], loads: list[Any]) -> None:
+        """Momenta of the body and what changes them."""
+        layout, pick, (state, rate) = self.layout, self.pick, self.mesh.integration()
+        every = self._at_points(np.ones((1, self.chain.n_link)))
+        names = ("speed x", "speed y", "force x", "force y", "torque")
+        totals = velocity + [every @ load for load in loads]
+        for name, row, total in zip(names, layout.centre, totals, strict=True):
+            self.add(name, pick(row) - total)
         now = [pick(self.change[0]), pick(self.change[1]), every @ pick(self.swing)]
         for k, name in enumerate(STATES):
             sites = pick(layout.momenta[k])
-            program.add(f"{name} of the body", now[k] - sites[self.sites])
-            program.add(
-                f"momentum {name}", state @ sites - RADIANS * rate @ pick(self.change[2 + k])
-            )
+            self.add(f"{name} of the body", now[k] - sites[self.sites])
+            changes = RADIANS * rate @ pick(self.change[2 + k])
+            self.add(f"momentum {name}", state @ sites - changes)
         if layout.accelerations.size:
-            matrix = self.control.admissible.gait.angle_matrix(
-                self.mesh.times, self.chain.n_joint, 2
-            )
-            rows = matrix.transpose(1, 0, 2).reshape(-1, matrix.shape[2]) / RADIANS**2
+            gait, n_joint = self.control.admissible.gait, self.chain.n_joint
+            matrix = gait.angle_matrix(self.mesh.times, n_joint, 2).transpose(1, 0, 2)
+            rows = sparse.csr_matrix(matrix.reshape(-1, matrix.shape[2]) / RADIANS**2)
             p = pick(layout.parameters)
-            program.add("accelerations", pick(layout.accelerations) - sparse.csr_matrix(rows) @ p)
+            self.add("accelerations", pick(layout.accelerations) - rows @ p)
         image = momenta_image(self.dynamics.symmetry)
         begin, end = pick(layout.momenta[:, 0]), pick(layout.momenta[:, -1])
-        program.add("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin))
+        self.add("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin))
 
     def ways(self) -> tuple[Any, Any, Any]:
-        pick, layout = self.program.pick, self.layout
-        mass, angle = self.spread(self.chain.mass_column().T), self.dynamics.regime.ahead
-        vx, vy = mass @ pick(layout.vx), mass @ pick(layout.vy)
+        mass, angle = self._at_points(self.chain.mass_column().T), self.dynamics.regime.ahead
+        vx, vy = mass @ self.pick(self.layout.vx), mass @ self.pick(self.layout.vy)
         c, s = np.cos(angle), np.sin(angle)
         power = self._on_links(3)
         if self.load is not None:  # of the joints
-            power = power - pick(self.load[2])
-        return c * vx + s * vy, c * vy - s * vx, self.of_points(self.chain.n_link) @ power
+            power = power - self.pick(self.load[2])
+        every = self._at_points(np.ones((1, self.chain.n_link)))
+        return c * vx + s * vy, c * vy - s * vx, every @ power
 
 
-class _Mapped(_Motion):
+class _Mapped(FullProgram):
     """A body whose tail velocity is tied to the one that balances it."""
 
     def functions(self) -> None:
         layout, body, law = self.layout, self.dynamics.body, self.dynamics.law
         self.velocity = BalancedVelocity(body, law, self.mesh.n_point)
-        gather = np.concatenate(
-            [layout.theta[:, self.sites], layout.angles, layout.rates, layout.z]
-        )
-        values, solve = np.empty((0, self.mesh.n_point)), self.velocity.of_local
-        solve = partial(solve, relative=self.relative)
-        point = Repeated(velocity_map(body, law, relative=self.relative), gather, values, solve)
-        self.point = self.program.add_repeated(point)
+        theta = layout.theta[:, self.sites]
+        gather = np.concatenate([theta, layout.angles, layout.rates, layout.z])
+        values = np.empty((0, self.mesh.n_point))
+        solve = partial(self.velocity.of_local, relative=self.relative)
+        function = velocity_map(body, law, relative=self.relative)
+        self.point = self.add_repeated(Repeated(function, gather, values, solve))
 
-    def joints(self, with_moments: bool) -> tuple[ca.SX, np.ndarray, ca.SX, ca.SX, ca.SX | None]:
-        n = self.dynamics.body.n_joint
-        local = ca.SX.sym("point", 2 * n)
-        gather = np.concatenate([self.layout.angles, self.layout.rates])
-        return local, gather, local[:n], local[n:], None
+    def shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
+        return [self.layout.angles, self.layout.rates], lambda q, r: (q, r, None)
 
-    def add_rows(self, state: Any, rate: Any) -> None:
-        program, layout, pick = self.program, self.layout, self.program.pick
-        p = pick(layout.parameters)
-        program.add("angles", pick(layout.angles) - self.Phi @ p, self.offset, self.offset)
-        program.add("rates", pick(layout.rates) - self.Phi_t @ p)
-        program.add("balance", pick(self.point[:3]))
-        self.add_orientation(layout.z[2], state, rate)
+    def equations(self, angles: Any, rates: Any, offset: np.ndarray) -> None:
+        self.add("angles", self.pick(self.layout.angles) - angles, offset, offset)
+        self.add("rates", self.pick(self.layout.rates) - rates)
+        self.add("balance", self.pick(self.point[:3]))
+        self.add_orientation(self.layout.z[2])
 
     def ways(self) -> tuple[Any, Any, Any]:
-        return tuple(self.program.pick(self.point[k]) for k in (3, 4, 5))
+        return tuple(self.pick(self.point[k]) for k in (3, 4, 5))

@@ -1,16 +1,27 @@
-"""Indices of the decision variables of a full program in the vector x."""
+"""Decision variables of a full program: their places in the vector x, and feasible values of them
+from a gait, through the balance solver."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights, sums
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.dynamics.kinds import kind_of_motion
+from colloc.dynamics.kinds import (
+    OMEGA,
+    PeriodTotals,
+    Shapes,
+    initial_heading,
+    kind_of_motion,
+    static_parameters_of,
+)
+from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.period import chord_per_way
-from colloc.mechanics.bodies import FULL, Body
+from colloc.mechanics.bodies import FULL
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
 from colloc.mechanics.links import Links
@@ -22,36 +33,37 @@ RADIANS = 2 * np.pi
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Index arrays ``(n_component, n_position)`` into x.
+    """Index arrays ``(n_component, n_position)`` into x; those that a problem has no use for are
+    empty."""
 
-    At the mesh's sites theta and, with inertia, the momenta; at its edges distance and work. At its
-    points of a lifted chain the directions of the links, their rotation rates, the velocities of
-    their midpoints, the friction on what touches the floor, the shape speed where delta is relative
-    to it, and the force and the moment at each joint or, with inertia, positions of the midpoints
-    from the centre of mass and the velocity of that, force and moment about it, and where torques
-    are limited the accelerations of the joints; of other bodies
-    shape coordinates, their rates and the tail velocity z.
-    """
-
+    # of the period
     parameters: np.ndarray
+    totals: np.ndarray
+    # at the mesh's sites
     theta: np.ndarray
+    momenta: np.ndarray
+    # at its edges
     distance: np.ndarray
     work: np.ndarray
-    totals: np.ndarray
-    momenta: np.ndarray
-    accelerations: np.ndarray
+    # at its points, of a lifted chain: of links, contacts, joints
     directions: np.ndarray
     spins: np.ndarray
     vx: np.ndarray
     vy: np.ndarray
     friction: np.ndarray
     speed: np.ndarray
+    """Of the shape, where delta is relative to it."""
     joint_fx: np.ndarray
     joint_fy: np.ndarray
     moments: np.ndarray
+    # with inertia
     x: np.ndarray
+    """Midpoints from the centre of mass."""
     y: np.ndarray
     centre: np.ndarray
+    """Its velocity, force and moment about it."""
+    accelerations: np.ndarray
+    # of other bodies
     angles: np.ndarray
     rates: np.ndarray
     z: np.ndarray
@@ -60,26 +72,23 @@ class Layout:
     pace: int = -1
     """Index of the log period among the parameters."""
 
-    def of_period(self, names: Iterable[str]) -> np.ndarray:
-        """Totals of the solved part, ``(n, 1)``; of the rotation its end and begin."""
+    def total(self, name: str) -> np.ndarray:
+        """A total of the solved part, ``(1,)``; of the rotation its end and begin; the log
+        period."""
         places = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
-        places |= {
-            "distance": self.distance[0, -1:],
-            "work": self.work[0, -1:],
-            "rotation": self.theta[0, [-1, 0]],
-            "period": self.parameters[self.pace],  # its logarithm
-        }
-        return np.concatenate([places[name] for name in names])[:, None]
+        places |= {"distance": self.distance[0, -1:], "work": self.work[0, -1:]}
+        places |= {"rotation": self.theta[0, [-1, 0]], "period": self.parameters[self.pace]}
+        return places[name]
 
     def shape_speed(self, x: np.ndarray) -> np.ndarray:
         speed: np.ndarray = x[self.speed[0]] if self.speed.size else x[self.rates]
         return speed if speed.ndim == 1 else np.linalg.norm(speed, axis=0)
 
-    def tail_velocity(self, body: Body, x: np.ndarray) -> np.ndarray:
+    def tail_velocity(self, body: Any, x: np.ndarray) -> np.ndarray:
         if self.z.size:
             return x[self.z]
         phi, w, vx, vy = (x[part[0]] for part in (self.directions, self.spins, self.vx, self.vy))
-        velocity, half = (vx + 1j * vy) * np.exp(-1j * phi), 0.5 * body.lengths[0]  # type: ignore[attr-defined]
+        velocity, half = (vx + 1j * vy) * np.exp(-1j * phi), 0.5 * body.lengths[0]
         return np.stack([velocity.real, velocity.imag - half * w, w])
 
 
@@ -111,9 +120,8 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
     for name, (rows, columns) in sizes.items():
         indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
         start += rows * columns
-    pace = -len(
-        kind_of_motion(dynamics).static_parameters
-    )  # which comes first of what a gait tells
+    # a free log period comes first of the static parameters, which come last
+    pace = -len(kind_of_motion(dynamics).static_parameters)
     return Layout(n=start, **indices, integrals=control.aims.integrals, pace=pace)
 
 
@@ -126,3 +134,95 @@ def distance_and_work(
         for row in (layout.distance, layout.work)
     )
     return chord_per_way(control.dynamics.turn) * way, work * control.unit
+
+
+def balanced_variables(
+    control: ControlProblem,
+    layout: Layout,
+    mesh: Mesh,
+    parameters: np.ndarray,
+    delta: float,
+    gait: AnyGait = None,
+) -> np.ndarray:
+    """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
+    gaits, n_joint = control.admissible.gait, control.admissible.n_joint
+    kind = kind_of_motion(control.dynamics.in_speeds_of(RADIANS))
+    if gait is None:
+        gait = gaits.trajectory(parameters, n_joint)
+        begin = parameters[parameters.size - len(kind.static_parameters) :]
+    else:
+        begin = static_parameters_of(kind, gait)
+    x = np.zeros(layout.n)
+    x[layout.parameters[:, 0]] = parameters
+    angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
+    relative, speed = gaits.relative_delta, np.ones(mesh.n_point)
+    if relative:
+        rates = (gaits.rates_on(mesh, n_joint) @ parameters).T / RADIANS
+        speed = np.linalg.norm(rates, axis=0)
+    slow = delta if relative else delta / RADIANS
+    shapes = Shapes(angles, rates / speed, slow, RADIANS, speed)
+    along = kind.along(mesh, shapes, begin)
+    now, z = along.now, speed * along.z
+
+    weight, points = RADIANS * stage_weights(mesh), mesh.points
+    turn = kind.turn * speed / (point_weights(mesh) @ speed) if relative else kind.turn
+    rotation, velocity = RADIANS * z[OMEGA] - turn, RADIANS * speed * np.array(now.centre)
+    pose = CollocatedPose.on_mesh(mesh, rotation, velocity, initial_heading(kind, begin))
+    power = (weight * (speed * now.power)[points]).sum(axis=1)
+    way, turned = complex(pose.place[-1]), float(pose.rotations.sum())
+    along_totals = kind.total_gradients(PeriodTotals(way, turned, float(power.sum()), begin))
+    heading = float(np.angle(along_totals["distance"].side))
+    climbed = (pose.place * np.conj(along_totals["work"].side)).real
+    # where the orientation is no state the plane is turned so that the gait goes along +x
+    theta_0 = 0.0 if "theta" in kind.static_parameters else -heading
+    theta = theta_0 + pose.theta_on(mesh)
+    x[layout.distance[0, 1:]] = (pose.place * np.exp(-1j * heading)).real[1:]
+    x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
+    x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
+    x[layout.theta[0, mesh.edge_sites]] = theta_0 + pose.theta
+    at = kind.instants(shapes, pose.theta_on(mesh), along.z)
+    for quantity, total in zip(layout.integrals, layout.totals, strict=True):
+        x[total] = (weight * (speed * quantity.at(at))[0, points]).sum()
+    if layout.momenta.size:
+        x[layout.momenta[:, mesh.sites]] = along.states[: len(layout.momenta), points]
+        x[layout.momenta[:, mesh.edge_sites]] = along.edges
+    if layout.accelerations.size:
+        matrix = gaits.angle_matrix(mesh.times, n_joint, 2) / RADIANS**2
+        x[layout.accelerations] = (matrix @ parameters).T
+    if layout.z.size:
+        x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
+        return x
+
+    # the variables of links, contacts and joints
+    if relative:
+        x[layout.speed] = speed
+    dynamics = control.dynamics.in_speeds_of(RADIANS)
+    body, pull = dynamics.body, dynamics.regime.pull(theta[None])
+    assert isinstance(body, Chain)
+    posture = body.posture(angles)
+    link, axes = body.velocity(posture, rates, z), np.exp(1j * theta)
+    direction = axes * (posture.cos + 1j * posture.sin)
+    velocity, place = (link.vs + 1j * link.vn) * direction, axes * (posture.x + 1j * posture.y)
+    slows = slow * speed if relative else np.full(mesh.n_point, slow)
+    friction = body.forces(dynamics.law, angles, rates, z, slows[None])
+    on_link, mass = body.contact.on_links(friction), body.mass_column()
+    force = (on_link.tangential + 1j * on_link.normal) * direction
+    if pull is not None:
+        force += mass * (pull[0] + 1j * pull[1]) * axes
+    x[layout.directions] = theta + body.tangent_angles(angles)
+    x[layout.spins], x[layout.vx], x[layout.vy] = link.w, velocity.real, velocity.imag
+    x[layout.friction] = friction
+    if layout.moments.size:
+        # N_(i+1) = N_i + f_i,   M_(i+1) = M_i + c_i - l_i/2 e_i x (N_i + N_(i+1))
+        at_joints = np.cumsum(force, axis=0)
+        both = at_joints + np.concatenate([0 * at_joints[:1], at_joints[:-1]])
+        lever = 0.5 * body.length_column() * (np.conj(direction) * both).imag
+        x[layout.joint_fx], x[layout.joint_fy] = at_joints.real[:-1], at_joints.imag[:-1]
+        x[layout.moments] = np.cumsum(on_link.couple - lever, axis=0)[:-1]
+    else:
+        arm = place - (mass * place).sum(axis=0)
+        total, moving = force.sum(axis=0), (mass * velocity).sum(axis=0)
+        moment = (on_link.couple + (np.conj(arm) * force).imag).sum(axis=0)
+        x[layout.x], x[layout.y] = arm.real, arm.imag
+        x[layout.centre] = [moving.real, moving.imag, total.real, total.imag, moment]
+    return x

@@ -19,8 +19,7 @@ from colloc.mechanics.contact import (
     smooth_minimum,
     tangent_of_minimum,
 )
-from colloc.transcription.shape_checks import shape_checks
-from colloc.transcription.worst_instants import check_values, held_shares, worst_instants
+from colloc.transcription.shape_constraints import near_peaks, shape_checks
 
 AROUND_THE_CORNER = Fourier(np.zeros(2), np.array([[2.877], [0.172]]), np.array([[0.0], [-2.872]]))
 """A gait that rounds the shape (2 pi/3, 2 pi/3), where the first end passes the third link, within
@@ -104,20 +103,20 @@ def corner_peak(gait):
     intervals."""
     problem = Problem(name="corner", guess=AROUND_THE_CORNER)
     check = next(c for c in shape_checks(problem.body) if c.name.endswith("(left)"))
-    times = worst_instants(gait, control_problem(problem).mesh(), [check], np.pi)[0]
-    values = check_values(check, gait, times)
+    times = near_peaks(gait, control_problem(problem).mesh(), [check], np.pi)[0][1]
+    values = check.along(gait.angles(times))
     return check, times[[np.argmax(values)]], values.max()
 
 
 def test_the_peak_at_a_corner_is_found_where_dense_sampling_finds_it():
     check, time, peak = corner_peak(AROUND_THE_CORNER)
     dense = time + np.linspace(-0.01, 0.01, 200_001)
-    assert check_values(check, AROUND_THE_CORNER, dense).max() == pytest.approx(peak, abs=1e-8)
+    assert check.along(AROUND_THE_CORNER.angles(dense)).max() == pytest.approx(peak, abs=1e-8)
 
 
 def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
     check, time, _ = corner_peak(AROUND_THE_CORNER)
-    share = held_shares(check, AROUND_THE_CORNER, time)
+    share = check.share(AROUND_THE_CORNER.angles(time))
     assert 0.1 < share[0] < 0.9
     errors, blind = [], []
     for size in (1e-2, 5e-3, 2.5e-3):
@@ -129,7 +128,7 @@ def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
         height = corner_peak(moved)[2]
         cut = float(np.array(check.cut(moved.angles(time), share)).ravel()[0])
         errors.append(abs(cut - height))
-        blind.append(height - check_values(check, moved, time)[0])
+        blind.append(height - check.along(moved.angles(time))[0])
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all((orders > 1.7) & (orders < 2.3))
     assert errors[-1] < 1e-5

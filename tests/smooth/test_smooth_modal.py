@@ -19,7 +19,7 @@ from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.motion import Motion, sine_wave
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
-from colloc.transcription.shape_checks import shape_checks
+from colloc.transcription.shape_constraints import shape_checks
 from scripts.models.period import measured_period
 
 SIDEWAYS = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
@@ -118,11 +118,11 @@ def test_the_tangent_is_bounded_wherever_it_is_largest(basis, modes):
         np.max([np.abs(check.along(shapes)) for check in checks], axis=0), everywhere, rtol=2e-5
     )
     for check in checks:
-        there = check.cut(shapes, check.itself(shapes))[0]
+        there = check.cut(shapes, check.share(shapes))[0]
         np.testing.assert_allclose(there, check.along(shapes), atol=1e-10)
-        rows = body.modes_at(check.itself(shapes))
+        rows = body.modes_at(check.share(shapes))
         np.testing.assert_allclose(
-            check.slope(shapes, check.itself(shapes)[None]).full(), rows.T, atol=1e-10
+            check.slope(shapes, check.share(shapes)[None]).full(), rows.T, atol=1e-10
         )
 
 
