@@ -9,7 +9,6 @@ from benchmarks.peer_table import OPTIMA, judged
 from benchmarks.peers import drag, physics
 from benchmarks.peers.starts import feasible_motion, starts
 from benchmarks.published import DIFFERS, number, scallop, small_stroke, small_wave
-from benchmarks.robustness import DELTA, PUBLISHED, SMALL_DELTA, advance, write_tables
 from benchmarks.zoo import described, law_problem, modal_problem, zoo_problem
 from colloc import Chain, Friction, ellipse, replay
 from colloc.mechanics.balance import instant, net_force, total_power
@@ -125,23 +124,3 @@ def test_an_engine_with_contacts_that_do_not_lift_goes_as_far_as_the_certificate
     distance, work = fast.came_to(mujoco_player.play(fast, 1e-3)) / fast.certificate[0] - 1
     assert abs(distance) < 0.03
     assert abs(work) < 0.01
-
-
-def test_a_table_of_starts_says_what_they_found(tmp_path):
-    law = (10.0, 1.0, 1.0)
-    advance(law, "antipodal", 1, 1, tmp_path, PUBLISHED)
-    write_tables((law,), ["antipodal"], 1, tmp_path, tmp_path, "a command", PUBLISHED)
-    for delta, line in zip(
-        (DELTA, SMALL_DELTA), _table_rows(tmp_path / "robustness.md"), strict=True
-    ):
-        assert line[:4] == ["(10, 1, 1)", "antipodal", "1", "100%"], delta
-        assert float(line[5]) == pytest.approx(0.11271, abs=1e-5)
-
-
-def _table_rows(path):
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in path.read_text().splitlines()
-        if "|" in line
-    ]
-    return [row for row in rows if row[0].startswith("(") and row[1] == "antipodal"]

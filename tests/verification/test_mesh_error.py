@@ -305,11 +305,9 @@ def test_violations_are_reported_in_the_interval_where_they_are():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "index", range(len(CASES)), ids=[case[0].replace(" ", "-") for case in CASES]
-)
-def test_estimate_is_never_optimistic_by_more_than_a_factor_two(index):
-    result = outcome(case_problem(index))
+@pytest.mark.parametrize("name", CASES, ids=[name.replace(" ", "-") for name in CASES])
+def test_estimate_is_never_optimistic_by_more_than_a_factor_two(name):
+    result = outcome(case_problem(name))
     if not result["optimal"]:
         pytest.skip(result["message"])
     assert held(result, "against replay"), result
