@@ -54,7 +54,7 @@ WAVE = one_harmonic([0.8, 0.0, -0.8], [0.0, 0.8, 0.0])
 BILATERAL, ANTIPODAL = Harmonic(1, "bilateral"), Harmonic(1, "antipodal")
 UNEQUAL = Chain((0.25, 0.45, 0.3))
 
-USUAL = {
+USUAL: dict[str, Any] = {
     "body": Chain(),
     "mu": (1, 1, 1),
     "gait": BILATERAL,
@@ -64,9 +64,9 @@ USUAL = {
     "intervals": 24,
     "mesh_tolerance": 0.0,
 }
-LONG = {"guess": ellipse(0, 1.5, 1.0), "gait": ANTIPODAL, "mu": (3, 1, 1)}
+LONG: dict[str, Any] = {"guess": ellipse(0, 1.5, 1.0), "gait": ANTIPODAL, "mu": (3, 1, 1)}
 FOUR_LINKS, FIVE_LINKS = Chain((0.25,) * 4), Chain((0.2,) * 5)
-TWO = {"gait": Harmonic(2, "bilateral"), "guess": SMALL_LOOP}
+TWO: dict[str, Any] = {"gait": Harmonic(2, "bilateral"), "guess": SMALL_LOOP}
 CASES: dict[str, dict[str, Any]] = {
     name: USUAL | changes
     for name, changes in {
