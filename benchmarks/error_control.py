@@ -67,83 +67,80 @@ USUAL: dict[str, Any] = {
 LONG: dict[str, Any] = {"guess": ellipse(0, 1.5, 1.0), "gait": ANTIPODAL, "mu": (3, 1, 1)}
 FOUR_LINKS, FIVE_LINKS = Chain((0.25,) * 4), Chain((0.2,) * 5)
 TWO: dict[str, Any] = {"gait": Harmonic(2, "bilateral"), "guess": SMALL_LOOP}
-CASES: dict[str, dict[str, Any]] = {
-    name: USUAL | changes
-    for name, changes in {
-        "isotropic, coarse": {"intervals": 10},
-        "isotropic": {},
-        "isotropic, smooth": {"delta": 1e-1},
-        "isotropic, 1e-2": {"delta": 1e-2, "scheme": "gauss-2", "intervals": 20},
-        "isotropic, 1e-3": {"delta": 1e-3, "scheme": "radau-3", "intervals": 20},
-        "isotropic, 1e-6": {"delta": 1e-6},
-        "trapezoid": {"delta": 1e-3, "scheme": "trapezoid", "intervals": 80},
-        "hermite-simpson": {"scheme": "hermite-simpson", "intervals": 30},
-        "gauss-5": {"scheme": "gauss-5", "intervals": 12},
-        "gauss-1": {"delta": 1e-3, "scheme": "gauss-1", "intervals": 80},
-        "second optimum": {"guess": ellipse(1.1, 0.66, 1.1), "intervals": 16},
-        "two harmonics": TWO,
-        "three harmonics": {
-            "gait": Harmonic(3, "bilateral"),
-            "guess": ellipse(0, 2.6, 1.2),
-            "scheme": "radau-5",
-            "intervals": 20,
-        },
-        "no symmetry": {
-            "gait": Harmonic(1),
-            "guess": ellipse(0, 2.8, 1.25),
-            "delta": 1e-3,
-            "intervals": 30,
-        },
-        "antipodal": LONG | {"scheme": "gauss-2"},
-        "(1.7, 1, 1.3)": {"mu": (1.7, 1, 1.3)},
-        "(1.7, 1, 1.3) lobatto": {
-            "mu": (1.7, 1, 1.3),
-            "delta": 1e-3,
-            "scheme": "hermite-simpson",
-            "intervals": 20,
-        },
-        "(10, 1, 1)": {
-            "mu": (10, 1, 1),
-            "guess": ellipse(0, 1.0, 1.0),
-            "scheme": "gauss-4",
-            "intervals": 14,
-        },
-        "(0.5, 1, 5)": {
-            "mu": (0.5, 1, 5),
-            "guess": ellipse(0.3, 1.0, 0.5),
-            "delta": 1e-3,
-            "intervals": 20,
-        },
-        "two links": {
-            "body": Chain((0.5, 0.5)),
-            "mu": (1, 1, 5),
-            "gait": ANTIPODAL,
-            "guess": one_harmonic([1.0], [0.0]),
-            "scheme": "gauss-2",
-            "intervals": 10,
-        },
-        "unequal links": LONG
-        | {"body": UNEQUAL, "delta": 1e-3, "scheme": "radau-2", "intervals": 30},
-        "four links": {"body": FOUR_LINKS, "guess": FOUR, "intervals": 16},
-        "four-link wave": {
-            "body": FOUR_LINKS,
-            "mu": (10, 1, 1),
-            "gait": ANTIPODAL,
-            "guess": WAVE,
-            "intervals": 12,
-        },
-        "five links": {"body": FIVE_LINKS, "guess": FIVE, "intervals": 20},
-        "refined to 1e-4": {"scheme": "gauss-2", "intervals": 20, "mesh_tolerance": 1e-4},
-        "refined to 1e-6": {"intervals": 20, "mesh_tolerance": 1e-6},
-        "refined, anisotropic": {
-            "mu": (1.7, 1, 1.3),
-            "scheme": "radau-3",
-            "intervals": 20,
-            "mesh_tolerance": 1e-5,
-        },
-        "refined, two harmonics": TWO | {"mesh_tolerance": 1e-5},
-    }.items()
+CHANGES: dict[str, dict[str, Any]] = {
+    "isotropic, coarse": {"intervals": 10},
+    "isotropic": {},
+    "isotropic, smooth": {"delta": 1e-1},
+    "isotropic, 1e-2": {"delta": 1e-2, "scheme": "gauss-2", "intervals": 20},
+    "isotropic, 1e-3": {"delta": 1e-3, "scheme": "radau-3", "intervals": 20},
+    "isotropic, 1e-6": {"delta": 1e-6},
+    "trapezoid": {"delta": 1e-3, "scheme": "trapezoid", "intervals": 80},
+    "hermite-simpson": {"scheme": "hermite-simpson", "intervals": 30},
+    "gauss-5": {"scheme": "gauss-5", "intervals": 12},
+    "gauss-1": {"delta": 1e-3, "scheme": "gauss-1", "intervals": 80},
+    "second optimum": {"guess": ellipse(1.1, 0.66, 1.1), "intervals": 16},
+    "two harmonics": TWO,
+    "three harmonics": {
+        "gait": Harmonic(3, "bilateral"),
+        "guess": ellipse(0, 2.6, 1.2),
+        "scheme": "radau-5",
+        "intervals": 20,
+    },
+    "no symmetry": {
+        "gait": Harmonic(1),
+        "guess": ellipse(0, 2.8, 1.25),
+        "delta": 1e-3,
+        "intervals": 30,
+    },
+    "antipodal": LONG | {"scheme": "gauss-2"},
+    "(1.7, 1, 1.3)": {"mu": (1.7, 1, 1.3)},
+    "(1.7, 1, 1.3) lobatto": {
+        "mu": (1.7, 1, 1.3),
+        "delta": 1e-3,
+        "scheme": "hermite-simpson",
+        "intervals": 20,
+    },
+    "(10, 1, 1)": {
+        "mu": (10, 1, 1),
+        "guess": ellipse(0, 1.0, 1.0),
+        "scheme": "gauss-4",
+        "intervals": 14,
+    },
+    "(0.5, 1, 5)": {
+        "mu": (0.5, 1, 5),
+        "guess": ellipse(0.3, 1.0, 0.5),
+        "delta": 1e-3,
+        "intervals": 20,
+    },
+    "two links": {
+        "body": Chain((0.5, 0.5)),
+        "mu": (1, 1, 5),
+        "gait": ANTIPODAL,
+        "guess": one_harmonic([1.0], [0.0]),
+        "scheme": "gauss-2",
+        "intervals": 10,
+    },
+    "unequal links": LONG | {"body": UNEQUAL, "delta": 1e-3, "scheme": "radau-2", "intervals": 30},
+    "four links": {"body": FOUR_LINKS, "guess": FOUR, "intervals": 16},
+    "four-link wave": {
+        "body": FOUR_LINKS,
+        "mu": (10, 1, 1),
+        "gait": ANTIPODAL,
+        "guess": WAVE,
+        "intervals": 12,
+    },
+    "five links": {"body": FIVE_LINKS, "guess": FIVE, "intervals": 20},
+    "refined to 1e-4": {"scheme": "gauss-2", "intervals": 20, "mesh_tolerance": 1e-4},
+    "refined to 1e-6": {"intervals": 20, "mesh_tolerance": 1e-6},
+    "refined, anisotropic": {
+        "mu": (1.7, 1, 1.3),
+        "scheme": "radau-3",
+        "intervals": 20,
+        "mesh_tolerance": 1e-5,
+    },
+    "refined, two harmonics": TWO | {"mesh_tolerance": 1e-5},
 }
+CASES = {name: USUAL | changes for name, changes in CHANGES.items()}
 
 
 def case_problem(name: str) -> Problem:
