@@ -24,7 +24,8 @@ from colloc import Chain, Fourier, Friction, Harmonic, Problem, Solution, Viscou
 from colloc.gaits.gait_fields import AnyGait as Gait
 from colloc.mechanics.law import Law
 from colloc.search.solve import solve
-from colloc.smooth.motion import Motion, sine_wave, tanh_wave
+from colloc.smooth.balance import Motion
+from colloc.smooth.prescribed_body import Wave
 from scripts.models.period import period
 from scripts.program import command_line
 
@@ -280,7 +281,7 @@ def best_small_stroke() -> Row:
 def small_wave() -> Row:
     amplitude, number_of_waves = 0.05, 16.0
     moved = period(
-        sine_wave(amplitude, number_of_waves),
+        Wave("sine", amplitude, number_of_waves).prescribed(),
         SWIMMER,
         1e-3,
         intervals=1,
@@ -385,11 +386,11 @@ def third_ellipse() -> Row:
 def waves() -> list[Row]:
     rows = []
     for what, printed, motion, friction in (
-        ("sine wave, (100, 1, 1)", 0.76, sine_wave(), Friction(mu_t=100, mu_f=1, mu_b=1)),
+        ("sine wave, (100, 1, 1)", 0.76, Wave().prescribed(), Friction(mu_t=100, mu_f=1, mu_b=1)),
         (
             "tanh wave of amplitude 1.3, (1, 100, 100)",
             0.93,
-            tanh_wave(1.3, 20.0, 2.0),
+            Wave("tanh", 1.3, 2.0).prescribed(),
             Friction(mu_t=1, mu_f=100, mu_b=100),
         ),
     ):
@@ -410,7 +411,11 @@ def amplitude_exponent() -> Row:
         search = {"bounds": (0.05, 1.0), "method": "bounded", "options": {"xatol": 1e-4}}
         best.append(
             minimize_scalar(
-                lambda a, mu=mu: -_efficiency(sine_wave(a, 2.0), Friction(mu_t=mu, mu_f=1, mu_b=1)),
+                lambda a, mu=mu: (
+                    -_efficiency(
+                        Wave("sine", a, 2.0).prescribed(), Friction(mu_t=mu, mu_f=1, mu_b=1)
+                    )
+                ),
                 **search,
             ).x
         )

@@ -8,8 +8,8 @@ Theta(s, t + 1/2) = -Theta(s, t). The paper states the shape in words; here it i
     Theta = a(t) odd(2 (s - c(t)) / epsilon),    odd(x) = -k x (1 - x^2)^3 on [-1, 1],  max odd = 1,
 
 with a linear in time between 0 and `amplitude` in stages 1 and 3, and c linear from 1/2 - epsilon/2
-to 1/2 + epsilon/2 in stage 2 (colloc.smooth.concertina). As epsilon -> 0: d ~ epsilon, W_inner ~
-epsilon^2, W_outer/d -> 1, efficiency -> 1.
+to 1/2 + epsilon/2 in stage 2 (colloc.smooth.prescribed_body). As epsilon -> 0: d ~ epsilon,
+W_inner ~ epsilon^2, W_outer/d -> 1, efficiency -> 1.
 
     python -m scripts.continue_epsilon
 """

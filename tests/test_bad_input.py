@@ -11,8 +11,8 @@ import pytest
 import colloc
 from colloc import Chain, CollocError, Foot, Friction, Harmonic, PowerLaw, Problem, ProblemError
 from colloc.bounds.sampled import Budget, efficiency_bound
-from colloc.smooth.balance import solve_smooth
-from colloc.smooth.motion import Motion, sine_wave
+from colloc.smooth.balance import Motion, solve_smooth
+from colloc.smooth.prescribed_body import Wave
 from colloc.system.errors import OrderWarning
 from colloc.verification.slope import checked_chain
 from colloc.verification.trajectory import plan_trajectory
@@ -47,7 +47,7 @@ def path(angles, rates):
 
 
 NAMES = {name: getattr(colloc, name) for name in colloc.__all__} | globals()
-NAMES |= {each.__name__: each for each in (checked_chain, sine_wave, solve_smooth)}
+NAMES |= {each.__name__: each for each in (checked_chain, Wave, solve_smooth)}
 
 
 def cases(text, separator, most=-1):
@@ -307,7 +307,7 @@ solve_balance(*AT, ONES, ONES, 1e-3, start=np.full((3, 4), {}))
 solve_balance(*AT, ONES, ONES, 1e-3, tolerance={})
 replay(*AT, path({}, 1.0), 1e-3)
 replay(*AT, path(1.0, {}), 1e-3)
-solve_smooth(sine_wave(), Friction(), np.array([0.1]), {})
+solve_smooth(Wave().prescribed(), Friction(), np.array([0.1]), {})
 """
 
 

@@ -27,10 +27,9 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import FeetLaw, Foot
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
-from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
-from colloc.smooth.prescribed_body import Wave
+from colloc.smooth.prescribed_body import Concertina, Wave
 from colloc.system.arguments import STATED_IF_SET
 from colloc.system.errors import ProblemError
 

@@ -27,7 +27,7 @@ from colloc.numerics.schemes import scheme
 from colloc.results.answer import Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
 from colloc.results.solution import Solution
-from colloc.smooth.panel_body import on_panels, panels_of
+from colloc.smooth.smooth_body import on_panels, panels_of
 from colloc.system.errors import ProblemError, StoreError
 from colloc.system.store_file import (
     BETWEEN_DIMS,

@@ -18,7 +18,7 @@ from colloc.search.converge import optimise
 from colloc.search.iterate import Iterate
 from colloc.search.options import FINE, MEDIUM, OPTIONS, TOLERANCES
 from colloc.search.spaces import on_mesh_of, space_of
-from colloc.smooth.panel_body import on_panels, panels_of
+from colloc.smooth.smooth_body import on_panels, panels_of
 from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, plan_mesh
 

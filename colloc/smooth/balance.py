@@ -1,44 +1,32 @@
-"""The balance of smooth bodies on Gauss panels.
+"""Smooth bodies by their tangent angle Theta(s, t), and their balance on composite Gauss panels.
+
+Positions are integrals of cos and sin of Theta with the panels' integration matrices (paper, eqs.
+x0, y0), so the body is inextensible to rounding. The rigid velocity ``z = (u, v, omega)`` is that
+of a *reference*, one of the panels' edges: velocity of the point and rotation rate of the tangent
+there. Path integrals start at the reference and rates are relative to it, so a stretch that keeps
+its shape moves with relative precision, however slow it is. What `solve_smooth` takes and returns
+is that of the tail in the axes in which Theta is measured, and the rotation rate of those axes.
 
 At stick the velocity changes over lengths ~ delta / (rotation rate), and shapes may be sharp. So
 `solve_smooth` compares each panel's integrals with those over its halves, halves panels that differ
-by more than the tolerance and solves again. The iteration is that of
-`colloc.mechanics.damped_newton`; its references are the panel edges.
-
-Velocities ``z = (u, v, omega)``, ``(3, n_time)``, are those of the tail, in the axes in which Theta
-is measured, and the rotation rate of those axes. In a batch, and at an anchor, omega is the
-rotation rate of the tangent there.
+by more than the tolerance and solves again, by the iteration of `colloc.mechanics.damped_newton`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from colloc.mechanics.balance import pull_back
-from colloc.mechanics.damped_newton import (
-    Evaluated,
-    MakeBatch,
-    State,
-    groups,
-    relative_delta,
-    solve,
-    starting_state,
-)
+from colloc.mechanics.damped_newton import Evaluated, groups, relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
-from colloc.smooth.curve import (
-    Curve,
-    PanelGrid,
-    bending_power,
-    curve,
-    mean_velocity,
-    node_velocity,
-    resultant,
-)
-from colloc.smooth.motion import Motion
+from colloc.numerics.arrays import Array, namespace
+from colloc.numerics.schemes import Scheme, scheme
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
 
@@ -46,26 +34,161 @@ TAIL, ANCHOR_MOVES = 0, 5
 _MOST_PANELS, _REFINEMENTS = 600, 40
 """Panels of a time point, and halvings of a panel."""
 _ROUNDING = 1e-15
+Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Arc length ``(n_body, n_time)`` and phase ``(n_time,)`` to values ``(n_body, n_time)``."""
 
 
-class PanelFields(NamedTuple):
-    """Tangent angle and its rate at the nodes ``(n_node, n_time)``, and the rate at the edges
-    ``(n_panel + 1, n_time)``."""
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A periodic motion Theta(s, t).
 
-    panels: PanelGrid
-    angle: np.ndarray
-    rate: np.ndarray
-    edge_rate: np.ndarray
+    angle, rate: Theta [rad] and its time derivative [rad/period]. breaks: phase ``(n_time,)`` to
+    arc lengths ``(n_break, n_time)`` where Theta is not smooth; panels end there. stages: phases
+    from 0 to the end of the part that has to be solved, between which the motion is smooth in time.
+    antipodal: Theta(s, t + 1/2) = -Theta(s, t), the second half period mirrors the first (paper,
+    section VI).
+    """
+
+    angle: Field
+    rate: Field
+    breaks: Callable[[np.ndarray], np.ndarray] | None = None
+    stages: tuple[float, ...] = (0.0, 1.0)
+    antipodal: bool = False
+
+    def __post_init__(self) -> None:
+        stages, end = self.stages, 0.5 if self.antipodal else 1.0
+        if stages[0] != 0.0 or stages[-1] != end or min(np.diff(stages)) <= 0:
+            raise ProblemError(f"motion.stages must ascend from 0 to {end:g}, not {stages}.")
+
+
+@lru_cache(maxsize=1024)
+def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, ...]:
+    """Nodes to whole panels, panels to their nodes, and the integrals from a panel's left end to
+    its nodes."""
+    unit = scheme(f"gauss-{order}")
+    each = sparse.identity(n, format="csc")
+    return tuple(sparse.kron(each, part, "csc") for part in (unit.b, np.ones((order, 1)), unit.A))
+
+
+@dataclass(frozen=True, eq=False)
+class PanelGrid:
+    """Gauss panels on the arc length, one column a time point (or a single column for all).
+
+    edges: ascending from 0 to 1, ``(n_panel + 1, n_time)``; panels of width zero fill up columns
+    that need fewer. order: Gauss nodes a panel.
+    """
+
+    edges: np.ndarray
+    order: int = 8
+
+    @property
+    def n(self) -> int:
+        return len(self.edges) - 1
+
+    @property
+    def gauss(self) -> Scheme:
+        return scheme(f"gauss-{self.order}")
+
+    @property
+    def widths(self) -> np.ndarray:
+        """Width of the panel of each node, ``(n_panel * order, n_time)``."""
+        return np.repeat(np.diff(self.edges, axis=0), self.order, axis=0)
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Arc length of the nodes, ``(n_panel * order, n_time)``."""
+        left = np.repeat(self.edges[:-1], self.order, axis=0)
+        return left + np.tile(self.gauss.c, self.n)[:, None] * self.widths
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Quadrature weights, ``(n_panel * order, n_time)``."""
+        return np.tile(self.gauss.b, self.n)[:, None] * self.widths
+
+    def integrate(self, integrand: Array, reference: int) -> Array:
+        """Integrals from edge `reference` to the nodes; the integrand ``(n_node, n_time)`` is times
+        the panel widths."""
+        matmul = namespace(integrand).matmul
+        whole, spread, inside = _panel_matrices(self.n, self.order)
+        ahead, ones = np.arange(self.n) >= reference, np.ones((self.n, self.n))
+        panel_by_panel = np.tril(ones, -1) * ahead - np.triu(ones) * ~ahead
+        start = matmul(panel_by_panel, matmul(whole, integrand))
+        return matmul(spread, start) + matmul(inside, integrand)
+
+    def edge_path(self, reference: int) -> np.ndarray:
+        """The same integrals up to the edges, ``(n_panel + 1, n_node)``."""
+        edge, panel = np.arange(self.n + 1)[:, None], np.arange(self.n)[None, :]
+        ahead = (panel >= reference).astype(float) * (panel < edge)
+        return np.kron(ahead - (panel < reference) * (panel >= edge), self.gauss.b)
+
+
+class Curve(NamedTuple):
+    """A body seen from a reference; each ``(n_node, n_time)``: direction cosines of the tangent;
+    tangential and normal motion of the nodes per rotation about the reference; their velocity while
+    the reference is held; quadrature weights."""
+
+    cos: Array
+    sin: Array
+    arm_s: Array
+    arm_n: Array
+    shape_s: Array
+    shape_n: Array
+    weight: Array
+
+
+def curve(
+    panels: PanelGrid, angle: Array, rate: Array, reference: int, reference_rate: Array
+) -> Curve:
+    """The curve of tangent angles and rates at the nodes, ``(n_node, n_time)``, seen from edge
+    number `reference`, where Theta has the rate ``(1, n_time)`` (paper, eqs. x0, y0 and dtz0)."""
+    xp, width = namespace(angle, rate), panels.widths
+    c, s = xp.cos(angle), xp.sin(angle)
+    x, y = panels.integrate(width * c, reference), panels.integrate(width * s, reference)
+    turning = width * (rate - reference_rate)
+    vx, vy = -panels.integrate(turning * s, reference), panels.integrate(turning * c, reference)
+    return Curve(
+        c, s, x * s - y * c, x * c + y * s, vx * c + vy * s, vy * c - vx * s, panels.weights
+    )
+
+
+def node_velocity(body: Curve, z: Array) -> tuple[Array, Array]:
+    """Tangential and normal velocity of the nodes when the reference moves with z ``(3,
+    n_time)``."""
+    u, v, omega = z[0:1, :], z[1:2, :], z[2:3, :]
+    return (
+        body.cos * u + body.sin * v + body.arm_s * omega + body.shape_s,
+        body.cos * v - body.sin * u + body.arm_n * omega + body.shape_n,
+    )
+
+
+def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
+    """Net force and torque about the reference of a force per length, ``(3, n_time)`` (paper, eq.
+    ftb); of the velocity of the nodes, that of the centre of mass first."""
+    xp = namespace(body.cos, tangential)
+    fs, fn = body.weight * tangential, body.weight * normal
+    return xp.stack(
+        [
+            xp.sum_rows(fs * body.cos - fn * body.sin),
+            xp.sum_rows(fs * body.sin + fn * body.cos),
+            xp.sum_rows(fs * body.arm_s + fn * body.arm_n),
+        ]
+    )
 
 
 class PanelBatch:
-    """Time points that share a reference edge, as `colloc.mechanics.damped_newton.Batch`."""
+    """Time points `members` that share a reference edge, as `colloc.mechanics.damped_newton.Batch`;
+    rows as of `_fields`."""
 
     def __init__(
-        self, fields: PanelFields, friction: Law, members: np.ndarray, reference: int
+        self,
+        panels: PanelGrid,
+        rows: tuple[np.ndarray, ...],
+        friction: Law,
+        members: np.ndarray,
+        reference: int,
     ) -> None:
-        grid, *rows = fields
-        self.panels = grid if grid.fixed else PanelGrid(grid.edges[:, members], grid.order)
+        fixed = panels.edges.shape[1] == 1
+        self.panels = panels if fixed else PanelGrid(panels.edges[:, members], panels.order)
         self.angle, self.rate, self.edge_rate = (row[:, members] for row in rows)
         self.friction, self.reference = friction, reference
         anchor_rate = self.edge_rate[reference : reference + 1]
@@ -104,11 +227,6 @@ class PanelBatch:
             ]
         )
 
-    def tail_velocity(self, z: np.ndarray) -> np.ndarray:
-        tail = self.edge_velocity(z)[:, TAIL]
-        tail[2] -= self.edge_rate[TAIL]
-        return tail
-
     def node_speed(self, z: np.ndarray) -> np.ndarray:
         return np.hypot(*node_velocity(self.curve, z))
 
@@ -118,30 +236,33 @@ class PanelBatch:
         speed = self.node_speed(z).reshape(self.panels.n, -1, z.shape[1]).max(axis=1)
         return np.where(np.diff(self.panels.edges, axis=0) > 0, speed, np.inf)
 
-    def forces(self, z: np.ndarray, delta: np.ndarray | float) -> tuple[np.ndarray, ...]:
-        """Tangential and normal velocity of the nodes, and force per length there."""
-        vs, vn = node_velocity(self.curve, z)
-        return vs, vn, *self.friction.density(vs, vn, delta)
-
-    def panel_sums(
-        self, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray, fn: np.ndarray
-    ) -> np.ndarray:
+    def panel_sums(self, z: np.ndarray, delta: np.ndarray | float) -> np.ndarray:
         """Force, torque about the reference and power of every panel, ``(4, n_panel, n)``."""
-        body = self.curve
+        body, panels = self.curve, self.panels
+        vs, vn = node_velocity(body, z)
+        fs, fn = self.friction.density(vs, vn, delta)
         densities = (
             fs * body.cos - fn * body.sin,
             fs * body.sin + fn * body.cos,
             fs * body.arm_s + fn * body.arm_n,
             -(fs * vs + fn * vn),
         )
-        return np.stack([self.panels.panel_sums(density) for density in densities])
+        weighted = (panels.weights * density for density in densities)
+        return np.stack([row.reshape(panels.n, panels.order, -1).sum(axis=1) for row in weighted])
 
-    def motion(self, z: np.ndarray, delta: np.ndarray | float) -> tuple[np.ndarray, ...]:
-        """Velocity of the centre ``(2, n)``, `panel_sums`, and power of what bends the body
-        ``(n,)``."""
-        vs, vn, fs, fn = self.forces(z, delta)
-        bending = bending_power(self.panels, self.curve, fs, fn, self.rate)
-        return mean_velocity(self.curve, vs, vn), self.panel_sums(vs, vn, fs, fn), bending
+    def bending_power(self, z: np.ndarray, delta: np.ndarray | float) -> np.ndarray:
+        """Power of what bends the body ``(n,)``.
+
+        The moment of all force F ahead of s has the derivative ``-t x F(s)``; its work on the
+        curvature is, by parts, ``-int (n . F) dTheta/dt ds``. In balance that is the power
+        dissipated.
+        """
+        body, panels = self.curve, self.panels
+        fs, fn = self.friction.density(*node_velocity(body, z), delta)
+        force = fs * body.cos - fn * body.sin, fs * body.sin + fn * body.cos
+        ahead_x, ahead_y = (-panels.integrate(panels.widths * f, panels.n) for f in force)
+        across = body.cos * ahead_y - body.sin * ahead_x
+        return np.asarray(-(body.weight * self.rate * across).sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +274,8 @@ class SmoothSolution:
     velocities were solved for, about the part at rest ``(3, n_time)``. bending_power: of what bends
     the body; equals `power` in balance. power_inside: the part of it done on the arcs `regions`.
     slowest: smallest speed of a whole panel. residual: as of `BalanceSolution`. quadrature_error:
-    largest panel's difference from its halves, in force or power. panels: number used. iterations:
-    steps over all refinements.
+    largest panel's difference from its halves, in force or power. iterations: steps over all
+    refinements.
     """
 
     t: np.ndarray
@@ -167,7 +288,6 @@ class SmoothSolution:
     slowest: np.ndarray
     residual: np.ndarray
     quadrature_error: np.ndarray
-    panels: np.ndarray
     iterations: np.ndarray
     tolerance: float
 
@@ -177,9 +297,8 @@ class SmoothSolution:
         if bad.size:
             raise NotConvergedError(
                 f"the smooth body did not balance at {bad.size} of {self.t.size} instants (first: "
-                f"phase "
-                f"{self.t[bad[0]]:.4f}, worst residual {self.residual[bad].max():.1e}); use a "
-                f"larger delta."
+                f"phase {self.t[bad[0]]:.4f}, worst residual {self.residual[bad].max():.1e}); use "
+                f"a larger delta."
             )
         return self
 
@@ -215,81 +334,88 @@ def solve_smooth(
     n = t.size
     z, centre, force = np.zeros((3, n)), np.zeros((2, n)), np.zeros((3, n))
     power, bending, inside, slowest, residual, error = np.zeros((6, n))
-    used, steps = np.zeros((2, n), dtype=int)
-    active, edges = np.arange(n), motion.first_edges(t, panels) if grid is None else grid.edges
+    steps, active = np.zeros(n, dtype=int), np.arange(n)
+    if grid is not None:
+        edges = grid.edges
+    else:
+        edges = np.repeat(np.linspace(0.0, 1.0, panels + 1)[:, None], n, axis=1)
+        if motion.breaks is not None:
+            breaks = np.clip(motion.breaks(t), 0.0, 1.0)
+            edges = np.sort(np.concatenate([edges, breaks]), axis=0)
     anchor, velocity = np.full(n, len(edges) // 2), np.zeros((3, n))
-    tail = start if slide is None else slide
-    if tail is not None:
-        anchor, velocity = np.full(n, TAIL), tail.copy()
+    first = start if slide is None else slide
+    if first is not None:
+        anchor, velocity = np.full(n, TAIL), first.copy()
         velocity[2] += motion.rate(np.zeros((1, n)), t)[0]
     for level in range(_REFINEMENTS + 1):
         # work in units of the largest rate: the law is homogeneous once delta scales along
         unit = np.ones(active.size) if friction.degree is None else None
-        panel_grid = PanelGrid(edges, order) if grid is None else grid
-        fields, speed = _motion_fields(motion, t[active], panel_grid, unit)
-        d, make = relative_delta(delta, speed), partial(PanelBatch, fields, friction)
+        now = PanelGrid(edges, order) if grid is None else grid
+        rows, speed = _fields(motion, t[active], now, unit)
+        d, batch_of = relative_delta(delta, speed), partial(PanelBatch, now, rows, friction)
         state = starting_state(anchor, velocity / speed)
         if slide is not None:
             state.residual[:] = 0.0
         else:
-            if level == 0 and tail is None:
-                state = _with_slowest_anchors(state, make, d, max_iterations, method)
-            solve(state, make, ANCHOR_MOVES, d, tolerance, max_iterations, method)
+            if level == 0 and first is None:
+                # a cheap pass finds what rests: the anchor is right before anything is judged
+                solve(state, batch_of, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
+                for reference, at in groups(state.anchor):
+                    slow = batch_of(at, reference).slowest(state.velocity[:, at], d[:, at])
+                    state.anchor[at], state.velocity[:, at] = slow
+                state = starting_state(state.anchor, state.velocity)
+            solve(state, batch_of, ANCHOR_MOVES, d, tolerance, max_iterations, method)
         velocity, split = state.velocity * speed, np.zeros((len(edges) - 1, active.size), bool)
+        middle = 0.5 * (edges[1:] + edges[:-1])
         for reference, members in groups(state.anchor):
-            batch, moved = make(members, reference), state.velocity[:, members]
+            batch, moved = batch_of(members, reference), state.velocity[:, members]
             at, dry, fast = active[members], d[:, members], speed[members]
             spent = fast ** (1.0 + (friction.degree or 0.0))
-            middle = 0.5 * (batch.panels.edges[1:] + batch.panels.edges[:-1])
-            is_inside = np.zeros(middle.shape, dtype=bool)
-            for low, high in regions:
-                is_inside |= (middle > low) & (middle < high)
-            mean, sums, bent = batch.motion(moved, dry)
-            z[:, at], centre[:, at] = batch.tail_velocity(moved) * fast, mean * fast
+            sums = batch.panel_sums(moved, dry)
+            tail = batch.edge_velocity(moved)[:, TAIL]
+            tail[2] -= batch.edge_rate[TAIL]
+            z[:, at] = tail * fast
+            centre[:, at] = resultant(batch.curve, *node_velocity(batch.curve, moved))[:2] * fast
             force[:, at], power[at] = sums[:3].sum(axis=1) * spent / fast, sums[3].sum(0) * spent
-            inside[at], bending[at] = (sums[3] * is_inside).sum(axis=0) * spent, bent * spent
-            slow = batch.panel_speed(moved).min(axis=0)
-            slowest[at] = slow * fast
+            places = middle if grid is not None else middle[:, members]
+            is_inside = np.zeros(places.shape, dtype=bool)
+            for low, high in regions:
+                is_inside |= (places > low) & (places < high)
+            inside[at] = (sums[3] * is_inside).sum(axis=0) * spent
+            bending[at] = batch.bending_power(moved, dry) * spent
+            least = batch.panel_speed(moved).min(axis=0)
+            slowest[at] = least * fast
             if grid is not None:
                 continue
             missed = _panel_error(motion, t[at], batch, moved, dry, fast)
             error[at] = missed.max(axis=0)
             # two stretches at rest know each other's velocity to rounding only: no refinement
             # beats that
-            floor = _ROUNDING * batch.node_speed(moved).max(axis=0) / (dry[0] + slow)
+            floor = _ROUNDING * batch.node_speed(moved).max(axis=0) / (dry[0] + least)
             split[:, members] = missed > quadrature_tolerance + floor
         steps[active] += state.iterations
         residual[active] = state.residual
-        used[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
-
-        more = split.any(axis=0) & (used[active] < _MOST_PANELS) & (state.residual <= tolerance)
+        used = np.sum(np.diff(edges, axis=0) > 0, axis=0)
+        more = split.any(axis=0) & (used < _MOST_PANELS) & (state.residual <= tolerance)
         if grid is not None or quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
             break
         anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
         active, velocity = active[more], velocity[:, more]
-        edges = _split(edges[:, more], split[:, more])
+        # columns that need fewer edges end in panels of width zero
+        halves = np.where(split[:, more], middle[:, more], 1.0)
+        edges = np.sort(np.concatenate([edges[:, more], halves]), axis=0)
+        edges = edges[: 1 + int(np.max(np.sum(edges < 1.0, axis=0)))]
         anchor = np.argmax(edges == anchor_at, axis=0)
     return SmoothSolution(
-        t, z, power, centre, force, bending, inside, slowest, residual, error, used, steps,
-        tolerance,
-    )  # fmt: skip
+        t, z, power, centre, force, bending, inside, slowest, residual, error, steps, tolerance
+    )
 
 
-def _with_slowest_anchors(
-    state: State, make: MakeBatch, delta: np.ndarray, max_iterations: int, method: str
-) -> State:
-    """A cheap pass finds what rests, so that the anchor is right before anything is judged."""
-    solve(state, make, 1, np.maximum(delta, 1e-3), 1e-6, max_iterations, method)
-    for reference, at in groups(state.anchor):
-        batch = make(at, reference)
-        state.anchor[at], state.velocity[:, at] = batch.slowest(state.velocity[:, at], delta[:, at])
-    return starting_state(state.anchor, state.velocity)
-
-
-def _motion_fields(
+def _fields(
     motion: Motion, t: np.ndarray, panels: PanelGrid, speed: np.ndarray | None = None
-) -> tuple[PanelFields, np.ndarray]:
-    """Theta and its rate on panels, rates in units of the returned `speed` ``(n_time,)``."""
+) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """Theta and its rate at the nodes, its rate at the edges; rates in units of the returned
+    `speed` ``(n_time,)``."""
     nodes = panels.nodes
     angle, rate = motion.angle(nodes, t), motion.rate(nodes, t)
     if not (np.isfinite(rate).all() and np.isfinite(angle).all()):
@@ -297,16 +423,7 @@ def _motion_fields(
     if speed is None:
         speed = np.abs(rate).max(axis=0)
         speed[speed == 0] = 1.0
-    return PanelFields(panels, angle, rate / speed, motion.rate(panels.edges, t) / speed), speed
-
-
-def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """The chosen panels ``(n_panel, n_time)`` cut in two; columns that need fewer edges end in
-    panels of width zero."""
-    middle = np.where(chosen, 0.5 * (edges[1:] + edges[:-1]), 1.0)
-    fine = np.sort(np.concatenate([edges, middle]), axis=0)
-    keep = 1 + int(np.max(np.sum(fine < 1.0, axis=0)))
-    return fine[:keep]
+    return (angle, rate / speed, motion.rate(panels.edges, t) / speed), speed
 
 
 def _panel_error(
@@ -323,7 +440,7 @@ def _panel_error(
     panel that makes it. Compared are force, torque and power, and the velocity of the right end in
     units of the speed of the slowest panel, which decides the friction there.
     """
-    friction, edges = batch.friction, batch.panels.edges
+    edges = batch.panels.edges
     left, right = edges[:-1].ravel(), edges[1:].ravel()
     slow = delta[0] + batch.panel_speed(z).min(axis=0)
     t, speed, dry, slow = (np.tile(a, len(edges) - 1) for a in (t, speed, delta[0], slow))
@@ -331,9 +448,9 @@ def _panel_error(
     results = []
     for cuts in ([left, right], [left, 0.5 * (left + right), right]):
         grid = PanelGrid(np.stack(cuts), batch.panels.order)
-        fields, _ = _motion_fields(motion, t, grid, speed)
-        one = PanelBatch(fields, friction, np.arange(t.size), 0)
-        sums = one.panel_sums(*one.forces(start, dry)).sum(axis=1)
+        rows, _ = _fields(motion, t, grid, speed)
+        one = PanelBatch(grid, rows, batch.friction, np.arange(t.size), 0)
+        sums = one.panel_sums(start, dry).sum(axis=1)
         end = one.edge_velocity(start)[:2, -1] / slow
-        results.append(np.concatenate([sums / friction.largest, end]))
+        results.append(np.concatenate([sums / batch.friction.largest, end]))
     return np.abs(results[1] - results[0]).max(axis=0).reshape(len(edges) - 1, -1)

@@ -4,12 +4,12 @@ On an arc of length ``w = 2 epsilon share``, centred at ``1/2 + w C``, the tange
 
     Theta = sum_m b_m phi_m(x),  phi_m = (1 - x^2)^3 T_m(x),  x = 2 (s - 1/2)/w - 2 C in [-1, 1],
 
-and zero elsewhere; phi_1 is scaled to be `colloc.smooth.concertina.odd_profile`. The place is a
-point on a circle, ``C = reach cos(pi p / LAP)``: the bump stays in its region whatever p is, at the
-rear end for p = LAP and -LAP, at the front end for p = 0. A crawler is a closed path of ``(p, b_0,
-b_1, ...)`` with ``q(t + 1/2) = -q(t)``: a bump grows at the rear (p = LAP), travels (p falls to 0)
-and is flattened at the front; while the body is straight p falls to -LAP, at no cost; there the
-mirrored bump begins.
+and zero elsewhere; phi_1 is scaled to be the odd profile of `colloc.smooth.prescribed_body`. The
+place is a point on a circle, ``C = reach cos(pi p / LAP)``: the bump stays in its region whatever p
+is, at the rear end for p = LAP and -LAP, at the front end for p = 0. A crawler is a closed path of
+``(p, b_0, b_1, ...)`` with ``q(t + 1/2) = -q(t)``: a bump grows at the rear (p = LAP), travels (p
+falls to 0) and is flattened at the front; while the body is straight p falls to -LAP, at no cost;
+there the mirrored bump begins.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 
 from colloc.mechanics.bodies import BoundedAngles
 from colloc.numerics.arrays import Array, namespace
-from colloc.smooth.concertina import ODD_SCALE
-from colloc.smooth.curve import PanelGrid
-from colloc.smooth.panel_body import PanelBody
+from colloc.smooth.balance import PanelGrid
+from colloc.smooth.prescribed_body import ODD_SCALE
+from colloc.smooth.smooth_body import SmoothBody
 from colloc.system.arguments import check_finite, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
@@ -36,7 +36,7 @@ between."""
 
 @named_arguments
 @dataclass(frozen=True)
-class CrawlerBody(PanelBody):
+class CrawlerBody(SmoothBody):
     """A straight body with one travelling bump; its shape coordinates are the bump's place and the
     profile's amplitudes.
 
@@ -66,7 +66,7 @@ class CrawlerBody(PanelBody):
     order: int = 6
 
     # a part at rest that slips is expensive: a large delta is another landscape; the replay adapts
-    defaults = PanelBody.defaults._replace(
+    defaults = SmoothBody.defaults._replace(
         coordinate="coordinate", quantity="bump coordinate",
         delta=5e-5, delta_start=5e-5, instants_a_point=2,
     )  # fmt: skip
@@ -86,11 +86,6 @@ class CrawlerBody(PanelBody):
         return 2 * self.epsilon * self.share
 
     @property
-    def reach(self) -> float:
-        """Largest |C| [bump widths]: the bump stays in its region."""
-        return 0.5 * (1 / self.share - 1)
-
-    @property
     def n_joint(self) -> int:
         return 1 + self.modes
 
@@ -108,29 +103,36 @@ class CrawlerBody(PanelBody):
         )
 
     def _centre(self, p: Array) -> tuple[Array, Array]:
-        """C, and its derivative."""
-        xp, k = namespace(p), np.pi / LAP
-        return self.reach * xp.cos(k * p), -self.reach * k * xp.sin(k * p)
+        """C [bump widths], of which the largest magnitude keeps the bump in its region, and its
+        derivative."""
+        xp, k, reach = namespace(p), np.pi / LAP, 0.5 * (1 / self.share - 1)
+        return reach * xp.cos(k * p), -reach * k * xp.sin(k * p)
 
     @cached_property
     def _powers(self) -> np.ndarray:
         """Coefficients of x^k in the polynomials times (1 - x^2)^3, ``(modes, modes)``, k along the
         rows."""
-        polynomials = np.zeros((self.modes, self.modes))
-        for m in range(self.modes):
-            polynomials[: m + 1, m] = np.polynomial.chebyshev.cheb2poly(np.eye(m + 1)[m])
-        polynomials[:, 1] *= -ODD_SCALE
-        return polynomials
+        powers = np.zeros((self.modes, self.modes))
+        for m, unit in enumerate(np.eye(self.modes)):
+            powers[: m + 1, m] = np.polynomial.chebyshev.cheb2poly(unit[: m + 1])
+        powers[:, 1] *= -ODD_SCALE
+        return powers
 
     def _profile(self, x: Array, b: Array, *, slope: bool = False) -> Array:
         """``sum b_m phi_m(x)``, or its derivative, b ``(modes, n_time)``."""
-        xp = namespace(x, b)
-        y = xp.where(x * x < 1, 1 - x * x, 0.0 * x)
-        p = _polynomial(self._powers, b, x)
+
+        def polynomial(powers: np.ndarray) -> Array:
+            coefficients, value = namespace(b).matmul(powers, b), 0.0 * x
+            for k in reversed(range(len(powers))):
+                value = value * x + coefficients[k : k + 1, :]
+            return value
+
+        y = namespace(x, b).where(x * x < 1, 1 - x * x, 0.0 * x)
+        p = polynomial(self._powers)
         if not slope:
             return y**3 * p
         derivative = np.polynomial.polynomial.polyder(self._powers)
-        return y**3 * _polynomial(derivative, b, x) - 6 * x * y**2 * p
+        return y**3 * polynomial(derivative) - 6 * x * y**2 * p
 
     def _x(self, s: np.ndarray, centre: Array) -> Array:
         places: Array = s if isinstance(centre, np.ndarray) else type(centre)(s)
@@ -150,17 +152,15 @@ class CrawlerBody(PanelBody):
         low, high = (np.full_like(angles[:1], 0.5 + sign * self.epsilon) for sign in (-1, 1))
         return np.concatenate([low, ends, high])
 
-    def modes_at(self, x: np.ndarray) -> np.ndarray:
+    def _modes_at(self, x: np.ndarray) -> np.ndarray:
         """Profiles at places ``(n,)`` across the bump, -1 to 1, ``(n, modes)``."""
-        return np.concatenate(
-            [self._profile(x[:, None], unit[:, None]) for unit in np.eye(self.modes)], axis=1
-        )
+        return np.asarray(self._profile(x[:, None], np.eye(self.modes)))
 
     @property
     def bounded_angles(self) -> BoundedAngles:
-        rows = np.concatenate([np.zeros((_PLACES.size, 1)), self.modes_at(_PLACES)], axis=1)
+        rows = np.concatenate([np.zeros((_PLACES.size, 1)), self._modes_at(_PLACES)], axis=1)
         names = tuple(f"tangent at {x:.2f} of the bump" for x in _PLACES)
-        return BoundedAngles(rows, names, fine=lambda angles: self.modes_at(_FINE) @ angles[1:])
+        return BoundedAngles(rows, names, fine=lambda angles: self._modes_at(_FINE) @ angles[1:])
 
     def concertina(
         self, amplitude: float, sides: int = 4, way: tuple[float, float] = (LAP, 0.0)
@@ -187,15 +187,12 @@ class CrawlerBody(PanelBody):
             raise ProblemError(
                 f"sides must be at least 4 and way two places, not {sides!r} and {way!r}."
             )
-        corners = np.zeros((self.n_joint, 5))
-        corners[0], corners[2] = (
-            (way[0], way[0], way[1], way[1], -way[0]),
-            (0.0, amplitude, amplitude, 0.0, 0.0),
-        )
+        corners, (rear, front) = np.zeros((self.n_joint, 5)), way
+        corners[0], corners[2, 1:3] = (rear, rear, front, front, -rear), amplitude
         parts = np.ones(4)
         for _ in range(sides - 4):
             # the return costs nothing, however long it is
-            parts[np.argmax(np.array([amplitude, way[0] - way[1], amplitude, 0.0]) / parts)] += 1
+            parts[np.argmax(np.array([amplitude, rear - front, amplitude, 0.0]) / parts)] += 1
         at = np.concatenate([k + np.arange(n) / n for k, n in enumerate(parts)] + [[4.0]])
         return np.stack([np.interp(at, np.arange(5), row) for row in corners])
 
@@ -209,18 +206,8 @@ class CrawlerBody(PanelBody):
     def from_chain(self, lengths: np.ndarray) -> np.ndarray:
         """A chain's bends pressed into the bump, as nearly as its profiles can, at the front end of
         the region."""
-        ends = np.append(0.0, np.cumsum(lengths)) / np.sum(lengths)
-        x = _PLACES
-        link = np.clip(np.searchsorted(ends, 0.5 * (x + 1)) - 1, 0, len(lengths) - 1)
-        stairs = np.tril(np.ones((len(lengths), len(lengths) - 1)), -1)[link]
-        profile = np.linalg.lstsq(self.modes_at(x), stairs - stairs.mean(axis=0), rcond=None)[0]
-        return np.concatenate([np.zeros((1, len(lengths) - 1)), profile])
-
-
-def _polynomial(powers: np.ndarray, b: Array, x: Array) -> Array:
-    """``sum_k (powers b)_k x^k`` by Horner's rule, b ``(modes, n_time)``."""
-    coefficients = namespace(b).matmul(powers, b)
-    value = 0.0 * x
-    for k in reversed(range(len(powers))):
-        value = value * x + coefficients[k : k + 1, :]
-    return value
+        ends, n = np.append(0.0, np.cumsum(lengths)) / np.sum(lengths), len(lengths)
+        link = np.clip(np.searchsorted(ends, 0.5 * (_PLACES + 1)) - 1, 0, n - 1)
+        stairs = np.tril(np.ones((n, n - 1)), -1)[link]
+        fit = np.linalg.lstsq(self._modes_at(_PLACES), stairs - stairs.mean(axis=0), rcond=None)
+        return np.concatenate([np.zeros((1, n - 1)), fit[0]])

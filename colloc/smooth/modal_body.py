@@ -6,15 +6,14 @@ Modes have zero mean, so that Theta is measured from the mean direction of the b
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
 
 from colloc.mechanics.bodies import BoundedAngles, Stretch
 from colloc.numerics.arrays import Array, namespace
-from colloc.smooth.curve import PanelGrid
-from colloc.smooth.panel_body import PanelBody
+from colloc.smooth.balance import PanelGrid
+from colloc.smooth.smooth_body import SmoothBody
 from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
@@ -27,7 +26,7 @@ polynomials change fast towards the ends."""
 
 @named_arguments
 @dataclass(frozen=True)
-class ModalBody(PanelBody):
+class ModalBody(SmoothBody):
     """A smooth body of unit length with a few bending modes; its shape coordinates are their
     amplitudes [rad].
 
@@ -121,6 +120,11 @@ class ModalBody(PanelBody):
             super().bounded_angles.fine,
         )
 
+    def _project(self, moments: np.ndarray) -> np.ndarray:
+        """Amplitudes nearest in the mean square, from inner products with the modes."""
+        values = self.modes_at(_FINE.nodes[:, 0])
+        return np.linalg.solve(values.T @ (_FINE.weights * values), moments)
+
     def from_chain(self, lengths: np.ndarray) -> np.ndarray:
         """Nearest in the mean square to the chain's staircase of a tangent angle, whose mean
         direction, a rigid rotation, is left out."""
@@ -130,19 +134,11 @@ class ModalBody(PanelBody):
         nodes, weights = np.polynomial.legendre.leggauss(2 * self.modes + 4)
         s = ends[:-1, None] + np.diff(ends)[:, None] * 0.5 * (nodes + 1)
         w = np.diff(ends)[:, None] * 0.5 * weights
-        moments = np.einsum("lg,lgm->ml", w, self.modes_at(s)) @ steps
-        return np.linalg.solve(_gram(self), moments)
+        return self._project(np.einsum("lg,lgm->ml", w, self.modes_at(s)) @ steps)
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         """``sin(2 pi t - 2 pi waves (s - 1/2))`` as nearly as the modes can."""
-        s, w = _FINE.nodes[:, 0], _FINE.weights[:, 0]
-        project = np.linalg.solve(_gram(self), self.modes_at(s).T * w)
+        s = _FINE.nodes[:, 0]
+        project = self._project((_FINE.weights * self.modes_at(s)).T)
         phase = 2 * np.pi * waves * (s - 0.5)
         return -project @ np.sin(phase), project @ np.cos(phase)
-
-
-@cache
-def _gram(body: ModalBody) -> np.ndarray:
-    """Inner products of the modes."""
-    values = body.modes_at(_FINE.nodes[:, 0])
-    return values.T @ (_FINE.weights * values)

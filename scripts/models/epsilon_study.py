@@ -14,7 +14,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
-from colloc.smooth.concertina import Concertina
+from colloc.smooth.prescribed_body import Concertina
 from colloc.system.errors import ProblemError
 from scripts.models.period import Period, measured_period, period
 

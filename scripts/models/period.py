@@ -15,8 +15,7 @@ import numpy as np
 
 from colloc.mechanics.law import Law
 from colloc.numerics.schemes import scheme
-from colloc.smooth.balance import SmoothSolution, solve_smooth
-from colloc.smooth.motion import Motion
+from colloc.smooth.balance import Motion, SmoothSolution, solve_smooth
 from colloc.system.errors import ProblemError
 
 

@@ -8,9 +8,7 @@ import numpy as np
 from scipy.integrate import cumulative_simpson
 
 from colloc.mechanics.friction import Friction
-from colloc.smooth.balance import solve_smooth
-from colloc.smooth.curve import PanelGrid
-from colloc.smooth.motion import Motion
+from colloc.smooth.balance import Motion, PanelGrid, solve_smooth
 from colloc.system.errors import ProblemError
 
 _STEPS_BETWEEN = 24

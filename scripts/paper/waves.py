@@ -3,13 +3,15 @@ and 6)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from colloc.mechanics.friction import Friction
-from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
+from colloc.smooth.balance import Motion
+from colloc.smooth.prescribed_body import Wave
 from scripts.models.period import measured_period, period
 from scripts.models.smooth_record import snapshots
 from scripts.paper.parallel import parallel_map
@@ -30,15 +32,11 @@ Task = tuple[str, dict, tuple[float, float, float], float, dict]
 """Kind of wave, its parameters, (mu_t, mu_f, mu_b), delta, and settings of the quadrature."""
 
 
-_MAKERS: dict[str, Callable[..., Motion]] = {
-    "triangular": tanh_wave,
-    "sine": sine_wave,
-    "standing": standing_wave,
-}
+_MADE = {"triangular": Wave("tanh", 1.3, 2.0), "sine": Wave(), "standing": Wave("standing")}
 
 
-def _motion(kind: str, **parameters: float) -> Motion:
-    return _MAKERS[kind](**parameters)
+def _motion(kind: str, **parameters: Any) -> Motion:
+    return replace(_MADE[kind], **parameters).prescribed()
 
 
 def _wave(task: tuple[str, float, int]) -> dict:

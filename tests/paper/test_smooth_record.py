@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.mechanics.friction import Friction
-from colloc.smooth.motion import sine_wave
+from colloc.smooth.prescribed_body import Wave
 from scripts.models.period import period
 from scripts.models.smooth_record import snapshots
 
@@ -12,7 +12,7 @@ ALONG_EASY = Friction(mu_t=20.0, mu_f=1.0, mu_b=1.0)
 
 
 def test_snapshots_are_inextensible_and_advance_by_the_distance():
-    motion = sine_wave()
+    motion = Wave().prescribed()
     made = snapshots(motion, ALONG_EASY, 1e-3, count=2, panels=40)
     steps = np.hypot(np.diff(made.x, axis=0), np.diff(made.y, axis=0))
     np.testing.assert_allclose(steps.sum(axis=0), steps.sum(axis=0)[0], rtol=1e-4)

@@ -18,7 +18,7 @@ import numpy as np
 
 from colloc import Chain, Friction, ProblemError, solve_balance
 from colloc.mechanics.balance import instant, total_power
-from colloc.smooth.motion import Motion
+from colloc.smooth.balance import Motion
 
 
 def chain_period(

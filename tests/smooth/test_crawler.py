@@ -21,8 +21,8 @@ from colloc.search.iterate import evaluate_at
 from colloc.search.options import COARSE
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
-from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
+from colloc.smooth.prescribed_body import Concertina
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
 

@@ -20,9 +20,8 @@ from colloc.results.solution import SOLVED
 from colloc.results.store import load, save
 from colloc.search.explore import first_optimum
 from colloc.search.solve import solve
-from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_body import ModalBody
-from colloc.smooth.prescribed_body import Wave, schedule
+from colloc.smooth.prescribed_body import Concertina, Wave, schedule
 from colloc.system.errors import ProblemError
 from scripts.models.period import measured_period, period
 

@@ -8,9 +8,8 @@ from scipy import integrate
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction, line_integrals
-from colloc.smooth.balance import solve_smooth
-from colloc.smooth.curve import PanelGrid, curve, node_velocity, resultant
-from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
+from colloc.smooth.balance import Motion, PanelGrid, curve, node_velocity, resultant, solve_smooth
+from colloc.smooth.prescribed_body import Wave
 from colloc.system.errors import NotConvergedError, ProblemError
 
 ANISOTROPIC = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
@@ -89,12 +88,15 @@ def naive_resultant(motion, friction, t, delta, z):
 
 @pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)])
 def test_solution_balances_by_independent_quadrature(friction):
-    motion, t, delta = sine_wave(0.8, 1.0), 0.13, 0.3
+    motion, t, delta = Wave("sine", 0.8, 1.0).prescribed(), 0.13, 0.3
     solution = solve_smooth(motion, friction, np.array([t]), delta).require()
     assert np.abs(naive_resultant(motion, friction, t, delta, solution.z[:, 0])).max() < 1e-8
 
 
-@pytest.mark.parametrize("motion", [sine_wave(), standing_wave(), tanh_wave(steepness=4.0)])
+@pytest.mark.parametrize(
+    "motion",
+    [Wave().prescribed(), Wave("standing").prescribed(), Wave("tanh", 1.3, 2.0, 4.0).prescribed()],
+)
 @pytest.mark.parametrize("friction", [Friction(), ANISOTROPIC])
 def test_many_starts_panels_and_methods_agree(motion, friction):
     t = np.array([0.02, 0.2, 0.41])
@@ -110,7 +112,7 @@ def test_many_starts_panels_and_methods_agree(motion, friction):
 
 def test_scaling_of_rates_and_delta():
     """z is homogeneous of degree one in (rates, delta)."""
-    motion = standing_wave()
+    motion = Wave("standing").prescribed()
     twice = Motion(motion.angle, lambda s, t: 2 * motion.rate(s, t))
     t = np.array([0.03, 0.4])
     one, two = solve_smooth(motion, ANISOTROPIC, t, 1e-4), solve_smooth(twice, ANISOTROPIC, t, 2e-4)
@@ -150,7 +152,7 @@ def test_panels_resolve_the_layer_where_a_body_pivots(delta):
 
 def test_chain_of_many_links_converges_to_the_smooth_body_with_isotropic_friction():
     t, delta, errors = np.array([0.1]), 0.05, []
-    motion = sine_wave()
+    motion = Wave().prescribed()
     smooth = solve_smooth(motion, Friction(), t, delta).require()
     for n in (20, 40):
         edges = np.linspace(0, 1, n + 1)
@@ -167,7 +169,7 @@ def test_chain_of_many_links_converges_to_the_smooth_body_with_isotropic_frictio
 
 def test_unusable_input_is_named():
     with pytest.raises(ProblemError, match="delta must be a positive"):
-        solve_smooth(sine_wave(), Friction(), np.array([0.1]), 0.0)
+        solve_smooth(Wave().prescribed(), Friction(), np.array([0.1]), 0.0)
     with pytest.raises(ProblemError, match="finite"):
         solve_smooth(
             Motion(lambda s, t: s * np.nan, lambda s, t: s), Friction(), np.array([0.1]), 1e-3
@@ -176,5 +178,10 @@ def test_unusable_input_is_named():
         Motion(lambda s, t: s, lambda s, t: s, stages=(0.0, 0.4))
     with pytest.raises(NotConvergedError, match="did not balance at 1 of 1"):
         solve_smooth(
-            sine_wave(), Friction(), np.array([0.1]), 1e-6, max_iterations=1, method="fixed_point"
+            Wave().prescribed(),
+            Friction(),
+            np.array([0.1]),
+            1e-6,
+            max_iterations=1,
+            method="fixed_point",
         ).require()

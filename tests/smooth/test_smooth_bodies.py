@@ -9,10 +9,9 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.friction import Friction
 from colloc.results.body_marks import friction_arrows
-from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.smooth.modal_body import ModalBody
-from colloc.smooth.prescribed_body import Wave
+from colloc.smooth.prescribed_body import Concertina, Wave
 
 POINTS = 9601
 S = np.linspace(0.0, 1.0, POINTS)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from colloc.mechanics.friction import Friction
-from colloc.smooth.concertina import Concertina
+from colloc.smooth.prescribed_body import Concertina
 from colloc.system.errors import ProblemError
 from scripts.models.epsilon_study import (
     Crawler,

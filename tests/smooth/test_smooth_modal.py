@@ -14,9 +14,9 @@ from colloc.results.distinct_optima import distance, reversed_in_time, swap_ends
 from colloc.results.store import load, save
 from colloc.search.solve import solve
 from colloc.search.spaces import program_of
-from colloc.smooth.balance import solve_smooth
+from colloc.smooth.balance import Motion, solve_smooth
 from colloc.smooth.modal_body import ModalBody
-from colloc.smooth.motion import Motion, sine_wave
+from colloc.smooth.prescribed_body import Wave
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
 from colloc.transcription.shape_constraints import shape_checks
@@ -58,8 +58,12 @@ def test_modes_have_zero_mean_and_are_orthogonal(basis):
 def test_fourier_modes_hold_the_paper_s_wave_exactly():
     motion, t = gait_motion(FOURIER, wave(FOURIER, 0.7)), np.array([0.03, 0.31])
     s = np.linspace(0.0, 1.0, 50)[:, None] * np.ones((1, 2))
-    np.testing.assert_allclose(motion.angle(s, t), sine_wave(0.7).angle(s, t + 0.5), atol=1e-12)
-    np.testing.assert_allclose(motion.rate(s, t), sine_wave(0.7).rate(s, t + 0.5), atol=1e-11)
+    np.testing.assert_allclose(
+        motion.angle(s, t), Wave("sine", 0.7).prescribed().angle(s, t + 0.5), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        motion.rate(s, t), Wave("sine", 0.7).prescribed().rate(s, t + 0.5), atol=1e-11
+    )
 
 
 def test_a_straight_staircase_is_laid_into_the_line_through_it():
@@ -174,7 +178,7 @@ def problem(**changes) -> Problem:
 
 def test_the_optimum_beats_the_paper_s_wave_and_is_certified(tmp_path):
     found = solve(problem(body=ModalBody(4, "fourier", panels=4)), 1)
-    reference = measured_period(sine_wave(), SIDEWAYS, found.problem.delta)
+    reference = measured_period(Wave().prescribed(), SIDEWAYS, found.problem.delta)
     assert found.status == "solved", found.message
     assert found.answer.program == "implicit velocity"
     assert reference.efficiency + 0.09 < found.efficiency < 1.0
