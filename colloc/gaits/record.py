@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from datetime import datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
@@ -16,15 +16,15 @@ from colloc.system.errors import ProblemError
 FEWEST = 6
 """Samples of a gait, and of each of its periods."""
 _LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
-
-
+_DEGREE = np.pi / 180
 _ANGLES = dict.fromkeys(("rad", "rads", "radian", "radians"), 1.0) | {"mrad": 1e-3}
 # Grad is German for degrees
-_ANGLES |= dict.fromkeys(("deg", "degs", "degree", "degrees", "grad", "°"), np.pi / 180)
+_ANGLES |= dict.fromkeys(("deg", "degs", "degree", "degrees", "grad", "°"), _DEGREE)
 _WORDS = {
-    "time": "t|time|timestamp|stamp|zeit|temps|tiempo|tempo|clock|elapsed|datetime|date|uptime|n?secs|nanosecs?",  # noqa: E501
-    "other": "vel.*|speeds?|rate|dot|qd|dq|omega|effort|torques?|tau|load|volt.*|temp.*|power|acc.*|pwm|force|currents?|err.*|"  # noqa: E501
-    "imu|gyro|battery|per|nm|m[va]|rpm|moving|status|cov.*",
+    "time": "t|time|timestamp|stamp|zeit|temps|tiempo|tempo|clock|elapsed|datetime|date|uptime|"
+    "n?secs|nanosecs?",
+    "other": "vel.*|speeds?|rate|dot|qd|dq|omega|effort|torques?|tau|load|volt.*|temp.*|power|"
+    "acc.*|pwm|force|currents?|err.*|imu|gyro|battery|per|nm|m[va]|rpm|moving|status|cov.*",
     "count": "index|idx|samples?|frame|step|seq|nr|no|count(er)?|id|row|unnamed|attempt",
     "angle": "positions?|pos|angles?",
     "commanded": "cmd|command(ed)?|target|goal|setpoint|des(ired)?|ref(erence)?|sp",
@@ -35,7 +35,6 @@ _WORDS = {
     "unit not read": "revs?|revolutions|turns?|gons?|ticks?|counts",
 }
 """Words in names of columns, as regular expressions; "other" are columns that are no angles."""
-_CALLED = "call columns of joints joint_1 (at the tail), joint_2 and so on"
 _ROUNDED = 0.15  # share of unequal time steps from which equal steps were rounded
 _MOST = 5_000  # samples; of more, every second, third ... is taken
 _CENTRED = np.radians(20)
@@ -55,7 +54,7 @@ class Record(NamedTuple):
 class _Column(NamedTuple):
     at: int
     name: str
-    words: tuple[str, ...]  # letters and numbers of the name and the unit below it, lower case
+    words: tuple[str, ...] = ()  # letters and numbers of name and unit, in lower case
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -71,31 +70,24 @@ class _Column(NamedTuple):
         """The last of its words that speaks of something; else empty."""
         return next((word for word in reversed(self.words) if re.fullmatch(_WORDS[what], word)), "")
 
-    def speaks_of(self, what: str) -> bool:
-        return bool(self.last(what))
-
     @property
     def kind(self) -> str:
         """One of "time", "count", "other", "place" and, if nothing else, "angle"."""
-        words, unit = set(self.words), self.words[-2:]
-        all_units = all(re.fullmatch(_WORDS["unit of time"], word) for word in words)
-        if self.speaks_of("time") or (words and all_units):
+        words, unit = self.words, self.words[-2:]
+        if self.last("time") or (
+            words and all(re.fullmatch(_WORDS["unit of time"], w) for w in words)
+        ):
             return "time"
-        after_number = len(unit) > 1 and unit[0].isdecimal() and unit[1] in ("w", "a", "v", "c")
+        # a number and a unit, as 1 v; a velocity; newton metres
+        other = words[:1] == ("v",) or unit == ("n", "m")
+        other |= len(unit) > 1 and unit[0].isdecimal() and unit[1] in ("w", "a", "v", "c")
         rate = re.search(r"(rad|deg|°|rev)\w*\s*/\s*s|n·m", self.name, re.I)
-        force = self.words[:1] == ("v",) or unit == ("n", "m")
-        if self.speaks_of("other") or force or after_number or rate:
-            current = self.speaks_of("angle") and "current" in words and not rate
-            return "angle" if current else "other"
-        if not words or (self.speaks_of("count") and not self.speaks_of("angle")):
+        if rate or other or self.last("other"):
+            is_current = self.last("angle") and "current" in words and not rate
+            return "angle" if is_current else "other"
+        if not words or (self.last("count") and not self.last("angle")):
             return "count"
-        return "place" if words & {"x", "y", "z"} and not words & {"joint", "angle"} else "angle"
-
-
-def _column(at: int, name: str, unit: str) -> _Column:
-    name = f"{name} {unit}"
-    words = re.findall(r"[^\W\d_]+|\d+|°", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
-    return _Column(at, name.strip(), tuple(words))
+        return "place" if {*words} & {*"xyz"} and not {*words} & {"joint", "angle"} else "angle"
 
 
 def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
@@ -106,22 +98,9 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
     """
     table = read_table(path)
     check_size(path, table, FEWEST)
-    numeric, width = np.isfinite(table.values).any(axis=0), table.values.shape[1]
-    pairs = zip(table.names, table.units, strict=True) if table.names else ()
-    columns = [_column(j, *pair) for j, pair in enumerate(pairs)]
-    if columns:
-        clock = _clock(table, columns)
-        others = [column for column in columns if column.at not in clock]
-        joints, how = _joints(path, [column for column in others if numeric[column.at]], n_joint)
-        left = [column.name for column in others if column not in joints and column.name]
-    else:
-        clock, how, left = [0] * (width != n_joint), "in the file's order, as it has no names", []
-        if width not in (n_joint, n_joint + 1):
-            raise ProblemError(_count(path, width - 1, n_joint))
-        joints = [_Column(j, f"column {j + 1}", ()) for j in range(width - n_joint, width)]
-    time, unit = _times(path, table, columns, clock)
-    at = [column.at for column in joints]
-    rows, notes = _rows(path, table, [time, *table.values[:, at].T], [*clock[:1], *at])
+    columns, clock, joints, how = _columns(path, table, n_joint)
+    time, unit = _times(path, table, clock)
+    rows, notes = _rows(path, table, time, clock, joints)
     if re.search(r"^#\s*ramp_s:", table.preamble, re.M):
         rows = rows[time[rows] >= 0]
         notes.append("the way into the gait, before time 0, left out")
@@ -140,161 +119,169 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
     if (every := -(-rows.size // _MOST)) > 1:
         time, rows = time[::every], rows[::every]
         notes.append(f"of {len(table.lines)} rows, one in {every} taken")
-    angles, in_degrees = _radians(path, table, joints, rows, degrees)
-    unwrapped = np.unwrap(angles, discont=1.5 * np.pi, axis=1)
-    unwrapped -= 2 * np.pi * np.round(unwrapped.mean(axis=1, keepdims=True) / (2 * np.pi))
-    if turned := _names(joints, np.abs(unwrapped - angles).max(axis=1) > 1.0):
+    units = _units(path, table, joints, degrees)
+    raw = table.values[rows][:, [column.at for column in joints]].T
+    _check_size_of_angles(path, joints, raw, units)
+    angles = np.unwrap(raw * units[:, None], discont=1.5 * np.pi, axis=1)
+    angles -= 2 * np.pi * np.round(angles.mean(axis=1, keepdims=True) / (2 * np.pi))
+    if turned := _names(joints, np.abs(angles - raw * units[:, None]).max(axis=1) > 1.0):
         notes.append(f"whole turns taken out of {turned}")
+    left = [c.name for c in columns if c.name and c not in [*clock, *joints]]
     if left:
         more = f" and {len(left) - 3} more" if len(left) > 3 else ""
         notes.append(f"left out: {', '.join(left[:3])}{more}")
-    angle_unit = "degrees"
-    if not in_degrees.all():
-        mixed = _names(joints, in_degrees)
-        angle_unit = f"radians (but {mixed} degrees)" if mixed else "radians"
+    in_degrees = np.isclose(units, _DEGREE)
+    mixed = f" (but {_names(joints, in_degrees)} degrees)" if in_degrees.any() else ""
+    angle_unit = "degrees" if in_degrees.all() else f"radians{mixed}"
     plural = "s" * (n_joint > 1)
-    facts = [f"read {n_joint} joint{plural} {how} from {_list_names(joints)}, {angle_unit}"]
+    facts = [f"read {n_joint} joint{plural} {how} from {_ends(joints)}, {angle_unit}"]
     facts += [f"time {unit}{even}", *table.notes, *notes]
     stated = re.search(r"^#\s*period_s:\s*([\d.eE+-]+)\s*$", table.preamble, re.M)
-    return Record(
-        time - time[0],
-        unwrapped,
-        bool(in_degrees.all()),
-        float(stated[1]) if stated and unit == "in s" else None,
-        "; ".join(facts),
-        _centre(unwrapped),
-    )
+    period = float(stated[1]) if stated and unit == "in s" else None
+    centres = 0.5 * (angles.max(axis=1) + angles.min(axis=1))
+    right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
+    centred = n_joint > 1 and np.abs(centres - right).max() < _CENTRED
+    centre = int(np.degrees(right).round()) if centred else 0
+    return Record(time - time[0], angles, bool(in_degrees.all()), period, "; ".join(facts), centre)
 
 
 def _names(columns: list[_Column], which: np.ndarray) -> str:
     return ", ".join(columns[j].name for j in np.flatnonzero(which))
 
 
-def _list_names(columns: list[_Column]) -> str:
+def _ends(columns: list[_Column]) -> str:
     return " ... ".join(dict.fromkeys((columns[0].name, columns[-1].name)))
 
 
-def _count(path: Path, count: int, n_joint: int) -> str:
-    return (
-        f"{path} has {count} column{'s' * (count != 1)} of angles, and the body has {n_joint} "
-        f"joint{'s' * (n_joint != 1)}: write a column of times, then one for each joint; {_CALLED}."
-    )
-
-
-def _clock(table: Table, columns: list[_Column]) -> list[int]:
-    """The column of times, or those of seconds and nanoseconds; none for equal steps."""
+def _columns(
+    path: Path, table: Table, n_joint: int
+) -> tuple[list[_Column], list[_Column], list[_Column], str]:
+    """All columns if they have names; that of times, or those of seconds and nanoseconds, if there
+    are any; those of the joints from tail to head, and by what they are known."""
+    if not table.names:
+        width = table.values.shape[1]
+        unnamed = [_Column(j, f"column {j + 1}") for j in range(width)]
+        if width not in (n_joint, n_joint + 1):
+            _refuse_count(path, width - 1, n_joint)
+        clock, joints = unnamed[: width - n_joint], unnamed[width - n_joint :]
+        return [], clock, joints, "in the file's order, as it has no names"
+    columns = []
+    for j, each in enumerate(zip(table.names, table.units, strict=True)):
+        name = " ".join(each)
+        spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
+        columns.append(_Column(j, name.strip(), tuple(re.findall(r"[^\W\d_]+|\d+|°", spaced))))
     varies = [column for column in columns if len({row[column.at] for row in table.cells}) > 1]
     times = [column for column in varies if column.kind == "time"]
-    whole = next((c for c in times if {"sec", "secs"} & set(c.words)), None)
-    part = next((c for c in times if {"nanosec", "nanosecs", "nsec", "nsecs"} & set(c.words)), None)
-    if whole and part:
-        return [whole.at, part.at]
+    whole, part = (
+        next((column for column in times if units & {*column.words}), None)
+        for units in ({"sec", "secs"}, {"nanosec", "nanosecs", "nsec", "nsecs"})
+    )
     rising = [column for column in varies if (np.diff(table.values[:, column.at]) > 0).all()]
     counts = [column for column in rising if column.kind == "count"]
     # times in another language
     others = [column for column in rising if column.at == 0 and not column.numbers]
-    return [column.at for column in (times or counts or others)[:1]]
+    clock = [whole, part] if whole and part else (times or counts or others)[:1]
+    numeric = np.isfinite(table.values).any(axis=0)
+    may_be = [column for column in columns if column not in clock and numeric[column.at]]
+    return columns, clock, *_joints(path, may_be, n_joint)
 
 
 def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Column], str]:
-    """The columns of the joints from tail to head, and by what they are known."""
+    def refuse(what: str) -> NoReturn:
+        raise ProblemError(
+            f"{path}: {what}: call columns of joints joint_1 (at the tail), joint_2 ..."
+        )
+
     angles = [column for column in columns if column.kind == "angle"]
     places = [column for column in columns if column.kind == "place"]
     if not angles and places:
-        raise ProblemError(
-            f"{path}: its columns {_list_names(places)} look like positions of points of the body: "
-            f"turn them into joint angles first, each the direction of a link less that of the "
-            f"link behind it."
+        refuse(
+            f"its columns {_ends(places)} look like positions of points of the body; write joint "
+            f"angles, each the direction of a link less that of the link behind it"
         )
-    if len(angles) > n_joint:
-        measured = [column for column in angles if not column.speaks_of("commanded")]
-        angles = measured if len(measured) >= n_joint else angles
+    measured = [column for column in angles if not column.last("commanded")]
+    if len(angles) > n_joint <= len(measured):
+        angles = measured
     sets: dict[tuple[str, ...], list[_Column]] = {}
     for column in angles:
         sets.setdefault(column.skeleton, []).append(column)
     same = len({column.skeleton[:-1] for column in angles}) == 1
     if same and all(len(column.skeleton[-1]) == 1 for column in angles):
         sets = {(): angles}  # known by a letter
-    numbered = [each for key, each in sets.items() if "#" in key or (not key and n_joint > 1)]
-    for each in numbered:
-        if len({c.words for c in each}) < len(each):
-            raise ProblemError(f"{path}: two columns are called {each[0].name}: {_CALLED}.")
-        each.sort(key=lambda column: (column.numbers, column.words))
+    numbered = []
+    for key, each in sets.items():
+        if "#" in key or (not key and n_joint > 1):
+            numbered.append(sorted(each, key=lambda column: (column.numbers, column.words)))
+            if len({column.words for column in each}) < len(each):
+                refuse(f"two columns are called {each[0].name}")
     full = [each for each in numbered if len(each) == n_joint]
     if len(full) > 1:
-        raise ProblemError(
-            f"{path}: two sets of columns may be the {n_joint} joints, {_list_names(full[0])}, and "
-            f"{_list_names(full[1])}: leave one of them out."
-        )
-    beyond = next((each for each in numbered if len(each) == n_joint + 1), None)
-    if full:
-        of_links = full[0][0].speaks_of("link") and "joint" not in full[0][0].words
-        beyond = full[0] if of_links else None
-    if beyond:
-        raise ProblemError(
-            f"{path}: {_list_names(beyond)} are {len(beyond)} columns of angles, and the body has "
-            f"{n_joint} joints: if they are directions of links, write what each has beyond the "
-            f"one behind it; {_CALLED}."
-        )
-    if full:
+        sides = f"{_ends(full[0])}, and {_ends(full[1])}"
+        refuse(f"two sets of columns may be the {n_joint} joints, {sides}; leave one of them out")
+    of_links = full and full[0][0].last("link") and "joint" not in full[0][0].words
+    if full and not of_links:
         return full[0], "by name"
+    if links := full or [each for each in numbered if len(each) == n_joint + 1]:
+        refuse(
+            f"{_ends(links[0])} are {len(links[0])} columns of angles, and the body has {n_joint} "
+            f"joints; if they are directions of links, write what each has beyond the one behind it"
+        )
     if len(angles) != n_joint:
-        raise ProblemError(_count(path, len(angles), n_joint))
+        _refuse_count(path, len(angles), n_joint)
     in_order = all(each == [column for column in angles if column in each] for each in numbered)
-    if not in_order or any(column.speaks_of("end") for column in angles):
-        names = ", ".join(column.name for column in angles)
-        raise ProblemError(f"{path}: the order of the columns {names} is not clear: {_CALLED}.")
+    if not in_order or any(column.last("end") for column in angles):
+        refuse(f"the order of the columns {', '.join(c.name for c in angles)} is not clear")
     return angles, "in the file's order, tail to head,"
 
 
-def _times(
-    path: Path, table: Table, columns: list[_Column], clock: list[int]
-) -> tuple[np.ndarray, str]:
+def _refuse_count(path: Path, count: int, n_joint: int) -> NoReturn:
+    raise ProblemError(
+        f"{path} has {count} column{'s' * (count != 1)} of angles, and the body has {n_joint} "
+        f"joint{'s' * (n_joint != 1)}: write a column of times, then one for each joint."
+    )
+
+
+def _times(path: Path, table: Table, clock: list[_Column]) -> tuple[np.ndarray, str]:
     """Times of all rows, and their unit in words."""
     if not clock:
         samples = np.arange(len(table.lines), dtype=float)
         return samples, "in equal steps, a sample each, as no column holds it"
+    column, time = clock[0], table.values[:, clock[0].at]
     if len(clock) > 1:
-        whole, part = table.values[:, clock].T
-        return whole - whole[0] + 1e-9 * part, "in s"
-    time = table.values[:, clock[0]]
+        return time - time[0] + 1e-9 * table.values[:, clock[1].at], "in s"
     if not np.isfinite(time).any():
-        stamps = [_stamp(row[clock[0]]) for row in table.cells]
+        stamps = []
+        for row in table.cells:
+            text = row[column.at].replace(",", ".")
+            if re.match(r"\d{1,2}:", text):  # a time of day
+                text = f"2000-01-01 {text:0>8}"
+            try:
+                stamps.append(datetime.fromisoformat(text).timestamp())
+            except ValueError:
+                stamps.append(np.nan)
         if np.isnan(stamps[0]):
             raise ProblemError(
-                f"{path}, line {table.lines[0]}: the time {table.cells[0][clock[0]]!r} is no "
+                f"{path}, line {table.lines[0]}: the time {table.cells[0][column.at]!r} is no "
                 f"number, and no date and time as 2026-01-31T12:00:00.05: write seconds."
             )
         return np.array(stamps) - stamps[0], "of day, in s"
-    if not columns:
+    if not table.names:
         return time, "in the first column"
-    column = columns[clock[0]]
     if column.kind == "count":
         return time, f"in samples ({column.name or 'the first column'})"
     unit = column.last("unit of time")
     return time, f"in {unit}" if unit else f"from {column.name}"
 
 
-def _stamp(text: str) -> float:
-    """Seconds of a date and time, or a time of day; NaN if it is none."""
-    text = text.replace(",", ".")
-    if re.match(r"\d{1,2}:", text):
-        text = f"2000-01-01 {text:0>8}"
-    try:
-        return datetime.fromisoformat(text).timestamp()
-    except ValueError:
-        return np.nan
-
-
 def _rows(
-    path: Path, table: Table, values: list[np.ndarray], at: list[int]
+    path: Path, table: Table, time: np.ndarray, clock: list[_Column], joints: list[_Column]
 ) -> tuple[np.ndarray, list[str]]:
-    """Numbers of the rows that are samples, and notes on the others; `at` are the columns of the
-    last values."""
-    together = np.array(values)
+    """Numbers of the rows that are samples, and notes on the others."""
+    needed = [column.at for column in (*clock[:1], *joints)]
+    together = np.vstack([time, table.values[:, needed[-len(joints) :]].T])
     whole = np.isfinite(together).all(axis=0)
     for k in np.flatnonzero(~whole):
-        for j, value in zip(reversed(at), reversed(together[:, k]), strict=False):
+        for j, value in zip(needed, together[-len(needed) :, k], strict=True):
             if not np.isfinite(value) and not is_blank(cell := table.cells[k][j]):
                 name = table.names[j] if table.names else j + 1
                 raise ProblemError(
@@ -303,11 +290,10 @@ def _rows(
                 )
     rows, blank = np.flatnonzero(whole), int((~whole).sum())
     if 2 * rows.size < whole.size or rows.size < FEWEST:
-        first = table.lines[int(np.flatnonzero(~whole)[0])]
         raise ProblemError(
             f"{path}: only {rows.size} of {whole.size} lines have a number in each of the columns "
-            f"that are needed (line {first} has not), and at least {FEWEST} are: write all joints "
-            f"in every line."
+            f"that are needed (line {table.lines[int(np.argmin(whole))]} has not), and at least "
+            f"{FEWEST} are: write all joints in every line."
         )
     again = np.append(False, (np.diff(together[:, rows], axis=1) == 0).all(axis=0))
     counts = {"with blank cells": blank, "like the one before": int(again.sum())}
@@ -331,59 +317,52 @@ def _even_steps(time: np.ndarray) -> tuple[np.ndarray, str]:
     return line, f", stamps rounded to {unit:.3g} taken as equal steps of {step:.4g}"
 
 
-def _radians(
-    path: Path, table: Table, joints: list[_Column], rows: np.ndarray, degrees: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Angles in radians ``(n_joint, n_time)``, and whether each was in degrees."""
+def _units(path: Path, table: Table, joints: list[_Column], degrees: bool) -> np.ndarray:
+    """Radians per unit of each joint's column ``(n_joint,)``."""
+    stated = []
     for column in joints:
         if unread := column.last("unit not read"):
             raise ProblemError(
                 f"{path}: the column {column.name} holds {unread}: write degrees or radians, and "
                 f"say so in its name."
             )
-    stated = [
-        next((_ANGLES[word] for word in reversed(c.words) if word in _ANGLES), 0.0) for c in joints
-    ]
+        stated.append(next((_ANGLES[w] for w in reversed(column.words) if w in _ANGLES), 0.0))
     if degrees and 1.0 in stated:
         raise ProblemError(
             f"{path}: the column {joints[stated.index(1.0)].name} holds radians: leave out "
             f"--degrees (degrees=True)."
         )
-    if re.search(r"in_?degrees\s*=\s*yes|angles are in degrees", table.preamble, re.I):
-        degrees = True
+    degrees |= bool(re.search(r"in_?degrees\s*=\s*yes|angles are in degrees", table.preamble, re.I))
     if not degrees and 0.0 in stated and max(stated) > 0.0:
         silent, other = joints[stated.index(0.0)].name, joints[stated.index(max(stated))].name
         raise ProblemError(
             f"{path}: the column {other} says its unit, and {silent} does not: call it "
             f"{silent}_deg or {silent}_rad."
         )
-    units = np.array([unit or (np.pi / 180 if degrees else 1.0) for unit in stated])
-    raw = table.values[rows][:, [column.at for column in joints]].T
-    largest, in_degrees = np.abs(raw).max(axis=1), np.isclose(units, np.pi / 180)
+    return np.array([unit or (_DEGREE if degrees else 1.0) for unit in stated])
+
+
+def _check_size_of_angles(
+    path: Path, joints: list[_Column], raw: np.ndarray, units: np.ndarray
+) -> None:
+    """Raise a `ProblemError` for numbers ``(n_joint, n_time)`` too large for their unit."""
+    largest = np.abs(raw).max(axis=1)
     worst = int((largest * units).argmax())
     name, most = joints[worst].name, largest[worst]
-    too_large = most * units[worst] > _LARGEST
     if most > 360 and raw.min() >= 0:
         raise ProblemError(
             f"{path}: {name} goes up to {most:.4g}, like ticks or pulses of a servo: write "
             f"degrees, such as (ticks - 512) * 300 / 1023 or (ticks - 2048) * 360 / 4096 for "
             f"Dynamixel, and (microseconds - 1500) * 0.09 for pulses."
         )
-    if too_large and not in_degrees[worst]:
+    if most * units[worst] <= _LARGEST:
+        return
+    if not np.isclose(units[worst], _DEGREE):
         raise ProblemError(
             f"{path} has an angle of {most:.4g} rad ({name}): if angles are degrees, say so "
             f"(degrees=True, --degrees)."
         )
-    if too_large and most > 720:
+    if most > 720:
         raise ProblemError(
             f"{path}: {name} has an angle of {most:.4g} degrees: is it the right column?"
         )
-    return raw * units[:, None], in_degrees
-
-
-def _centre(angles: np.ndarray) -> int:
-    """The right angle about which all joints are centred, as servos are [degrees], or 0."""
-    centres = 0.5 * (angles.max(axis=1) + angles.min(axis=1))
-    right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
-    centred = centres.size > 1 and np.abs(centres - right).max() < _CENTRED
-    return int(np.degrees(right).round()) if centred else 0
