@@ -14,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.known import known, row_of, save_known, with_row
 from colloc.commands.ending import FAILED, OK, run
-from colloc.commands.options import PRINTING, flag, status_line, tell, text
+from colloc.commands.main import PRINTING, flag, status_line, tell, text
 from colloc.results.store import load
 from colloc.system.errors import CollocError, ProblemError
 from colloc.system.files import alone_in

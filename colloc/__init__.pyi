@@ -29,15 +29,10 @@ from colloc.gaits.inertia import Free as Free
 from colloc.gaits.bspline import BSpline as BSpline, Polygon as Polygon
 from colloc.gaits.columns import Basis as Basis
 from colloc.gaits.polygon import Corners as Corners
-from colloc.studies.calls import (
-    solve as solve,
-    multistart as multistart,
-    Starts as Starts,
-    sweep as sweep,
-)
+from colloc.studies.solve import solve as solve, multistart as multistart, Starts as Starts
+from colloc.studies.sweep import sweep as sweep
 from colloc.studies.study import Study as Study, Axis as Axis
-from colloc.studies.pareto import pareto_front as pareto_front
-from colloc.studies.steering import steer as steer
+from colloc.studies.families import pareto_front as pareto_front, steer as steer
 from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
 from colloc.search.evaluate import evaluate as evaluate

@@ -11,7 +11,7 @@ from colloc.__main__ import start
 
 class _Callable(ModuleType):
     def __call__(self, *given: object, **named: object) -> object:
-        from colloc.studies.calls import solve
+        from colloc.studies.solve import solve
         from colloc.system.arguments import checked_arguments
 
         return checked_arguments(solve)(*given, **named)  # type: ignore[arg-type]

@@ -175,11 +175,11 @@ def test_an_archive_is_gone_on_with_and_its_starts_are_opened(tmp_path, capsys):
     first = colloc.multistart(QUICK, 2, archive=path)
     colloc.multistart(QUICK, 2, archive=path, progress=again.append)
     assert again == []
-    assert main(["open", str(path)]) == 0
+    assert main(["multistart", str(path)]) == 0
     assert f"{first.optima[0].best.efficiency:.6f}" in capsys.readouterr().out
-    assert main(["open", str(path), "--start", "1", "--quiet"]) == 0
+    assert main(["multistart", str(path), "--start", "1", "--quiet"]) == 0
     opened = colloc.load(tmp_path / "quick.start-1.h5")
     assert opened.success
     assert opened.efficiency == pytest.approx(first.outcomes[1].efficiency, rel=1e-4)
-    assert main(["open", str(path), "--start", "7"]) == 2
+    assert main(["multistart", str(path), "--start", "7"]) == 2
     assert "holds no start 7" in capsys.readouterr().err

@@ -15,7 +15,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from colloc.commands import options as cli
+from colloc.commands import main as cli
 from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, naming_saved_files
 from colloc.commands.solve import bound_facts, kept_facts, kept_lines, save_and_tell
 from colloc.gaits.gait_fields import fields
@@ -26,13 +26,11 @@ from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import STATUSES, Outcome, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import ProblemError, StoreError
-from colloc.system.files import lock_file, write_text
+from colloc.system.files import SUFFIX, lock_file, write_text
 
 if TYPE_CHECKING:
-    from colloc.results.archive import Archive
-    from colloc.studies.pareto import ParetoFront
-    from colloc.studies.run import StudyRun
-    from colloc.studies.steering import Steering
+    from colloc.studies.families import ParetoFront, Steering
+    from colloc.studies.sweep import StudyRun
 
 _MOST_SHOWN = 12
 _SAVE_EVERY = 60.0  # seconds
@@ -45,36 +43,35 @@ def starts_summary(
     """Distinct optima of starts, facts about all of them, and lines for people."""
     optima, tally = basins(problem, outcomes), counts(outcomes)
     failures = [o for o in outcomes if o.status != SOLVED]
-    floors = [on_speed_floor(problem, basin.best.gait) for basin in optima]
+    rows: list[dict[str, Any]] = [
+        {
+            "value": basin.best.value,
+            "efficiency": basin.best.efficiency,
+            "frequency": basin.frequency,
+            "starts": list(basin.starts),
+            "on_speed_floor": on_speed_floor(problem, basin.best.gait),
+            "gait": fields(basin.best.gait),
+        }
+        for basin in optima
+    ]
     facts = {
         "name": problem.name,
         "problem_hash": problem.hash,
         "file": str(path),
         "starts": len(outcomes),
         "counts": {status: tally.get(status, 0) for status in STATUSES},
-        "optima": [
-            {
-                "value": basin.best.value,
-                "efficiency": basin.best.efficiency,
-                "frequency": basin.frequency,
-                "starts": list(basin.starts),
-                "on_speed_floor": floor,
-                "gait": fields(basin.best.gait),
-            }
-            for basin, floor in zip(optima, floors, strict=True)
-        ],
+        "optima": rows,
         "failures": [
             {name: getattr(o, name) for name in ("start", "status", "message")} for o in failures
         ],
     }
     ends = ", ".join(f"{n} {status}" for status, n in tally.items())
     lines = [f"{problem.name}: {len(outcomes)} starts: {ends}; {len(optima)} distinct optima"]
-    for basin, floor in zip(optima[:_MOST_SHOWN], floors, strict=False):
+    for basin, row in zip(optima[:_MOST_SHOWN], rows, strict=False):
         share = f"{len(basin.starts)} of {len(outcomes)} starts"
-        lines.append(
-            f"  {problem.objective.name} {basin.best.value:.6f}  {share:<20s} best: start "
-            f"{basin.best.start}{'  on the bound smallest_shape_speed' * floor}"
-        )
+        floor = "  on the bound smallest_shape_speed" * row["on_speed_floor"]
+        value = f"{problem.objective.name} {basin.best.value:.6f}"
+        lines.append(f"  {value}  {share:<20s} best: start {basin.best.start}{floor}")
     if len(optima) > _MOST_SHOWN:
         lines.append(f"  ... and {len(optima) - _MOST_SHOWN} more")
     lines += [f"  start {o.start}: {o.status}: {o.message}" for o in failures[:_MOST_SHOWN]]
@@ -82,35 +79,62 @@ def starts_summary(
 
 
 @cli.command(
-    "multistart",
     """\
 Start k of a seed is the same gait whatever --starts and --workers are. What the archive holds is
-not solved again: the same command goes on after Ctrl-C, and more starts and seeds add to it.
+not solved again: the same command goes on after Ctrl-C, and more starts and seeds add to it. In
+place of a problem file an archive lists its distinct optima; with --start it makes a result of that
+start like any other, solved again from its gait (from its guess, if it had failed).
 
-  colloc multistart problems/three_link.py --starts 100 --workers 2""",
+  colloc multistart problems/three_link.py --starts 100 --workers 2
+  colloc multistart results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
     *cli.PROBLEM,
-    cli.count("--starts", "N", "starts 0 to N-1 (default: 20)", 20),
-    cli.SEED,
+    cli.count("--starts", "N", "starts 0 to N-1 (default: 20)", 20, least=1),
+    cli.count("--seed", "N", "of the sampler (default: 0)", 0, least=0),
     cli.WORKERS,
     cli.choice("--sampler", SAMPLERS, "perturbed: near the problem's guess", LATIN_HYPERCUBE),
-    cli.number("--time-limit", "S", "seconds for one start (default: 300)", 300.0),
+    cli.number("--time-limit", "S", "seconds for one start (default: 300)", 300.0, above=0),
     cli.RETRY,
     cli.BOUND,
-    cli.output("folder, or .h5 file (default: results/NAME.starts.h5)"),
+    cli.count("--start", "N", "with an archive: the start to make a result of"),
+    cli.VERBOSE,
+    cli.output("folder, or .h5 file (default: results/NAME.starts.h5; beside an archive)"),
 )
 def multistart(options: argparse.Namespace) -> int:
-    cli.check_least(options, starts=1, workers=1, seed=0)
-    cli.check_positive(options, "time_limit")
+    if Path(options.problem).suffix == SUFFIX:
+        return _open_archive(options)
+    if options.start is not None:
+        raise ProblemError("--start opens a start of an archive: colloc multistart ARCHIVE.h5.")
     problem = cli.read_problem(options)[1]
-    path = cli.output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
+    path = cli.output_path(options, Path("results") / f"{problem.name}.starts.h5")
     # slow imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
     from colloc.results.archive import open_archive, save_archive
+    from colloc.studies.solve import run_archive
 
     archive = open_archive(problem, path)  # or refused, before anything is solved
-    interrupted = _run_starts(archive, options)
+    search = options.sampler, options.seed, options.starts
+    done = archive.done(*search, retry=options.retry)
+    todo = (k for k in range(options.starts) if k not in done)  # may be more than memory holds
+    to_go, loud, interrupted = options.starts - len(done), not cli.quiet(options), False
+    settings = cli.values(options, "sampler", "seed", "workers", "time_limit")
+    if loud:
+        header = " start       value   iter  seconds  status"
+        print(f"{len(done)} starts done already, {to_go} to go\n{header}", flush=True)
+    begin = time.perf_counter()
+    try:
+        with cli.status_line(options) as line:
+            line.say(f"{problem.name}: 0 of {to_go} starts")
+            for k, o in enumerate(run_archive(archive, todo, **settings), 1):
+                if loud:
+                    line.clear()
+                    numbers = f"{o.start:6d} {o.value:11.6f} {o.iterations:6d} {o.seconds:8.2f}"
+                    print(f"{numbers}  {o.status}", flush=True)
+                left = (time.perf_counter() - begin) / k * (to_go - k)
+                line.say(f"{problem.name}: {k} of {to_go} starts", left)
+    except KeyboardInterrupt:
+        interrupted = True
     save_archive(archive, options.command)
-    outcomes = list(archive.of_search(options.sampler, options.seed, options.starts).values())
+    outcomes = list(archive.of_search(*search).values())
     optima, facts, lines = starts_summary(problem, outcomes, path)
     bound = upper_bound(problem, path.parent, compute=options.bound) if optima else None
     if optima:
@@ -118,15 +142,15 @@ def multistart(options: argparse.Namespace) -> int:
         which = f" --seed {options.seed}" if options.seed else ""
         which += f" --sampler {options.sampler}" if options.sampler != LATIN_HYPERCUBE else ""
         start = f"--start {optima[0].best.start}{which}"
-        lines.append(f"  colloc open {path} {start}   makes a result of the best")
+        lines.append(f"  colloc multistart {path} {start}   makes a result of the best")
     if others := len(archive.outcomes) - len(outcomes):
+        line_ = f"  starts in the file besides: {others}"
         solved = {name: o.value for name, o in archive.outcomes.items() if o.status == SOLVED}
-        line = f"  starts in the file besides: {others}"
         if solved:
             best = max(solved, key=lambda name: solved[name])
             where = f"start {best.number} of seed {best.seed} ({best.sampler})"
-            line += f"; the best of all, {solved[best]:.6f}, is {where}"
-        lines.append(line)
+            line_ += f"; the best of all, {solved[best]:.6f}, is {where}"
+        lines.append(line_)
     lines.append(f"  saved {path}")
     cli.tell(options, facts | {"bound": bound_facts(bound), "interrupted": interrupted}, lines)
     if interrupted:
@@ -135,69 +159,26 @@ def multistart(options: argparse.Namespace) -> int:
     return OK if optima else NONE_FOUND
 
 
-def _run_starts(archive: Archive, options: argparse.Namespace) -> bool:
-    """Solve the missing starts; whether Ctrl-C came."""
-    from colloc.studies.multistart import run_archive
-
-    done = archive.done(options.sampler, options.seed, options.starts, retry=options.retry)
-    todo = (k for k in range(options.starts) if k not in done)  # may be more than memory holds
-    to_go, name, loud = options.starts - len(done), archive.problem.name, not cli.quiet(options)
-    settings = cli.values(options, "sampler", "seed", "workers", "time_limit")
-    if loud:
-        header = " start       value   iter  seconds  status"
-        print(f"{len(done)} starts done already, {to_go} to go\n{header}", flush=True)
-    begin = time.perf_counter()
-    try:
-        with cli.status_line(options) as line:
-            line.say(f"{name}: 0 of {to_go} starts")
-            for k, o in enumerate(run_archive(archive, todo, **settings), 1):
-                if loud:
-                    line.clear()
-                    numbers = f"{o.start:6d} {o.value:11.6f} {o.iterations:6d} {o.seconds:8.2f}"
-                    print(f"{numbers}  {o.status}", flush=True)
-                left = (time.perf_counter() - begin) / k * (to_go - k)
-                line.say(f"{name}: {k} of {to_go} starts", left)
-    except KeyboardInterrupt:
-        return True
-    return False
-
-
-@cli.command(
-    "open",
-    """\
-Without --start: the distinct optima of the archive. With it: that start, solved again from its gait
-(from its guess, if it had failed) and saved as a result like any other.
-
-  colloc open results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
-    cli.text("archive", "ARCHIVE.h5", "an archive that colloc multistart wrote"),
-    cli.count("--start", "N", "the start to make a result of"),
-    cli.SEED,
-    cli.choice("--sampler", SAMPLERS, "of the start", LATIN_HYPERCUBE),
-    cli.output("folder, or .h5 file (default: beside the archive)"),
-    cli.VERBOSE,
-)
-def open_archive(options: argparse.Namespace) -> int:
+def _open_archive(options: argparse.Namespace) -> int:
     from colloc.results.archive import StartName, archive_at
 
-    archive = archive_at(options.archive)
-    problem = archive.problem
+    archive = archive_at(options.problem)
+    problem, start = archive.problem, StartName(options.sampler, options.seed, options.start)
     if options.start is None:
-        outcomes = list(archive.outcomes.values())
-        optima, facts, lines = starts_summary(problem, outcomes, archive.path)
+        optima, facts, lines = starts_summary(problem, [*archive.outcomes.values()], archive.path)
         cli.tell(options, facts, lines)
         return OK if optima else NONE_FOUND
-    start = StartName(options.sampler, options.seed, options.start)
     if start not in archive.outcomes:
         there = sorted({f"{name.sampler} seed {name.seed}" for name in archive.outcomes})
         raise ProblemError(
-            f"{options.archive} holds no start {options.start} of {options.sampler} seed "
+            f"{options.problem} holds no start {options.start} of {options.sampler} seed "
             f"{options.seed}; it holds {len(archive.outcomes)} starts of "
             f"{', '.join(there) or 'no sampler'}."
         )
     name = f"{problem.name}.start-{options.start}.h5"
-    path = cli.output_path(options.output, Path(options.archive).with_name(name))
+    path = cli.output_path(options, Path(options.problem).with_name(name))
     # slow imports only now: a bad option is refused at once
-    from colloc.studies.calls import reopen
+    from colloc.studies.solve import reopen
 
     with cli.status_line(options) as line:
         line.say(f"{problem.name}: start {options.start}")
@@ -206,7 +187,6 @@ def open_archive(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    "sweep",
     """\
 Starts travel between neighbours. What is done is kept, and not solved again. A study file is Python
 code, and is executed. Exit code 3: some cells have no certified gait.""",
@@ -215,101 +195,90 @@ code, and is executed. Exit code 3: some cells have no certified gait.""",
     ),
     cli.WORKERS,
     cli.text("--dask", "ADDRESS", "scheduler of a Dask cluster (tcp://host:8786), or 'local'"),
-    cli.count("--chunk", "N", "cells to a task, instead of the study's own number"),
+    cli.count("--chunk", "N", "cells to a task, instead of the study's own number", least=1),
     cli.RETRY,
-    cli.text(
-        "--output", "FOLDER", "for NAME.nc and NAME.study/ (default: results)", default="results"
-    ),
+    cli.output("folder, or .nc file; NAME.study/ lies beside it (default: results/NAME.nc)"),
 )
 def sweep(options: argparse.Namespace) -> int:
     from colloc.studies.study import read_study_file
 
-    cli.check_least(options, workers=1, chunk=1)
     study, source = read_study_file(options.study)
     if options.chunk is not None:
         study = replace(study, chunk=options.chunk)
+    path = cli.output_path(options, Path("results") / f"{study.name}.nc")
     # slow imports only now: a bad study is refused at once
-    from colloc.studies.run import StudyRun
+    from colloc.bounds.optimality_gap import upper_bound
+    from colloc.studies.sweep import StudyRun, save_study, study_table
+    from colloc.system.task_pool import process_pool
 
-    path = cli.output_path(None, cli.output_folder(options.output) / f"{study.name}.nc")
-    folder = path.with_suffix(".study")
+    def known_bound(problem: Problem) -> float | None:
+        known = upper_bound(problem, path.parent, compute=False)
+        return None if known is None else known.sampled
 
-    def save() -> None:
-        from colloc.bounds.optimality_gap import upper_bound
-        from colloc.studies.table import save_study, study_table
+    def save() -> float:
+        begin = time.perf_counter()
+        table = study_table(run, known_bound)
+        save_study(table, path, source=source, command=options.command)
+        return time.perf_counter() - begin
 
-        def bound(problem: Problem) -> float | None:
-            known = upper_bound(problem, path.parent, compute=False)
-            return None if known is None else known.sampled
-
-        save_study(study_table(run, bound), path, source=source, command=options.command)
-
+    folder, interrupted = path.with_suffix(".study"), False
     with lock_file(folder / "lock"):
-        run = StudyRun(study, folder, retry=options.retry)
+        run, total = StudyRun(study, folder, retry=options.retry), math.prod(study.shape)
         if not cli.quiet(options):
-            total = math.prod(study.shape)
             print(f"{study.name}: {total} cells, {run.visited} of them in the journal", flush=True)
+        executor: Callable[[int], Executor] = process_pool
+        workers = options.workers
+        if options.dask is not None:
+            from colloc.system.dask_pool import connect
+
+            executor, workers = connect(options.dask, workers, cli.complain)
+        begin = time.perf_counter()
+        due, number = begin + _SAVE_EVERY, 0
         try:
-            interrupted = _run_cells(run, options, save)
+            for news in run.run(workers=workers, executor=executor):
+                if news.round != number:
+                    number, begin = news.round, time.perf_counter()
+                if not cli.quiet(options):
+                    best = news.state.best
+                    value = f"{best.outcome.value:9.6f}" if best else "     none"
+                    tally = Counter(a.outcome.status for a in news.new)
+                    tries = ", ".join(f"{n} {status}" for status, n in tally.items())
+                    left = (time.perf_counter() - begin) / news.done * (news.total - news.done)
+                    print(
+                        f"{study.label(news.cell)}: {value}  ({tries}; round {number}: "
+                        f"{news.done} of {news.total}, {left:.0f} s left)",
+                        flush=True,
+                    )
+                if time.perf_counter() > due:
+                    due = time.perf_counter() + max(_SAVE_EVERY, 20 * save())
+        except KeyboardInterrupt:
+            interrupted = True
+        except BrokenExecutor as error:
+            what = f"no worker could be started ({error}); what is done is kept."
+            raise StoreError(what) from None
         finally:
             save()
     cli.tell(options, *sweep_summary(run, path))
     if interrupted:
         cli.complain("interrupted; what is done is kept, and the same command goes on from there.")
         return INTERRUPTED
-    solved = sum(state.best is not None for state in run.cells.values())
-    return OK if solved == math.prod(study.shape) else NONE_FOUND
-
-
-def _run_cells(run: StudyRun, options: argparse.Namespace, save: Callable[[], None]) -> bool:
-    """Work until all is done, saving now and then; whether Ctrl-C came."""
-    from colloc.system.task_pool import process_pool
-
-    executor: Callable[[int], Executor] = process_pool
-    workers = options.workers
-    if options.dask is not None:
-        from colloc.system.dask_pool import connect
-
-        executor, workers = connect(options.dask, workers, cli.complain)
-    begin = time.perf_counter()
-    due, number = begin + _SAVE_EVERY, 0
-    try:
-        for news in run.run(workers=workers, executor=executor):
-            if news.round != number:
-                number, begin = news.round, time.perf_counter()
-            if not cli.quiet(options):
-                best = news.state.best
-                value = f"{best.outcome.value:9.6f}" if best else "     none"
-                tally = Counter(a.outcome.status for a in news.new)
-                tries = ", ".join(f"{n} {status}" for status, n in tally.items())
-                left = (time.perf_counter() - begin) / news.done * (news.total - news.done)
-                print(
-                    f"{run.study.label(news.cell)}: {value}  ({tries}; round {number}: "
-                    f"{news.done} of {news.total}, {left:.0f} s left)",
-                    flush=True,
-                )
-            if time.perf_counter() > due:
-                saving = time.perf_counter()
-                save()
-                due = time.perf_counter() + max(_SAVE_EVERY, 20 * (time.perf_counter() - saving))
-    except KeyboardInterrupt:
-        return True
-    except BrokenExecutor as error:
-        raise StoreError(f"no worker could be started ({error}); what is done is kept.") from None
-    return False
+    return OK if all(run.state(cell).best for cell in study.cells()) else NONE_FOUND
 
 
 def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]:
     """Facts about a study at its end, and lines for people."""
-    study, cells = run.study, run.cells
-    total, reached = math.prod(study.shape), list(cells)
+    study, cells = run.study, dict(run.cells)
+    total = math.prod(study.shape)
     tally: Counter[str] = Counter()
-    for state in cells.values():
+    failed = []
+    for cell, state in cells.items():
         tried = "no certified gait" if state.attempts else "not tried yet"
         tally["solved" if state.best else tried if state.problem else "no problem"] += 1
-    if total > len(reached):
-        tally["not tried yet"] += total - len(reached)
-    below = [cell for cell in reached if run.below_neighbour(cell)]
+        why = state.attempts[-1].outcome.message if state.attempts else state.message
+        if not state.best and (state.attempts or why):
+            failed.append(f"  {study.label(cell)}: {why}")
+    tally += Counter({"not tried yet": total - len(cells)})
+    below = [cell for cell in cells if run.below_neighbour(cell)]
     facts = {
         "name": study.name,
         "file": str(path),
@@ -329,14 +298,7 @@ def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]
         assert best is not None
         value = f"{best.outcome.value:.6f}, where a neighbour's gait achieves {could:.6f}"
         lines.append(f"  {study.label(cell)}: {value}")
-    failed = [
-        f"  {study.label(cell)}: "
-        f"{state.attempts[-1].outcome.message if state.attempts else state.message}"
-        for cell, state in cells.items()
-        if not state.best and (state.attempts or state.message)
-    ]
-    if len(failed) > _MOST_SHOWN:
-        more = len(failed) - _MOST_SHOWN
+    if more := len(failed[_MOST_SHOWN:]):
         failed[_MOST_SHOWN:] = [f"  ... and {more} more; all are in the file, with their messages"]
     return facts, lines + failed
 
@@ -375,7 +337,6 @@ def _save_family(
 
 
 @cli.command(
-    "pareto",
     """\
 An objective is "efficiency", "speed", "turning", or an expression of distance, work, rotation and
 length of a period. Every point is a result: NAME.front/00.h5 is the best by the first objective,
@@ -386,21 +347,18 @@ the last one the best by the second. Exit code 4: a gap is left where gaits are 
     cli.text(
         "--objectives", ("FIRST", "SECOND"), f"default: {' '.join(_AIMS)}", nargs=2, default=_AIMS
     ),
-    cli.count("--points", "N", "of the front, without duplicates (default: 9)", 9),
-    cli.count("--starts", "N", "starting points for both ends (default: 32)"),
+    cli.count("--points", "N", "of the front, without duplicates (default: 9)", 9, least=2),
+    cli.count("--starts", "N", "starting points for both ends (default: 32)", least=1),
     cli.output("folder, or .csv file (default: results/NAME.front.csv)"),
     cli.NO_FIGURE,
 )
 def pareto(options: argparse.Namespace) -> int:
-    cli.check_least(options, starts=1)
-    if options.points < 2:
-        raise ProblemError(f"a front has at least 2 points, not {options.points}.")
     stated, problem = cli.read_problem(options)
     first, second = aims = [objective_from(text) for text in options.objectives]
-    table = cli.output_path(options.output, Path("results") / f"{problem.name}.front.csv")
+    table = cli.output_path(options, Path("results") / f"{problem.name}.front.csv")
     from colloc.search.options import OPTIONS
-    from colloc.studies.pareto import pareto_front
-    from colloc.studies.saved import checkpoints_in
+    from colloc.studies.families import pareto_front
+    from colloc.studies.solve import checkpoints_in
 
     with checkpoints_in(table.with_suffix("")):
         with cli.status_line(options) as line:
@@ -442,7 +400,6 @@ def pareto(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    "steer",
     """\
 Positive angles turn left, counter-clockwise. The problem states the gait that goes straight. Every
 gait is a result: NAME.steer/00.h5 turns right the most, NAME.steer/spot_00.h5 with --spot. A
@@ -456,22 +413,21 @@ of a period.
         nargs="+",
     ),
     cli.number("--spot", "DEG", "turns on the spot, with the least work", [], nargs="+"),
-    cli.count("--starts", "N", "starting points for the straight gait (default: 32)"),
+    cli.count("--starts", "N", "starting points for the straight gait (default: 32)", least=1),
     cli.output("folder, or .json file (default: results/NAME.steer.json)"),
     cli.NO_FIGURE,
 )  # fmt: skip
 def steer(options: argparse.Namespace) -> int:
-    cli.check_least(options, starts=1)
     if not all(abs(turn) < 180 for turn in (*options.turn, *options.spot)) or 0 in options.spot:
         raise ProblemError(
             "--turn and --spot take degrees between -180 and 180, --spot not 0: by more a body "
             "could turn the other way."
         )
     stated, problem = cli.read_problem(options)
-    table = cli.output_path(options.output, Path("results") / f"{problem.name}.steer.json")
+    table = cli.output_path(options, Path("results") / f"{problem.name}.steer.json")
     from colloc.search.options import OPTIONS
-    from colloc.studies.saved import checkpoints_in
-    from colloc.studies.steering import steer as steer_problem
+    from colloc.studies.families import steer as steer_problem
+    from colloc.studies.solve import checkpoints_in
 
     with checkpoints_in(table.with_suffix("")):
         with cli.status_line(options) as line:

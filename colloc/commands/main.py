@@ -1,16 +1,50 @@
-"""The entry point ``colloc``, which imports the module of the subcommand alone."""
+"""The entry point ``colloc``: its commands, of which it imports the module of one alone, and what
+they share: options, output paths, printing."""
 
 from __future__ import annotations
 
+import argparse
 import importlib
+import json
+import os
+import re
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from colloc.commands.ending import BAD_PROBLEM, OK, exit_code
-from colloc.commands.options import COMMANDS, SUBCOMMANDS, Command
+from colloc.commands.ending import BAD_PROBLEM, OK, exit_code, run, show
 from colloc.system.errors import ProblemError
+from colloc.system.files import SUFFIX, reserved_ending
 from colloc.system.processors import one_thread_each
+from colloc.system.progress import StatusLine
 
+if TYPE_CHECKING:
+    from colloc.gaits.problem import Problem
+    from colloc.gaits.problem_file import ProblemFile
+
+SUBCOMMANDS = {
+    "init": ("solve", "write a commented problem file for a chain of links, to change and solve"),
+    "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
+    "multistart": ("families", "solve from many random starts; distinct optima, how often found"),
+    "sweep": ("families", "solve a study, a grid of problems, over processes or a cluster"),
+    "pareto": ("families", "trade-off (Pareto front) of two objectives, as certified gaits"),
+    "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
+    "evaluate": ("solve", "evaluate a gait of your own: joint angles from a CSV file"),
+    "verify": ("results", "check a result again by independent replay; or compare two results"),
+    "report": ("results", "one self-contained web page about a result, to read or to send"),
+    "animate": ("results", "the motion as GIF or MP4"),
+    "export": ("results", "joint angles over time for a robot, as CSV or JSON; or the robot"),
+    "robot": ("results", "speed, power and torques on a robot of given length and mass"),
+    "sensitivity": ("results", "how the best value changes with friction, lengths, feet, limits"),
+}
+"""Name to module of this package, with a function of that name, and what the command does."""
+_ELSEWHERE = {
+    "open": "an archive of starts is opened by: colloc multistart ARCHIVE.h5 --start N",
+    "compare": "results are compared by: colloc verify A.h5 --compare B.h5",
+    "referee": "the table of known gaits is a benchmark: python -m benchmarks.referee, in a clone",
+}
 _EXAMPLE = """\
 From a problem to a page to send:
 
@@ -20,6 +54,13 @@ From a problem to a page to send:
   colloc export results/three_link.h5 --max-speed 2.0 --rate 50
 
 `colloc COMMAND --help` explains a command."""
+_EXIT_CODES = """\
+Exit codes: 0 success; 1 different (--compare); 2 bad problem, option or file; 3 nothing found; 4 a
+certificate failed; 130 interrupted."""
+_LONGEST_NAME = 220  # bytes; systems allow 255, and temporary files have longer names
+_MOST = 2**63 - 1
+Option = tuple[str, dict[str, Any]]
+Function = Callable[[argparse.Namespace], int]
 
 
 def help_text() -> str:
@@ -27,11 +68,6 @@ def help_text() -> str:
     head = "usage: colloc COMMAND ...\n\nFind and certify efficient gaits of crawling robots.\n\n"
     lines = [f"  {name:<{width}}  {summary}" for name, (_, summary) in SUBCOMMANDS.items()]
     return head + "\n".join(["commands:", *lines, "", _EXAMPLE])
-
-
-def command(name: str) -> Command:
-    importlib.import_module(f"colloc.commands.{SUBCOMMANDS[name][0]}")
-    return COMMANDS[name]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,25 +78,227 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    if not words or words[0] in ("-h", "--help", "help"):
+    name = words[0] if words else ""
+    if name in ("", "-h", "--help", "help"):
         print(help_text())
         return OK if words else BAD_PROBLEM
-    if words[0] == "--version":
+    if name == "--version":
         from colloc.system.versions import versions
 
         print(", ".join(f"{name} {version}" for name, version in versions().items()))
         return OK
-    if words[0] == "referee":
-        raise ProblemError(
-            "the table of known gaits is a benchmark: python -m benchmarks.referee, in a clone."
-        )
-    if words[0] not in SUBCOMMANDS:
-        import difflib
+    if name in SUBCOMMANDS:
+        module = importlib.import_module(f"colloc.commands.{SUBCOMMANDS[name][0]}")
+        return getattr(module, name)(words[1:])
+    if name in _ELSEWHERE:
+        raise ProblemError(f"{_ELSEWHERE[name]}.")
+    import difflib
 
-        hints = difflib.get_close_matches(words[0], SUBCOMMANDS, n=1)
-        if words[0].endswith(".py"):
-            hints = [f"solve {words[0]}"]
-        hint = f"choose one of {', '.join(SUBCOMMANDS)}."
-        hint = f"do you mean colloc {hints[0]}?" if hints else hint
-        raise ProblemError(f"there is no command {words[0]!r}; {hint}")
-    return command(words[0])(words[1:])
+    hints = [f"solve {name}"] if name.endswith(".py") else []
+    hints += difflib.get_close_matches(name, SUBCOMMANDS, n=1)
+    hint = (
+        f"do you mean colloc {hints[0]}?" if hints else f"choose one of {', '.join(SUBCOMMANDS)}."
+    )
+    raise ProblemError(f"there is no command {name!r}; {hint}")
+
+
+class Parser(argparse.ArgumentParser):
+    """Refuses bad options in one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        choices = r"invalid choice: (.*) \(choose from (.*)\)"
+        message = re.sub(choices, r"must be one of \2, not \1", message)
+        message = re.sub(r"^argument (\S+): (must|expected)", r"\1 \2", message)
+        raise ProblemError(f"{message}; see {self.prog} --help.")
+
+
+def command(epilog: str, *options: Option) -> Callable[[Function], Callable[..., int]]:
+    """Make the subcommand of its name of a function of its options; it is called with the
+    arguments, and returns an exit code."""
+
+    def register(function: Function) -> Callable[..., int]:
+        def call(arguments: Sequence[str] | None = None) -> int:
+            what = SUBCOMMANDS[function.__name__][1]
+            parser = Parser(
+                f"colloc {function.__name__}",
+                description=f"{what[0].upper()}{what[1:]}.",
+                epilog=f"{epilog}\n\n{_EXIT_CODES}",
+                formatter_class=argparse.RawDescriptionHelpFormatter,
+            )
+            for name, settings in (*options, *PRINTING):
+                parser.add_argument(name, **settings)
+            return run(parser, function, arguments)
+
+        return call
+
+    return register
+
+
+def text(name: str, metavar: Any, help: str, **settings: Any) -> Option:
+    return name, {"metavar": metavar, "help": help, **settings}
+
+
+def _reader(kind: type, least: float | None) -> Callable[[str], Any]:
+    """A reader of whole numbers of at least `least`, or of numbers above it."""
+    whole = kind is int
+
+    def read(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            what = f"must be a {'whole ' * whole}number, not {text!r}"
+            raise argparse.ArgumentTypeError(what) from None
+        if least is None or (least <= value <= _MOST if whole else value > least):
+            return value
+        what = f"at least {least}, and at most {_MOST}" if whole else "positive"
+        raise argparse.ArgumentTypeError(f"must be {what}, not {value}")
+
+    return read
+
+
+def number(
+    name: str, metavar: Any, help: str, default: Any = None, above: float | None = None, **more: Any
+) -> Option:
+    return text(name, metavar, help, type=_reader(float, above), default=default, **more)
+
+
+def count(
+    name: str, metavar: Any, help: str, default: Any = None, least: int | None = None, **more: Any
+) -> Option:
+    return text(name, metavar, help, type=_reader(int, least), default=default, **more)
+
+
+def choice(name: str, choices: Sequence[str], help: str, default: Any = None) -> Option:
+    return text(name, None, help, choices=choices, default=default)
+
+
+def flag(name: str, help: str) -> Option:
+    return name, {"action": "store_true", "help": help}
+
+
+def output(what: str) -> Option:
+    return text("--output", "PATH", what)
+
+
+PRINTING = (
+    flag("--json", "print one JSON object on standard output, and nothing else"),
+    flag("--quiet", "no progress, only the final summary"),
+)
+VERBOSE = flag("--verbose", "also print the search, the gait and every check")
+NO_FIGURE = flag("--no-figure", "do not draw a figure")
+BOUND = flag("--bound", "compute an upper bound on every gait (a minute; kept in bounds.sqlite)")
+WORKERS = count("--workers", "N", "processes, one BLAS thread each (default: 1)", 1, least=1)
+RETRY = flag("--retry", "solve again what ended in an error, a crash or the time limit")
+RESULT = text("result", "FILE.h5", "a result that colloc solve wrote")
+_CHANGES = (
+    number("--delta", "SPEED", "final regularisation speed of friction"),
+    number("--delta-start", "SPEED", "first delta of the continuation"),
+    count("--mesh", "N", "intervals of the first mesh", dest="intervals"),
+    number("--mesh-tolerance", "TOL", "relative error to refine to; 0: never"),
+    text("--scheme", "NAME", "trapezoid, hermite-simpson, gauss-N or radau-N"),
+    text("--formulation", "NAME", "of the balance as constraints: full, or implicit velocity"),
+)
+PROBLEM = (
+    text("problem", None, "a Python file that states PROBLEM, for example problems/three_link.py"),
+    *_CHANGES,
+)
+"""The problem file, and the changes to it that every solving command takes."""
+LENGTH = number("--length", "M", "of the stretched robot [m]")
+MASS = number("--mass", "KG", "of the robot [kg]")
+ROBOT = (LENGTH, MASS, number("--gravity", "G", "default: 9.81 m/s^2", 9.81))
+PERIOD = number("--period", "S", "seconds per period")
+MAX_SPEED = number("--max-speed", "V", "of the joints [rad/s], one or one each", nargs="+")
+MAX_TORQUE = number("--max-torque", "M", "of the joints [N m], one or one each", nargs="+")
+
+
+def read_problem(
+    options: argparse.Namespace, start: str | None = None
+) -> tuple[ProblemFile, Problem]:
+    """The problem file; and its problem with the changes of the options of `PROBLEM`, and the gait
+    of the result `start` as guess."""
+    from colloc.gaits.problem_file import read_problem_file
+
+    stated = read_problem_file(options.problem)
+    names = (more.get("dest", name[2:].replace("-", "_")) for name, more in _CHANGES)
+    changes = {name: x for name in names if (x := getattr(options, name)) is not None}
+    problem = stated.problem.with_(**changes) if changes else stated.problem
+    if start is None:
+        return stated, problem
+    from colloc.results.store import load
+
+    gait = load(start).gait
+    try:
+        return stated, problem.with_(guess=gait)
+    except ProblemError as error:
+        raise ProblemError(f"the gait of {start} cannot be the guess: {error}") from None
+
+
+def robot_size(options: argparse.Namespace) -> dict[str, float]:
+    """Values of `ROBOT` by name; none without length and mass."""
+    missing = [name for name in ("length", "mass") if getattr(options, name) is None]
+    if len(missing) == 1:
+        raise ProblemError(f"a robot needs --length and --mass; --{missing[0]} is missing.")
+    return {} if missing else values(options, "length", "mass", "gravity")
+
+
+def values(options: argparse.Namespace, *names: str) -> dict[str, Any]:
+    return {name: getattr(options, name) for name in names}
+
+
+def quiet(options: argparse.Namespace) -> bool:
+    return options.quiet or options.json
+
+
+def status_line(options: argparse.Namespace) -> StatusLine:
+    return StatusLine(enabled=not quiet(options))
+
+
+def complain(sentence: str) -> None:
+    print(f"colloc: {sentence}", file=sys.stderr, flush=True)
+
+
+def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
+    """Print the result of a command: facts as one JSON object, or lines for people."""
+    show(json.dumps(facts) if options.json else "\n".join(lines))
+
+
+def output_path(options: argparse.Namespace, default: Path, kinds: Sequence[str] = ()) -> Path:
+    """The file to write: the default, or a folder or file that ``--output`` names.
+
+    Its ending is that of the default; or one of `kinds`, by ``--format``, else by ``--output``,
+    else the first. `ProblemError` if it cannot be written, or is named like one that another
+    command makes.
+    """
+    output, endings = options.output, [f".{kind}" for kind in kinds] or [default.suffix]
+    if kinds and options.format:
+        endings = [f".{options.format}"]
+    path = default.with_suffix(endings[0])
+    if output is not None:
+        file = Path(output)
+        folder = output.endswith(("/", os.sep)) or not file.suffix or os.path.isdir(output)
+        path = file / path.name if folder else file
+    if path.suffix not in endings:
+        raise ProblemError(
+            f"--output {path} should end in {' or '.join(endings)}; a folder of that name is "
+            f"written {path}/."
+        )
+    ending = reserved_ending(path.stem) if path.suffix == SUFFIX else ""
+    if ending and ending.partition("-")[0] != reserved_ending(default.stem).partition("-")[0]:
+        raise ProblemError(
+            f"--output {path.name} ends in .{ending}{SUFFIX}: colloc itself names files like that; "
+            f"choose another."
+        )
+    if len(os.fsencode(path.name)) > _LONGEST_NAME:
+        raise ProblemError(
+            f"the file name {path.name[:30]}... is too long: choose an --output of at most "
+            f"{_LONGEST_NAME} bytes."
+        )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=path.parent).close()
+        if path.is_dir():
+            raise IsADirectoryError(0, "it is a folder")
+    except OSError as error:
+        why = error.strerror or error
+        raise ProblemError(f"cannot write {path}: {why}; choose another --output.") from None
+    return path

@@ -1,4 +1,4 @@
-"""Commands that end in one result, and its summary: solve, evaluate."""
+"""Commands that end in a problem file or in one result, and its summary: init, solve, evaluate."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colloc.commands import options as cli
+from colloc.commands import main as cli
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, naming_saved_files
 from colloc.commands.ending import INTERRUPTED as CODE_INTERRUPTED
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.inertia import Free
 from colloc.gaits.objective import EFFICIENCY
-from colloc.gaits.problem_file import Reference
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import Reference, read_problem_file
+from colloc.mechanics.chain import Chain
 from colloc.results import limit_use
 from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
-from colloc.results.checks import Certificate
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
-from colloc.system.errors import CollocError, NotConvergedError, StoreError
+from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
 from colloc.system.progress import duration
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
     from colloc.results.kept import Saved
 
+_FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
 _MANY_INTERVALS, _SECONDS_PER_INTERVAL = 1000, 0.02
 _SEARCHES = ("reduced", "full")
 EXIT = {
@@ -37,6 +39,103 @@ EXIT = {
     CERTIFICATE_FAILED: FAILED,
     INTERRUPTED: CODE_INTERRUPTED,
 }
+_FLOOR = {
+    "": "    body=Chain({lengths}),",
+    "feet": """\
+    # and what they stand on: feet on each link, evenly spread; or one by one,
+    # feet=(Foot(0), Wheel(1), ...)
+    body=Chain({lengths}, feet={feet}),""",
+    "wheels": """\
+    # and what they stand on: a wheel in the middle of each link, with its own friction
+    # in units of the weight
+    body=Chain(
+        {lengths},
+        feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range({links})),
+    ),""",
+}
+_TEMPLATE = '''\
+"""{links} links: change what is yours, then `colloc solve {file}`."""
+
+from colloc import {names}
+
+PROBLEM = Problem(
+    name="{name}",
+    # link lengths from tail to head; they add up to 1, the unit of length
+{floor}
+    # what sliding sideways, forwards and backwards costs, in units of the weight;
+    # friction does not depend on speed
+    friction=Friction(mu_t=1.0, mu_f=1.0, mu_b=1.0),
+    # the class of gaits to search, which decides the answer: more harmonics allow finer motions.
+    # "bilateral": the body run backwards in time looks the same from its head; it never turns,
+    # and half a period is enough. It needs lengths that read the same from both ends.
+    # Others: "antipodal" (the second half mirrors the first), "none"
+    gait=Harmonic(harmonics=2, symmetry="{symmetry}"),
+    # the largest angle of a joint [rad], at most pi. In degrees: `from math import radians`
+    # above, and radians(100) here
+    joint_limit=3.14,
+    # No guess is needed: travelling waves, known gaits and random ones are tried.
+    # guess=Fourier(mean, cos, sin) adds yours.
+)
+'''
+
+
+@cli.command(
+    """\
+The file runs as it is; one that is there already is left alone. Take --links or --lengths, --feet
+or --wheels.
+
+  colloc init mine.py --links 4 --feet 1
+  colloc init mine.py --lengths 22 30 30 22 --wheels
+  colloc solve mine.py""",
+    cli.text("problem", "FILE.py", "the file to write", type=Path),
+    cli.count("--links", "N", f"equal links (default: {_FEWEST})"),
+    cli.number("--lengths", "L", "of the links, tail to head, in any unit", nargs="+"),
+    cli.count("--feet", "N", "feet on each link (default: none, links lie flat)"),
+    cli.flag("--wheels", "a wheel in the middle of each link"),
+)
+def init(options: argparse.Namespace) -> int:
+    path: Path = options.problem
+    for one, other in (("links", "lengths"), ("feet", "wheels")):
+        if getattr(options, one) is not None and getattr(options, other):
+            raise ProblemError(f"--{one} and --{other} exclude each other; see colloc init --help.")
+    links = _FEWEST if options.links is None else options.links
+    lengths = options.lengths or [1.0] * min(links, _MOST + 1)
+    if not _FEWEST <= (links := len(lengths)) <= _MOST:
+        more = " or more" * (links > _MOST)
+        raise ProblemError(f"a chain must have {_FEWEST} to {_MOST} links here, not {links}{more}.")
+    whole, largest = math.fsum(lengths), _LONGER * min(lengths)
+    if not (math.isfinite(whole) and 0 < max(lengths) <= largest):
+        raise ProblemError(
+            f"--lengths must be positive numbers, the longest at most {_LONGER:g} times the "
+            f"shortest, not {', '.join(f'{length:g}' for length in lengths)}."
+        )
+    if path.suffix != ".py":
+        raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
+    feet = options.feet or 0
+    # raises for a name that files cannot have
+    Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))
+    floor = _FLOOR["wheels" if options.wheels else "feet" if feet else ""].format(
+        lengths=f"({', '.join(f'{length:.12g} / {whole:.12g}' for length in lengths)})",
+        feet=feet,
+        links=links,
+    )
+    content = _TEMPLATE.format(
+        links=links,
+        file=path.name,
+        name=path.stem,
+        names=f"Chain, Friction, Harmonic, Problem{', Wheel' * options.wheels}",
+        floor=floor,
+        symmetry="bilateral" if lengths == lengths[::-1] else "none",
+    )
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(content)
+    except FileExistsError:
+        raise ProblemError(f"{path} is there already; choose another name.") from None
+    read_problem_file(path)
+    line = f"wrote {path}: a problem of {links} links. Change it, then: colloc solve {path}"
+    cli.tell(options, {"status": "written", "file": str(path), "links": links}, [line])
+    return OK
 
 
 def save_and_tell(options: argparse.Namespace, solution: Solution, path: Path) -> int:
@@ -55,63 +154,37 @@ def summary_lines(
 ) -> list[str]:
     """Lines about a result for people; with `verbose` also the search, the gait and every check."""
     verdict = f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"
-    certificate, best = solution.certificate, solution.problem.objective
-    lines = [verdict]
-    if certificate.replayed:
-        alone = solution.answer.program in (PRESCRIBED, EVALUATED)
-        lines = [
-            verdict if alone else f"{verdict} ({solution.standing[0]})",
-            f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e}, "
-            f"re-simulated at {certificate.instants} time points; "
-            f"{certificate.value_at_zero_delta:.6f} +- "
-            f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
-            *_quantities(solution),
-            f"  distance d      {certificate.distance:.6f} +- "
-            f"{certificate.errors['distance']:.0e}      work W  {certificate.work:.6f} +- "
-            f"{certificate.errors['work']:.0e}      at delta {solution.answer.delta:.0e}",
-            *(_background(solution) if verbose else []),
-            *_check_lines(certificate, verbose),
-        ]
-        if reference is not None:
-            lines.append(f"  {reference.verdict(certificate.efficiency)}")
-    if solution.message:
-        lines.append(f"  {solution.message}")
-    return lines
-
-
-def _background(solution: Solution) -> list[str]:
-    problem = solution.problem
-    paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
-    rows = [("search", text) for text in _search_lines(solution)]
-    rows += [("scene", problem.scene)] if problem.scene else []
-    rows += [("gait", f"class: {problem.gait.describe()}{paced}")]
-    rows += [("gait", text) for text in solution.gait.lines()]
-    return [f"  {name:<15s} {text}" for name, text in rows]
-
-
-def _check_lines(certificate: Certificate, verbose: bool) -> list[str]:
-    """Every check; or those that failed, and the one nearest to its tolerance of the others."""
-    if verbose:
-        return [f"  {check.line()}" for check in certificate.checks]
-    lines = [f"  {check.line()}" for check in certificate.failures]
-    passed = [check for check in certificate.checks if check.passed]
-    if passed:
+    lines, period = [f"  {solution.message}"] if solution.message else [], solution.certificate
+    if not period.replayed:
+        return [verdict, *lines]
+    if solution.answer.program not in (PRESCRIBED, EVALUATED):
+        verdict += f" ({solution.standing[0]})"
+    rows = [*_quantities(solution), *(_background(solution) if verbose else [])]
+    table = [f"  {name:<15s} {text}" for name, text in rows]
+    if reference is not None:
+        lines.insert(0, f"  {reference.verdict(period.efficiency)}")
+    # every check; or those that failed, and the one nearest to its tolerance of the others
+    checks = [f"  {each.line()}" for each in (period.checks if verbose else period.failures)]
+    if passed := [] if verbose else [check for check in period.checks if check.passed]:
         nearest = max(passed, key=lambda check: abs(check.value) / max(check.threshold, 1e-300))
-        every = "" if lines else "all "
-        lines.insert(
-            0,
-            f"  {every}{len(passed)} checks passed (tightest: {nearest.name} "
-            f"{abs(nearest.value):.1e}, tolerance {nearest.threshold:.0e})",
-        )
-    return lines
+        which = f"{'' if checks else 'all '}{len(passed)} checks passed"
+        value = f"{abs(nearest.value):.1e}, tolerance {nearest.threshold:.0e}"
+        checks.insert(0, f"  {which} (tightest: {nearest.name} {value})")
+    return [verdict, *table, *checks, *lines]
 
 
-def _quantities(solution: Solution) -> list[str]:
+def _quantities(solution: Solution) -> list[tuple[str, str]]:
     """Numbers of a period that matter to its objective and limits."""
-    period, problem, rows = solution.certificate, solution.problem, []
+    period, problem = solution.certificate, solution.problem
+    text = (
+        f"{period.value:.6f} +- {period.value_error:.0e}, re-simulated at {period.instants} time "
+        f"points; {period.value_at_zero_delta:.6f} +- {period.value_error_at_zero_delta:.0e} for "
+        f"delta -> 0"
+    )
+    rows = [(problem.objective.label, text)]
     if problem.objective != EFFICIENCY:
-        error = f"{period.efficiency_error:.0e}"
-        rows.append((EFFICIENCY.label, f"{period.efficiency:.6f} +- {error}"))
+        text = f"{period.efficiency:.6f} +- {period.efficiency_error:.0e}"
+        rows.append((EFFICIENCY.label, text))
     if period.dry is not None:
         low, high = period.dry
         rows.append(("dry friction", f"between {low:.8f} and {high:.8f}, with no delta"))
@@ -134,20 +207,30 @@ def _quantities(solution: Solution) -> list[str]:
     rows += [("limits", text) for text in limit_use.lines(solution)]
     if problem.rotation != 0:
         rows.append(("net rotation", f"{period.rotation:.6f} rad: {solution.turning}"))
-    return [f"  {name:<15s} {text}" for name, text in rows]
+    distance, work = (
+        f"{getattr(period, name):.6f} +- {period.errors[name]:.0e}" for name in ("distance", "work")
+    )
+    text = f"{distance}      work W  {work}      at delta {solution.answer.delta:.0e}"
+    return [*rows, ("distance d", text)]
 
 
-def _search_lines(solution: Solution) -> list[str]:
-    answer = solution.answer
+def _background(solution: Solution) -> list[tuple[str, str]]:
+    problem, answer = solution.problem, solution.answer
     measured = f"measured on a mesh of {answer.edges.size - 1} intervals"
     if answer.program == PRESCRIBED:
-        return [f"nothing is free: the motion is prescribed, {measured}"]
-    if answer.program == EVALUATED:
-        return [f"nothing is sought: the gait was given, {measured}"]
-    rows = f"{answer.x.size} variables, {answer.lam_g.size} constraints"
-    how = f"{answer.iterations} iterations of IPOPT" if answer.program != REDUCED else answer.status
-    program = f"{solution.problem.formulation} program: {rows}, {how}"
-    return [f"{program}, KKT error {answer.kkt_error:.0e}", *solution.standing]
+        search = [f"nothing is free: the motion is prescribed, {measured}"]
+    elif answer.program == EVALUATED:
+        search = [f"nothing is sought: the gait was given, {measured}"]
+    else:
+        reduced = answer.program == REDUCED
+        how = answer.status if reduced else f"{answer.iterations} iterations of IPOPT"
+        rows = f"{answer.x.size} variables, {answer.lam_g.size} constraints"
+        program = f"{problem.formulation} program: {rows}, {how}"
+        search = [f"{program}, KKT error {answer.kkt_error:.0e}", *solution.standing]
+    paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
+    gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
+    scene = [("scene", problem.scene)] if problem.scene else []
+    return [*(("search", x) for x in search), *scene, *(("gait", x) for x in gait)]
 
 
 def summary_dict(
@@ -201,7 +284,6 @@ def kept_facts(saved: Sequence[Saved]) -> list[str]:
 
 
 @cli.command(
-    "solve",
     """\
 A failed solve is kept as NAME.failed.h5, a former result of another problem called NAME, or a
 better one of this problem, as NAME.former-1.h5. After Ctrl-C or a crash the same command goes on
@@ -214,9 +296,18 @@ from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
     cli.flag("--fresh", "do not go on from an interrupted run"),
     cli.output("folder, or .h5 file (default: results/NAME.h5)"),
     cli.count(
-        "--starts", "N", "minimum number of starting points (default: 32); 1: the guess alone"
+        "--starts",
+        "N",
+        "minimum number of starting points (default: 32); 1: the guess alone",
+        least=1,
     ),
-    cli.number("--seconds", "S", "wall time allowed; then the best gait so far counts", math.inf),
+    cli.number(
+        "--seconds",
+        "S",
+        "wall time allowed; then the best gait so far counts",
+        math.inf,
+        above=0,
+    ),
     cli.choice(
         "--search",
         _SEARCHES,
@@ -231,13 +322,11 @@ from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
     cli.VERBOSE,
 )
 def solve(options: argparse.Namespace) -> int:
-    cli.check_least(options, starts=1)
-    cli.check_positive(options, "seconds")
-    stated, problem = cli.read_problem(options)
-    path = cli.output_path(options.output, Path("results") / f"{problem.name}.h5")
+    stated, problem = cli.read_problem(options, options.start)
+    path = cli.output_path(options, Path("results") / f"{problem.name}.h5")
     # slow imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.studies.saved import resume, save_and_clear
+    from colloc.studies.solve import resume, save_and_clear
 
     if not cli.quiet(options) and problem.intervals > _MANY_INTERVALS:
         seconds = duration(_SECONDS_PER_INTERVAL * problem.intervals)
@@ -300,7 +389,6 @@ def solve(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    "evaluate",
     """\
 The file has a line for each time point: its time, then the angle of each joint. Columns are known
 by their names (joint_1 at the tail, joint_2, ...; units as _deg, [deg], time_ms); without names
@@ -308,7 +396,7 @@ they go from tail to head. Angles are radians unless names or --degrees say othe
 include the residual of the samples, with two standard deviations.
 
   colloc evaluate problems/three_link.py mine.csv                          results/mine-evaluated.h5
-  colloc compare results/mine-evaluated.h5 results/three_link.h5""",
+  colloc verify results/mine-evaluated.h5 --compare results/three_link.h5""",
     cli.text("problem", None, "a Python file that states PROBLEM, for body, friction and limits"),
     cli.text("gait", "GAIT.csv", "times and joint angles"),
     cli.number("--period", "T", "in the file's unit of time (default: from repetition)"),
@@ -318,7 +406,6 @@ include the residual of the samples, with two standard deviations.
     cli.VERBOSE,
 )
 def evaluate(options: argparse.Namespace) -> int:
-    from colloc.gaits.problem_file import read_problem_file
     from colloc.search.evaluate import evaluate as evaluate_gait
 
     problem = read_problem_file(options.problem).problem
@@ -326,5 +413,5 @@ def evaluate(options: argparse.Namespace) -> int:
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", Path(options.gait).stem) + "-evaluated"
     settings = cli.values(options, "period", "harmonics", "degrees")
     solution = evaluate_gait(problem.with_(name=name), options.gait, **settings)
-    path = cli.output_path(options.output, Path("results") / f"{name}.h5")
+    path = cli.output_path(options, Path("results") / f"{name}.h5")
     return save_and_tell(options, solution, path)

@@ -13,8 +13,7 @@ from colloc.pictures.figure import draw_key, draw_series
 from colloc.pictures.publication import COLUMN, Panel, find_panel
 from colloc.pictures.style import BLUE, VERMILION, Picture, snapshot_colours, styled
 from colloc.results.robot import Robot
-from colloc.studies.pareto import ParetoFront
-from colloc.studies.steering import Steering
+from colloc.studies.families import ParetoFront, Steering
 
 _FINE = np.linspace(0.0, 1.0, 1001)
 _PERIODS, _PHASES = 6, 60  # of a track, and drawn points of a period

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -82,32 +83,27 @@ def row_path(path: str | os.PathLike[str]) -> Path:
     return Path(path).with_suffix(".sqlite")
 
 
-def _lock(path: Path) -> Path:
-    return path.with_name(f".{path.name}.lock")
-
-
 def _read(path: Path, problem: Problem | None = None) -> Archive | None:
-    rows = read_rows(row_path(path), _ROWS, _decode)
-    if not rows:
+    def decode(row: Any) -> Problem | tuple[StartName, Outcome]:
+        if isinstance(row, dict):
+            return Problem.from_dict(row)
+        (sampler, seed, number), outcome = row
+        return StartName(str(sampler), int(seed), int(number)), outcome_from(outcome)
+
+    if not (rows := read_rows(row_path(path), _ROWS, decode)):
         return None
-    if "problem" not in rows:
-        raise StoreError(
-            f"{row_path(path)} is damaged: it does not say what problem it is about; move it away."
-        )
-    archive = Archive(rows.pop("problem"), path, dict(rows.values()))
-    if problem is not None and problem.hash != archive.problem.hash:
-        raise StoreError(
-            f"{row_path(path)} holds starts of another problem; choose another --output, or move "
-            f"it away."
-        )
-    return archive
+    stated = rows.pop("problem", None)
+    if stated is None:
+        why = "is damaged: it does not say what problem it is about; move it away"
+    elif problem is not None and problem.hash != stated.hash:
+        why = "holds starts of another problem; choose another --output, or move it away"
+    else:
+        return Archive(stated, path, dict(rows.values()))
+    raise StoreError(f"{row_path(path)} {why}.")
 
 
-def _decode(row: Any) -> Problem | tuple[StartName, Outcome]:
-    if isinstance(row, dict):
-        return Problem.from_dict(row)
-    (sampler, seed, number), outcome = row
-    return StartName(str(sampler), int(seed), int(number)), outcome_from(outcome)
+def _alone_at(path: Path) -> AbstractContextManager[None]:
+    return lock_file(path.with_name(f".{path.name}.lock"), wait=True)
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
@@ -116,7 +112,7 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
     `StoreError` if it is damaged, of another problem or version, or cannot be written.
     """
     path = Path(path)
-    with lock_file(_lock(path), wait=True):
+    with _alone_at(path):
         archive = _read(path, problem)
         if archive is None:
             if path.exists():
@@ -131,62 +127,59 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
 def archive_at(path: str | os.PathLike[str]) -> Archive:
     """Read the archive with this HDF5 file. `StoreError` if there is none, or it is damaged."""
     path = Path(path)
-    archive = _read(path.with_suffix(".h5"))
-    if archive is None:
-        what = f"there is no archive of starts at {path}"
-        if path.is_file():
-            what = (
-                f"{path} is no archive of starts, or {row_path(path).name}, which holds its rows, "
-                f"is not beside it"
-            )
-        raise StoreError(f"{what}; colloc multistart makes one.")
-    return archive
+    if archive := _read(path.with_suffix(".h5")):
+        return archive
+    what = f"there is no archive of starts at {path}"
+    if path.is_file():
+        what = (
+            f"{path} is no archive of starts, or {row_path(path).name}, which holds its rows, is "
+            f"not beside it"
+        )
+    raise StoreError(f"{what}; colloc multistart makes one.")
 
 
 def save_archive(archive: Archive, command: str = "") -> Path:
     """Write the HDF5 file of all starts on the disk, which `archive` then holds as well."""
-    assert archive.path is not None
-    with lock_file(_lock(archive.path), wait=True):
-        if stored := _read(archive.path, archive.problem):
+    path, problem = archive.path, archive.problem
+    assert path is not None
+    with _alone_at(path):
+        if stored := _read(path, problem):
             archive.outcomes |= stored.outcomes
-        return save_table(_table(archive, command), archive.path, _KIND, _VERSION)
-
-
-def _table(archive: Archive, command: str) -> Table:
-    problem, names = archive.problem, sorted(archive.outcomes)
-    outcomes = [archive.outcomes[name] for name in names]
-    rows = {id(o): row for row, o in enumerate(outcomes)}
-    optima = basins(problem, outcomes)
-    columns: dict[str, tuple[Any, tuple[str, ...]]] = {
-        "problem": (json.dumps(problem.to_dict()), ()),
-        "versions": (json.dumps(versions()), ()),
-        **{name: ([getattr(o, name) for o in outcomes], ("start",)) for name in _COLUMNS},
-        "seed": ([n.seed for n in names], ("start",)),
-        "sampler": ([n.sampler for n in names], ("start",)),
-    }
-    of_basins: dict[str, list] = {
-        "row": [rows[id(b.best)] for b in optima],
-        "count": [len(b.starts) for b in optima],
-        "frequency": [b.frequency for b in optima],
-        "efficiency": [b.best.efficiency for b in optima],
-        "value": [b.best.value for b in optima],
-        "on_speed_floor": [int(on_speed_floor(problem, b.best.gait)) for b in optima],
-    }
-    columns |= {f"basin_{name}": (column, ("basin",)) for name, column in of_basins.items()}
-    for which in ("guess", "gait") if outcomes else ():
-        series = [fourier_series(problem, getattr(o, which)) for o in outcomes]
-        longest = max(each.n_harmonic for each in series)
-        for part, dims in _SERIES.items():
-            values = [getattr(each.resize(longest), part) for each in series]
-            columns[f"{which}_{part}"] = values, ("start", *dims)
-    return Table(
-        problem.name,
-        {"start": np.array([name.number for name in names])},
-        {
-            name: np.array(column, dtype=object if name in _TEXTS or not dims else None)
-            for name, (column, dims) in columns.items()
-        },
-        {name: dims for name, (_, dims) in columns.items()},
-        _UNITS,
-        attributes={"problem_hash": problem.hash, "command": command},
-    )
+        names = sorted(archive.outcomes)
+        outcomes = [archive.outcomes[name] for name in names]
+        rows = {id(o): row for row, o in enumerate(outcomes)}
+        of_starts = {name: [getattr(o, name) for o in outcomes] for name in _COLUMNS}
+        of_starts |= {"seed": [n.seed for n in names], "sampler": [n.sampler for n in names]}
+        optima = basins(problem, outcomes)
+        of_basins: dict[str, list] = {
+            "row": [rows[id(b.best)] for b in optima],
+            "count": [len(b.starts) for b in optima],
+            "frequency": [b.frequency for b in optima],
+            "efficiency": [b.best.efficiency for b in optima],
+            "value": [b.best.value for b in optima],
+            "on_speed_floor": [int(on_speed_floor(problem, b.best.gait)) for b in optima],
+        }
+        columns: dict[str, tuple[Any, tuple[str, ...]]] = {
+            "problem": (json.dumps(problem.to_dict()), ()),
+            "versions": (json.dumps(versions()), ()),
+            **{name: (column, ("start",)) for name, column in of_starts.items()},
+            **{f"basin_{name}": (column, ("basin",)) for name, column in of_basins.items()},
+        }
+        for which in ("guess", "gait") if outcomes else ():
+            series = [fourier_series(problem, getattr(o, which)) for o in outcomes]
+            longest = max(each.n_harmonic for each in series)
+            for part, dims in _SERIES.items():
+                values = [getattr(each.resize(longest), part) for each in series]
+                columns[f"{which}_{part}"] = values, ("start", *dims)
+        table = Table(
+            problem.name,
+            {"start": np.array([name.number for name in names])},
+            {
+                name: np.array(column, dtype=object if name in _TEXTS or not dims else None)
+                for name, (column, dims) in columns.items()
+            },
+            {name: dims for name, (_, dims) in columns.items()},
+            _UNITS,
+            attributes={"problem_hash": problem.hash, "command": command},
+        )
+        return save_table(table, path, _KIND, _VERSION)

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait_fields import AnyGait, gait_from
-from colloc.gaits.gait_fields import fields as gait_fields
+from colloc.gaits.gait_fields import AnyGait, fields, gait_from
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED
 
 TRIVIAL, ERROR, TIME_LIMIT, CRASHED = "trivial gait", "error", "time limit", "crashed"
 PASSED_OVER = "passed over"
 """Status of a start that was no better than the incumbent and was not certified."""
 UNITS = {
-    "efficiency": "1/weight",
-    "efficiency_error": "1/weight",
-    "value": "of the objective",
-    "value_error": "of the objective",
+    **dict.fromkeys(("efficiency", "efficiency_error"), "1/weight"),
+    **dict.fromkeys(("value", "value_error"), "of the objective"),
     "distance": "length",
     "work": "weight length",
     "delta": "length/period",
@@ -38,6 +35,7 @@ STATUSES = (
     CRASHED,
 )
 _LONGEST_MESSAGE = 1000
+_READERS: dict[Any, Any] = {"int": int, "str": str, "float": float, "AnyGait": gait_from}
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,33 +70,18 @@ class Outcome:
         )
 
 
-_GAITS, _TEXTS, _COUNTS = ("guess", "gait"), ("status", "message"), ("start", "iterations")
-_NUMBERS = tuple(
-    f.name for f in dataclasses.fields(Outcome) if f.name not in (*_GAITS, *_TEXTS, *_COUNTS)
-)
-
-
 def outcome_fields(outcome: Outcome) -> dict[str, Any]:
     """Plain fields (numbers, strings, lists) of an outcome."""
-    plain = {name: getattr(outcome, name) for name in (*_COUNTS, *_TEXTS, *_NUMBERS)}
-    return (
-        plain
-        | {"message": outcome.message[:_LONGEST_MESSAGE]}
-        | {g: gait_fields(getattr(outcome, g)) for g in _GAITS}
-    )
+    gaits = {"guess": fields(outcome.guess), "gait": fields(outcome.gait)}
+    return {**vars(outcome), "message": outcome.message[:_LONGEST_MESSAGE], **gaits}
 
 
 def outcome_from(entry: dict[str, Any]) -> Outcome:
     """Outcome from `outcome_fields`."""
     if entry["status"] not in STATUSES:
         raise ValueError(f"no status: {entry['status']}")
-    kinds: list[tuple[Callable, tuple[str, ...]]] = [
-        (int, _COUNTS),
-        (str, _TEXTS),
-        (float, _NUMBERS),
-        (gait_from, _GAITS),
-    ]
-    return Outcome(**{name: kind(entry[name]) for kind, names in kinds for name in names})
+    types = {field.name: field.type for field in dataclasses.fields(Outcome)}
+    return Outcome(**{name: _READERS[kind](entry[name]) for name, kind in types.items()})
 
 
 def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:

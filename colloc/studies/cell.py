@@ -1,31 +1,101 @@
-"""Solve the cells of a task of a study on a worker."""
+"""Cells of a study: what a worker does for one, and the journal of all visits."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from colloc.gaits.gait import delta_per_period
-from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.gait_fields import AnyGait, fields, statement_hash
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait, to_class
 from colloc.results.distinct_optima import SAME_GAIT, distance, fourier_series, phase_distance
-from colloc.results.outcome import ERROR, Outcome
+from colloc.results.outcome import ERROR, Outcome, outcome_fields, outcome_from
+from colloc.results.solution import SOLVED
 from colloc.search.closure import project_to_zero_rotation
 from colloc.search.iterate import Iterate
 from colloc.search.spaces import space_near
-from colloc.studies.journal import Attempt, Visit, best_attempt, start_key
-from colloc.studies.multistart import run_guess
+from colloc.studies.solve import run_guess
 from colloc.studies.study import Index
 from colloc.system.errors import CollocError
+from colloc.system.row_file import put_rows, read_rows
 from colloc.verification.replay import replayer
 
+KIND, NAME = "colloc journal 2", "journal.sqlite"
+GUESS, WARM, COLD, RESCUE = "guess", "warm", "cold", "rescue"
 _COARSE, _FINE = (200, 200), (1600, 25600)  # instants of a replay, and at most; 200 are within 3e-4
 _LEVER = 0.5  # body lengths by which the distance depends on the point followed, per net rotation
 _SAME_START = 1e-3
 BETTER = 1e-3  # relative gain in value that is worth a solve, and that a coarse replay resolves
-GUESS, WARM, COLD, RESCUE = "guess", "warm", "cold", "rescue"
+
+
+def start_key(gait: AnyGait) -> str:
+    return statement_hash(fields(gait))[:16]
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """Outcome of one start of a cell; its origin, and a key so that it is not solved again."""
+
+    origin: str
+    key: str
+    outcome: Outcome
+
+    @cached_property
+    def gait_key(self) -> str:
+        return start_key(self.outcome.gait)
+
+
+def best_attempt(attempts: Iterable[Attempt]) -> Attempt | None:
+    """The certified attempt of largest value."""
+    certified = (a for a in attempts if a.outcome.status == SOLVED)
+    return max(certified, key=lambda a: a.outcome.value, default=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """Attempts at the cell of a problem, and values there of gaits of other cells by `start_key`,
+    evaluated without optimising (NaN if unknown)."""
+
+    problem_hash: str
+    attempts: list[Attempt]
+    scores: dict[str, float] = field(default_factory=dict)
+
+
+def read_journal(folder: Path) -> list[Visit]:
+    """All visits in a folder, in order. `StoreError` if the journal cannot be read."""
+
+    def decode(row: dict[str, Any]) -> Visit:
+        attempts = [
+            Attempt(str(a["origin"]), str(a["key"]), outcome_from(a["outcome"]))
+            for a in row["attempts"]
+        ]
+        scores = {str(key): float(score) for key, score in row["scores"].items()}
+        return Visit(str(row["problem"]), attempts, scores)
+
+    return [*read_rows(folder / NAME, KIND, decode).values()]
+
+
+def append_visits(folder: Path, visits: Iterable[Visit]) -> None:
+    """Put visits on the disk. `StoreError` if that is not possible."""
+    rows = [
+        {
+            "problem": visit.problem_hash,
+            "attempts": [
+                {"origin": a.origin, "key": a.key, "outcome": outcome_fields(a.outcome)}
+                for a in visit.attempts
+            ],
+            "scores": {key: x for key, x in visit.scores.items() if math.isfinite(x)},
+        }
+        for visit in visits
+    ]
+    put_rows(folder / NAME, KIND, {statement_hash(row): row for row in rows})
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +113,6 @@ class Work:
     warm_starts: int
     time_limit: float
     seed: int
-
-
-def failed_visit(work: Work, status: str, message: str) -> Visit:
-    """A visit without result; gaits of others may be tried again if own starts may be to blame."""
-    guess = work.problem.guess
-    attempt = Attempt(GUESS, start_key(guess), Outcome(0, status, message, guess, guess))
-    scores = {} if work.first else {start_key(gait): np.nan for gait in work.gaits}
-    return Visit(work.problem.hash, [attempt], scores)
 
 
 def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
@@ -80,8 +142,8 @@ def value_of(problem: Problem, gait: AnyGait, instants: tuple[int, int] = _COARS
     except CollocError:
         return 0.0
     turned = 0.0 if problem.rotation is None else abs(period.rotation - rotation)
-    distance = max(0.0, period.distance - _LEVER * turned)
-    value = problem.objective({**period.values, "distance": distance})
+    sure = {**period.values, "distance": max(0.0, period.distance - _LEVER * turned)}
+    value = problem.objective(sure)
     return float(value) if np.isfinite(value) else 0.0
 
 
@@ -97,6 +159,13 @@ def visit(work: Work) -> Visit:
     nearest = {key: member(problem, gait) for key, gait in gaits.items()}
     members = {key: gait for key, gait in nearest.items() if gait is not None}
     scores = {key: value_of(problem, members[key]) if key in members else 0.0 for key in gaits}
+    paths = {key: fourier_series(problem, gait) for key, gait in members.items()}
+    warm = list[str]()  # keys of distinct gaits that were not solved before, best first
+    for key in sorted(members, key=lambda key: -scores[key]):
+        if start_key(members[key]) not in work.tried and all(
+            phase_distance(paths[key], paths[other]) > _SAME_START for other in warm
+        ):
+            warm.append(key)
 
     def enough() -> float:
         best = best_attempt(attempts)
@@ -119,7 +188,6 @@ def visit(work: Work) -> Visit:
         outcome = run_guess(stated, lambda: gait, number, work.time_limit, worth=worth)
         attempts.append(Attempt(origin, key, outcome))
 
-    warm = _new_starts(work, members, scores)
     if work.first:
         for key in warm[: work.warm_starts]:
             solve(WARM, members[key], problem.delta)
@@ -139,19 +207,16 @@ def visit(work: Work) -> Visit:
     return Visit(problem.hash, attempts, scores)
 
 
-def _new_starts(work: Work, members: dict[str, AnyGait], scores: dict[str, float]) -> list[str]:
-    """Keys of distinct gaits that were not solved before, best first."""
-    paths = {key: fourier_series(work.problem, gait) for key, gait in members.items()}
-    distinct: list[str] = []
-    for key in sorted(members, key=lambda key: -scores[key]):
-        new = all(phase_distance(paths[key], paths[other]) > _SAME_START for other in distinct)
-        if new and start_key(members[key]) not in work.tried:
-            distinct.append(key)
-    return distinct
+def failed_visit(work: Work, status: str, message: str) -> Visit:
+    """A visit without result; gaits of others may be tried again if own starts may be to blame."""
+    guess = work.problem.guess
+    attempt = Attempt(GUESS, start_key(guess), Outcome(0, status, message, guess, guess))
+    scores = {} if work.first else {start_key(gait): np.nan for gait in work.gaits}
+    return Visit(work.problem.hash, [attempt], scores)
 
 
 def run_chunk(chunk: tuple[Work, ...]) -> list[Visit]:
-    """Solve the cells of a task in order; nothing is raised."""
+    """Solve the cells of a task in order, on a worker; nothing is raised."""
     earlier: dict[Index, AnyGait] = {}
     visits = []
     for work in chunk:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,42 +16,12 @@ from colloc.numerics.schemes import scheme
 from colloc.results.distinct_optima import phase_distance, reversed_in_time, swap_ends
 from colloc.smooth.smooth_body import SmoothBody
 
-RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
 _SAME, _STANDING = 0.02, 0.05  # relative distance of a symmetric gait to its image; standing |wave|
-_INSTANTS, _FINE = 200, 2000
-_DELTA = 1e-3
-
-
-@dataclass(frozen=True)
-class GaitClass:
-    """Symmetries of a gait (`colloc.gaits.symmetry`) and its wave."""
-
-    bilateral: bool
-    antipodal: bool
-    retraced: bool  # it goes back the way it came
-    winding: int  # turns of the path (angle 1, angle 2) about its mean, counter-clockwise
-    wave: float  # `wave_direction`
-    forward: float  # displacement along the mean body axis over the distance: 1 is head first
-
-    @property
-    def symmetry(self) -> str:
-        if self.bilateral and self.antipodal:
-            return "both"
-        return "bilateral" if self.bilateral else "antipodal" if self.antipodal else "none"
-
-    @property
-    def kind(self) -> str:
-        if self.retraced or abs(self.wave * self.forward) < _STANDING:
-            return STANDING
-        return DIRECT if self.wave * self.forward > 0 else RETROGRADE
-
-    @property
-    def label(self) -> str:
-        return f"{self.kind}{' (retraced)' if self.retraced else ''}, {self.symmetry}"
+_INSTANTS, _FINE, _DELTA = 200, 2000, 1e-3
 
 
 def winding(gait: Fourier) -> int:
-    """Turns of the first two joint angles about their mean."""
+    """Turns of the path (angle 1, angle 2) about its mean, counter-clockwise."""
     angles = gait.angles(np.linspace(0.0, 1.0, _FINE + 1)) - gait.mean[:, None]
     turns = np.unwrap(np.arctan2(angles[1], angles[0]))
     return round((turns[-1] - turns[0]) / (2 * np.pi))
@@ -81,25 +51,34 @@ def forward_share(gait: Fourier, body: Body, friction: Law) -> float:
     return float((displacement * np.conj(axis)).real / size) if size > 0 else 0.0
 
 
-def _bending(body: Body) -> np.ndarray:
-    """How far the body bends at places from tail to head, ``(n_place, n_joint)``."""
-    if isinstance(body, SmoothBody):
-        return np.diff(body.bounded_angles.rows, axis=0)
-    return np.eye(body.n_joint)
+def class_name(
+    bilateral: bool, antipodal: bool, retraced: bool, wave: float, forward: float
+) -> str:
+    """The kind of wave and the symmetries in words, as "retrograde, both"."""
+    moving = not retraced and abs(wave * forward) >= _STANDING
+    kind = ("direct" if wave * forward > 0 else "retrograde") if moving else "standing"
+    symmetries = ["bilateral"] * bilateral + ["antipodal"] * antipodal
+    symmetry = "both" if len(symmetries) > 1 else "".join(symmetries) or "none"
+    return f"{kind}{' (retraced)' * retraced}, {symmetry}"
 
 
-def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
-    """Classify a gait of a body with at least two joints or modes."""
+def gait_class(gait: Fourier, body: Body, friction: Law) -> dict[str, Any]:
+    """Columns of a study about a gait of a body with at least two joints or modes: symmetries
+    (`colloc.gaits.symmetry`), whether it goes back the way it came, `winding`, `wave_direction`,
+    `forward_share` and `class_name`."""
     amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
     close = _SAME * max(amplitude, 1e-12)
     image = reversed_in_time(swap_ends(gait, body)) if body.reversal is not None else None
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
-    retraced = phase_distance(gait, reversed_in_time(gait)) < close
-    return GaitClass(
-        image is not None and phase_distance(gait, image) < close,
-        bool(np.linalg.norm(even) < close),
-        retraced,
-        0 if retraced else winding(gait),
-        wave_direction(gait.mapped(_bending(body))),
-        forward_share(gait, body, friction),
-    )
+    # how far the body bends at places from tail to head, (n_place, n_joint)
+    smooth = isinstance(body, SmoothBody)
+    bending = np.diff(body.bounded_angles.rows, axis=0) if smooth else np.eye(body.n_joint)
+    kind: dict[str, Any] = {
+        "bilateral": image is not None and phase_distance(gait, image) < close,
+        "antipodal": bool(np.linalg.norm(even) < close),
+        "retraced": phase_distance(gait, reversed_in_time(gait)) < close,
+        "wave": wave_direction(gait.mapped(bending)),
+        "forward": forward_share(gait, body, friction),
+    }
+    turns = 0 if kind["retraced"] else winding(gait)
+    return kind | {"winding": turns, "gait_class": class_name(**kind)}

@@ -23,7 +23,6 @@ from colloc.system.files import check_name
 
 Index = tuple[int, ...]
 NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
-KINDS = ("bilateral", "antipodal", "retraced", "winding", "wave", "forward")
 COLUMNS: dict[str, float | str] = {
     **dict.fromkeys((*NUMBERS, "delta", "trivial_bound", "upper_bound"), math.nan),
     **dict.fromkeys(("neighbour_value", "seconds", "wave", "forward"), math.nan),
@@ -75,21 +74,17 @@ class Axis:
                 f"values of an axis must be numbers or names, not {self.values!r}."
             ) from None
         object.__setattr__(self, "values", values)
-        if not isinstance(self.name, str) or not self.name.isidentifier():
+        name, texts = self.name, {isinstance(v, str) for v in values}
+        if not isinstance(name, str) or not name.isidentifier() or name in _RESERVED:
             raise ProblemError(
-                f"the name of an axis must be a Python name, not {shown(self.name)}."
+                f"the name of an axis must be a Python name, and not that of a column of the "
+                f"results, not {shown(name)}."
             )
-        if self.name in _RESERVED:
+        distinct = len(texts) == 1 and len(set(values)) == len(values)
+        if not distinct or not (True in texts or np.isfinite(values).all()):
             raise ProblemError(
-                f"an axis cannot be called {self.name}, as a column of the results is: take "
-                f"another name."
-            )
-        if not values or len(set(values)) != len(values):
-            raise ProblemError(f"axis {self.name}: values must be distinct, and at least one.")
-        texts = [isinstance(v, str) for v in values]
-        if any(texts) != all(texts) or (not all(texts) and not np.isfinite(values).all()):
-            raise ProblemError(
-                f"axis {self.name}: values must be finite numbers, or texts, not a mixture."
+                f"axis {name}: values must be distinct finite numbers, or distinct texts, and at "
+                f"least one."
             )
 
     @property
@@ -200,37 +195,23 @@ class Study:
             raise ProblemError(
                 f"no problem at {where}: {place}{': ' * bool(place)}{words_of(error)}"
             ) from None
-        if not isinstance(problem, Problem):
-            raise ProblemError(
-                f"no problem at {where}: the study's function gave a {type(problem).__name__}."
-            )
-        return problem
+        if isinstance(problem, Problem):
+            return problem
+        what = type(problem).__name__
+        raise ProblemError(f"no problem at {where}: the study's function gave a {what}.")
 
-    def before(self, cell: Index) -> list[Index]:
-        """Return the neighbours from which warm starts come first."""
-        return self._neighbours(cell, (-1,))
-
-    def around(self, cell: Index) -> list[Index]:
-        """Return all neighbours."""
-        return self._neighbours(cell, (-1, 1))
-
-    def _neighbours(self, cell: Index, steps: tuple[int, ...]) -> list[Index]:
+    def around(self, cell: Index, *, before: bool = False) -> list[Index]:
+        """Return the neighbours of a cell; only those whose gaits come first with `before`."""
         neighbours = []
         for a, axis in enumerate(self.axes):
-            places: Iterable[int] = (cell[a] + step for step in steps)
-            if axis.of_texts:
-                places = range(self.shape[a] if 1 in steps else cell[a])
+            i, count = cell[a], self.shape[a]
+            places = [*range(count)] if axis.of_texts else [i - 1, i + 1]
             neighbours += [
-                (*cell[:a], i, *cell[a + 1 :])
-                for i in places
-                if axis.travels and 0 <= i < self.shape[a] and i != cell[a]
+                (*cell[:a], k, *cell[a + 1 :])
+                for k in places
+                if axis.travels and 0 <= k < (i if before else count) and k != i
             ]
         return neighbours
-
-    def cold_numbers(self, cell: Index) -> tuple[int, ...]:
-        """Return the numbers of the seeded starts of a cell."""
-        first = self.cold_starts * int(np.ravel_multi_index(cell, self.shape))
-        return tuple(range(first, first + self.cold_starts))
 
 
 def read_study_file(path: str | os.PathLike[str]) -> tuple[Study, str]:

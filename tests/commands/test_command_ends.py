@@ -104,12 +104,15 @@ def test_ctrl_c_after_the_end_does_not_change_it(tmp_path):
 
 
 @needs_full
-@pytest.mark.parametrize(("words", "buffered"), [("verify", ""), ("compare", ""), ("verify", "1")])
+@pytest.mark.parametrize(
+    ("words", "buffered"), [("verify", ""), ("verify --compare", ""), ("verify", "1")]
+)
 def test_a_full_disk_behind_standard_output_is_said_once(words, buffered, result):
-    files = [result] * (2 if words == "compare" else 1)
+    command, *options = words.split()
+    more = [*options, result] if options else []
     environment = {**os.environ, "PYTHONUNBUFFERED": buffered}
     with open("/dev/full", "wb") as full:
-        code, _, said = python("-m", "colloc", words, *files, stdout=full, env=environment)
+        code, _, said = python("-m", "colloc", command, result, *more, stdout=full, env=environment)
     assert code == 2
     assert said == "colloc: cannot read or write the output: No space left on device.\n"
 
@@ -181,7 +184,7 @@ def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(
         raise StoreError("cannot write quick.h5: No space left on device.")
 
     with monkeypatch.context() as patch:
-        patch.setattr("colloc.studies.saved.save_result", full)
+        patch.setattr("colloc.studies.solve.save_result", full)
         code, said, complaint = solve(*words)
     why = "the result is not saved: cannot write quick.h5: No space left on device."
     assert (code, complaint) == (2, f"colloc: {why}\n")
@@ -259,7 +262,7 @@ def test_a_command_that_was_interrupted_says_so_whatever_became_of_the_interrupt
         "report RESULT",
         "animate RESULT --periods 1 --seconds 0.3 --fps 10 --width 200",
         "export RESULT --period 4",
-        "compare RESULT RESULT",
+        "verify RESULT --compare RESULT",
         "verify RESULT",
     ],
 )
@@ -292,7 +295,7 @@ PROBLEM = Problem("wide", Corners(np.array([np.cos(t), np.sin(t)]), "none"), gai
 
 @pytest.mark.parametrize("text", [QUICK + f"# {'x' * 2**20}\n", WIDE], ids=["file", "description"])
 def test_what_results_could_not_keep_is_refused_before_the_search(text, solve, monkeypatch):
-    monkeypatch.setattr("colloc.studies.saved.resume", lambda *_, **__: pytest.fail("searched"))
+    monkeypatch.setattr("colloc.studies.solve.resume", lambda *_, **__: pytest.fail("searched"))
     code, _, complaint = solve(text=text)
     assert code == 2
     assert re.search(r"\.py.* has \d{7} bytes, and results keep at most 1048576", complaint)

@@ -56,20 +56,20 @@ solve problem.py --output LONG.h5 -> too long
 solve problem.py --output LONG -> File name too long
 solve problem.py --turbo -> unrecognized arguments: --turbo
 solve | problem.py --delta nan | problem.py --starts 0 | problem.py --seconds 0 | problem.py --search no
-multistart | nope.py | fails.py | good.h5 | problem.py --workers 0 | problem.py --sampler no
+multistart | nope.py | fails.py | problem.py --workers 0 | problem.py --sampler no
 multistart problem.py --starts 0 -> --starts must be at least 1
 multistart problem.py --time-limit 0 -> --time-limit must be positive, not 0
 multistart | problem.py --seed -1 | problem.py --time-limit nan
-open | nope.h5 | text.h5 | good.h5 --start 1
-open good.h5 -> good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not beside it
+multistart | nope.h5 | text.h5 | good.h5 --start 1 | problem.py --start 1
+multistart good.h5 -> good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not beside it
 sweep | fails.py | problem.py | study.py --workers 0 | study.py --workers x
 sweep nope.py -> there is no study file
 sweep study.py --chunk 0 -> --chunk must be at least 1
-sweep study.py --output z.nc -> z.nc should be a folder
-sweep study.py --output text.h5/x -> cannot make the folder
+sweep study.py --output z.h5 -> z.h5 should end in .nc; a folder of that name is written z.h5/
+sweep study.py --output text.h5/x -> cannot write text.h5/x/quick.nc: Not a directory
 verify | nope.h5 | text.h5 | problem.py | good.h5 --tolerance 0 | good.h5 --tolerance nan
 verify LONG -> File name too long
-compare | good.h5 | good.h5 nope.h5 | text.h5 good.h5
+verify | good.h5 --compare | good.h5 --compare nope.h5 | text.h5 --compare good.h5
 report | nope.h5 | text.h5 | good.h5 --problem nope.py | good.h5 --period 1
 report good.h5 --output x.htm -> x.htm should end in .html
 animate | nope.h5 | text.h5 | good.h5 --periods 0 | good.h5 --seconds nan | good.h5 --fps 0
@@ -212,6 +212,8 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
         ("x.py", "colloc solve x.py?"),
         ("zzzz", "choose one of init,"),
         ("referee", "python -m benchmarks.referee"),
+        ("open", "colloc multistart ARCHIVE.h5 --start N"),
+        ("compare", "colloc verify A.h5 --compare B.h5"),
     ):
         assert colloc([word]) == 2
         assert hint in capsys.readouterr().err

@@ -7,7 +7,7 @@ import pytest
 
 from colloc import Chain, Wheel
 from colloc.commands.ending import BAD_PROBLEM, OK
-from colloc.commands.init import init as main
+from colloc.commands.solve import init as main
 from colloc.gaits.problem_file import read_problem_file
 
 

@@ -25,17 +25,16 @@ STUDY = Study(
     cold_starts=1,
 )
 """
+ALSO = ["multistart quick.starts.h5 --start 0", "verify quick.h5 --compare quick.h5"]
 COMMANDS = {
     "init": "new.py --links 3",
     "solve": "quick.py --starts 3 --output again.h5",
     "multistart": "quick.py --starts 1",
-    "open": "quick.starts.h5 --start 0",
     "sweep": "study.py",
     "pareto": "quick.py --points 2 --starts 1",
     "steer": "quick.py --turn 0 5 --starts 1",
     "evaluate": "quick.py quick.csv",
     "verify": "quick.h5",
-    "compare": "quick.h5 quick.h5",
     "report": "quick.h5",
     "animate": "quick.h5 --periods 1 --seconds 0.2 --width 200",
     "export": "quick.h5 --period 4 --output other.csv",
@@ -83,11 +82,18 @@ def test_no_command_is_left_out():
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in COMMANDS]
+    "words",
+    [
+        *(
+            pytest.param(f"{name} {words}", id=name, marks=[pytest.mark.slow] * (name in LONG))
+            for name, words in COMMANDS.items()
+        ),
+        *ALSO,
+    ],
 )
-def test_every_command_ends_well_in_a_terminal(name, quick, tmp_path):
+def test_every_command_ends_well_in_a_terminal(words, quick, tmp_path):
     place(quick, tmp_path, *(path.name for path in quick.iterdir() if path.is_file()))
-    shown(["colloc", name, *COMMANDS[name].split()], tmp_path)
+    shown(["colloc", *words.split()], tmp_path)
 
 
 def test_the_first_command_of_the_readme_shows_how_far_it_is_and_then_the_answer_alone(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, Problem, Solution, save
-from colloc.commands import verify as recheck
+from colloc.commands import results as recheck
 from colloc.results import checks
 
 
@@ -156,12 +156,12 @@ def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_pat
     a, b = save(three_link, tmp_path / "a.h5"), save(offset, tmp_path / "b.h5")
     mirror = three_link.problem.with_(intervals=30)
     other = save(Solution(mirror, three_link.answer, three_link.certificate), tmp_path / "c.h5")
-    assert recheck.compare([str(a), str(b)]) == 1
+    assert recheck.verify([str(a), "--compare", str(b)]) == 1
     printed = capsys.readouterr().out
     assert "different: efficiencies differ by 20" in printed
     assert "guess" in printed
-    assert recheck.compare([str(a), str(other), "--json"]) == 0
+    assert recheck.verify([str(a), "--compare", str(other), "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["same"]
     assert report["problem"] == {"intervals": ["24", "30"]}
-    assert recheck.compare([str(a), str(tmp_path / "none.h5")]) == 2
+    assert recheck.verify([str(a), "--compare", str(tmp_path / "none.h5")]) == 2

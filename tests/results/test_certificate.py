@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc.commands.verify import verify as recheck
+from colloc.commands.results import verify as recheck
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.objective import QUANTITIES
 from colloc.gaits.problem import Problem

@@ -131,7 +131,7 @@ def test_the_command_saves_a_result_that_compare_holds_against_the_best(
     colloc.save(evaluated, "best.h5")
     assert main(["evaluate", "p.py", "own.csv"]) == 0
     assert "own-evaluated: solved" in capsys.readouterr().out
-    assert main(["compare", "results/own-evaluated.h5", "best.h5"]) == 1
+    assert main(["verify", "results/own-evaluated.h5", "--compare", "best.h5"]) == 1
     amplitude = np.sqrt(0.5 * np.sum(GAIT.cos**2 + GAIT.sin**2))
     assert f"joint angles by {0.2 * amplitude:.3g} rad" in capsys.readouterr().out
 

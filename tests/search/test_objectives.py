@@ -15,7 +15,7 @@ from colloc import (
     replay,
     save,
 )
-from colloc.commands.verify import verify
+from colloc.commands.results import verify
 from colloc.gaits.objective import SPEED
 from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, ellipse, load, save
+from colloc.commands.results import verify
 from colloc.commands.solve import summary_lines
-from colloc.commands.verify import verify
 from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram

@@ -8,9 +8,8 @@ import numpy as np
 from colloc import Axis, Fourier, Harmonic, Problem, Study, ellipse, load, save
 from colloc.results.archive import Archive, StartName, open_archive
 from colloc.results.outcome import Outcome
-from colloc.studies.journal import NAME, Attempt, Visit, append_visits, read_journal
-from colloc.studies.run import StudyRun
-from colloc.studies.table import KIND, VERSION, save_study, study_table
+from colloc.studies.cell import NAME, Attempt, Visit, append_visits, read_journal
+from colloc.studies.sweep import KIND, VERSION, StudyRun, save_study, study_table
 from colloc.system.row_file import CACHE, put_rows, read_rows
 from colloc.system.store_file import Table, array, attribute, open_file
 from scripts.paper.array_store import read_arrays, write_arrays
@@ -45,7 +44,7 @@ def table(folder):
         "sample", (Axis("x", (1.0, 1.5)), Axis("kind", ("a", "b"))), lambda x, kind: problem(x)
     )
     run = StudyRun(study, folder)
-    for k, state in enumerate(run.cells[cell] for cell in study.cells()):
+    for k, state in enumerate(map(run.state, study.cells())):
         state.attempts.append(Attempt("warm", "key", outcome(k)))
     return study_table(run)
 

@@ -144,7 +144,7 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     for command, more in (
         ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps",
         "5", "--periods", "1")),
-        ("compare", (file,)),
+        ("verify", ("--compare", file)),
     ):  # fmt: skip
         assert colloc_main([command, file, *more]) == 0
     assert "bump coordinate" in (tmp_path / "paper.html").read_text()

@@ -40,8 +40,7 @@ from colloc.search import certify
 from colloc.search.certify import is_trivial
 from colloc.search.options import Tolerances
 from colloc.search.solve import solve
-from colloc.studies import calls
-from colloc.studies import multistart as campaign
+from colloc.studies import solve as campaign
 from colloc.system.errors import StoreError
 from colloc.verification.replay import replay
 from scripts.continue_delta import resolution_warning, value_at_zero_delta
@@ -254,7 +253,7 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
         found = solve(stated, starts, **how)
         return replace(found, interrupted=True, certificate=UNCERTIFIED) if number == 3 else found
 
-    monkeypatch.setattr(campaign, "solve", watched)
+    monkeypatch.setattr(campaign, "search_solve", watched)
     monkeypatch.setattr(campaign.time, "perf_counter", itertools.count(0, 1000).__next__)
     run = campaign.run_starts(problem(), range(3), time_limit=500, executor=ThreadPoolExecutor)
     good, bad, slow = run
@@ -388,7 +387,7 @@ def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(
     assert ended == ["3", "4", "5"]
     tracemalloc.start()
     run(lambda: multistart([*words, "--quiet"]))
-    run(lambda: calls.multistart(problem(), many))
+    run(lambda: campaign.multistart(problem(), many))
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 5e6
@@ -403,7 +402,7 @@ def test_a_start_that_fails_on_its_way_is_told_with_the_last_optimum_it_came_thr
         answer = replace(solution.answer, optimal=False)
         return replace(solution, answer=answer, certificate=UNCERTIFIED)
 
-    monkeypatch.setattr(campaign, "solve", stopped)
+    monkeypatch.setattr(campaign, "search_solve", stopped)
     found = campaign.run_guess(problem, lambda: problem.guess, 3, np.inf)
     assert found.status not in (ERROR, SOLVED)
     assert found.delta == problem.delta

@@ -20,7 +20,7 @@ from colloc import (
 )
 from colloc.pictures.families import front_figure
 from colloc.search.solve import solve
-from colloc.studies.pareto import Gap, ParetoFront
+from colloc.studies.families import Gap, ParetoFront
 
 PROBLEM = Problem(
     "wide",

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from colloc import Chain, Coupled, Fourier, Friction, Harmonic, Problem, ProblemError, replay, steer
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.pictures.families import steering_figure
-from colloc.studies.steering import Steering
+from colloc.studies.families import Steering
 
 PROBLEM = Problem(
     "p",

@@ -11,7 +11,7 @@ import time
 import pytest
 from shared.dask_cluster import DaskProcesses
 
-from colloc.studies.journal import read_journal
+from colloc.studies.cell import read_journal
 from colloc.system.dask_pool import connect
 from colloc.system.task_pool import EngineGone, Task, run_tasks
 

@@ -30,11 +30,9 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.results import store
 from colloc.results.archive import Archive, open_archive
 from colloc.search.checkpoint import ROWS
-from colloc.studies import multistart as campaign
-from colloc.studies import run as study_run
-from colloc.studies import saved
-from colloc.studies import table as _  # noqa: F401  imported before any fork
-from colloc.studies.journal import read_journal
+from colloc.studies import solve as campaign
+from colloc.studies import sweep as study_run
+from colloc.studies.cell import read_journal
 from colloc.system import task_pool
 from colloc.system.row_file import read_rows
 
@@ -81,7 +79,7 @@ def child(kind, folder, pipe):
     os.dup2(null, 1)
     os.dup2(null, 2)
     if kind == "solve":
-        saved.save_result = told(say, kind, saved.save_result, solve_facts)
+        campaign.save_result = told(say, kind, campaign.save_result, solve_facts)
         return solve([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
     if kind == "multistart":
         campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)

@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, record
 
-from colloc.commands.families import open_archive as show_archive
+from colloc.commands.families import multistart as show_archive
 from colloc.results.archive import StartName, archive_at, open_archive
-from colloc.studies.journal import append_visits, read_journal
+from colloc.studies.cell import append_visits, read_journal
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.files import alone_in, lock_file, replaced_file
 from colloc.system.row_file import CACHE, put_rows, read_rows

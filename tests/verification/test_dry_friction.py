@@ -166,7 +166,7 @@ def test_unequal_coefficients_drag_and_curved_bodies_have_no_bounds():
 
 
 def test_verify_tells_the_interval_on_demand(three_link, tmp_path, capsys):
-    from colloc.commands.verify import verify as main
+    from colloc.commands.results import verify as main
 
     file = str(colloc.save(three_link, tmp_path / "x.h5"))
     assert main([file, "--dry", "--quiet"]) == 0

@@ -1,0 +1,401 @@
+"""Run a study: a wavefront of tasks over an executor, then rounds in which gaits spread.
+
+A task waits for the cells that its warm starts come from, so results do not depend on the workers.
+Rounds end when no gait does better in a neighbouring cell, unchanged, than what is known there.
+A journal keeps every visit to a cell. Problems are made when their cells are reached.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import tempfile
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.gait import delta_per_period
+from colloc.gaits.problem import Problem
+from colloc.gaits.starts import on_speed_floor
+from colloc.mechanics.law import rate_independent
+from colloc.mechanics.native_kernel import native_kernel
+from colloc.results.distinct_optima import fourier_series, series_class
+from colloc.results.outcome import CRASHED, RETRIED, UNITS
+from colloc.results.solution import SOLVED, versions
+from colloc.studies.cell import (
+    BETTER,
+    Attempt,
+    Visit,
+    Work,
+    append_visits,
+    best_attempt,
+    failed_visit,
+    read_journal,
+    run_chunk,
+    start_key,
+)
+from colloc.studies.gait_class import gait_class
+from colloc.studies.study import ARRAYS, COLUMNS, NUMBERS, Index, Study, read_study_file
+from colloc.system.arguments import check_count
+from colloc.system.errors import ProblemError
+from colloc.system.store_file import Table, save_table
+from colloc.system.task_pool import Lost, Task, pool_for, process_pool, run_tasks
+
+KIND, VERSION = "colloc study", 2
+NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
+
+
+@dataclass(eq=False)
+class CellState:
+    """Problem of a cell (or why there is none), attempts, and values of gaits of other cells."""
+
+    problem: Problem | None
+    message: str = ""
+    attempts: list[Attempt] = field(default_factory=list)
+    scores: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def best(self) -> Attempt | None:
+        return best_attempt(self.attempts)
+
+    @property
+    def tried(self) -> frozenset[str]:
+        return frozenset(a.key for a in self.attempts)
+
+    @property
+    def missing(self) -> bool:
+        """True if the problem's own guess was not tried yet."""
+        return self.problem is not None and start_key(self.problem.guess) not in self.tried
+
+    def add(self, visit: Visit) -> None:
+        self.attempts += visit.attempts
+        self.scores |= visit.scores
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """A cell that was just visited; `done` of `total` cells of a round."""
+
+    cell: Index
+    state: CellState
+    new: list[Attempt]
+    round: int
+    done: int
+    total: int
+
+
+class StudyRun:
+    """A study under way, kept in the journal of a folder; what that holds is not solved again, but
+    with `retry` errors, crashes and time limits are.
+
+    `ProblemError` if no cell has a problem, `StoreError` if the journal cannot be read.
+    """
+
+    def __init__(self, study: Study, folder: Path, *, retry: bool = False) -> None:
+        self.study, self.folder, self._retry = study, folder, retry
+        self.cells: dict[Index, CellState] = {}
+        """Those that were reached."""
+        self._visits: dict[str, list[Visit]] = {}
+        for each in read_journal(folder):
+            self._visits.setdefault(each.problem_hash, []).append(each)
+        self.visited = len(self._visits)
+        if all(self.state(cell).problem is None for cell in study.cells()):
+            message = next(iter(self.cells.values())).message
+            raise ProblemError(f"the study {study.name} has no problem in any cell; {message}")
+
+    def state(self, cell: Index) -> CellState:
+        """The state of a cell, which is made from the journal when the cell is reached."""
+        if cell not in self.cells:
+            try:
+                state = CellState(problem := self.study.problem_at(cell))
+            except ProblemError as error:
+                state = CellState(None, str(error))
+            else:
+                for each in self._visits.get(problem.hash, []):
+                    state.add(each)
+            if self._retry:
+                state.attempts = [a for a in state.attempts if a.outcome.status not in RETRIED]
+            self.cells[cell] = state
+        return self.cells[cell]
+
+    def neighbours(self, cell: Index) -> list[Attempt]:
+        """Best attempts of the cells around one."""
+        bests = (self.state(other).best for other in self.study.around(cell))
+        return [best for best in bests if best is not None]
+
+    def neighbour_value(self, cell: Index) -> float:
+        """Largest value in a cell of a neighbour's best gait, projected but not optimised; or
+        NaN."""
+        known = self.state(cell).scores
+        scores = (known.get(best.gait_key, math.nan) for best in self.neighbours(cell))
+        return max((score for score in scores if not math.isnan(score)), default=math.nan)
+
+    def below_neighbour(self, cell: Index) -> bool:
+        """True if a neighbour's gait does clearly better in the cell than its own best."""
+        best = self.state(cell).best
+        return best is not None and self.neighbour_value(cell) > (1 + BETTER) * best.outcome.value
+
+    def run(
+        self,
+        *,
+        workers: int = 1,
+        executor: Callable[[int], Executor] = process_pool,
+        ahead: int | None = None,
+    ) -> Iterator[Progress]:
+        """Visit what is missing, yielding each cell that was tried when it is on the disk;
+        arguments as for `colloc.system.task_pool.run_tasks`."""
+        native_kernel()  # its absence is reported once for all workers
+        ahead = 1 + workers // 4 if ahead is None else ahead
+        first = _Wavefront(self)
+        tasks, total = first.ready, lambda: first.total
+        for number in itertools.count():
+            done = 0
+            for task, result in run_tasks(
+                run_chunk, tasks, workers=workers, executor=executor, ahead=ahead
+            ):
+                (works,) = task.arguments
+                if isinstance(result, Lost):
+                    result = [failed_visit(work, CRASHED, result.message) for work in works]
+                append_visits(self.folder, [v for v in result if v.attempts or v.scores])
+                for work, visited in zip(works, result, strict=True):
+                    self.state(work.cell).add(visited)
+                if number == 0:
+                    first.finish(task.key)
+                for work, visited in zip(works, result, strict=True):
+                    done += 1
+                    if new := visited.attempts:
+                        state = self.state(work.cell)
+                        yield Progress(work.cell, state, new, number, done, total())
+            improvable = [
+                cell
+                for cell, state in list(self.cells.items())
+                if state.problem is not None
+                and any(best.gait_key not in state.scores for best in self.neighbours(cell))
+            ]
+            if not improvable:
+                return
+            # all start from what is known now
+            known = {cell: state.best for cell, state in self.cells.items()}
+            waiting = iter([Task(cell, ((self.work(cell, known.get),),)) for cell in improvable])
+            tasks, total = partial(next, waiting, None), partial(len, improvable)
+
+    def work(
+        self, cell: Index, best: Callable[[Index], Attempt | None], chunk: tuple[Index, ...] = ()
+    ) -> Work:
+        """Work on a cell: in the first round within a chunk, later with none."""
+        study, state, incumbent = self.study, self.state(cell), best(cell)
+        assert state.problem is not None
+        sources = study.around(cell, before=bool(chunk))
+        others = (best(c) for c in sources if c not in chunk)
+        begin = study.cold_starts * int(np.ravel_multi_index(cell, study.shape))
+        return Work(
+            cell,
+            state.problem,
+            bool(chunk),
+            tuple(c for c in sources if c in chunk),
+            tuple(a.outcome.gait for a in others if a and a.gait_key not in state.scores),
+            tuple(range(begin, begin + study.cold_starts)) if chunk else (),
+            incumbent.outcome.value if incumbent else 0.0,
+            state.tried,
+            *(study.warm_starts, study.time_limit, study.seed),
+        )
+
+
+class _Wavefront:
+    """Tasks of the first round: chunks of missing cells along the last axis, each ready when those
+    before it are finished."""
+
+    def __init__(self, run: StudyRun) -> None:
+        self._run, self._travels = run, [axis.travels for axis in run.study.axes]
+        self.total = math.prod(run.study.shape)  # less what is not missing, as it is reached
+        *sizes, last = run.study.shape
+        self._counts = (*sizes, -(-last // run.study.chunk))
+        every = zip(self._counts, self._travels, strict=True)
+        self._first = itertools.product(*(range(1 if goes else n) for n, goes in every))
+        self._released: deque[Index] = deque()
+        self._finished: set[Index] = set()
+
+    def ready(self) -> Task | None:
+        run, size = self._run, self._run.study.chunk
+        while chunk := self._released.popleft() if self._released else next(self._first, None):
+            places = range(run.study.shape[-1])[chunk[-1] * size :][:size]
+            cells = tuple(c for k in places if run.state(c := (*chunk[:-1], k)).missing)
+            self.total -= len(places) - len(cells)
+            if cells:
+                works = (run.work(cell, lambda c: run.state(c).best, cells) for cell in cells)
+                return Task(chunk, (tuple(works),))
+            self.finish(chunk)
+        return None
+
+    def finish(self, chunk: Any) -> None:
+        """Release the chunks after one of which all others before them are finished, too."""
+        self._finished.add(chunk)
+        for following in self._shift(chunk, 1):
+            if self._finished.issuperset(self._shift(following, -1)):
+                self._released.append(following)
+
+    def _shift(self, chunk: Index, by: int) -> Iterator[Index]:
+        for a, goes in enumerate(self._travels):
+            if goes and 0 <= (i := chunk[a] + by) < self._counts[a]:
+                yield (*chunk[:a], i, *chunk[a + 1 :])
+
+
+@dataclass(frozen=True, eq=False)
+class StudyTable(Table):
+    """Results of a study as labelled arrays over its axes.
+
+    Numbers are those of the best certified gait of a cell, or NaN, with ``status`` and ``message``.
+    ``delta`` is per period; ``mean``, ``cos`` and ``sin`` are the gait's truncated Fourier series.
+    ``below_neighbour`` is 1 where a neighbour's gait does better, unchanged (``neighbour_value``).
+    """
+
+    def __repr__(self) -> str:
+        status = self.variables["status"]
+        certified = int((status == SOLVED).sum())
+        return f"<StudyTable {self.name}: {certified} of {status.size} cells have a certified gait>"
+
+
+def study_table(
+    run: StudyRun, known_bound: Callable[[Problem], float | None] = lambda _: None
+) -> StudyTable:
+    """Results of all cells; `known_bound` gives an upper bound on d/W that is known for a
+    problem."""
+    study, reached = run.study, list(run.cells.items())
+    problems = [p for _, state in reached if (p := state.problem) is not None]
+    sizes = {
+        "joint": max(p.body.n_joint for p in problems),
+        "harmonic": max(series_class(p).harmonics for p in problems),
+    }
+    variables = {
+        name: np.full(study.shape, x, dtype=object if isinstance(x, str) else type(x))
+        for name, x in COLUMNS.items()
+    }
+    variables["status"][:] = NOT_TRIED
+    for name, extra in ARRAYS.items():
+        variables[name] = np.full((*study.shape, *(sizes[e] for e in extra)), np.nan)
+    for cell, state in reached:
+        for name, value in _row(run, cell, state, known_bound).items():
+            if name in ARRAYS:
+                variables[name][cell][tuple(map(slice, np.shape(value)))] = value
+            else:
+                variables[name][cell] = value
+    axes = {axis.name: axis for axis in study.axes}
+    return StudyTable(
+        study.name,
+        {x: np.array(a.values, dtype=object if a.of_texts else float) for x, a in axes.items()}
+        | {name: np.arange(1, size + 1) for name, size in sizes.items()},
+        variables,
+        {name: (*axes, *ARRAYS.get(name, ())) for name in variables},
+        {
+            **UNITS,
+            **dict.fromkeys(("trivial_bound", "upper_bound"), "1/weight"),
+            "neighbour_value": "of the objective",
+            **dict.fromkeys(ARRAYS, "rad"),
+            **{name: axis.units for name, axis in axes.items()},
+        },
+        {**{n: n for n in sizes}, **{name: axis.label or name for name, axis in axes.items()}},
+    )
+
+
+def _row(
+    run: StudyRun, cell: Index, state: CellState, known_bound: Callable[[Problem], float | None]
+) -> dict[str, Any]:
+    problem, best = state.problem, state.best
+    if problem is None:
+        return {"status": NO_PROBLEM, "message": state.message}
+    outcomes, bound = [a.outcome for a in state.attempts], known_bound(problem)
+    row: dict[str, Any] = {
+        "problem_hash": problem.hash,
+        "starts": len(outcomes),
+        "starts_certified": sum(o.status == SOLVED for o in outcomes),
+        "seconds": sum(o.seconds for o in outcomes),
+        "trivial_bound": 1.0 / problem.law.smallest if rate_independent(problem.law) else np.nan,
+        "upper_bound": np.nan if bound is None else bound,
+        "neighbour_value": run.neighbour_value(cell),
+        "below_neighbour": int(run.below_neighbour(cell)),
+    }
+    if best is None:
+        last = {name: getattr(o, name) for o in outcomes[-1:] for name in ("status", "message")}
+        return row | last
+    outcome = best.outcome
+    gait = fourier_series(problem, outcome.gait)
+    row |= {"status": SOLVED, "origin": best.origin}
+    row |= {name: getattr(outcome, name) for name in NUMBERS}
+    row |= {name: getattr(gait, name) for name in ARRAYS}
+    row["delta"] = delta_per_period(problem.gait, outcome.gait, outcome.delta)
+    row["at_slowest"] = int(on_speed_floor(problem, outcome.gait))
+    several = problem.body.n_joint > 1
+    return row | (gait_class(gait, problem.body, problem.law) if several else {})
+
+
+def save_study(
+    table: StudyTable, path: str | os.PathLike[str], *, source: str = "", command: str = ""
+) -> Path:
+    """Write a table as netCDF-4."""
+    facts = {"source": source, "command": command, "versions": json.dumps(versions())}
+    stated = replace(table, attributes=facts | {"Conventions": "CF-1.8"})
+    return save_table(stated, path, KIND, VERSION)
+
+
+def sweep(
+    study: Study | str | os.PathLike[str],
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    workers: int = 1,
+    verbose: bool = False,
+    progress: Callable[[Progress], object] | None = None,
+) -> StudyTable:
+    """Solve every problem of a study, as ``colloc sweep`` does.
+
+    Parameters
+    ----------
+    study : Study or path-like
+        A study, or a study file.
+    folder : path-like, optional
+        Folder of the journal, in which results are kept and not solved again.
+    workers : int
+        Processes, as for `multistart`.
+    verbose : bool
+        Print every cell that is solved.
+    progress : callable, optional
+        Called with every `colloc.studies.sweep.Progress`.
+
+    Returns
+    -------
+    StudyTable
+        Labelled arrays; ``.to_xarray()`` makes a Dataset.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> def problem(mu_t):
+    ...     return colloc.Problem(
+    ...         "grid",
+    ...         friction=colloc.Friction(mu_t=mu_t),
+    ...         gait=colloc.Harmonic(1, "bilateral"),
+    ...         delta=1e-2,
+    ...     )
+    >>> study = colloc.Study("grid", (colloc.Axis("mu_t", (1, 2)),), problem, cold_starts=0)
+    >>> colloc.sweep(study).variables["status"].tolist()
+    ['solved', 'solved']
+    """
+    check_count(workers=workers)
+    study = study if isinstance(study, Study) else read_study_file(study)[0]
+    with tempfile.TemporaryDirectory() as scratch:
+        run = StudyRun(study, Path(folder or scratch))
+        for news in run.run(workers=workers, executor=pool_for):
+            if verbose:
+                best = news.state.best
+                value = best.outcome.value if best else np.nan
+                print(f"{study.label(news.cell)}: {value:.6f}", flush=True)
+            if progress is not None:
+                progress(news)
+        return study_table(run)
