@@ -109,7 +109,7 @@ def multistart(options: argparse.Namespace) -> int:
     # slow imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
     from colloc.results.archive import open_archive, save_archive
-    from colloc.studies.solve import run_archive
+    from colloc.studies.solve import run_starts
 
     archive = open_archive(problem, path)  # or refused, before anything is solved
     search = options.sampler, options.seed, options.starts
@@ -124,7 +124,7 @@ def multistart(options: argparse.Namespace) -> int:
     try:
         with cli.status_line(options) as line:
             line.say(f"{problem.name}: 0 of {to_go} starts")
-            for k, o in enumerate(run_archive(archive, todo, **settings), 1):
+            for k, o in enumerate(run_starts(archive, todo, **settings), 1):
                 if loud:
                     line.clear()
                     numbers = f"{o.start:6d} {o.value:11.6f} {o.iterations:6d} {o.seconds:8.2f}"

@@ -29,16 +29,12 @@ _TOLERANCE = 1e-6
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
 _MOST_INSTANTS = 100_000
 _PACE = ("period", "max_speed", "max_torque")
-_NUMBERS = {
-    "efficiency": ("efficiency_error", "an efficiency"),
-    "value": ("value_error", "a value"),
-    "distance": ("distance_error", "a distance"),
-    "work": ("work_error", "a work"),
-    "efficiency_at_zero_delta": ("error_at_zero_delta", "an efficiency for delta -> 0"),
-    "value_at_zero_delta": ("value_error_at_zero_delta", "a value for delta -> 0"),
-    "rotation": ("", "a rotation"),
+_ERRORS = {
+    **{name: f"{name}_error" for name in ("efficiency", "value", "distance", "work")},
+    "efficiency_at_zero_delta": "error_at_zero_delta",
+    "value_at_zero_delta": "value_error_at_zero_delta",
 }
-"""Numbers of a certificate: the name of the error (else the tolerance is taken), and words."""
+"""Numbers of a certificate that have an error of their own; for others the tolerance is taken."""
 
 
 def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TOLERANCE) -> str:
@@ -46,21 +42,15 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
     if not recorded.replayed:
         return "the file holds no certificate."
     recorded, now = recorded.by_replay, now.by_replay  # without the residual of samples
-    others = (name for name in recorded.values if name not in _NUMBERS)
-    numbers = _NUMBERS | {name: ("", f"a {name.replace('_', ' ')}") for name in others}
-    for name, (error, words) in numbers.items():
+    for name in {**_ERRORS, "rotation": "", **recorded.values}:
         stated, value = recorded.numbers[name], now.numbers.get(name, float("nan"))
-        rounding = max(tolerance, _TOLERANCE) * max(abs(value), 1.0)
+        rounding, error = max(tolerance, _TOLERANCE) * max(abs(value), 1.0), _ERRORS.get(name)
         errors = [each.numbers[error] for each in (recorded, now)] if error else [rounding, 0.0]
+        what = f"the file certifies {name.replace('_', ' ')} {stated:.8f}"
         if error and not max(errors) <= _SAME_SIZE * min(errors) + rounding:
-            return (
-                f"the file certifies {words} with an error of {errors[0]:.0e}, where "
-                f"{errors[1]:.0e} is found."
-            )
+            return f"{what} with an error of {errors[0]:.0e}, where {errors[1]:.0e} is found."
         if not abs(value - stated) <= _AGREEMENT * sum(errors) + 1e-9:
-            return (
-                f"the file certifies {words} of {stated:.8f}, which is off by {stated - value:.1e}."
-            )
+            return f"{what}, which is off by {stated - value:.1e}."
     before, after = ({x.name: x.threshold for x in each.checks} for each in (recorded, now))
     if before.keys() != after.keys():
         missing = ", ".join(sorted(before.keys() ^ after.keys()))

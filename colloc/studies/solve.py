@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -272,7 +272,7 @@ def multistart(
     how: dict[str, Any] = {"workers": workers, "time_limit": time_limit, "executor": pool_for}
     todo = (k for k in range(starts) if k not in done)
     try:
-        for outcome in run_archive(store, todo, sampler=sampler, seed=seed, **how):
+        for outcome in run_starts(store, todo, sampler=sampler, seed=seed, **how):
             report(outcome)
     finally:
         if archive is not None:
@@ -280,17 +280,8 @@ def multistart(
     return Starts(problem, tuple(store.of_search(sampler, seed, starts).values()))
 
 
-def run_archive(
-    archive: Archive, starts: Iterable[int], *, sampler: str, seed: int, **settings
-) -> Iterator[Outcome]:
-    """Outcomes of `run_starts` for an archive, each added to it before it is yielded."""
-    for outcome in run_starts(archive.problem, starts, sampler=sampler, seed=seed, **settings):
-        archive.add({StartName(sampler, seed, outcome.start): outcome})
-        yield outcome
-
-
 def run_starts(
-    problem: Problem,
+    archive: Archive,
     starts: Iterable[int],
     *,
     sampler: str = LATIN_HYPERCUBE,
@@ -298,32 +289,30 @@ def run_starts(
     workers: int = 1,
     time_limit: float = 300.0,
     executor: Callable[[int], Executor] = process_pool,
-    known: Mapping[int, AnyGait] | None = None,
 ) -> Iterator[Outcome]:
-    """Outcomes of starts, each as soon as it is there; some begin at `known` gaits.
+    """Outcomes of starts, each as soon as it is there and in the archive.
 
     A start depends only on the problem, the sampler, the seed and its number. Workers and executor
     are as for `colloc.system.task_pool.run_tasks`; a start that kills its worker twice has crashed.
     """
+    problem = archive.problem
     if not problem.gait.free:
         raise ProblemError(
             "a prescribed motion is the same from every start; colloc solve measures it."
         )
     native_kernel()  # its absence is reported once for all workers
-    tasks = (Task(k, (problem, sampler, seed, k, time_limit, (known or {}).get(k))) for k in starts)
+    tasks = (Task(k, (problem, sampler, seed, k, time_limit)) for k in starts)
     ready = partial(next, tasks, None)
     for task, outcome in run_tasks(_run_start, ready, workers=workers, executor=executor):
         if isinstance(outcome, Lost):
-            guess = problem.guess
-            outcome = Outcome(task.arguments[3], CRASHED, outcome.message, guess, guess)
+            guess, number = problem.guess, task.arguments[3]
+            outcome = Outcome(number, CRASHED, outcome.message, guess, guess)
+        archive.add({StartName(sampler, seed, outcome.start): outcome})
         yield outcome
 
 
-def _run_start(
-    problem: Problem, sampler: str, seed: int, start: int, time_limit: float, known: AnyGait | None
-) -> Outcome:
-    begin = partial(start_gait, problem, sampler, seed, start)
-    return run_guess(problem, lambda: known or begin(), start, time_limit)
+def _run_start(problem: Problem, sampler: str, seed: int, start: int, time_limit: float) -> Outcome:
+    return run_guess(problem, partial(start_gait, problem, sampler, seed, start), start, time_limit)
 
 
 def run_guess(

@@ -31,7 +31,7 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.contact import crossing_depth
 from colloc.results import distinct_optima
-from colloc.results.archive import StartName, open_archive, row_path, save_archive
+from colloc.results.archive import Archive, StartName, open_archive, row_path, save_archive
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.distinct_optima import basins, images, phase_distance, reversed_in_time
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
@@ -255,7 +255,9 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
 
     monkeypatch.setattr(campaign, "search_solve", watched)
     monkeypatch.setattr(campaign.time, "perf_counter", itertools.count(0, 1000).__next__)
-    run = campaign.run_starts(problem(), range(3), time_limit=500, executor=ThreadPoolExecutor)
+    run = campaign.run_starts(
+        Archive(problem()), range(3), time_limit=500, executor=ThreadPoolExecutor
+    )
     good, bad, slow = run
     assert (good.start, bad.start, slow.start) == (0, 1, 2)
     assert good.iterations > 0
@@ -284,7 +286,9 @@ class _Dying(Executor):
 
 @pytest.mark.parametrize("workers", [1, 2, 5])
 def test_a_worker_that_dies_costs_one_start(workers):
-    found = list(campaign.run_starts(problem(), range(6), workers=workers, executor=_Dying))
+    found = list(
+        campaign.run_starts(Archive(problem()), range(6), workers=workers, executor=_Dying)
+    )
     assert sorted(o.start for o in found) == [0, 1, 2, 3, 4, 5]
     assert [o.start for o in found if o.status == CRASHED] == [2]
 
@@ -300,9 +304,10 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     def kept():
         return open_archive(read_problem_file(path).problem, out / "quick.starts.h5")
 
-    def starts(stated, numbers, **settings):
+    def starts(archive, numbers, *, seed, **settings):
         for k in numbers:
             asked.append(k)
+            archive.add({name(k, seed): outcome(k, ROUND)})
             yield outcome(k, ROUND)
 
     assert "0 starts done already, 2 to go" in run("--starts", 2)[1]
