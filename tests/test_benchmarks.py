@@ -4,7 +4,6 @@ right."""
 import numpy as np
 import pytest
 
-from benchmarks.engines.__main__ import tasks
 from benchmarks.peer_table import OPTIMA, judged
 from benchmarks.peers import drag, physics
 from benchmarks.peers.starts import feasible_motion, starts
@@ -12,7 +11,6 @@ from benchmarks.published import DIFFERS, number, scallop, small_stroke, small_w
 from benchmarks.zoo import described, law_problem, modal_problem, zoo_problem
 from colloc import Chain, Friction, ellipse, replay
 from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.inertia import moment_of_inertia
 from scripts.models.ellipses import admissible
 
 
@@ -92,35 +90,3 @@ def test_the_numbers_of_the_zoo_keep_their_problems_and_all_families_are_stated(
     assert law_problem(7).hash == law_problem(7).hash != law_problem(2).hash
     assert described(modal_problem(0)).startswith("smooth, 2 legendre modes")
     assert {modal_problem(k).body.modes for k in range(20)} == {2, 3, 4, 5, 6}
-
-
-def test_the_robot_of_the_engines_has_the_inertia_of_the_chain():
-    mujoco = pytest.importorskip("mujoco")
-    for task in tasks(["three_link", "wheeled_snake"])[::2]:
-        model = mujoco.MjModel.from_xml_string(task.urdf)
-        data = mujoco.MjData(model)
-        angles = np.array([0.7, -0.4])
-        data.qpos[[model.joint(name).qposadr[0] for name in task.joints]] = angles
-        mujoco.mj_forward(model, data)
-        matrix = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, matrix)
-        # the plane's part: mass, its moments, and inertia about the tail
-        mass, (x, y), about = matrix[0, 0], (matrix[1, 2], -matrix[0, 2]), matrix[2, 2]
-        posture = task.body.posture(angles[:, None])
-        assert mass == pytest.approx(1.0, abs=1e-6)
-        assert (x, y) == pytest.approx(
-            tuple(at.item() for at in task.body.centre_of_mass(posture)), abs=1e-6
-        )
-        assert about - x**2 - y**2 == pytest.approx(
-            moment_of_inertia(task.body, posture).item(), rel=1e-4
-        )
-
-
-def test_an_engine_with_contacts_that_do_not_lift_goes_as_far_as_the_certificate_says():
-    pytest.importorskip("mujoco")
-    from benchmarks.engines.players import mujoco_player
-
-    (_, fast) = tasks(["three_link_feet"])
-    distance, work = fast.came_to(mujoco_player.play(fast, 1e-3)) / fast.certificate[0] - 1
-    assert abs(distance) < 0.03
-    assert abs(work) < 0.01
