@@ -1,6 +1,6 @@
 """The best infinitesimal gait at a shape, and over all shapes: what upper bounds are held against.
 
-The linear program of `colloc.bounds.infinitesimal` over rate directions, which column generation
+The linear program of `colloc.bounds.motions` over rate directions, which column generation
 adds.
 """
 
@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import (
+from colloc.bounds.motions import (
     CoulombMotion,
+    SmallGait,
     admissible,
     balanced_motion,
+    best_mixture,
     fundamental,
+    gain_along,
+    heading_of,
     move_inside,
     one_joint,
     random_directions,
     two_resting,
     unit_directions,
 )
-from colloc.bounds.infinitesimal import SmallGait, best_mixture, gain_along, heading_of
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError

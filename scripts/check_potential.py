@@ -12,15 +12,14 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import CoulombMotion
-from colloc.bounds.potential import PotentialSpace, largest_ratios
-from colloc.bounds.sampling import Domain, climb_from_lattice
-from colloc.bounds.spline import TensorSpline
+from colloc.bounds.motions import CoulombMotion, Domain, climb_from_lattice
+from colloc.bounds.potential import PotentialSpace, TensorSpline
 from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
@@ -104,7 +103,7 @@ def largest_ratio(
     domain: Domain, space: PotentialSpace, free: np.ndarray, **settings: int
 ) -> tuple[float, CoulombMotion]:
     """The largest ratio that `climb_from_lattice` finds, and its motion."""
-    reached, summit = climb_from_lattice(domain, space, free, **settings)
+    reached, summit = climb_from_lattice(domain, partial(space.largest_ratios, free), **settings)
     best = int(np.argmax(reached))
     return float(reached[best]), summit.take(np.array([best]))
 
@@ -119,7 +118,7 @@ def largest_random_ratio(kept: Kept, count: int, seed: int) -> float:
         way = rng.uniform(0.0, 2.0 * np.pi, angles[0].shape)
         motion, _ = kept.domain.motions(angles, np.stack([np.cos(way), np.sin(way)]))
         top, left = (
-            max(top, largest_ratios(kept.space, kept.free, motion).max()),
+            max(top, kept.space.largest_ratios(kept.free, motion).max()),
             left - angles.shape[1],
         )
     return float(top)

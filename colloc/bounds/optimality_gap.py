@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from colloc.bounds.coulomb_motion import MOST_LINKS
+from colloc.bounds.motions import MOST_LINKS, Domain
 from colloc.gaits.limits import widest
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
@@ -18,7 +18,11 @@ from colloc.system.errors import ProblemError, ReadOnlyRunWarning, StoreError
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
 
-CACHE = "bounds.sqlite"  # beside the results
+
+def _has_bound(problem: Problem) -> bool:
+    # work that depends on the pace has no bound per distance, nor has a body that coasts
+    dry = problem.regime.slow_on_level and rate_independent(problem.law)
+    return dry and problem.objective == EFFICIENCY and problem.rotation == 0
 
 
 def refusal(problem: Problem) -> str:
@@ -33,7 +37,7 @@ def refusal(problem: Problem) -> str:
             f"on feet no upper bound is computed for {problem.law.label}: its motions are not "
             f"unique; there is 1/min(mu)."
         )
-    if not _compute_bound(problem):
+    if not _has_bound(problem):
         return "upper bounds are of the efficiency, on the level, of gaits that do not turn."
     if problem.body.n_link > MOST_LINKS:
         return (
@@ -44,32 +48,28 @@ def refusal(problem: Problem) -> str:
 
 
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
-    """The bound for a problem's body, friction and joint limit: from the cache, or computed.
+    """The bound for a problem's body, friction and joint limit: from the cache beside the results,
+    or computed.
 
     None where there can be none (`refusal`), unless it is asked for: a `ProblemError`. A cache that
     cannot be read or written costs a `ReadOnlyRunWarning`.
     """
-    if why := refusal(problem):
-        if compute:
-            raise ProblemError(why)
+    why, cache = refusal(problem), folder / "bounds.sqlite"
+    if why and compute:
+        raise ProblemError(why)
+    if why or not (compute or cache.exists()):
         return None
-    domain: tuple[Any, Any, float] = (problem.body, problem.friction, widest(problem.joint_limit))
-    cache = folder / CACHE
-    if not compute and not cache.exists():
-        return None
-    from colloc.bounds.sampled import efficiency_bound, known_bound
+    from colloc.bounds.sampled import efficiency_bound, known_bound, usual_budget
 
+    at = problem.body, problem.friction, widest(problem.joint_limit)
     try:
-        return (efficiency_bound if compute else known_bound)(*domain, cache=cache)
+        if compute:
+            return efficiency_bound(*at, cache=cache)  # type: ignore[arg-type]
+        domain = Domain(*at)  # type: ignore[arg-type]
+        return known_bound(domain, usual_budget(domain), cache)
     except StoreError as error:
         warnings.warn(f"{error} No bound is taken from it.", ReadOnlyRunWarning, stacklevel=2)
-        return efficiency_bound(*domain) if compute else None
-
-
-def _compute_bound(problem: Problem) -> bool:
-    # work that depends on the pace has no bound per distance, nor has a body that coasts
-    dry = problem.regime.slow_on_level and rate_independent(problem.law)
-    return dry and problem.objective == EFFICIENCY and problem.rotation == 0
+        return efficiency_bound(*at) if compute else None  # type: ignore[arg-type]
 
 
 def gap_line(
@@ -78,7 +78,7 @@ def gap_line(
     """Efficiency, upper bound and gap; without a bound 1/min(mu), with the hint to ask for one."""
     if bound is not None:
         return f"  {bound.report(efficiency)}"
-    if not _compute_bound(problem):
+    if not _has_bound(problem):
         return f"  no upper bound on the {problem.objective.name} is known"
     limit = 1.0 / problem.law.smallest
     tighter = "" if asked or refusal(problem) else "; --bound computes a tighter one"

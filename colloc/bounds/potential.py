@@ -5,28 +5,167 @@ the integral of its rate vanishes over a closed gait, so
 
     efficiency <= max over q, theta, r of ( Re(e^{i theta} v) + d phi/dt ) / P,
 
-with ``phi = Re sum_k e^{i k theta} c_k(q)``, c_k splines with the parities of the symmetries. The
-harmonic k = 1 alone follows a point c_1(q) of the body from the middle link.
+with ``phi = Re sum_k e^{i k theta} c_k(q)``, c_k tensor-product cubic B-splines with the parities
+of the symmetries. The harmonic k = 1 alone follows a point c_1(q) of the body from the middle link.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
+from scipy.interpolate import BSpline
+from scipy.linalg import qr
 from scipy.sparse.linalg import spsolve
 
-from colloc.bounds.coulomb_motion import CoulombMotion
-from colloc.bounds.spline import TensorSpline
+from colloc.bounds.motions import CoulombMotion
+from colloc.system.errors import ProblemError
 
+DEGREE = 3
+_DEPENDENT = 1e-9  # pivot, relative, below which a function is a sum of others
 _HEADINGS = 48
 _NEWTON_STEPS = 3
 _AT_ONCE = 50000
 _MOST_WORTH = 0.3  # share of the largest worth that a knot needs to be inserted with the best
 _SINGULAR = 1e-10  # added to the roughness, of its mean diagonal: affine functions have none
+
+
+@dataclass(frozen=True)
+class TensorSpline:
+    """Tensor-product cubic splines on the cube |angle| <= limit [rad].
+
+    A function is a vector of (intervals + 3)^n_joint coefficients, last joint fastest. Symmetries
+    permute these, so a function with given parities has fewer free ones: ``full = E @ free``.
+    """
+
+    n_joint: int
+    limit: float
+    intervals: int
+    graded: tuple[float, ...] = ()
+    """Inner knots, ascending and symmetric about 0; evenly spaced if empty."""
+
+    def __post_init__(self) -> None:
+        inner, knots = np.array(self.graded), self.knots
+        graded = not self.graded or (
+            inner.size == self.intervals - 1 and np.abs(inner + inner[::-1]).max() < 1e-9
+        )
+        if self.intervals < 1 or not graded or (np.diff(knots) <= 0).any():
+            raise ProblemError(
+                f"a spline needs a positive limit and an interval, and graded knots must be "
+                f"{self.intervals - 1} angles, ascending, symmetric and within the limit."
+            )
+
+    @cached_property
+    def knots(self) -> np.ndarray:
+        if not self.graded:
+            return np.linspace(-self.limit, self.limit, self.intervals + 1)
+        return np.array([-self.limit, *self.graded, self.limit])
+
+    @cached_property
+    def extend(self) -> np.ndarray:
+        beyond = np.arange(1, DEGREE + 1) * (self.knots[1] - self.knots[0])
+        return np.concatenate([self.knots[0] - beyond[::-1], self.knots, self.knots[-1] + beyond])
+
+    @property
+    def per_joint(self) -> int:
+        return self.intervals + DEGREE
+
+    @property
+    def size(self) -> int:
+        return self.per_joint**self.n_joint
+
+    def cell(self, angle: np.ndarray) -> np.ndarray:
+        return np.clip(np.searchsorted(self.knots, angle, side="right") - 1, 0, self.intervals - 1)
+
+    def _pieces(self, angle: np.ndarray, order: int) -> np.ndarray:
+        """Derivatives ``(n, 4)`` of the functions of one joint that live at an angle."""
+        every = BSpline(self.extend, np.eye(self.per_joint), DEGREE)(angle, nu=order)
+        return np.take_along_axis(every, self.cell(angle)[:, None] + np.arange(DEGREE + 1), axis=1)
+
+    def matrix(
+        self, angles: np.ndarray, orders: tuple[int, ...] | None = None
+    ) -> sparse.csr_matrix:
+        """Functions, or partial derivatives of given orders, at angles ``(n_joint, n)``, ``(n,
+        size)``."""
+        orders = orders or (0,) * self.n_joint
+        pieces = [self._pieces(*each) for each in zip(angles, orders, strict=True)]
+        return self._columns(angles, reduce(_products, pieces))
+
+    def slope(self, angles: np.ndarray, rates: np.ndarray) -> sparse.csr_matrix:
+        """Rates of change of all functions for joint rates ``(n_joint, n)``, ``(n, size)``."""
+        value, change = np.ones((angles.shape[1], 1)), np.zeros((angles.shape[1], 1))
+        for angle, rate in zip(angles, rates, strict=True):
+            pieces, steepness = (self._pieces(angle, order) for order in (0, 1))
+            change = _products(change, pieces) + _products(value, rate[:, None] * steepness)
+            value = _products(value, pieces)
+        return self._columns(angles, change)
+
+    def _columns(self, angles: np.ndarray, value: np.ndarray) -> sparse.csr_matrix:
+        """Put values ``(n, 4^n_joint)`` into the columns of their functions."""
+        n, width = value.shape
+        column = np.zeros((n, 1), dtype=np.int32)
+        for angle in angles:
+            local = self.cell(angle)[:, None, None] + np.arange(DEGREE + 1)
+            column = (column[:, :, None] * self.per_joint + local).reshape(n, -1)
+        rows = np.arange(n + 1) * width
+        return sparse.csr_matrix((value.ravel(), column.ravel(), rows), shape=(n, self.size))
+
+    @cached_property
+    def roughness(self) -> sparse.csr_matrix:
+        """Gram matrix of the second derivatives: ``c.roughness.c`` is about the integral of |D^2
+        f|^2."""
+        half = 0.5 * np.diff(self.knots)
+        axis = (self.knots[:-1, None] + half[:, None] * np.array([0.5, 1.5])).ravel()
+        angles, widths = (
+            np.stack([a.ravel() for a in np.meshgrid(*[each] * self.n_joint, indexing="ij")])
+            for each in (axis, np.repeat(half, 2))
+        )
+        weights = sparse.diags(widths.prod(axis=0))
+        total, unit = sparse.csr_matrix((self.size, self.size)), np.eye(self.n_joint, dtype=int)
+        for one in unit:
+            for other in unit:
+                second = self.matrix(angles, tuple(one + other))
+                total = total + second.T @ weights @ second
+        return total.tocsr()
+
+    def symmetric_basis(
+        self, mirror: int, swap: int | None, together: int | None = None
+    ) -> sparse.csr_matrix:
+        """Basis ``(size, n_free)`` of functions with f(-q) = mirror f(q), f(-reversed q) = swap
+        f(q); with `together`, of sums of functions of so many joints."""
+        index = np.arange(self.size).reshape((self.per_joint,) * self.n_joint)
+        flipped = index[(slice(None, None, -1),) * self.n_joint]
+        group = [(index.ravel(), 1), (flipped.ravel(), mirror)]
+        if swap is not None:
+            turned = flipped.transpose().ravel()
+            group += [(turned, swap), (flipped.ravel()[turned], mirror * swap)]
+        every, average = np.arange(self.size), sparse.csr_matrix((self.size, self.size))
+        for image, sign in group:
+            average = average + sparse.csr_matrix((np.full(self.size, float(sign)), (every, image)))
+        if together is not None and together < self.n_joint:
+            # functions of so many joints, for every choice
+            of = sparse.csc_matrix(np.ones((self.per_joint, 1))), sparse.eye(self.per_joint)
+            some = combinations(range(self.n_joint), together)
+            choices = [[of[k in each] for k in range(self.n_joint)] for each in some]
+            products = sparse.hstack([reduce(sparse.kron, each) for each in choices], format="csc")
+            summands = average @ products
+            _, r, order = qr(summands.toarray(), mode="economic", pivoting=True)
+            rank = np.sum(np.abs(np.diag(r)) > _DEPENDENT * np.abs(r[0, 0]))
+            basis = summands.tocsc()[:, np.sort(order[:rank])]
+        else:
+            # orbits: one free coefficient for each, unless the signs cancel
+            representative = np.min([image for image, _ in group], axis=0)
+            alive = (representative == every) & (abs(average.diagonal()) > 0)
+            basis = average.tocsc()[:, np.flatnonzero(alive)]
+        return (basis @ sparse.diags(1.0 / abs(basis).max(axis=0).toarray().ravel())).tocsr()
+
+
+def _products(values: np.ndarray, more: np.ndarray) -> np.ndarray:
+    return (values[:, :, None] * more[:, None]).reshape(len(values), -1)
 
 
 @dataclass(frozen=True)
@@ -78,6 +217,42 @@ class PotentialSpace:
             full[k] += (1, 1j)[part] * (self.bases[part] @ free[where])
         return full
 
+    def largest_ratios(self, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
+        """Largest (gain over heading) / power of each motion; `Samples` of a part at a time are
+        large."""
+        parts = np.array_split(np.arange(motion.size), motion.size // _AT_ONCE + 1)
+        ratios = (Samples(self, motion.take(part)).ratio(free)[0] for part in parts)
+        return np.concatenate([*ratios])
+
+    def with_knots(self, added: np.ndarray) -> PotentialSpace:
+        old = self.spline
+        inner = np.unique(np.concatenate([old.knots[1:-1], added, -added]).round(12) + 0.0)
+        spline = TensorSpline(old.n_joint, old.limit, inner.size + 1, tuple(inner.tolist()))
+        return replace(self, spline=spline)
+
+    def worth(self, measure: Measure) -> float:
+        """What its functions gain over those that the measure closes for, up to a factor:
+        ``g.R^-1.g``, g being their mean rates and R the roughness."""
+        samples = Samples(self, measure.motion)
+        rows, _ = samples.rows(np.arange(measure.weight.size), measure.heading)
+        slope, size = rows.T @ measure.weight, self.roughness.diagonal().mean()
+        roughness = self.roughness + _SINGULAR * size * sparse.eye(self.size)
+        return float(slope @ spsolve(roughness.tocsc(), slope))
+
+    def with_more_knots(self, measure: Measure, intervals: int) -> PotentialSpace:
+        """The potentials with knots in the middle of those intervals where they are worth most."""
+        knots = self.spline.knots
+        middle = 0.5 * (knots[1:] + knots[:-1])
+        places = middle[middle > -1e-12]
+        values = np.array([self.with_knots(each).worth(measure) for each in places[:, None]])
+        added: list[float] = []
+        for k in np.argsort(-values):
+            more = self.with_knots(np.array([*added, places[k]])).spline.intervals
+            if added and (values[k] < _MOST_WORTH * values.max() or more > intervals):
+                break
+            added.append(float(places[k]))
+        return self.with_knots(np.array(added))
+
 
 class Samples:
     """Motions with what potentials need to be evaluated on them."""
@@ -87,22 +262,20 @@ class Samples:
         self.value = space.spline.matrix(motion.angles)
         self.slope = space.spline.slope(motion.angles, motion.rates)
 
-    def join(self, motion: CoulombMotion) -> Samples:
+    def add(self, motion: CoulombMotion) -> None:
         new = Samples(self.space, motion)
-        both = Samples.__new__(Samples)
-        both.space, both.motion = self.space, self.motion.join(motion)
-        both.value = sparse.vstack([self.value, new.value], format="csr")
-        both.slope = sparse.vstack([self.slope, new.slope], format="csr")
-        return both
+        self.motion = self.motion.join(motion)
+        self.value = sparse.vstack([self.value, new.value], format="csr")
+        self.slope = sparse.vstack([self.slope, new.slope], format="csr")
 
     def amplitudes(self, free: np.ndarray) -> dict[int, np.ndarray]:
         """Complex amplitudes a_k ``(n,)`` of the gain ``Re sum_k e^{i k theta} a_k``."""
         motion = self.motion
-        result = {1: motion.velocity[0] + 1j * motion.velocity[1]}
+        amplitudes = {1: motion.velocity[0] + 1j * motion.velocity[1]}
         for k, c in self.space.coefficients(free).items():
             rate = self.slope @ c + 1j * k * motion.spin * (self.value @ c)
-            result[k] = result.get(k, 0) + rate
-        return result
+            amplitudes[k] = amplitudes.get(k, 0) + rate
+        return amplitudes
 
     def ratio(self, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Largest (gain over heading) / power ``(n,)``, and the heading where it is taken."""
@@ -122,13 +295,6 @@ class Samples:
             full = sparse.diags(along) @ slope + sparse.diags(across * k * motion.spin) @ value
             blocks.append(full @ self.space.bases[part])
         return sparse.hstack(blocks, format="csr"), constant
-
-
-def largest_ratios(space: PotentialSpace, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
-    """Largest (gain over heading) / power of each motion; `Samples` of a part at a time are
-    large."""
-    parts = np.array_split(np.arange(motion.size), motion.size // _AT_ONCE + 1)
-    return np.concatenate([Samples(space, motion.take(part)).ratio(free)[0] for part in parts])
 
 
 def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -164,34 +330,3 @@ class Measure(NamedTuple):
     motion: CoulombMotion
     heading: np.ndarray  # of the middle link [rad], (n,)
     weight: np.ndarray  # share of the work, of sum 1, (n,)
-
-
-def worth(space: PotentialSpace, measure: Measure) -> float:
-    """What the functions of a space gain over those that the measure closes for, up to a factor:
-    ``g.R^-1.g``, g being their mean rates and R the roughness."""
-    rows, _ = Samples(space, measure.motion).rows(np.arange(measure.weight.size), measure.heading)
-    slope, size = rows.T @ measure.weight, space.roughness.diagonal().mean()
-    roughness = space.roughness + _SINGULAR * size * sparse.eye(space.size)
-    return float(slope @ spsolve(roughness.tocsc(), slope))
-
-
-def with_knots(space: PotentialSpace, added: np.ndarray) -> PotentialSpace:
-    old = space.spline
-    inner = np.unique(np.concatenate([old.knots[1:-1], added, -added]).round(12) + 0.0)
-    spline = TensorSpline(old.n_joint, old.limit, inner.size + 1, tuple(inner.tolist()))
-    return replace(space, spline=spline)
-
-
-def with_more_knots(space: PotentialSpace, measure: Measure, intervals: int) -> PotentialSpace:
-    """The potentials with knots in the middle of those intervals where they are worth most."""
-    knots = space.spline.knots
-    middle = 0.5 * (knots[1:] + knots[:-1])
-    places = middle[middle > -1e-12]
-    values = np.array([worth(with_knots(space, places[[k]]), measure) for k in range(places.size)])
-    added: list[float] = []
-    for k in np.argsort(-values):
-        more = with_knots(space, np.array([*added, places[k]])).spline.intervals
-        if added and (values[k] < _MOST_WORTH * values.max() or more > intervals):
-            break
-        added.append(float(places[k]))
-    return with_knots(space, np.array(added))

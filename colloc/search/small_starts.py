@@ -3,15 +3,21 @@ class hardly ever meet.
 
 Dry friction lets a loop of any size move a body, and at a few shapes, such as folded ones, small
 loops beat most large gaits. A linear program gives the best small loop at a shape
-(`colloc.bounds.infinitesimal`); it is solved at shapes drawn from a coarse lattice.
+(`colloc.bounds.motions`); it is solved at shapes drawn from a coarse lattice.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import CoulombMotion, one_joint, unit_directions
-from colloc.bounds.infinitesimal import SmallGait, best_mixture, heading_of
+from colloc.bounds.motions import (
+    CoulombMotion,
+    SmallGait,
+    best_mixture,
+    heading_of,
+    one_joint,
+    unit_directions,
+)
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import largest_factor
 from colloc.gaits.harmonic import Fourier

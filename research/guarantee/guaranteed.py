@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.bounds.motions import Domain
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampled import Bound
-from colloc.bounds.sampling import Domain
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_sums
 from colloc.mechanics.friction import Friction

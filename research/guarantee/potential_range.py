@@ -8,8 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.bounds.potential import PotentialSpace
-from colloc.bounds.spline import DEGREE
+from colloc.bounds.potential import DEGREE, PotentialSpace
 from research.guarantee.enclosure import WIDER, Cells, ReferencePoint, spread
 from research.guarantee.kernel import call
 from research.guarantee.loaded_balance import Loaded

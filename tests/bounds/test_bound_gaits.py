@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion
+from colloc.bounds.motions import CoulombMotion, admissible, balanced_motion
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.mechanics.chain import Chain

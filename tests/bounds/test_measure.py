@@ -4,10 +4,9 @@ the program says."""
 import numpy as np
 import pytest
 
-from colloc.bounds.cutting_plane import exchanged_optimum
-from colloc.bounds.potential import PotentialSpace, Samples, with_knots, with_more_knots, worth
-from colloc.bounds.sampling import Domain
-from colloc.bounds.spline import TensorSpline
+from colloc.bounds.motions import Domain
+from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
+from colloc.bounds.sampled import Budget, compute_bound
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
@@ -20,10 +19,7 @@ LIMIT = 2.5
 def found():
     domain = Domain(Chain(), Friction(), LIMIT)
     space = PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True)
-    optimum = exchanged_optimum(
-        domain, space, shapes=10, directions=24, rounds=4, starts=20, tolerance=1e-2
-    )
-    return space, optimum
+    return space, *compute_bound(domain, Budget(4, (1,), 10, 24, 4, 20, 1e-2, first=4))
 
 
 def efficiency(measure):
@@ -33,14 +29,13 @@ def efficiency(measure):
 
 
 def test_the_measure_travels_as_the_program_says(found):
-    _, optimum = found
-    assert optimum.measure.weight.sum() == pytest.approx(1.0)
-    assert efficiency(optimum.measure) == pytest.approx(optimum.floor, abs=2e-3)
+    _, bound, measure = found
+    assert measure.weight.sum() == pytest.approx(1.0)
+    assert efficiency(measure) == pytest.approx(bound.floor, abs=2e-3)
 
 
 def test_no_potential_of_the_space_changes_what_the_measure_travels(found):
-    space, optimum = found
-    measure = optimum.measure
+    space, _, measure = found
     matrix, constant = Samples(space, measure.motion).rows(
         np.arange(measure.weight.size), measure.heading
     )
@@ -52,32 +47,32 @@ def test_no_potential_of_the_space_changes_what_the_measure_travels(found):
 
 
 def test_knots_are_worth_something_only_where_the_measure_does_not_close(found):
-    space, optimum = found
-    finer = [worth(with_knots(space, np.array([place])), optimum.measure) for place in (0.6, 1.9)]
-    assert worth(space, optimum.measure) < 0.05 * min(finer)
-    more = with_more_knots(space, optimum.measure, 6)
+    space, _, measure = found
+    finer = [space.with_knots(np.array([place])).worth(measure) for place in (0.6, 1.9)]
+    assert space.worth(measure) < 0.05 * min(finer)
+    more = space.with_more_knots(measure, 6)
     inner = np.array(more.spline.graded)
     assert more.spline.intervals == 6
     assert np.allclose(inner, -inner[::-1])
     assert set(np.round(space.spline.knots, 9)) <= set(np.round(more.spline.knots, 9))
     # of the two places it took the better
-    values = [
-        worth(with_knots(space, np.array([place])), optimum.measure) for place in (0.625, 1.875)
-    ]
+    values = [space.with_knots(np.array([place])).worth(measure) for place in (0.625, 1.875)]
     assert np.abs(inner - (0.625, 1.875)[int(np.argmax(values))]).min() < 1e-9
 
 
 def test_a_kept_potential_is_the_one_that_was_found(found, tmp_path):
-    space, optimum = found
+    space, bound, measure = found
     domain, path = Domain(Chain(), Friction(), LIMIT), tmp_path / "potentials.json"
     path.write_text("[]")
-    for more in (space, with_knots(space, np.array([1.9]))):
+    for more in (space, space.with_knots(np.array([1.9]))):
         free = (
-            optimum.free if more is space else np.random.default_rng(5).standard_normal(more.size)
+            np.array(bound.coefficients)
+            if more is space
+            else np.random.default_rng(5).standard_normal(more.size)
         )
-        keep(Kept(domain, more, free, optimum.floor), path)
-        kept, motion = potentials(path)[-1], optimum.measure.motion
-        assert (kept.domain, kept.program) == (domain, optimum.floor)
+        keep(Kept(domain, more, free, bound.floor), path)
+        kept, motion = potentials(path)[-1], measure.motion
+        assert (kept.domain, kept.program) == (domain, bound.floor)
         ratios = [
             Samples(each, motion).ratio(given)[0]
             for each, given in ((more, free), (kept.space, kept.free))
@@ -87,32 +82,31 @@ def test_a_kept_potential_is_the_one_that_was_found(found, tmp_path):
 
 
 def test_a_potential_is_checked_by_samples_that_were_not_chosen_for_it(found):
-    space, optimum = found
+    space, bound, _ = found
     domain, settings = (
         Domain(Chain(), Friction(), LIMIT),
         {"shapes": 20, "directions": 48, "starts": 100},
     )
     values = [
-        largest_ratio(domain, space, optimum.free, seed=seed, **settings)[0] for seed in (1, 2)
+        largest_ratio(domain, space, np.array(bound.coefficients), seed=seed, **settings)[0]
+        for seed in (1, 2)
     ]
     assert values[0] == pytest.approx(values[1], abs=2e-3)
     # four rounds were too few: what they missed shows
-    assert min(values) > optimum.floor
+    assert min(values) > bound.floor
     # another potential is worse
-    assert largest_ratio(domain, space, 0.5 * optimum.free, **settings)[0] > max(values) + 0.1
+    assert (
+        largest_ratio(domain, space, 0.5 * np.array(bound.coefficients), **settings)[0]
+        > max(values) + 0.1
+    )
 
 
 @pytest.mark.slow
 def test_more_knots_lower_the_program(found):
-    domain, space = (
-        Domain(Chain(), Friction(), LIMIT),
-        PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True),
-    )
-    more = exchanged_optimum(
-        domain, space, intervals=6, shapes=10, directions=24, rounds=8, starts=40, tolerance=1e-2
-    )
-    assert more.space.spline.intervals == 6
-    assert more.space.spline.graded
+    budget = Budget(6, (1,), 10, 24, 8, 40, 1e-2, first=4)
+    more, _ = compute_bound(Domain(Chain(), Friction(), LIMIT), budget)
+    assert more.intervals == 6
+    assert more.graded
     assert more.floor < found[1].floor - 1e-3
 
 

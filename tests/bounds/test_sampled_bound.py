@@ -10,13 +10,16 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from colloc import solve_balance
-from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental, two_resting
-from colloc.bounds.cutting_plane import smallest_maximum
+from colloc.bounds.motions import (
+    CoulombMotion,
+    Domain,
+    balanced_motion,
+    fundamental,
+    two_resting,
+)
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
-from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
-from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
-from colloc.bounds.sampling import Domain
-from colloc.bounds.spline import TensorSpline
+from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline, largest_gain
+from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, smallest_maximum
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.laws.viscous import Viscous

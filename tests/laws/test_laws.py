@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from colloc.bounds.motions import Domain
 from colloc.bounds.sampled import QUICK, bound_key
-from colloc.bounds.sampling import Domain
 from colloc.gaits.gait_fields import LAWS, fields, law_from
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw

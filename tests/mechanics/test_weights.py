@@ -16,8 +16,8 @@ from colloc import (
     save,
     solve_balance,
 )
+from colloc.bounds.motions import Domain
 from colloc.bounds.sampled import Budget, efficiency_bound
-from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.search.solve import solve
 from research.guarantee.guaranteed import certify

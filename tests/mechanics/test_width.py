@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Harmonic, Problem, ProblemError, ellipse, solve
-from colloc.bounds.coulomb_motion import admissible
+from colloc.bounds.motions import admissible
 from colloc.mechanics.contact import (
     crossing_depth,
     ends_and_links,

@@ -4,11 +4,9 @@ are what they claim."""
 import numpy as np
 import pytest
 
-from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion
-from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.motions import CoulombMotion, Domain, balanced_motion
+from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
-from colloc.bounds.sampling import Domain
-from colloc.bounds.spline import TensorSpline
 from colloc.laws.elliptic import Elliptic
 from colloc.mechanics.balance import dissipation_potential, instant, net_force
 from colloc.mechanics.chain import Chain

@@ -6,8 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from colloc.bounds.potential import PotentialSpace
-from colloc.bounds.spline import DEGREE, TensorSpline
+from colloc.bounds.potential import DEGREE, PotentialSpace, TensorSpline
 from research.guarantee.enclosure import CORNERS, Cells
 from research.guarantee.loaded_balance import Loaded
 from research.guarantee.potential_range import _HEADINGS, PotentialRange, gain_bound

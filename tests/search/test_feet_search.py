@@ -9,8 +9,8 @@ from scipy.optimize import root
 from shared.instants import random_instants
 
 from colloc import Chain, Elliptic, Foot, Friction, Problem, ProblemError, Wheel, solve_balance
+from colloc.bounds.motions import Domain
 from colloc.bounds.optimality_gap import refusal
-from colloc.bounds.sampling import Domain
 from colloc.commands.solve import summary_lines
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
