@@ -19,9 +19,8 @@ import numpy as np
 
 from benchmarks.tables import markdown_table
 from colloc import Chain, Fourier, Friction, NotConvergedError, inertial_motion
-from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import EFFICIENCY
-from colloc.gaits.sloped import Slope
+from colloc.gaits.regime import Regime
 from colloc.results.measured import measured
 from colloc.verification.inertial_motion import GaitWithInertia
 from colloc.verification.replay import replayer
@@ -116,7 +115,7 @@ def motion(case: Case) -> Row:
 def slope(case: Case) -> Row:
     """On a slope."""
     on = GaitOnSlope(*case[:4], case.grade, ())
-    ran = replayer(Slope(case.grade))(*case[:4], tolerance=case.tolerance)
+    ran = replayer(Regime(grade=case.grade))(*case[:4], tolerance=case.tolerance)
     states = on.integrate(np.array([case.gait.theta]), _finer(ran.errors), 1e-3).states
     theta, climb, _, spent, *_ = states[:, -1] - states[:, 0]
     return _row(
@@ -129,7 +128,7 @@ def slope(case: Case) -> Row:
 def certificate(case: Case) -> Row:
     """Measured as a certificate does."""
     level = case._replace(gait=Fourier(case.gait.mean, case.gait.cos, case.gait.sin))
-    known = measured(*level[:4], rotation=None, run=replayer(Paced(case.froude)))
+    known = measured(*level[:4], rotation=None, run=replayer(Regime(froude=case.froude)))
     played = GaitWithInertia(*level[:4], froude=case.froude, breaks=())
     start = played.momenta(known.fine.tail_velocity(np.zeros(1)))
     return _row(

@@ -48,7 +48,7 @@ _NAMES = {
     "laws.fitted_friction": "fitted_friction FittedFriction",
     "gaits.serpenoid": "Serpenoid",
     "gaits.harmonic": "Harmonic Fourier ellipse",
-    "gaits.inertia": "Free",
+    "gaits.regime": "Free",
     "gaits.bspline": "BSpline Polygon",
     "gaits.columns": "Basis",
     "gaits.polygon": "Corners",

@@ -25,7 +25,7 @@ from colloc.laws.fitted_friction import (
 )
 from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
-from colloc.gaits.inertia import Free as Free
+from colloc.gaits.regime import Free as Free
 from colloc.gaits.bspline import BSpline as BSpline, Polygon as Polygon
 from colloc.gaits.columns import Basis as Basis
 from colloc.gaits.polygon import Corners as Corners

@@ -24,7 +24,7 @@ ONLY = {
     "casadi": {"numerics", "dynamics", "transcription", "reduced", "search"},
 }
 COLLOCATED = re.compile(
-    r"colloc\.(dynamics\.(collocated|states|kinds|control_problem)|numerics\.mesh|transcription|reduced|search)\b"
+    r"colloc\.(dynamics\.(collocated|states|dynamics|control_problem)|numerics\.mesh|transcription|reduced|search)\b"
 )
 ADAPTIVE = (
     "replay_record replay panels adaptive_motion slope inertial_motion dry_balance dry_friction"

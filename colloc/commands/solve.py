@@ -15,10 +15,10 @@ from colloc.commands import main as cli
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, naming_saved_files
 from colloc.commands.ending import INTERRUPTED as CODE_INTERRUPTED
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.inertia import Free
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, read_problem_file
+from colloc.gaits.regime import Free
 from colloc.mechanics.chain import Chain
 from colloc.results import limit_use
 from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED

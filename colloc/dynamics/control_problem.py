@@ -8,42 +8,27 @@ no degree in the coefficients is left as it is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from colloc.dynamics.dynamics import QuasiStatic, StaticParameter, dynamics_of
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.limits import Limit
+from colloc.gaits.limits import Limit, widest
 from colloc.gaits.objective import Objective, integrals_of
 from colloc.gaits.problem import Problem
-from colloc.gaits.regime import Regime
+from colloc.gaits.symmetry import fraction
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimits, Quantity
-from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
 
-class Dynamics(NamedTuple):
-    """A body under a law of friction, in a regime."""
-
-    body: Body
-    law: Law
-    regime: Regime
-    symmetry: str
-    """Symmetry of the motion (`colloc.gaits.symmetry`)."""
-    turn: float = 0.0
-    """Prescribed rotation over a period [rad]."""
-    joint_map: JointMap | None = None
-
-    def in_speeds_of(self, unit: float) -> Dynamics:
-        return self._replace(law=self.law.in_speeds_of(unit))
-
-
 class Admissible(NamedTuple):
-    """A class of gaits of a body, and its limits."""
+    """A class of gaits of a body and its limits. Vectors of parameters are those of the class, then
+    the static ones."""
 
     gait: AnyClass
     body: Body
@@ -51,13 +36,46 @@ class Admissible(NamedTuple):
     largest_speeds: tuple[float, ...]
     """[rad per period]; empty without a limit."""
     smallest_shape_speed: float
+    static: tuple[StaticParameter, ...]
+    fraction: float
+    """Part of the period that is solved."""
 
     @property
     def n_joint(self) -> int:
         return self.body.n_joint
 
+    @property
+    def n_shape(self) -> int:
+        """Number of parameters of the class."""
+        return int(self.gait.size(self.n_joint))
+
     def member(self, parameters: np.ndarray) -> AnyGait:
-        return self.gait.member(parameters, self.n_joint)
+        shape, static = np.split(parameters, [self.n_shape])
+        gait = self.gait.member(shape, self.n_joint)
+        values = zip(self.static, static, strict=True)
+        stated = {each.name: float(value) for each, value in values if not np.isnan(value)}
+        return replace(gait, **stated) if stated else gait
+
+    def parameters(self, gait: AnyGait) -> np.ndarray:
+        """Parameters of the member nearest to a gait; NaN for a heading that it does not state, or
+        states for another phase than that of the class."""
+        near = self.gait.through(gait)
+        source = gait if gait.is_series else near
+        stated = {each.name: getattr(source, each.name) for each in self.static}
+        kept = stated.get("theta") is not None and self.gait.in_phase(near)
+        static = []
+        for name, lower, upper, guess in self.static:
+            known = kept if name == "theta" else stated[name] is not None
+            static.append(np.clip(stated[name], lower, upper) if known else guess)
+        return np.append(self.gait.nearest(near) if kept else self.gait.parameters(near), static)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest parameters."""
+        lower, upper = self.gait.bounds(self.body, widest(self.joint_limit))
+        return (
+            np.append(lower, [each.lower for each in self.static]),
+            np.append(upper, [each.upper for each in self.static]),
+        )
 
 
 class Aims(NamedTuple):
@@ -67,11 +85,8 @@ class Aims(NamedTuple):
     at_least: tuple[tuple[Objective, float], ...]
     rotation: float | None
     no_way_across: bool
-
-    def uses(self, quantity: str) -> bool:
-        return any(
-            quantity in aim.uses for aim in (self.objective, *(aim for aim, _ in self.at_least))
-        )
+    closing: str
+    """Symmetry that closes the net rotation."""
 
     @property
     def integrals(self) -> tuple[Quantity, ...]:
@@ -94,7 +109,7 @@ class ControlProblem:
     """
 
     problem: Problem
-    dynamics: Dynamics
+    dynamics: QuasiStatic
     admissible: Admissible
     aims: Aims
     actuators: PathLimits
@@ -106,8 +121,11 @@ class ControlProblem:
 
     def mesh(self, edges: np.ndarray | None = None, of_scheme: str = "") -> Mesh:
         """The first mesh on the solved part of the period, or one of given edges and scheme."""
-        if edges is None:
-            edges = self.admissible.gait.edges(self.intervals)
+        gaits, fraction = self.admissible.gait, self.admissible.fraction
+        if edges is None and gaits.fraction == fraction:
+            edges = gaits.edges(self.intervals)
+        elif edges is None:
+            edges = np.linspace(0.0, fraction, self.intervals + 1)
         return Mesh(scheme(of_scheme or self.scheme), edges)
 
     def in_phases(self, mesh: Mesh, gait: AnyGait) -> Mesh:
@@ -122,33 +140,29 @@ class ControlProblem:
 
 
 def control_problem(problem: Problem) -> ControlProblem:
-    body = problem.body
-    gait = problem.gait
-    law = problem.law
-    aims = (problem.objective, *(aim for aim, _ in problem.at_least))
-    limits, regime = problem.path_limits, problem.regime
+    gait, law, regime = problem.gait, problem.law, problem.regime
+    aims, limits = problem.aims, problem.path_limits
     degrees = [part.degree for part in aims] + [limit.friction_degree for limit in limits.each]
     # what a gait says of its pace has no unit
-    unit = 1.0 if None in degrees or regime.free_pace else friction_unit(law)
+    unit = 1.0 if None in degrees or regime.free else friction_unit(law)
+    if unit != 1.0:
+        law, regime = law.in_units_of(unit), regime.in_units_of(unit)
+    symmetry, turn = regime.motion_symmetry(gait.symmetry), problem.rotation or 0.0
+    dynamics = dynamics_of(problem.body, law, regime, symmetry, turn, problem.joint_map)
     return ControlProblem(
         problem,
-        Dynamics(
-            body,
-            law if unit == 1.0 else law.in_units_of(unit),
-            regime.in_units_of(unit),
-            gait.motion_symmetry,
-            problem.rotation or 0.0,
-            problem.joint_map,
-        ),
+        dynamics,
         Admissible(
-            gait, body, problem.joint_limit, problem.largest_speeds, problem.smallest_shape_speed
+            gait, problem.body, problem.joint_limit, problem.largest_speeds,
+            problem.smallest_shape_speed, dynamics.static_parameters, fraction(symmetry),
         ),
         Aims(
             problem.objective,
             tuple((aim, value / _size(aim, unit)) for aim, value in problem.at_least),
             # a row that holds whatever the gait would have no slope but what the mesh errs by
             None if problem.keeps_heading else problem.rotation,
-            regime.keeps_ahead,
+            regime.towards is not None,
+            regime.closing_symmetry(gait.symmetry),
         ),
         limits.in_units_of(unit),
         problem.formulation,
@@ -156,7 +170,7 @@ def control_problem(problem: Problem) -> ControlProblem:
         problem.intervals,
         problem.delta_start,
         unit,
-    )
+    )  # fmt: skip
 
 
 def friction_unit(law: Law) -> float:

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, point_weights
-from colloc.dynamics.kinds import OMEGA, Inertial, QuasiStatic, Shapes
-from colloc.gaits.inertia import Paced
+from colloc.dynamics.dynamics import OMEGA, Inertial, QuasiStatic, Shapes
 from colloc.gaits.period import chord_per_way
-from colloc.gaits.symmetry import NONE
+from colloc.gaits.regime import Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.inertia import Path, checked_mass
@@ -66,19 +65,18 @@ class GaitOnMesh:
         NotConvergedError
             If none is found.
         """
-        slow = QuasiStatic(self._body, self._friction, NONE)
-        kind = Inertial(slow, Paced(froude)) if froude else slow
+        kind = Inertial if froude else QuasiStatic
+        dynamics = kind(self._body, self._friction, Regime(froude=froude))
         states = None if near is None or not near.states.size else near.states
-        along = kind.along(
-            self._mesh, Shapes(self._angles, self._rates, delta), np.empty(0), (states, None)
-        )
+        shapes = Shapes(self._angles, self._rates, delta)
+        along = dynamics.simulate(self._mesh, shapes, np.empty(0), states)
         if not along.held.all():
             raise NotConvergedError(
                 f"at a Froude number of {froude:g} no motion was found in which all periods are "
                 f"alike."
             )
-        turn, work = point_weights(self._mesh) @ np.array([along.z[OMEGA], along.now.power]).T
-        pose = CollocatedPose.on_mesh(self._mesh, along.z[OMEGA] - turn, along.now.centre)
+        turn, work = point_weights(self._mesh) @ np.array([along.now.z[OMEGA], along.now.power]).T
+        pose = CollocatedPose.on_mesh(self._mesh, along.now.z[OMEGA] - turn, along.now.centre)
         return Played(chord_per_way(turn) * float(abs(pose.place[-1]) / work), along.states)
 
 

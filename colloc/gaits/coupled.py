@@ -56,8 +56,6 @@ class Coupled(LinearClass):
     gears: tuple[tuple[float, ...], ...] = ()
     stuck: tuple[tuple[int, float], ...] = ()
 
-    takes_static_parameters = False
-
     def __post_init__(self) -> None:
         kind = self.gait
         if not isinstance(kind, LinearClass) or isinstance(kind, Coupled) or not kind.linear:

@@ -122,9 +122,6 @@ class ClassOfGaits:
     relative_delta = False  # delta is relative to the shape speed, as the pace does not matter
     delta_start: float | None = None  # first delta of a search; None: the body's default
     linear = True  # angles are linear in the parameters of the search
-    takes_static_parameters = (
-        False  # members can have static parameters (`colloc.gaits.static_parameters`)
-    )
 
     def _check_symmetry(self) -> None:
         if self.symmetry not in SYMMETRIES:
@@ -151,21 +148,6 @@ class ClassOfGaits:
     def fraction(self) -> float:
         """Part of the period that is solved; symmetry gives the rest."""
         return fraction(self.symmetry)
-
-    @property
-    def motion_symmetry(self) -> str:
-        """Symmetry of the motion, which is less than that of the gait on a slope."""
-        return self.symmetry
-
-    @property
-    def closing_symmetry(self) -> str:
-        """Symmetry that closes the net rotation."""
-        return self.symmetry
-
-    @property
-    def level(self) -> Any:
-        """The class without static parameters."""
-        return self
 
     def describe(self) -> str:
         """The class in words, for reports."""

@@ -123,7 +123,7 @@ def problem_fields(problem: Any) -> dict[str, Any]:
         name: fields(getattr(problem, name)) for name in ("guess", "body", "friction")
     }
     plain |= {
-        "gait": fields(problem.gait.level),
+        "gait": fields(problem.gait),
         "objective": problem.objective.fields(),
         "at_least": [[aim.fields(), least] for aim, least in problem.at_least],
         "limits": [limit.fields() for limit in problem.limits],

@@ -116,7 +116,7 @@ def default_guess(
 ) -> Any:
     """A wave in a class, no joint of it faster than allowed. `ProblemError` if it hardly moves."""
     wave = travelling_wave(body, joint_limit, least=smallest_shape_speed)
-    gait = initial_member(gait_class.level, wave)
+    gait = initial_member(gait_class, wave)
     if gait.joint_map is not None:
         most = largest_factor(body, joint_limit, gait.angles(_PHASES), gait.rest)
         gait = gait.scaled(min(1.0, most))

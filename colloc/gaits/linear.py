@@ -110,7 +110,6 @@ class LinearClass(ClassOfGaits):
 
     harmonics: int
     """Harmonics that resolve the functions."""
-    takes_static_parameters = True
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """phi ``(n_function, n_time)`` at phases t, or the derivatives per period."""
@@ -136,7 +135,7 @@ class LinearClass(ClassOfGaits):
 
     @property
     def start_class(self) -> Any:
-        return super().start_class if self.relative_delta else self.level
+        return super().start_class if self.relative_delta else self
 
     def intervals(self, n_joint: int) -> int:
         # enough for the waves, and some for stick and slip

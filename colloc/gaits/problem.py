@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -12,14 +13,12 @@ from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.guesses import check_guess, default_guess
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.inertia import Free, paced_from
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
-from colloc.gaits.regime import LEVEL, Regime
-from colloc.gaits.sloped import slope_from
-from colloc.gaits.symmetry import ANTIPODAL, NONE, check_symmetric
+from colloc.gaits.regime import LEVEL, Free, Regime, regime_of
+from colloc.gaits.symmetry import ANTIPODAL, NONE, check_symmetric, fraction
 from colloc.mechanics.bodies import FULL, Body, formulations
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
@@ -189,17 +188,14 @@ class Problem:
         self._set(objective=objective_from(self.objective), at_least=least_values(self.at_least))
         regime, froude = self.regime, self.froude
         paces = isinstance(froude, (list, tuple))
-        self._set(
-            gait=regime.class_of(self.gait),
-            froude=Free(*map(float, froude)) if paces else float(froude),  # type: ignore[arg-type]
-        )
-        start = self.gait.delta_start or usual.delta_start
+        self._set(froude=Free(*map(float, froude)) if paces else float(froude))  # type: ignore[arg-type]
+        start = regime.delta_start(self.gait) or usual.delta_start
         self._fill(
             delta=usual.delta,
             delta_start=start if self.law.regularised else usual.delta,
             joint_limit=usual.limit,
             formulation=formulations(self.body)[0],
-            intervals=self.gait.intervals(self.body.n_joint),
+            intervals=self.usual_intervals,
         )
         self._check_numbers()
         self._set(
@@ -416,17 +412,21 @@ class Problem:
         body = self.body
         return body.law(self.friction) if isinstance(body, Links) else self.friction
 
-    @property
+    @cached_property
     def regime(self) -> Regime:
         """The kind of motion. `ProblemError` if there is none like it."""
-        slope = slope_from(self.body, self.friction, self.grade, self.towards)
-        if self.motion is not None and (slope is not None or self.froude != 0):
-            raise ProblemError(
-                "a kind of motion of your own takes the place of grade and froude: leave these out."
-            )
-        if self.froude == 0:
-            return self.motion or slope or LEVEL
-        return paced_from(self.froude, slope, timed=self.uses("period"))
+        return regime_of(self)
+
+    @property
+    def usual_intervals(self) -> int:
+        """Intervals of the first mesh, if nothing else is stated."""
+        usual = self.gait.intervals(self.body.n_joint)
+        return round(usual * self.fraction / self.gait.fraction)
+
+    @property
+    def fraction(self) -> float:
+        """Part of the period that is solved; symmetry gives the rest."""
+        return fraction(self.regime.motion_symmetry(self.gait.symmetry))
 
     @property
     def scene(self) -> str:

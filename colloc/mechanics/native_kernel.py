@@ -208,7 +208,7 @@ def compiled_motion(
 def kernel_momenta(
     library: ctypes.CDLL, moving: Moving, states: np.ndarray, froude: float, *, columns: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Outputs of `colloc.dynamics.compiled_momenta` ``(9, n_time)``, and derivatives ``(9, columns,
+    """Outputs of `colloc.dynamics.chain` ``(9, n_time)``, and derivatives ``(9, columns,
     n_time)``."""
     n_time, (_held, shapes) = moving.angles.shape[1], _shapes(moving)
     states = np.ascontiguousarray(states, dtype=float)

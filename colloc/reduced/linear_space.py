@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.dynamics.kinds import kind_of_motion
-from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.limits import widest
+from colloc.dynamics.dynamics import QuasiStatic
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.regime import LEVEL
 from colloc.mechanics.contact import Pairs
 from colloc.numerics.sqp import keep_last
-from colloc.reduced.constraints import Constraints, Function
-from colloc.reduced.pointed import with_heading
+from colloc.reduced.motion import ReducedMotion
+from colloc.reduced.program import Constraints, SearchSpace
 from colloc.transcription.shape_constraints import (
     Placed,
     following_instants,
@@ -23,10 +23,13 @@ from colloc.transcription.shape_constraints import (
     shape_checks,
 )
 
+_TURNS = 0.25 * np.pi * np.array([0, 1, -1, 2, -2, 3, -3])
+"""Turns [rad] of the initial heading tried where the body slides down."""
 
-class LinearSpace:
-    """A `SearchSpace` of a linear class on a mesh (by default the first one), with pairs of links
-    `far` kept from crossing."""
+
+class LinearSpace(SearchSpace):
+    """The space of a linear class on a mesh (by default the first one), with pairs of links `far`
+    kept from crossing."""
 
     def __init__(
         self,
@@ -35,155 +38,149 @@ class LinearSpace:
         scheme: str = "",
         far: Pairs = (),
     ) -> None:
-        self.control, self.edges, self.scheme, self.far = control, edges, scheme, far
-        self.mesh, self._admissible = control.mesh(edges, scheme), control.admissible
-        gait, body, limit, speeds, _ = control.admissible
-        self.checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
-        n_joint = body.n_joint
-        self._offset = gait.offset(n_joint)
-        angles = gait.angle_matrix(self.mesh.times, n_joint)
-        rates = gait.rates_on(self.mesh, n_joint)
-        self._matrix = np.concatenate([angles, rates], axis=1)
-        self.n = self._matrix.shape[2]
+        super().__init__(control, edges, scheme, far)
+        self._gaits, self._limit = control.admissible.gait, control.admissible.joint_limit
+        self._relative, n_joint = self._gaits.relative_delta, control.admissible.n_joint
+        speeds, joint_map = control.admissible.largest_speeds, control.dynamics.joint_map
+        self.checks = shape_checks(control.dynamics.body, far, speeds, joint_map)
+        self._offset = self._gaits.offset(n_joint)
+        angles = self._gaits.angle_matrix(self.mesh.times, n_joint)
+        self._matrix = np.concatenate([angles, self._gaits.rates_on(self.mesh, n_joint)], axis=1)
         self._pace = np.ones(self.mesh.n_point)
-        self._speed = (_MeanSpeed if gait.relative_delta else _RootMeanSquareSpeed)(gait, n_joint)
-        self.lower, self.upper = gait.bounds(body, widest(limit))
-        self.own = np.arange(self.n)
+        if self._relative:
+            self._sides, rates = self._gaits.side_rates(n_joint)
+            self._side_rates = rates / (2 * np.pi)
+        else:
+            self._square = self._gaits.mean_square_rate(n_joint) / (2 * np.pi) ** 2
+        self.lower, self.upper = control.admissible.bounds()
+        self.own = np.arange(self.lower.size)
         self._peaks = keep_last(
-            lambda v: near_peaks(self.trajectory(v), self.mesh, self.checks, limit)
+            lambda v: near_peaks(self.trajectory(v), self.mesh, self.checks, self._limit)
         )
 
-    def member(self, v: np.ndarray) -> AnyGait:
-        return self._admissible.member(v)
+    def shape(self, v: np.ndarray) -> np.ndarray:
+        """Parameters of the class."""
+        return v[: self._matrix.shape[2]]
 
-    def trajectory(self, v: np.ndarray) -> AnyGait:
-        """The gait in the time of the mesh."""
-        return self._admissible.gait.trajectory(v, self._admissible.n_joint)
-
-    def parameters(self, gait: AnyGait) -> np.ndarray:
-        v = self._admissible.gait.parameters(self._admissible.gait.through(gait))
-        return with_heading(self.control, self.mesh, self, v)
+    def shape_vjp(self, v: np.ndarray, on_shape: np.ndarray) -> np.ndarray:
+        """Derivatives ``(k, n)`` along v from those along `shape`."""
+        return np.pad(on_shape, ((0, 0), (0, v.size - on_shape.shape[1])))
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        return v
+        return np.append(self.shape(v), v[v.size - len(self.control.admissible.static) :])
+
+    def trajectory(self, v: np.ndarray) -> AnyGait:
+        return self._gaits.trajectory(self.shape(v), self.control.admissible.n_joint)
+
+    def parameters(self, gait: AnyGait) -> np.ndarray:
+        """Parameters of the member nearest to a gait; if it states no heading, with the one that
+        travels as asked on the level, or the nearest at which the body does not slide down."""
+        v = self.control.admissible.parameters(gait)
+        if not np.isnan(v[-1:]).any():
+            return v
+        dynamics, delta, v[-1] = self.control.dynamics, self.control.delta_start, 0.0
+        flat = QuasiStatic(dynamics.body, dynamics.law, LEVEL, dynamics.symmetry, dynamics.turn)
+        level, here = (ReducedMotion(each, self.mesh, self) for each in (flat, dynamics))
+        v[-1] = dynamics.regime.ahead - np.angle(level.at(v, delta).pose.place[-1])
+        beside = (np.append(v[:-1], v[-1] + turn) for turn in _TURNS)
+        return next((each for each in beside if np.isfinite(here.values(each, delta)["work"])), v)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates and the pace; where delta is relative to the shape speed, the pace is that
         speed and rates are those at unit speed."""
-        shapes, n_joint = (self._matrix @ v).T, self._matrix.shape[1] // 2
+        shapes, n_joint = (self._matrix @ self.shape(v)).T, self._matrix.shape[1] // 2
         angles, rates = shapes[:n_joint] + self._offset, shapes[n_joint:]
-        if not self._admissible.gait.relative_delta:
+        if not self._relative:
             return angles, rates, self._pace
         speed = np.linalg.norm(rates, axis=0)
         return angles, rates / speed, speed
 
     def at_times(self, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         angles, rates = self.trajectory(v)(t)
-        relative = self._admissible.gait.relative_delta
-        return angles, rates / np.linalg.norm(rates, axis=0) if relative else rates
+        return angles, rates / np.linalg.norm(rates, axis=0) if self._relative else rates
 
     def _acceleration_matrix(self, t: np.ndarray) -> np.ndarray:
-        return self._admissible.gait.angle_matrix(t, self._admissible.n_joint, 2)
+        return self._gaits.angle_matrix(t, self.control.admissible.n_joint, 2)
 
     def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return (self._acceleration_matrix(t) @ v).T
+        return (self._acceleration_matrix(t) @ self.shape(v)).T
 
     def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
-        return np.einsum("kjt,tjp->kp", on_points, self._acceleration_matrix(self.mesh.times))
+        matrix = self._acceleration_matrix(self.mesh.times)
+        return self.shape_vjp(v, np.einsum("kjt,tjp->kp", on_points, matrix))
 
     def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        if self._admissible.gait.relative_delta:
+        if self._relative:
             _, unit, speed = self.at(v)
             on_angles, on_rates = np.split(on_shape, 2, axis=2)
             along = np.einsum("kpj,jp->kp", on_rates, unit)
             across = on_rates - along[..., None] * unit.T
             on_rates = across / speed[:, None] + on_pace[..., None] * unit.T
             on_shape = np.concatenate([on_angles, on_rates], axis=2)
-        return np.asarray(
-            on_shape.reshape(len(on_shape), -1) @ self._matrix.reshape(-1, self._matrix.shape[2])
-        )
+        matrix = self._matrix.reshape(-1, self._matrix.shape[2])
+        return self.shape_vjp(v, on_shape.reshape(len(on_shape), -1) @ matrix)
 
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """Shape constraints at their worst instants in cells where they might bind, then the square
         of the shape speed."""
-        gait = self.trajectory(v)
-        gaits, limit = self._admissible.gait, self._admissible.joint_limit
-        placed = list[tuple[Placed, np.ndarray]]()
+        gait, limit, placed = self.trajectory(v), self._limit, list[tuple[Placed, np.ndarray]]()
         kinds, low, high, excess = dict[str, np.ndarray](), [], [], -np.inf
         for check, (cells, times) in zip(self.checks, self._peaks(v), strict=True):
             kinds[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
-            each = Placed.at(check, cells, times, gaits, gait)
+            each = Placed.at(check, cells, times, self._gaits, gait)
             values = check.along(check.of(gait, times))
             placed.append((each, moving(each, values, limit, self.mesh)))
             excess = max(excess, float(check.excess(values, limit).max()))
-            (lower, upper) = check.nearer_bounds(values, limit)
+            lower, upper = check.nearer_bounds(values, limit)
             low.append(lower)
             high.append(upper)
         kinds["shape speed"] = np.zeros(1, dtype=int)
-        lower = np.concatenate([*low, [self._admissible.smallest_shape_speed**2]])
+        lower = np.concatenate([*low, [self.control.admissible.smallest_shape_speed**2]])
         upper = np.concatenate([*high, [np.inf]])
+
+        def rows(placed_at: Callable[[np.ndarray], list[Placed]]) -> Constraints:
+            def values(v: np.ndarray) -> np.ndarray:
+                shapes = (each.value(self.shape(v)) for each in placed_at(v))
+                return np.concatenate([*shapes, [self._square_of_speed(v)[0]]])
+
+            def slopes(v: np.ndarray) -> np.ndarray:
+                shapes = (each.slope(self.shape(v)) for each in placed_at(v))
+                return self.shape_vjp(v, np.vstack([*shapes, self._square_of_speed(v)[1]]))
+
+            return Constraints(kinds, lower, upper, excess, values, slopes)
+
         at_worst = keep_last(partial(self._at_worst, placed))
-
-        def moving_on() -> Constraints:
-            return Constraints(kinds, lower, upper, excess, *self._rows(at_worst))
-
-        at_once = self._rows(lambda v: [each for each, _ in placed])
-        return Constraints(kinds, lower, upper, excess, *at_once, moving_on)
-
-    def _rows(self, placed: Callable[[np.ndarray], list[Placed]]) -> tuple[Function, Function]:
-        speed = self._speed
-        return (
-            lambda v: np.concatenate([*(each.value(v) for each in placed(v)), [speed.square(v)]]),
-            lambda v: np.vstack([*(each.slope(v) for each in placed(v)), speed.slope(v)]),
+        return rows(lambda v: [each for each, _ in placed])._replace(
+            following=lambda: rows(at_worst)
         )
+
+    def _square_of_speed(self, v: np.ndarray) -> tuple[float, np.ndarray]:
+        """Square of the root-mean-square shape speed [rad per radian of phase], or of the mean one
+        where delta is relative to it, and its derivatives."""
+        p = self.shape(v)
+        if not self._relative:
+            return float(p @ self._square @ p), 2 * self._square @ p
+        rates = self._side_rates @ p
+        speeds = np.linalg.norm(rates, axis=1)
+        mean, unit = float(self._sides @ speeds), rates / speeds[:, None]
+        slope = np.einsum("k,kj,kjp->p", self._sides, unit, self._side_rates)
+        return mean**2, 2 * mean * slope
 
     def _at_worst(self, placed: list[tuple[Placed, np.ndarray]], v: np.ndarray) -> list[Placed]:
         """Constraints at the worst instants of v in the cells where they were placed."""
         gait, found = self.trajectory(v), []
-        gaits, limit = self._admissible.gait, self._admissible.joint_limit
         for each, which in placed:
             if which.size:
-                worst = following_instants(each, which, gait, self.mesh, limit)
+                worst = following_instants(each, which, gait, self.mesh, self._limit)
                 matrix = each.matrix.copy()
-                matrix[which] = each.check.matrix(gaits, worst, self._admissible.n_joint)
+                n_joint = self.control.admissible.n_joint
+                matrix[which] = each.check.matrix(self._gaits, worst, n_joint)
                 each = each._replace(matrix=matrix)
             found.append(each)
         return found
-
-
-class _RootMeanSquareSpeed:
-    """Square of the root-mean-square shape speed [rad per radian of phase]."""
-
-    def __init__(self, gait: AnyClass, n_joint: int) -> None:
-        self._form = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
-
-    def square(self, v: np.ndarray) -> float:
-        return float(v @ self._form @ v)
-
-    def slope(self, v: np.ndarray) -> np.ndarray:
-        return 2 * self._form @ v
-
-
-class _MeanSpeed:
-    """Square of the mean shape speed: the length of the path over 2 pi."""
-
-    def __init__(self, gait: AnyClass, n_joint: int) -> None:
-        self._shares, rates = gait.side_rates(n_joint)
-        self._rates = rates / (2 * np.pi)
-
-    def square(self, v: np.ndarray) -> float:
-        return float(self._shares @ np.linalg.norm(self._rates @ v, axis=1)) ** 2
-
-    def slope(self, v: np.ndarray) -> np.ndarray:
-        rates = self._rates @ v
-        speeds = np.linalg.norm(rates, axis=1)
-        unit = rates / speeds[:, None]
-        return (
-            2 * (self._shares @ speeds) * np.einsum("k,kj,kjp->p", self._shares, unit, self._rates)
-        )
 
 
 class SerpenoidSpace(LinearSpace):
@@ -198,40 +195,16 @@ class SerpenoidSpace(LinearSpace):
         far: Pairs = (),
     ) -> None:
         super().__init__(control, edges, scheme, far)
-        self._n_own = n_own = control.admissible.gait.n_own
-        n_static = len(kind_of_motion(control.dynamics).static_parameters)  # which come last
-        self.own = np.concatenate([self.own[:n_own], self.own[self.own.size - n_static :]])
-        self.n = n_own + n_static
+        self._n_own, static = self._gaits.n_own, len(control.admissible.static)
+        self.own = np.append(self.own[: self._n_own], self.own[self.own.size - static :])
         self.lower, self.upper = self.lower[self.own], self.upper[self.own]
 
-    def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        own, static = np.split(v, [self._n_own])
-        return np.concatenate([self._admissible.gait.full(own, self._admissible.n_joint), static])
+    def shape(self, v: np.ndarray) -> np.ndarray:
+        return self._gaits.full(v[: self._n_own], self.control.admissible.n_joint)
 
-    def _slopes(self, v: np.ndarray) -> np.ndarray:
-        """Derivatives of the full parameters, ``(n_full, n)``."""
-        n_own = self._n_own
-        coefficients = self._admissible.gait.coefficient_slopes(
-            v[: self._n_own], self._admissible.n_joint
+    def shape_vjp(self, v: np.ndarray, on_shape: np.ndarray) -> np.ndarray:
+        coefficients = self._gaits.coefficient_slopes(
+            v[: self._n_own], self.control.admissible.n_joint
         )
-        slopes = np.eye(self.n + len(coefficients), self.n)
-        slopes[n_own:, n_own:] = np.eye(
-            self.n + len(coefficients) - n_own, self.n - n_own, -len(coefficients)
-        )
-        slopes[n_own : n_own + len(coefficients), :n_own] = coefficients
-        return slopes
-
-    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return super().at(self.full_parameters(v))
-
-    def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        return super().vjp(self.full_parameters(v), on_shape, on_pace) @ self._slopes(v)
-
-    def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return super().accelerations(self.full_parameters(v), t)
-
-    def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
-        return super().accelerations_vjp(v, on_points) @ self._slopes(v)
-
-    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
-        return super().constraints(v, later).through(self.full_parameters, self._slopes)
+        on_own = on_shape @ np.vstack([np.eye(self._n_own), coefficients])
+        return super().shape_vjp(v, on_own)

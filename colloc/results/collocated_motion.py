@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.dynamics.collocated import CollocatedPose
-from colloc.dynamics.heading import whole_turns
+from colloc.dynamics.collocated import CollocatedPose, whole_turns
 from colloc.gaits.gait import finite_array
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
@@ -87,7 +86,7 @@ class CollocatedMotion:
     def rotation(self) -> float:
         """Net rotation over a period [rad], counter-clockwise."""
         problem, theta = self.problem, self.x[self.layout.theta[0]]
-        turns = problem.gait.motion_symmetry == NONE
+        turns = problem.regime.motion_symmetry(problem.gait.symmetry) == NONE
         return float(theta[-1] - theta[0]) + (problem.rotation or 0.0) if turns else 0.0
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
@@ -95,7 +94,8 @@ class CollocatedMotion:
         0, and the first period's displacement along +x; on a slope +x is straight uphill."""
         t = finite_array("t", np.atleast_1d(t), 1)
         period, phase = np.divmod(t, 1.0)
-        symmetry, body = self.problem.gait.motion_symmetry, self.problem.body
+        problem, body = self.problem, self.problem.body
+        symmetry = problem.regime.motion_symmetry(problem.gait.symmetry)
         solved, second = reduced(symmetry, phase)
         z, theta, centre, end = self._interpolate(solved)
         angles, rates = self.gait(phase)

@@ -75,7 +75,7 @@ def _beyond_any_gait(problem: Problem) -> Iterator[str]:
     quasi_static = not problem.froude
     if quasi_static and isinstance(problem.body, Chain) and rate_independent(problem.law):
         torque = largest_moments(problem.body, problem.friction, problem.grade)
-    if isinstance(gait.level, Harmonic) and problem.body.bounded_angles.rows.shape == (n, n):
+    if isinstance(gait, Harmonic) and problem.body.bounded_angles.rows.shape == (n, n):
         speed = 2 * math.pi * gait.harmonics * _half_ranges(problem)
     power = torque * np.minimum(speed, problem.largest_speeds or np.inf)
     for (field, unit), bound in zip(UNITS.values(), (speed, torque, power), strict=True):

@@ -177,10 +177,11 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
     rows = zip(*columns.values(), strict=True)
     history = tuple(Step(**dict(zip(columns, row, strict=True))) for row in rows)
-    layout = layout_of(control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]))
+    control = control_problem(problem)
+    layout = layout_of(control, Mesh(scheme(plain["scheme"]), arrays["edges"]))
     if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
         raise StoreError("its variables do not fit its mesh.")
-    gait = problem.gait.member(arrays["x"][layout.parameters[:, 0]], problem.body.n_joint)
+    gait = control.admissible.member(arrays["x"][layout.decisions])
     return Answer(problem, gait, **arrays, **plain, second_order=second, history=history)
 
 

@@ -65,7 +65,7 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     problem, gait = answer.problem, answer.gait
     if instants is None:
         usual = problem.body.defaults
-        each = 0.5 * usual.instants_a_point / problem.gait.fraction
+        each = 0.5 * usual.instants_a_point / problem.fraction
         instants = max(usual.instants, 2 * int(np.ceil(each * answer.mesh.n_point)))
     is_optimum = answer.program != EVALUATED
     return gait_certificate(
@@ -309,7 +309,7 @@ def _requirements(problem: Problem, fine: Replay) -> list[Check]:
         meaning = f"excess over a limit, relative, in replay; nearest to its own: {nearest}"
         excess = max(float(fine.shares.max()) - 1.0, 0.0)
         checks.append(Check("actuators", excess, TOLERANCES.replay_gap, meaning))
-    if problem.regime.keeps_ahead:
+    if problem.regime.towards is not None:
         meaning = "of the way, off the one that was asked for [rad]"
         checks.append(Check("direction", fine.across / fine.distance, TOLERANCES.angle, meaning))
     return checks
@@ -318,14 +318,14 @@ def _requirements(problem: Problem, fine: Replay) -> list[Check]:
 def _one_motion(problem: Problem, fine: Replay) -> Check:
     """Change of the objective by other balanced motions: where the law leaves it open no mesh
     decides it, and as much is allowed as delta may change."""
-    if not problem.regime.others_measured:
+    if problem.regime.slides and not problem.regime.froude:
         meaning = (
             "part of the period at which several motions are balanced; what they would "
             "change is not measured"
         )
         return Check("one motion", fine.several, TOLERANCES.nonunique_fraction, meaning)
-    if problem.regime.others:
-        meaning = f"between the motions {problem.regime.others}"
+    if problem.regime.froude:
+        meaning = "between the motions that follow from slow motion and from rest"
     elif problem.law.associated:
         meaning = "the law leaves one balanced motion"
     elif not isinstance(problem.body, Chain):

@@ -77,7 +77,7 @@ def project_to_zero_rotation(
     delta = delta_per_period(problem.gait, gait, problem.delta if delta is None else delta)
     level = {"gait": seeds, "guess": gait, "intervals": _INTERVALS + 4 * seeds.harmonics}
     level |= _FREE_OTHERWISE
-    if problem.regime.free_pace:
+    if problem.regime.free:
         level |= {"objective": EFFICIENCY, "froude": problem.regime.froude}
     space, v = space_near(problem.with_(**level), gait)
     program = ReducedProgram(space, delta)

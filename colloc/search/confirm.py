@@ -114,7 +114,7 @@ def _solve_within(
     within reach."""
     program, radius = solver.program, OPTIONS.confirm_radius
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), radius)
-    own = program.layout.parameters[reduced.space.own, 0]
+    own = program.layout.decisions[reduced.space.own]
     # beyond its checks by what SQP allows; at last, where the worst instant swings, by what a
     # certificate lets pass
     rounds = max_rounds(COARSE)
@@ -227,5 +227,5 @@ def _multipliers(
         )
         lam_g[program.groups[name].start + of_full] = on_shape[at + of_reduced]
         at += cells.size
-    lam_x[program.layout.parameters[space.own, 0]] = conditions.on_bounds
+    lam_x[program.layout.decisions[space.own]] = conditions.on_bounds
     return lam_x, lam_g

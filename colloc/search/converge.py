@@ -172,7 +172,7 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     """Pairs of links more than two apart that cross in a gait, by plain intersection: the smooth
     clearance keeps a distance that links which only touch do not need."""
     admissible = space.control.admissible
-    body, t = admissible.body, np.linspace(0.0, admissible.gait.fraction, PHASES)
+    body, t = admissible.body, np.linspace(0.0, admissible.fraction, PHASES)
     ends = np.stack(body.outline(space.member(v).angles(t)))
     return overlapping_pairs(ends, far_pairs(body), link_width(body), TOLERANCES.violation)
 

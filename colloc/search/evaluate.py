@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.dynamics.control_problem import ControlProblem, control_problem
-from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.coupled import Coupled
 from colloc.gaits.fitted_gait import FittedGait, Given, Uncertainty, fitted_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait
@@ -23,7 +22,7 @@ from colloc.mechanics.joint_map import JointMap
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.reduced.motion import ReducedMotion
-from colloc.reduced.one_gait import OneGait
+from colloc.reduced.program import SearchSpace
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
@@ -176,8 +175,9 @@ def _evaluate_fit(problem: Problem, fitted: FittedGait) -> Solution:
 
 def _answer(problem: Problem, gait: AnyGait) -> Answer:
     """The gait on a mesh that meets the problem's tolerance; on a first mesh if it goes nowhere."""
-    begin, parameters = time.perf_counter(), problem.gait.parameters(gait)
+    begin = time.perf_counter()
     control = control_problem(problem)
+    parameters = control.admissible.parameters(gait)
     member, mesh, message = control.admissible.member(parameters), control.mesh(), ""
     first, answer = mesh, _answer_on_mesh(control, mesh, parameters)
     meshes = OPTIONS.meshes if problem.mesh_tolerance > 0 and not goes_nowhere(answer) else 0
@@ -194,7 +194,7 @@ def _answer(problem: Problem, gait: AnyGait) -> Answer:
 
 
 def _answer_on_mesh(control: ControlProblem, mesh: Mesh, parameters: np.ndarray) -> Answer:
-    space = OneGait(control, mesh.edges, mesh.scheme.name, full=parameters)
+    space = SearchSpace(control, mesh.edges, mesh.scheme.name, full=parameters)
     iterate = evaluate_at(space, np.empty(0), control.problem.delta)
     return replace(answer_of_iterate(iterate), status=EVALUATED, program=EVALUATED)
 
@@ -220,7 +220,7 @@ def _errors_of_samples(
         np.stack([wide.functions(phases), wide.functions(phases, 1)]), answer.problem.joint_map
     )
     aims, delta = control.aims, answer.problem.delta
-    motion = ReducedMotion(kind_of_motion(control.dynamics), answer.mesh, series, aims.integrals)
+    motion = ReducedMotion(control.dynamics, answer.mesh, series, aims.integrals)
     scale = np.array([control.stated(1.0), 1 / control.unit, 1.0, control.unit])
 
     def values(v: np.ndarray) -> np.ndarray:

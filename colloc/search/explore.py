@@ -279,9 +279,7 @@ def multistart(
     """Candidates on a coarse mesh, best first, and the number of starts, at least one."""
     run = active_run()
     count = starts or OPTIONS.starts * (OPTIONS.max_starts if problem.regime.froude else 1)
-    coarse = problem.with_(
-        intervals=min(problem.intervals, problem.gait.intervals(problem.body.n_joint) // 2)
-    )
+    coarse = problem.with_(intervals=min(problem.intervals, problem.usual_intervals // 2))
     # gaits are compared where friction is nearly dry
     usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)
     first_deltas = problem.delta_start, OPTIONS.delta_ratio * usual

@@ -378,7 +378,10 @@ def _violations(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
     if excess > _EXCESS:
         yield f"{excess:.2g} beyond its limits"
     turned = kept.rotation - (problem.rotation or 0.0)
-    asked = problem.rotation is not None and problem.gait.closing_symmetry == NONE
+    asked = (
+        problem.rotation is not None
+        and problem.regime.closing_symmetry(problem.gait.symmetry) == NONE
+    )
     if asked and abs(turned) > _TURNS:
         yield f"turns {np.degrees(turned):+.2g}° too far a period"
     for aim, least in problem.at_least:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from colloc.dynamics.collocated import whole_turns
 from colloc.dynamics.control_problem import control_problem
-from colloc.dynamics.heading import whole_turns
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.prescribed import Prescribed
@@ -14,12 +14,11 @@ from colloc.gaits.serpenoid import Serpenoid
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.contact import Pairs
 from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
-from colloc.reduced.one_gait import OneGait
 from colloc.reduced.program import SearchSpace
 from colloc.system.errors import ProblemError
 from colloc.transcription.full_program import FullProgram, full_program
 
-SPACES = LinearSpace, SerpenoidSpace, OneGait
+SPACES = LinearSpace, SerpenoidSpace, SearchSpace
 
 
 def space_of(
@@ -36,7 +35,7 @@ def space_of(
     if isinstance(problem.gait, Serpenoid):
         space: type = SerpenoidSpace
     elif isinstance(problem.gait, Prescribed):
-        space = OneGait
+        space = SearchSpace
     elif isinstance(problem.gait, LinearClass):
         space = LinearSpace
     else:
@@ -72,7 +71,7 @@ def program_of(problem: Problem, gait: AnyGait | None = None) -> FullProgram:
 
 def with_whole_turns(program: FullProgram, x: np.ndarray) -> FullProgram:
     """The program with the net rotation of an antipodal gait closed as variables x close it."""
-    if program.control.admissible.gait.closing_symmetry != ANTIPODAL:
+    if program.control.aims.closing != ANTIPODAL:
         return program
     if "rotation" not in program.groups:
         return program

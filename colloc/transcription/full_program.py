@@ -26,7 +26,7 @@ is that of a slope. With inertia the momenta P of the body take the place of N a
     P' = (sum f_i + m_i g, sum c_i + x_i x f_i) / Fr + turning of the axes        collocated
 
 with x_i the midpoints seen from the centre of mass; where torques are limited they follow from
-q'', variables too, and the momenta (`colloc.dynamics.torques`). Other bodies, and the formulation
+q'', variables too, and the momenta (`colloc.dynamics.chain`). Other bodies, and the formulation
 "implicit velocity", have shape coordinates q, rates r and tail velocity z as variables, and z =
 Z(q, r), the velocity that balances them, in place of friction and balance
 (`colloc.transcription.velocity_map`).
@@ -48,12 +48,10 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
+from colloc.dynamics.chain import torque_function
+from colloc.dynamics.collocated import closing_sign, momenta_image
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.dynamics.heading import closing_sign, momenta_image
-from colloc.dynamics.kinds import kind_of_motion
-from colloc.dynamics.torques import torque_function
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.limits import widest
 from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.contact import Pairs
@@ -95,7 +93,9 @@ class FullProgram(Program):
     ) -> None:
         self.control, self.mesh, self.far = control, mesh, far
         self.layout = layout = layout_of(control, mesh)
-        self.limits = limits = ShapeLimits(control, mesh, layout, parameters, far)
+        self.limits = limits = ShapeLimits(
+            control, mesh, layout, parameters[: len(layout.parameters)], far
+        )
         super().__init__(layout.n + limits.n_bend)
         self.dynamics, admissible = control.dynamics.in_speeds_of(RADIANS), control.admissible
         aims, gaits, n_joint = control.aims, admissible.gait, admissible.n_joint
@@ -112,10 +112,12 @@ class FullProgram(Program):
         names = sorted({name for aim in objectives for name in aim.uses})
 
         def period(*parts: ca.SX) -> ca.SX:
-            totals = {name: part / gaits.fraction for name, part in zip(names, parts, strict=True)}
+            totals = {
+                name: part / admissible.fraction for name, part in zip(names, parts, strict=True)
+            }
             for name, part in zip(names, parts, strict=True):
                 if name == "distance":
-                    totals[name] = chord_per_way(self.dynamics.turn) * part / gaits.fraction
+                    totals[name] = chord_per_way(self.dynamics.turn) * part / admissible.fraction
                 elif name == "rotation":
                     totals[name] = part[0] - part[1] + self.dynamics.turn
                 elif name == "period":
@@ -145,11 +147,11 @@ class FullProgram(Program):
         self.equations(angles, rates, np.repeat(gaits.offset(n_joint)[:, 0], mesh.n_point))
 
         # what grows along the mesh, and the boundary
-        sign, theta = closing_sign(gaits.closing_symmetry), pick(layout.theta[0])
+        sign, theta = closing_sign(aims.closing), pick(layout.theta[0])
         if sign is not None and aims.rotation is not None:
             self.add("rotation", theta[-1] + sign * theta[0])
-        if "theta" in kind_of_motion(control.dynamics).static_parameters:
-            self.add("heading", theta[0] - pick(p[-1]))
+        if "theta" in self.dynamics.states:
+            self.add("heading", theta[0] - pick(layout.static[-1]))
         state, rate = mesh.quadrature()
         ahead, aside, power = self.ways()
         self.add("distance", state @ pick(layout.distance) - RADIANS * rate @ ahead)
@@ -174,8 +176,8 @@ class FullProgram(Program):
         self.objective = -pick(of_period[0])
 
         self.lower, self.upper = np.full(self.n, -np.inf), np.full(self.n, np.inf)
-        bounds = gaits.bounds(admissible.body, widest(admissible.joint_limit))
-        self.lower[p[:, 0]], self.upper[p[:, 0]] = bounds
+        decisions = layout.decisions
+        self.lower[decisions], self.upper[decisions] = admissible.bounds()
         if layout.friction.size:
             most = self.dynamics.body.contact.largest_forces(control.dynamics.law)  # type: ignore[attr-defined]
             self.lower[layout.friction], self.upper[layout.friction] = -most, most
@@ -205,9 +207,9 @@ class FullProgram(Program):
         def value(*local: ca.SX) -> ca.SX:
             q, r, moments = shape(*local)
             slow = self.delta * ca.norm_2(r) if self.relative else self.delta
-            body, law, _, _, _, joint_map = self.dynamics
-            how: Any = {"unit": RADIANS, "moments": moments, "joint_map": joint_map}
-            return formula.at(Instants(body, law, q, r, slow, **how))
+            now = self.dynamics
+            how: Any = {"unit": RADIANS, "moments": moments, "joint_map": now.joint_map}
+            return formula.at(Instants(now.body, now.law, q, r, slow, **how))
 
         return self.repeat(value, variables)
 
@@ -230,7 +232,7 @@ class FullProgram(Program):
         return 1.0 if self.relative else RADIANS
 
     def member(self, x: np.ndarray) -> AnyGait:
-        return self.control.admissible.member(x[self.layout.parameters[:, 0]])
+        return self.control.admissible.member(x[self.layout.decisions])
 
     def moved_to(self, x: np.ndarray) -> tuple[FullProgram, np.ndarray]:
         """The program with path constraints at the worst instants of variables x, and its variables
@@ -252,7 +254,8 @@ class FullProgram(Program):
     def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
         """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
         motion = balanced_variables(self.control, self.layout, self.mesh, parameters, delta)
-        return np.concatenate([motion, self.limits.bends(parameters)])
+        shape = parameters[: len(self.layout.parameters)]
+        return np.concatenate([motion, self.limits.bends(shape)])
 
 
 def _lengths_of_sides(shares: np.ndarray, rates: np.ndarray, p: ca.SX) -> ca.SX:
@@ -382,8 +385,8 @@ class _Links(FullProgram):
 
     def _momenta_and_pace(self) -> list[np.ndarray]:
         """Momenta and a free log period at the points."""
-        free = [self.layout.pace] * self.dynamics.regime.free_pace
-        paces = np.repeat(self.layout.parameters[free], self.mesh.n_point, axis=1)
+        free = int(self.dynamics.regime.free is not None)
+        paces = np.repeat(self.layout.static[:free], self.mesh.n_point, axis=1)
         return [self.layout.momenta[:, self.sites], paces]
 
     def _froude(self, pace: ca.SX) -> Any:

@@ -10,14 +10,7 @@ import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights, sums
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.dynamics.kinds import (
-    OMEGA,
-    PeriodTotals,
-    Shapes,
-    initial_heading,
-    kind_of_motion,
-    static_parameters_of,
-)
+from colloc.dynamics.dynamics import OMEGA, PeriodTotals, Shapes
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL
@@ -38,6 +31,7 @@ class Layout:
 
     # of the period
     parameters: np.ndarray
+    static: np.ndarray
     totals: np.ndarray
     # at the mesh's sites
     theta: np.ndarray
@@ -69,15 +63,18 @@ class Layout:
     z: np.ndarray
     n: int
     integrals: tuple[Quantity, ...] = ()
-    pace: int = -1
-    """Index of the log period among the parameters."""
+
+    @property
+    def decisions(self) -> np.ndarray:
+        """Parameters of the gait, and the static ones."""
+        return np.concatenate([self.parameters, self.static])[:, 0]
 
     def total(self, name: str) -> np.ndarray:
         """A total of the solved part, ``(1,)``; of the rotation its end and begin; the log
         period."""
         places = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
         places |= {"distance": self.distance[0, -1:], "work": self.work[0, -1:]}
-        places |= {"rotation": self.theta[0, [-1, 0]], "period": self.parameters[self.pace]}
+        places |= {"rotation": self.theta[0, [-1, 0]], "period": self.static[:1, 0]}
         return places[name]
 
     def shape_speed(self, x: np.ndarray) -> np.ndarray:
@@ -101,6 +98,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
     mapped = mesh.n_point - lifted
     sizes = {
         "parameters": (gait.size(n_joint), 1),
+        "static": (len(dynamics.static_parameters), 1),
         "theta": (1, mesh.n_site),
         "distance": (1, mesh.n + 1),
         "work": (1, mesh.n + 1),
@@ -120,9 +118,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
     for name, (rows, columns) in sizes.items():
         indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
         start += rows * columns
-    # a free log period comes first of the static parameters, which come last
-    pace = -len(kind_of_motion(dynamics).static_parameters)
-    return Layout(n=start, **indices, integrals=control.aims.integrals, pace=pace)
+    return Layout(n=start, **indices, integrals=control.aims.integrals)
 
 
 def distance_and_work(
@@ -130,8 +126,7 @@ def distance_and_work(
 ) -> tuple[float, float]:
     """Distance and work of a period in the problem's units; a gait that turns has its chord."""
     way, work = (
-        float(x[row[0, -1]]) / control.admissible.gait.fraction
-        for row in (layout.distance, layout.work)
+        float(x[row[0, -1]]) / control.admissible.fraction for row in (layout.distance, layout.work)
     )
     return chord_per_way(control.dynamics.turn) * way, work * control.unit
 
@@ -146,14 +141,14 @@ def balanced_variables(
 ) -> np.ndarray:
     """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
     gaits, n_joint = control.admissible.gait, control.admissible.n_joint
-    kind = kind_of_motion(control.dynamics.in_speeds_of(RADIANS))
+    kind = control.dynamics.in_speeds_of(RADIANS)
+    x = np.zeros(layout.n)
+    x[layout.decisions] = parameters
+    parameters, begin = np.split(parameters, [len(layout.parameters)])
     if gait is None:
         gait = gaits.trajectory(parameters, n_joint)
-        begin = parameters[parameters.size - len(kind.static_parameters) :]
     else:
-        begin = static_parameters_of(kind, gait)
-    x = np.zeros(layout.n)
-    x[layout.parameters[:, 0]] = parameters
+        begin = kind.static_of(gait)
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
     relative, speed = gaits.relative_delta, np.ones(mesh.n_point)
     if relative:
@@ -161,26 +156,26 @@ def balanced_variables(
         speed = np.linalg.norm(rates, axis=0)
     slow = delta if relative else delta / RADIANS
     shapes = Shapes(angles, rates / speed, slow, RADIANS, speed)
-    along = kind.along(mesh, shapes, begin)
-    now, z = along.now, speed * along.z
+    along = kind.simulate(mesh, shapes, begin)
+    now, z = along.now, speed * along.now.z
 
     weight, points = RADIANS * stage_weights(mesh), mesh.points
     turn = kind.turn * speed / (point_weights(mesh) @ speed) if relative else kind.turn
     rotation, velocity = RADIANS * z[OMEGA] - turn, RADIANS * speed * np.array(now.centre)
-    pose = CollocatedPose.on_mesh(mesh, rotation, velocity, initial_heading(kind, begin))
+    pose = CollocatedPose.on_mesh(mesh, rotation, velocity, kind.initial_heading(begin))
     power = (weight * (speed * now.power)[points]).sum(axis=1)
     way, turned = complex(pose.place[-1]), float(pose.rotations.sum())
     along_totals = kind.total_gradients(PeriodTotals(way, turned, float(power.sum()), begin))
     heading = float(np.angle(along_totals["distance"].side))
     climbed = (pose.place * np.conj(along_totals["work"].side)).real
     # where the orientation is no state the plane is turned so that the gait goes along +x
-    theta_0 = 0.0 if "theta" in kind.static_parameters else -heading
+    theta_0 = 0.0 if "theta" in kind.states else -heading
     theta = theta_0 + pose.theta_on(mesh)
     x[layout.distance[0, 1:]] = (pose.place * np.exp(-1j * heading)).real[1:]
     x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
     x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
     x[layout.theta[0, mesh.edge_sites]] = theta_0 + pose.theta
-    at = kind.instants(shapes, pose.theta_on(mesh), along.z)
+    at = kind.instants(shapes, pose.theta_on(mesh), along.now.z)
     for quantity, total in zip(layout.integrals, layout.totals, strict=True):
         x[total] = (weight * (speed * quantity.at(at))[0, points]).sum()
     if layout.momenta.size:

@@ -289,7 +289,7 @@ class ShapeLimits:
         parameters: np.ndarray,
         far: Pairs,
     ) -> None:
-        gaits, body, self._limit, speeds, _ = control.admissible
+        gaits, body, self._limit, speeds, *_ = control.admissible
         gait = gaits.trajectory(parameters, body.n_joint)
         checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
         self._p, self._first, self.n_bend = layout.parameters[:, 0], layout.n, 0

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.dynamics.followed_motion import on_one_branch
+from colloc.dynamics.branches import on_one_branch
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity

@@ -14,13 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.dynamics.compiled_momenta import MomentaAt
+from colloc.dynamics.chain import MomentaAt, joint_torques
 from colloc.dynamics.follow import ONE_SIDED, STEP, Course, integrate_period
-from colloc.dynamics.torques import joint_torques
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
 from colloc.gaits.regime import LEVEL, Regime
-from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import LENGTH, Instants, PathLimits, Quantity, quantities_of
 from colloc.mechanics.fixed_point import solve_balance
@@ -145,7 +143,7 @@ class GaitWithInertia:
         return integrate_period(rates, begin.ravel(), aim, self.breaks)
 
     def _at(self, t: float, states: np.ndarray) -> np.ndarray:
-        """Outputs of `colloc.dynamics.compiled_momenta`, with the weight's pull, ``(n, 9)``."""
+        """Outputs of `colloc.dynamics.chain`, with the weight's pull, ``(n, 9)``."""
         angles, rates = self.path(np.array([t]))
         now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
         if self.regime.slides:
@@ -299,7 +297,7 @@ def inertial_motion(
     quantities : iterable of Quantity or str
         Further quantities that shapes and their rates sum up to.
     regime : Regime
-        On a slope `problem.regime`, or `colloc.gaits.sloped.Slope`: the gait says where it points,
+        On a slope `problem.regime`, or `colloc.gaits.regime.Regime`: the gait says where it points,
         distance and work are as of `colloc.slope_motion`.
     near : (3,), optional
         Momenta at phase 0 to begin with, as those of another delta; then as if the gait were played
@@ -468,9 +466,7 @@ def motion_from_rest(
     check_count(MOST_PERIODS, periods=periods)
     check_finite(grade=grade, theta=theta)
     how: Any = {"froude": froude, "breaks": breaks}
-    moving = GaitWithInertia(
-        body, friction, gait, delta, regime=Slope(float(grade)) if grade else LEVEL, **how
-    )
+    moving = GaitWithInertia(body, friction, gait, delta, regime=Regime(grade=float(grade)), **how)
     start = np.array([0.0, 0.0, 0.0, theta, 0.0, 0.0, 0.0])
     phases, states, ends = through_periods(partial(moving.run, aim=tolerance), start, periods)
     change = np.diff(ends)

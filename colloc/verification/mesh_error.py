@@ -14,7 +14,7 @@ import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, stage_weights
 from colloc.dynamics.control_problem import Admissible, ControlProblem
-from colloc.dynamics.kinds import OMEGA, PeriodTotals, kind_of_motion, motion_vjp
+from colloc.dynamics.dynamics import OMEGA, PeriodTotals
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.period import chord_per_way
@@ -67,7 +67,7 @@ def gait_motion(
     control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float
 ) -> Any:
     """The gait's motion: a `FineMotion`; where it has states, a `ReferenceMotion`."""
-    kind = kind_of_motion(control.dynamics)
+    kind = control.dynamics
     if kind.followed:
         return reference_motion(control, gait, delta, mesh, tolerance)
 
@@ -80,8 +80,7 @@ def gait_motion(
         return {name: counts[name] * by_period[name] for name in part}
 
     asked: Any = {"quantities": control.aims.integrals, "turn": kind.turn}
-    body, friction, *_ = control.dynamics
-    return fine_motion(body, friction, gait, delta, mesh.edges, tolerance, shares, **asked)
+    return fine_motion(kind.body, kind.law, gait, delta, mesh.edges, tolerance, shares, **asked)
 
 
 def mesh_error(
@@ -96,7 +95,7 @@ def mesh_error(
     need not be exact. `NotConvergedError` without a balance."""
     if fine is None:
         fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
-    known, kind = Known(control, gait, delta, fine), kind_of_motion(control.dynamics)
+    known, kind = Known(control, gait, delta, fine), control.dynamics
     violation = constraint_violation(control.admissible, mesh, gait)
     if kind.followed:
         return MeshError(**_errors_with_states(known, mesh), violation=violation)
@@ -125,7 +124,7 @@ def _first_order(
     integrals: Iterable[np.ndarray],
 ) -> np.ndarray:
     """Relative changes of the objective by errors of intervals; `displacement` at the end."""
-    kind, weights = kind_of_motion(control.dynamics), control.aims.objective.shares(period)
+    kind, weights = control.dynamics, control.aims.objective.shares(period)
     value = np.zeros(rotation.size)
     for name, share in kind.total_gradients(passed).items():
         way = (np.conj(share.side) * displacement).real
@@ -155,7 +154,7 @@ def _collocated_cells(known: Known, rule: Scheme, left: np.ndarray, right: np.nd
     (control, gait, delta, fine), h = known, right - left
     nodes = left[:, None] + h[:, None] * rule.c
     asked: Any = {"quantities": control.aims.integrals, "turn": control.dynamics.turn}
-    at = *control.dynamics[:2], gait, delta, nodes
+    at = control.dynamics.body, control.dynamics.law, gait, delta, nodes
     rates = rates_at(*at, near=fine.velocity(nodes), **asked)
     pose = CollocatedPose(rule, h, rates.z[2], rates.centre)
     totals = (h[:, None] * rule.b * rates.gained).sum(axis=2)
@@ -178,7 +177,7 @@ def _period(
     known: Known, end: complex, rotation: float, totals: np.ndarray
 ) -> tuple[PeriodTotals, dict[str, float]]:
     """The solved part, and quantities of the period."""
-    kind = kind_of_motion(known.control.dynamics)
+    kind = known.control.dynamics
     passed = PeriodTotals(complex(end), float(rotation) - kind.turn, float(totals[0]))
     names = (each.name for each in known.control.aims.integrals)
     return passed, period_of(kind, passed, dict(zip(names, totals[1:], strict=True)))
@@ -191,14 +190,14 @@ def _exact(known: Known) -> tuple[PeriodTotals, dict[str, float]]:
 
 def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     """`MeshError` but for the violation."""
-    (control, gait, delta, exact), kind = known, kind_of_motion(known.control.dynamics)
+    (control, gait, delta, exact), kind = known, known.control.dynamics
     aims, seen = control.aims, collocate(control, mesh, gait, delta)
     shapes, along, pose = seen[:3]
     at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
     passed = PeriodTotals(
-        complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), along.begin
+        complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), along.static
     )
     with_forces = iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
     integrals = {
@@ -224,8 +223,8 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
         if not kind.states[3:]:  # an error of rotation turns everything after it
             path = place[0] + 1j * place[1]
             displacement += 1j * rotation * (path[-1] - path[1:])
-        shares, (_, on_states) = kind.total_gradients(passed), kind.slopes(shapes, along)
-        *_, on_ends = motion_vjp(kind, mesh, pose, shares.values(), on_states)
+        shares, (_, on_states) = kind.total_gradients(passed), along.slopes()
+        *_, on_ends = kind.vjp(mesh, pose, shares.values(), on_states)
         counts = np.array([weights.get(name, 0.0) for name in shares])
         by_states = np.einsum("m,mkn,kn->n", counts, on_ends, ends - states[:, 1:])
         by_states[~solved] = 1.0

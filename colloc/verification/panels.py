@@ -40,7 +40,7 @@ class Panels(NamedTuple):
     """Rotation rate from evenly turning axes, velocity of the centre of mass in the body frame,
     power, densities: complex, ``(n, 5, 3 + k)``."""
     joint_power: np.ndarray  # (n, 5)
-    apart: np.ndarray  # `colloc.dynamics.followed_motion.FollowedMotion.apart`, (n, 5, 3 + k)
+    apart: np.ndarray  # `colloc.dynamics.branches.FollowedMotion.apart`, (n, 5, 3 + k)
     wider: np.ndarray  # `changes` of the panel that each is half of, (n, 3 + k)
 
     def take(self, chosen: np.ndarray) -> Panels:

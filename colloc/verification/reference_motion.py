@@ -9,18 +9,13 @@ import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, stage_weights
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.dynamics.kinds import (
+from colloc.dynamics.dynamics import (
     OMEGA,
-    Kind,
     PeriodTotals,
+    QuasiStatic,
     Shapes,
     Trajectory,
-    initial_heading,
-    kind_of_motion,
-    static_parameters_of,
 )
-from colloc.gaits.inertia import Paced
-from colloc.gaits.sloped import Slope
 from colloc.numerics.mesh import Mesh
 from colloc.verification.inertial_motion import GaitWithInertia, amplification
 from colloc.verification.replay_record import LEAST
@@ -35,7 +30,7 @@ class ReferenceMotion(NamedTuple):
     sums: Callable[[np.ndarray], np.ndarray] | None = None
     """Quantities that forces are needed for up to ascending phases, ``(k, n)``."""
     alone: Callable[..., Any] | None = None
-    """Intervals by themselves (`colloc.dynamics.kinds.Inertial.alone`); None: their errors are
+    """Intervals by themselves (`colloc.dynamics.dynamics.Inertial.alone`); None: their errors are
     seen in the whole motion."""
 
 
@@ -44,22 +39,22 @@ def reference_motion(
 ) -> ReferenceMotion:
     """The motion of a gait, delta per period, to a relative error of the objective; a regime of
     one's own has it as ``reference``, by an error of the states."""
-    dynamics, kind = control.dynamics, kind_of_motion(control.dynamics)
+    dynamics = control.dynamics
     on_mesh, regime = collocate(control, mesh, gait, delta), dynamics.regime
     counts = sum(map(abs, control.aims.objective.shares(on_mesh.period).values()))
     error = tolerance / counts if np.isfinite(counts) else tolerance
     if hasattr(regime, "reference"):
         return regime.reference(control, gait, delta, mesh, error)
-    if isinstance(regime, Paced):
+    if regime.froude:
         at = regime.at(gait)
         how: Any = {"froude": at.froude, "turn": dynamics.turn, "regime": at}
         moving = GaitWithInertia(dynamics.body, dynamics.law, gait, delta, **how)
         begin, _, slopes = moving.rough_period(on_mesh.along.edges[:, 0])
         times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
         run = moving.periodic_run(begin, max(error / times, LEAST), slopes)
-        alone = kind.alone  # type: ignore[attr-defined]
+        alone = dynamics.alone  # type: ignore[attr-defined]
         return ReferenceMotion(run.course.at, times * run.aim, alone=alone)
-    if isinstance(regime, Slope):
+    if regime.slides:
         asked = [each for each in control.aims.integrals if each.needs_forces]
         breaks = gait.corner_phases
         on = GaitOnSlope(dynamics.body, dynamics.law, gait, delta, regime.grade, breaks)
@@ -83,26 +78,26 @@ class Collocated(NamedTuple):
 
 def collocate(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> Collocated:
     kind, weights, (angles, rates) = (
-        kind_of_motion(control.dynamics),
+        control.dynamics,
         stage_weights(mesh),
         gait(mesh.times),
     )
     shapes = Shapes(angles, rates, delta)
-    along = kind.along(mesh, shapes, static_parameters_of(kind, gait))
-    theta = initial_heading(kind, along.begin)
-    pose = CollocatedPose.on_mesh(mesh, along.z[OMEGA] - kind.turn, along.now.centre, theta)
-    now = kind.instants(shapes, pose.theta_on(mesh), along.z)
+    along = kind.simulate(mesh, shapes, kind.static_of(gait))
+    theta = kind.initial_heading(along.static)
+    pose = CollocatedPose.on_mesh(mesh, along.now.z[OMEGA] - kind.turn, along.now.centre, theta)
+    now = kind.instants(shapes, pose.theta_on(mesh), along.now.z)
     work = (weights * along.now.power[mesh.points]).sum(axis=1)
     sums = {
         each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1)
         for each in control.aims.integrals
     }
     way, turn = complex(pose.place[-1]), float(pose.rotations.sum())
-    passed = PeriodTotals(way, turn, float(work.sum()), along.begin)
+    passed = PeriodTotals(way, turn, float(work.sum()), along.static)
     return Collocated(shapes, along, pose, work, sums, period_of(kind, passed, sums))
 
 
-def period_of(kind: Kind, passed: PeriodTotals, sums: Mapping[str, Any]) -> dict[str, float]:
+def period_of(kind: QuasiStatic, passed: PeriodTotals, sums: Mapping[str, Any]) -> dict[str, float]:
     """Quantities of a period from those of the solved part."""
     totals = {name: kind.periods * float(np.sum(part)) for name, part in sums.items()}
     return kind.totals(passed) | totals

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.dynamics.kinds import kind_of_motion
 from colloc.gaits.gait_fields import AnyGait
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
@@ -60,9 +59,9 @@ def kink_knots(
     control: ControlProblem, gait: AnyGait, delta: float, fine: FineMotion
 ) -> np.ndarray:
     """Phases of the kinks of a gait's velocities, one for each group of very close ones."""
-    apart = _ONE_KINK * control.admissible.gait.fraction
+    apart = _ONE_KINK * control.admissible.fraction
     knots: list[float] = []
-    for kink in kink_phases(*control.dynamics[:2], gait, delta, fine):
+    for kink in kink_phases(control.dynamics.body, control.dynamics.law, gait, delta, fine):
         if not knots or kink - knots[-1] > apart:
             knots.append(float(kink))
     return np.array(knots)
@@ -114,8 +113,8 @@ def plan_mesh(
         return MeshPlan(mesh.scheme.name, edges, error.estimate, True, knots)
     rules, gaits = _family(scheme(control.scheme)), control.admissible.gait
     asked: Any = {"kept": knots, "tolerance": tolerance, "aim": aim}
-    if kind_of_motion(control.dynamics).followed:
-        uniform = np.linspace(0.0, gaits.fraction, control.intervals + 1)
+    if control.dynamics.followed:
+        uniform = np.linspace(0.0, control.admissible.fraction, control.intervals + 1)
         first = np.union1d(mesh.edges if nested else uniform, knots)
         return _fewest(_halve(known, rule, first, budget=most_points, **asked) for rule in rules)
     kinks = kink_knots(control, gait, delta, fine)

@@ -2,7 +2,7 @@
 
 It shares nothing with collocation but the friction law: velocities by the NumPy solver at five
 instants of panels (`colloc.verification.panels`). Where several balance an instant, it follows one
-branch in time, and says how far the others would lead (`colloc.dynamics.followed_motion`).
+branch in time, and says how far the others would lead (`colloc.dynamics.branches`).
 """
 
 from __future__ import annotations
@@ -14,13 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from colloc.dynamics.branches import FORWARDS, followed_motion
 from colloc.dynamics.follow import ONE_SIDED
-from colloc.dynamics.followed_motion import FORWARDS, followed_motion
-from colloc.gaits.inertia import Paced
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.regime import Regime
-from colloc.gaits.sloped import Slope
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import (
     LENGTH,
@@ -170,7 +168,7 @@ def replay(
     0.26
     """
     if froude:
-        return replayer(Paced(froude))(
+        return replayer(Regime(froude=froude))(
             body, friction, path, delta, tolerance=tolerance, breaks=breaks, objective=objective,
             quantities=quantities, turn=turn,
         )  # fmt: skip
@@ -288,11 +286,11 @@ def replayer(regime: Regime) -> Callable[..., Replay]:
     own = getattr(regime, "replay", None)
     if own is not None:
         return own
-    if isinstance(regime, Paced):
+    if regime.froude:
         from colloc.verification.inertial_motion import inertial_replay  # loads what integrates
 
         return partial(inertial_replay, regime=regime)
-    if isinstance(regime, Slope):
+    if regime.slides:
         from colloc.verification.slope import slope_replay
 
         return partial(slope_replay, slope=regime)

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from colloc.dynamics.chain import balance_on_slope
 from colloc.dynamics.follow import Course, integrate_period
-from colloc.dynamics.on_slope import balance_on_slope
 from colloc.gaits.objective import EFFICIENCY, Objective
-from colloc.gaits.sloped import Slope, checked_chain
+from colloc.gaits.regime import Regime, checked_chain
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import (
     LENGTH,
@@ -110,7 +110,7 @@ class GaitOnSlope:
         grade: float,
         breaks: np.ndarray | tuple[float, ...] = (),
     ) -> None:
-        self.body, self.slope = checked_chain(body, friction, grade), Slope(float(grade))
+        self.body, self.slope = checked_chain(body, friction, grade), Regime(grade=float(grade))
         self.friction, self.path, self.delta = friction, path, delta
         self.breaks = tuple(sorted(map(float, breaks)))
 
@@ -267,7 +267,7 @@ def slope_replay(
     gait: Any,
     delta: float,
     *,
-    slope: Slope,
+    slope: Regime,
     instants: int = 1600,
     tolerance: float = 1e-6,
     breaks: np.ndarray | tuple[float, ...] = (),

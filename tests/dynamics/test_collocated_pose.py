@@ -4,8 +4,7 @@ and which way a gait goes."""
 import numpy as np
 import pytest
 
-from colloc.dynamics.collocated import CollocatedPose
-from colloc.dynamics.heading import heading
+from colloc.dynamics.collocated import CollocatedPose, heading
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme

@@ -4,7 +4,7 @@ every choice."""
 import numpy as np
 import pytest
 
-from colloc.dynamics.followed_motion import BACKWARDS, FORWARDS, followed_motion, on_one_branch
+from colloc.dynamics.branches import BACKWARDS, FORWARDS, followed_motion, on_one_branch
 from colloc.gaits.harmonic import Fourier, ellipse
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.chain_motion import chain_motion
@@ -142,7 +142,7 @@ def test_an_instant_without_any_balance_is_said_to_have_none(monkeypatch):
         z[:, :, 3], sign[:, 3] = np.nan, 0.0
         return Branches(z, sign)
 
-    monkeypatch.setattr("colloc.dynamics.followed_motion.all_balanced_velocities", lost)
+    monkeypatch.setattr("colloc.dynamics.branches.all_balanced_velocities", lost)
     angles, rates = ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 20))
     with pytest.raises(NotConvergedError, match="at 1 of 20 instants"):
         followed_motion(Chain(), Friction(mu_t=1.0, mu_f=0.01, mu_b=100.0), angles, rates, 1e-4)

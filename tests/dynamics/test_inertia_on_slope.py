@@ -6,9 +6,7 @@ import pytest
 
 import colloc
 from colloc.dynamics.control_problem import control_problem
-from colloc.dynamics.kinds import kind_of_motion
-from colloc.gaits.inertia import PacedOnSlope
-from colloc.gaits.sloped import Slope
+from colloc.gaits.regime import Regime
 from colloc.pictures.robot_model import mjcf
 from colloc.reduced.motion import ReducedMotion
 from colloc.results.robot import joint_torques
@@ -36,12 +34,18 @@ def problem(**fields):
 
 def motion_of(stated):
     space, v = space_near(stated, LEANING)
-    return ReducedMotion(kind_of_motion(control_problem(stated).dynamics), space.mesh, space), v
+    return ReducedMotion(control_problem(stated).dynamics, space.mesh, space), v
 
 
 def played(grade, froude, towards=None):
     return inertial_motion(
-        BODY, FRICTION, LEANING, DELTA, froude, tolerance=1e-6, regime=Slope(grade, towards)
+        BODY,
+        FRICTION,
+        LEANING,
+        DELTA,
+        froude,
+        tolerance=1e-6,
+        regime=Regime(grade=grade, towards=towards),
     )
 
 
@@ -92,7 +96,7 @@ def test_a_gait_is_found_and_certified_and_kept(found, tmp_path):
     assert {check.name for check in found.certificate.checks} >= {"stability", "net rotation"}
     read = colloc.load(colloc.save(found, tmp_path / "gliding.h5"))
     assert (read.problem.regime, read.certificate) == (
-        PacedOnSlope(grade=0.05, froude=0.03),
+        Regime(grade=0.05, froude=0.03),
         found.certificate,
     )
     assert read.gait.theta == found.gait.theta

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, load, save
+from colloc.dynamics.dynamics import QuasiStatic, Trajectory
 from colloc.dynamics.follow import integrate_period
-from colloc.dynamics.kinds import QuasiStatic, Trajectory, kind_in
 from colloc.gaits import gait_fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
@@ -27,12 +27,39 @@ from colloc.verification.replay import replay, replayer
 from colloc.verification.replay_record import Replay, to_tolerance
 
 
+class PushedMotion(QuasiStatic):
+    """The balance holds instant by instant, with the push; the work is that of the joints."""
+
+    followed = True
+
+    def simulate(self, mesh, shapes, static, near_states=None, near_z=None):
+        at = self.body, self.law, shapes.angles, shapes.rates, shapes.delta
+        pushed = self.regime.pull(np.zeros((1, mesh.n_point)))
+        solved = solve_balance(*at, load=pushed, start=near_z, tolerance=1e-12)
+        now = chain_motion(*at, solved, pushed)
+
+        def slopes():
+            found = motion_and_derivatives(*at, solved, pushed)[1][:, : 2 * self.body.n_joint]
+            found[5] -= self.regime.push * found[3]
+            return found, found[:, :0]
+
+        now = now._replace(power=now.actuator_power)
+        return Trajectory(static, now, solved.residual < 1e-9, slopes)
+
+    def instants(self, shapes, theta, z=None):
+        at = self.law, shapes.angles, shapes.rates, shapes.delta
+        pushed = self.regime.pull(np.zeros((1, theta.size)))
+        z = solve_balance(self.body, *at, load=pushed).z if z is None else z
+        return Instants(self.body, *at, z=z, unit=shapes.unit, load=pushed)
+
+
 @dataclass(frozen=True)
 class Pushed(Regime):
     """Slow, on the level, and pushed along the tail link by a force in units of the weight."""
 
     push: float
 
+    dynamics = PushedMotion
     spent = "friction less what the push does"
 
     @property
@@ -49,7 +76,7 @@ class Pushed(Regime):
         return namespace(theta).stack([self.push + 0 * theta, 0 * theta])
 
     def reference(self, control, gait, delta, mesh, error):
-        ran = Gait(*control.dynamics[:2], gait, delta, self.push).run(error)
+        ran = Gait(control.dynamics.body, control.dynamics.law, gait, delta, self.push).run(error)
         return ReferenceMotion(lambda t: ran.at(t)[:4], error)
 
     def replay(
@@ -81,54 +108,6 @@ class Pushed(Regime):
             tail=(t, solved.z),
             objective=objective,
         )
-
-
-class PushedMotion(QuasiStatic):
-    """The balance holds instant by instant, with the push; the work is that of the joints."""
-
-    followed = True
-
-    def __init__(self, body, friction, symmetry, push):
-        super().__init__(body, friction, symmetry)
-        self._push = push
-
-    def _load(self, shapes):
-        return Pushed(self._push).pull(np.zeros((1, shapes.angles.shape[1])))
-
-    def along(self, mesh, shapes, begin, near=(None, None), tolerance=1e-12):
-        at, pushed = (
-            (self.body, self.friction, shapes.angles, shapes.rates, shapes.delta),
-            self._load(shapes),
-        )
-        solved = solve_balance(*at, load=pushed, start=near[1], tolerance=tolerance)
-        now = chain_motion(*at, solved, pushed)
-        held = solved.residual < 1e3 * tolerance
-        return Trajectory(
-            begin,
-            np.empty((0, held.size)),
-            solved.z,
-            now._replace(power=now.actuator_power),
-            held,
-            solved=solved,
-        )
-
-    def slopes(self, shapes, along):
-        at = self.body, self.friction, shapes.angles, shapes.rates, shapes.delta
-        found = motion_and_derivatives(*at, along.solved, self._load(shapes))[1][
-            :, : 2 * self.body.n_joint
-        ]
-        found[5] -= self._push * found[3]
-        return found, found[:, :0]
-
-    def instants(self, shapes, theta, z=None):
-        at, pushed = (self.friction, shapes.angles, shapes.rates, shapes.delta), self._load(shapes)
-        z = solve_balance(self.body, *at, load=pushed).z if z is None else z
-        return Instants(self.body, *at, z=z, unit=shapes.unit, load=pushed)
-
-
-@kind_in.register
-def _(regime: Pushed, of):
-    return PushedMotion(of.body, of.law, of.symmetry, regime.push)
 
 
 class Gait:

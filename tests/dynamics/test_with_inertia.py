@@ -6,10 +6,10 @@ import pytest
 
 import colloc
 from colloc.commands.solve import summary_lines
-from colloc.dynamics import kinds
-from colloc.dynamics.compiled_momenta import momenta_along_states, momenta_at
+from colloc.dynamics import dynamics
+from colloc.dynamics.chain import momenta_at
 from colloc.dynamics.control_problem import control_problem
-from colloc.dynamics.kinds import Shapes, kind_of_motion, static_parameters_of
+from colloc.dynamics.dynamics import Shapes
 from colloc.gaits.objective import objective_from
 from colloc.mechanics.inertia import kinetic_energy, momentum_rates
 from colloc.mechanics.native_kernel import numpy_instead
@@ -99,7 +99,7 @@ def test_shooting_and_collocation_find_the_same_motion(froude):
     assert found["work"] == pytest.approx(shot.work, rel=2e-4)
     assert found["rotation"] == pytest.approx(shot.rotation, abs=2e-4)
     kind, mesh, gait = reduced.motion.kind, reduced.space.mesh, reduced.space.member(v)
-    along = kind.along(mesh, Shapes(*gait(mesh.times), 1e-2), static_parameters_of(kind, gait))
+    along = kind.simulate(mesh, Shapes(*gait(mesh.times), 1e-2), np.empty(0))
     largest = np.abs(shot.states[:3]).max()
     for momentum, edges in zip(shot.states[:3], along.edges, strict=True):
         np.testing.assert_allclose(
@@ -149,22 +149,22 @@ def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypa
     space, _ = space_near(stated, LEANING)
     angles, rates = LEANING(space.mesh.times)
     kind, at = (
-        kind_of_motion(control_problem(stated).dynamics),
+        control_problem(stated).dynamics,
         (space.mesh, Shapes(angles, rates, 1e-4), np.empty(0)),
     )
     expected, far, asked = (
-        kind.along(*at),
+        kind.simulate(*at),
         np.random.default_rng(seed).normal(size=(3, space.mesh.n_point)),
         [],
     )
     monkeypatch.setattr(
-        kinds,
-        "momenta_along_states",
-        lambda *given: asked.append(1) or momenta_along_states(*given),
+        dynamics,
+        "momenta_at",
+        lambda *given, **how: asked.append(1) or momenta_at(*given, **how),
     )
-    compiled = kind.along(*at, near=(far, None))
+    compiled = kind.simulate(*at, far)
     with numpy_instead():
-        found = kind.along(*at, near=(far, None))
+        found = kind.simulate(*at, far)
     assert found.held.all()
     assert compiled.held.all()
     np.testing.assert_allclose(compiled.states, found.states, atol=1e-11)

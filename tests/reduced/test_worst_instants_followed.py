@@ -9,7 +9,6 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem
 from colloc.gaits.starts import latin_hypercube_gait
-from colloc.reduced.constraints import Constraints
 from colloc.reduced.program import ReducedProgram
 from colloc.search import converge
 from colloc.search.converge import solve_subproblems
@@ -75,7 +74,7 @@ def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, 
     """With the instants held it swings: every round is optimal for the instants of the one
     before."""
     if not follows:
-        monkeypatch.setattr(Constraints, "following", lambda held: held)
+        monkeypatch.setattr(ReducedProgram, "follow_worst", lambda held: None)
     monkeypatch.setattr(converge, "OPTIONS", replace(OPTIONS, radius=0.5))
     body, friction = Chain((0.25, 0.25, 0.25, 0.25)), Friction(mu_t=0.4, mu_f=1, mu_b=1)
     problem = Problem(

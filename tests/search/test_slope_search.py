@@ -71,13 +71,13 @@ def test_a_body_on_feet_climbs_a_slope_that_is_too_steep_for_one_that_lies():
 
 
 def test_no_gait_and_no_heading_beside_it_climbs_better(uphill):
-    own, gait, rng = PROBLEM.gait, uphill.gait, np.random.default_rng(2)
+    own, gait, rng = control_problem(PROBLEM).admissible, uphill.gait, np.random.default_rng(2)
     v = own.parameters(gait)
     for size in (0.03, 0.1):
         for _ in range(2):
             # folded links may not cross
             step = np.append(-np.abs(rng.normal(size=v.size - 1)) * np.sign(v[:-1]), rng.normal())
-            assert run(Chain(), own.member(v + size * step, 2)) < uphill.certificate.value
+            assert run(Chain(), own.member(v + size * step)) < uphill.certificate.value
     assert uphill.certificate.value > 1.05 * run(Chain(), ellipse(0, 2.8, 1.3))
 
 

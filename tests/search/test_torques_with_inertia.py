@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import colloc
+from colloc.dynamics.chain import joint_torques, torque_function
 from colloc.dynamics.control_problem import control_problem
-from colloc.dynamics.torques import joint_torques, torque_function
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.inertia import (
     inertial_moments,

@@ -145,13 +145,14 @@ def test_a_gait_in_balance_satisfies_every_equation_on_any_scheme(case, name):
 def test_moments_at_the_joints_are_those_that_the_power_of_single_joints_says(case):
     """Two statements that share nothing: recursion along the chain, and virtual work."""
     full, x, *_ = at_guess(stated(case))
-    body, law, regime, *_ = full.control.dynamics
+    dynamics = full.control.dynamics
+    body, law = dynamics.body, dynamics.law
     gait, t = full.member(x), full.mesh.times
     q, r = gait.angles(t), gait.rates(t) / RADIANS
     law = law.in_speeds_of(RADIANS)
     z, theta = full.layout.tail_velocity(body, x), x[full.layout.directions[:1]]
     forces = body.forces(law, q, r, z, 0.1 / full.delta_unit)
-    expected = joint_moments(body, q, forces, regime.pull(theta))
+    expected = joint_moments(body, q, forces, dynamics.regime.pull(theta))
     np.testing.assert_allclose(x[full.layout.moments], expected, atol=1e-12)
 
 

@@ -1,0 +1,204 @@
+r"""A chain under its weight on a slope, and with inertia: balance, rates of the momenta
+(`colloc.mechanics.inertia`) and joint torques, with derivatives.
+
+With the kinetic energy T(q, r, z) of a body of mass 1 that moves with joint angles q, rates r and
+tail velocity z, the equation of joint j is
+
+    Fr (d/dt dT/dr_j - dT/dq_j) = M_j - (virtual power of friction, the tail resting).
+
+A uniform pull, as that of a slope, accelerates all links alike and takes no torque. Replays take
+the accelerations of the links by differences in time, programs by derivatives of z(q, r, momenta);
+the two share no formula.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colloc.gaits.regime import Regime
+from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.balance import Moving
+from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.chain_motion import motion_and_derivatives
+from colloc.mechanics.densities import Instants, PathLimits
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.inertia import (
+    STATES,
+    Path,
+    inertial_moments,
+    kinetic_energy,
+    momentum_rates,
+    tail_velocity,
+)
+from colloc.mechanics.law import Law
+from colloc.mechanics.links import LinkVelocity
+from colloc.mechanics.native_kernel import kernel_momenta, native_kernel
+
+N_OUT = 9
+"""Tail velocity, velocity of the centre of mass, power, rates of the momenta."""
+_STEP = 1e-5  # of differences in time, in phase
+_LOAD = slice(-2, None)
+
+
+class Leaning(NamedTuple):
+    """A chain at instants on a slope."""
+
+    solved: BalanceSolution
+    now: BalancedMotion
+    on_shape: np.ndarray
+    """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles,
+    rates), ``(6, 2 n_joint, n)``."""
+    on_theta: np.ndarray
+    """The same with respect to the orientation, ``(6, n)``."""
+
+
+def balance_on_slope(
+    body: Chain,
+    friction: Law,
+    slope: Regime,
+    shapes: tuple[np.ndarray, np.ndarray, float],
+    theta: np.ndarray,
+    **settings: Any,
+) -> Leaning:
+    """The balance of angles and rates ``(n_joint, n)`` at a delta, the tail link at angles theta
+    ``(n,)`` from straight uphill [rad]; settings are the start and tolerance of `solve_balance`."""
+    load = slope.pull(theta[None])
+    load = np.zeros((2, theta.size)) if load is None else load
+    solved = solve_balance(body, friction, *shapes, load=load, **settings)
+    now, slopes = motion_and_derivatives(body, friction, *shapes, solved, load)
+    on_load = slopes[:, _LOAD]
+    # the pull turns against theta
+    on_theta = on_load[:, 0] * load[1] - on_load[:, 1] * load[0]
+    return Leaning(solved, now, slopes[:, : _LOAD.start], on_theta)
+
+
+@lru_cache(maxsize=32)
+def _momenta_function(body: Chain, friction: Law, *, differentiated: bool) -> Any:
+    """(angles, rates, momenta, delta, Froude number) to outputs and derivatives along the first
+    three."""
+    import casadi as ca  # which nothing slow needs, nor a search
+
+    sizes = {"angles": body.n_joint, "rates": body.n_joint, "momenta": len(STATES)}
+    given = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
+    delta, froude = ca.SX.sym("delta"), ca.SX.sym("froude")
+    now = momentum_rates(body, friction, *given.values(), delta=delta, froude=froude)
+    out, slopes = ca.vertcat(now.z, given["momenta"][:2], now.power, now.rates), ca.SX(0, 1)
+    if differentiated:
+        slopes = ca.vec(ca.densify(ca.jacobian(out, ca.vertcat(*given.values())).T))
+    return ca.Function("momenta", [*given.values(), delta, froude], [out, slopes], {"cse": True})
+
+
+def momenta_at(
+    body: Chain,
+    friction: Law,
+    shapes: tuple[np.ndarray, np.ndarray, float],
+    states: np.ndarray,
+    froude: float,
+    *,
+    along_states: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Outputs ``(9, n_time)`` and derivatives ``(9, 2 n_joint + 3, n_time)`` along angles, rates,
+    momenta, or along the momenta alone; `shapes` are angles, rates ``(n_joint, n_time)`` and
+    delta."""
+    columns = len(STATES) if along_states else 2 * body.n_joint + len(STATES)
+    library, (angles, rates, delta) = native_kernel(body, friction), shapes
+    if library is not None:
+        moving = Moving(body, friction, angles, rates, delta, None)
+        return kernel_momenta(library, moving, states, froude, columns=columns)
+    evaluate = _momenta_function(body, friction, differentiated=True)
+    out, slopes = evaluate(angles, rates, states, delta, froude)
+    by_output = slopes.full().reshape(N_OUT, -1, states.shape[1])
+    return np.asarray(out.full()), np.asarray(by_output[:, -columns:])
+
+
+class MomentaAt:
+    """Outputs ``(n, 9)`` for n momenta at one time, in a few microseconds."""
+
+    def __init__(self, body: Chain, friction: Law, delta: float, froude: float, n: int = 1) -> None:
+        shapes = np.zeros((2, body.n_joint))
+        momenta = np.zeros((n, len(STATES)))
+        numbers = np.array([[delta], [froude]])
+        self._given, self._out = (*shapes, momenta, *numbers), np.zeros((n, N_OUT))
+        one = _momenta_function(body, friction, differentiated=False)
+        self._function = one.map("momenta", "serial", n, [0, 1, 3, 4], list[int]())
+        self._buffer, self._evaluate = self._function.buffer()
+        for k, given in enumerate(self._given):
+            self._buffer.set_arg(k, memoryview(given.reshape(-1).data))
+        self._buffer.set_res(0, memoryview(self._out.reshape(-1).data))
+
+    def __call__(self, angles: np.ndarray, rates: np.ndarray, states: np.ndarray) -> np.ndarray:
+        self._given[0][:], self._given[1][:], self._given[2][:] = angles, rates, states
+        self._evaluate()
+        return self._out.copy()
+
+
+def joint_torques(
+    body: Chain,
+    friction: Law,
+    path: Path,
+    t: np.ndarray,
+    momenta: np.ndarray,
+    *,
+    delta: float,
+    froude: float,
+) -> np.ndarray:
+    """Joint torques ``(n_joint, n_time)`` of a gait with momenta ``(3, n_time)`` at phases t."""
+    angles, rates = path(t)
+    z = tail_velocity(body, angles, rates, momenta)
+    how: Any = {"delta": delta, "froude": froude}
+    changes = momentum_rates(body, friction, angles, rates, momenta, **how).rates
+
+    def link_velocity(by: float) -> LinkVelocity:
+        angles, rates = path(t + by)
+        tail = tail_velocity(body, angles, rates, momenta + by * changes)
+        return body.velocity(body.posture(angles), rates, tail)
+
+    pairs = zip(link_velocity(-_STEP), link_velocity(_STEP), strict=True)
+    growth = LinkVelocity(*((after - before) / (2 * _STEP) for before, after in pairs))
+    link = body.velocity(body.posture(angles), rates, z)
+    forces = body.forces(friction, angles, rates, z, delta)
+    inertial = froude * inertial_moments(body, angles, link, growth)
+    return joint_moments(body, angles, forces) + inertial
+
+
+@lru_cache(maxsize=32)
+def torque_function(body: Chain, friction: Law) -> Any:
+    """CasADi function (q, r, q'', momenta, delta, Froude number) to the joint torques ``(n_joint,
+    1)`` at one time, in any unit of time."""
+    import casadi as ca
+
+    n = body.n_joint
+    sizes = (("q", n), ("r", n), ("a", n), ("momenta", len(STATES)), ("delta", 1), ("froude", 1))
+    q, r, accelerations, momenta, delta, froude = symbols = [ca.SX.sym(*each) for each in sizes]
+    z = tail_velocity(body, q, r, momenta)
+    changes = momentum_rates(body, friction, q, r, momenta, delta=delta, froude=froude).rates
+    z_rate = ca.jtimes(z, ca.vertcat(q, r, momenta), ca.vertcat(r, accelerations, changes))
+    tail, tail_rate = ca.SX.sym("z", 3), ca.SX.sym("z_rate", 3)
+    energy = kinetic_energy(body, q, r, tail)
+    way = ca.vertcat(q, r, tail), ca.vertcat(r, accelerations, tail_rate)
+    inertia = ca.jtimes(ca.gradient(energy, r), *way) - ca.gradient(energy, q)
+    inertia = ca.substitute(inertia, ca.vertcat(tail, tail_rate), ca.vertcat(z, z_rate))
+    forces = body.forces(friction, q, r, z, delta)
+    torques = joint_moments(body, q, forces) + froude * inertia
+    return ca.Function("torques", symbols, [torques], {"cse": True})
+
+
+@lru_cache(maxsize=32)
+def limit_shares(body: Chain, friction: Law, limits: PathLimits) -> Any:
+    """CasADi functions (y, delta) to shares of limits, ``(n_share, n_time)``, and to their
+    derivatives along y = (q, r, q'', momenta, Froude number), row by row."""
+    import casadi as ca
+
+    n = body.n_joint
+    sizes = (("q", n), ("r", n), ("a", n), ("momenta", len(STATES)), ("froude", 1))
+    q, r, accelerations, momenta, froude = parts = [ca.SX.sym(*each) for each in sizes]
+    y, delta = ca.vertcat(*parts), ca.SX.sym("delta")
+    moments = torque_function(body, friction)(q, r, accelerations, momenta, delta, froude)
+    out = limits.at(Instants(body, friction, q, r, delta, moments=moments))
+    slope = ca.vec(ca.densify(ca.jacobian(out, y).T))
+    values = ca.Function("shares", [y, delta], [out], {"cse": True})
+    return values, ca.Function("share_slopes", [y, delta], [slope], {"cse": True})

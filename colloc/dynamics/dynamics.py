@@ -1,0 +1,485 @@
+r"""Dynamics of a gait: states of a period besides the shape, their rates, and period totals.
+
+| dynamics | states solved for | integrated |
+|---|---|---|
+| quasi-static on level ground | none: balanced at every time | orientation, place, work |
+| quasi-static on a slope | orientation theta, on which the pull depends | place, work |
+| inertial on level ground | momenta Vx, Vy, H, periodic | orientation, place, work |
+| inertial on a slope | momenta and orientation | place, work |
+
+Static parameters, such as the initial heading on a slope and the log period at a free pace, are the
+last entries of the vector of decisions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from colloc.dynamics.branches import on_one_branch
+from colloc.dynamics.chain import balance_on_slope, momenta_at
+from colloc.dynamics.collocated import (
+    CollocatedPose,
+    heading,
+    momenta_image,
+    stage_weights,
+    sums,
+)
+from colloc.dynamics.states import CollocatedStates, Rates
+from colloc.gaits.period import chord_per_way
+from colloc.gaits.regime import LEVEL, Regime, checked_chain
+from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction
+from colloc.mechanics.balance import Moving
+from colloc.mechanics.bodies import BalancedMotion, Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.chain_motion import motion_and_derivatives
+from colloc.mechanics.densities import Instants
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
+from colloc.mechanics.joint_map import JointMap
+from colloc.mechanics.law import Law
+from colloc.mechanics.native_kernel import kernel_repeating, native_kernel
+from colloc.numerics.mesh import Mesh
+
+_MOMENTA, _MORE = slice(len(STATES)), slice(-len(STATES), None)
+_VISCOUS, _WETTER = 3.0, 10**0.5
+"""Delta at which friction is as good as viscous, and the factor between deltas."""
+_TOLERANCE, _BALANCED = 1e-12, 1e-9
+"""Residual at which balances are solved, and where rounding may stop the solver."""
+OMEGA, OUTPUTS = 2, slice(2, None)
+"""Rows of `Trajectory.slopes`: rotation rate; all after the tail's velocity."""
+
+
+class StaticParameter(NamedTuple):
+    """A number of a gait besides its angles; a guess of NaN is made by the search."""
+
+    name: str
+    lower: float
+    upper: float
+    guess: float
+
+
+class Shapes(NamedTuple):
+    """Angles and rates ``(n_joint, n_point)`` per time over `unit`, delta in that unit, and the
+    pace ``(n_point,)`` that multiplies velocities."""
+
+    angles: np.ndarray
+    rates: np.ndarray
+    delta: float
+    unit: float = 1.0
+    pace: np.ndarray | float = 1.0
+
+
+class Trajectory(NamedTuple):
+    """A motion at the points of a mesh."""
+
+    static: np.ndarray
+    """Static parameters, ``(n_static,)``."""
+    now: BalancedMotion
+    """Per time over the shapes' unit."""
+    held: np.ndarray
+    """Points where the equations hold, ``(n_point,)``."""
+    slopes: Callable[[], tuple[np.ndarray, np.ndarray]]
+    """Derivatives of (tail velocity, velocity of the centre, power, rates of states) along (angles,
+    rates), ``(6 + k, 2 n_joint, n_point)``, and along the states, ``(6 + k, n_state, n_point)``."""
+    states: np.ndarray = np.empty((0, 0))
+    """``(n_state, n_point)``."""
+    edges: np.ndarray = np.empty((0, 0))
+    """Momenta at the edges of the mesh, ``(3, n + 1)``."""
+
+
+class PeriodTotals(NamedTuple):
+    """Totals of the solved part of a period: displacement (from orientation 0, or in the plane
+    where that is a state), rotation, work, static parameters; seen from axes that turn evenly."""
+
+    displacement: complex
+    rotation: float
+    work: float
+    static: np.ndarray = np.empty(0)
+
+
+class TotalGradient(NamedTuple):
+    """Gradient of a period total: along a displacement, rotation, work, and the first static
+    parameter."""
+
+    side: complex = 0.0
+    rotation: float = 0.0
+    work: float = 0.0
+    static: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class QuasiStatic:
+    """Slow motion on level ground: no states, distance along the direction of travel. Base of all
+    dynamics."""
+
+    body: Body
+    law: Law
+    regime: Regime = LEVEL
+    symmetry: str = NONE
+    """Symmetry of the motion (`colloc.gaits.symmetry`)."""
+    turn: float = 0.0
+    """Prescribed rotation over a period [rad]."""
+    joint_map: JointMap | None = None
+
+    states: ClassVar[tuple[str, ...]] = ()
+    followed = False
+    """Whether mesh errors come from a differential equation
+    (`colloc.verification.reference_motion`)."""
+    lack = "no velocity balances the body; give another guess"
+    """What may be wrong where a gait has no motion, and what to try."""
+
+    @property
+    def static_parameters(self) -> tuple[StaticParameter, ...]:
+        return ()
+
+    @property
+    def periods(self) -> float:
+        """Solved parts of a period."""
+        return 1.0 / fraction(self.symmetry)
+
+    def in_speeds_of(self, unit: float) -> Self:
+        return replace(self, law=self.law.in_speeds_of(unit))
+
+    def simulate(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        static: np.ndarray,
+        near_states: np.ndarray | None = None,
+        near_z: np.ndarray | None = None,
+    ) -> Trajectory:
+        """Motion along a mesh, from states and tail velocities to start from."""
+        body, at = self.body, (self.law, shapes.angles, shapes.rates, shapes.delta)
+        solved = body.solve(*at, start=near_z, tolerance=_TOLERANCE)
+        if near_z is None and solved.converged.all():
+            followed = on_one_branch(body, *at, solved.z)
+            if followed is not solved.z:
+                solved = body.solve(*at, start=followed, tolerance=_TOLERANCE)
+
+        def slopes() -> tuple[np.ndarray, np.ndarray]:
+            found = motion_and_derivatives(body, *at, solved)[1]
+            return found, found[:, :0]
+
+        held = solved.residual < _BALANCED
+        return Trajectory(static, body.motion(*at, solved), held, slopes)
+
+    def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
+        """Instants for formulas, at orientations ``(n,)`` and tail velocities ``(3, n)``, by
+        default balanced ones."""
+        at = self.law, shapes.angles, shapes.rates, shapes.delta
+        z = self.body.solve(*at).z if z is None else z
+        return Instants(self.body, *at, z=z, unit=shapes.unit, joint_map=self.joint_map)
+
+    def totals(self, passed: PeriodTotals) -> dict[str, float]:
+        """Totals of a whole period."""
+        along, chords = self._axis(passed), self.periods * chord_per_way(self.turn)
+        return {
+            "distance": chords * float((passed.displacement * np.conj(along)).real),
+            "work": self.periods * passed.work,
+            "rotation": passed.rotation + self.turn,
+        }
+
+    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
+        """Gradients of `totals`."""
+        along, chords = self._axis(passed), self.periods * chord_per_way(self.turn)
+        # the axis turns with the solved part
+        turns = 0.5 if self.symmetry == ANTIPODAL else 0.0
+        aside = chords * (passed.displacement * np.conj(along)).imag
+        return {
+            "distance": TotalGradient(chords * along, turns * aside),
+            "work": TotalGradient(work=self.periods),
+            "rotation": TotalGradient(rotation=1.0),
+        }
+
+    def _axis(self, passed: PeriodTotals) -> complex:
+        return complex(np.exp(1j * heading(self.symmetry, passed.displacement, passed.rotation)))
+
+    def initial_heading(self, static: np.ndarray) -> float:
+        """Initial orientation; 0 where it is no state."""
+        names = [each.name for each in self.static_parameters]
+        return float(static[names.index("theta")]) if "theta" in names else 0.0
+
+    def static_of(self, gait: Any) -> np.ndarray:
+        """Static parameters that a gait states, ``(n_static,)``."""
+        return np.array([getattr(gait, each.name) for each in self.static_parameters])
+
+    def equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
+        return CollocatedStates(mesh, unit=unit)
+
+    @property
+    def _grow(self) -> list[int]:
+        """Rows of `Trajectory.slopes` that are the rates of the states."""
+        return [OMEGA if name == "theta" else 6 + STATES.index(name) for name in self.states]
+
+    def vjp(
+        self,
+        mesh: Mesh,
+        pose: CollocatedPose,
+        gradients: Iterable[TotalGradient],
+        on_states: np.ndarray,
+        by_theta: np.ndarray | float = 0.0,
+        by_states: np.ndarray | float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Adjoint of a period.
+
+        Derivatives of m numbers along (rotation rate, velocity of the centre, power, rates of
+        states) at the stages, ``(m, 4 + k, n, s)``, along the static parameters that are initial
+        values ``(m, n_static)``, and along the states at the ends of intervals ``(m, n_state, n)``;
+        `by_theta` ``(m, n, s)`` and `by_states` are direct derivatives along orientation and
+        states, `on_states` those of `Trajectory.slopes`.
+        """
+        side, rotation, work, _ = (np.array(column) for column in zip(*gradients, strict=True))
+        m, k, weight = side.size, len(self.states), stage_weights(mesh)
+        on_theta, on_centre = pose.on_pose(side)
+        on_theta = on_theta + by_theta
+        rows = np.zeros((m, len(on_states[OUTPUTS]), *weight.shape))
+        rows[:, 0], rows[:, 3] = (part[:, None, None] * weight for part in (rotation, work))
+        rows[:, 1:3] = on_centre
+        turns = [name == "theta" for name in self.states]
+        if not any(turns):
+            rows[:, 0] += pose.on_rates(on_theta)
+        if not k:
+            return rows, np.empty((m, 0)), np.empty((m, 0, mesh.n))
+        of_states = np.einsum(
+            "mrt,rkt->mkt", rows[:, :4].reshape(m, 4, -1), on_states[OUTPUTS, :k][:4]
+        )
+        of_states += by_states
+        of_states[:, turns] += on_theta.reshape(m, 1, -1)
+        on_begin, on_rates, on_ends = self.equations(mesh).vjp(on_states[self._grow, :k], of_states)
+        rows[:, np.array(self._grow) - OMEGA] += on_rates.reshape(m, k, *weight.shape)
+        on_more = np.einsum("mrt,rkt->mk", on_rates, on_states[self._grow, k:])
+        return rows, np.concatenate([on_more, on_begin[:, turns]], axis=1), on_ends
+
+
+class OnSlope(QuasiStatic):
+    """Slow motion on a slope: the orientation is a state, from straight uphill."""
+
+    states = ("theta",)
+    followed = True
+    lack = (
+        "friction does not hold the body on the slope all the way, or its joints brake; "
+        "take a gentler one"
+    )
+
+    @property
+    def static_parameters(self) -> tuple[StaticParameter, ...]:
+        return (StaticParameter("theta", -100.0, 100.0, np.nan),)  # any heading
+
+    @cached_property
+    def chain(self) -> Chain:
+        return checked_chain(self.body, self.law, self.regime.grade)
+
+    def simulate(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        static: np.ndarray,
+        near_states: np.ndarray | None = None,
+        near_z: np.ndarray | None = None,
+    ) -> Trajectory:
+        z = np.zeros((3, mesh.n_point)) if near_z is None else near_z
+        at = shapes.angles, shapes.rates, shapes.delta
+        now: Any = None
+
+        def rates(states: np.ndarray) -> Rates:
+            nonlocal now, z
+            now = balance_on_slope(
+                self.chain, self.law, self.regime, at, states[0], start=z, tolerance=_TOLERANCE
+            )
+            z, balanced = now.solved.z, bool((now.solved.residual < _BALANCED).all())
+            turns = shapes.pace * z[None, OMEGA]
+            return Rates(turns, shapes.pace * now.on_theta[None, None, OMEGA], balanced)
+
+        states, _, held = self.equations(mesh, shapes.unit).solve(rates, static, near_states)
+        slopes = now.on_shape, now.on_theta[:, None]
+        return Trajectory(static, now.now, np.full(mesh.n_point, held), lambda: slopes, states)
+
+    def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
+        at = (self.law, shapes.angles, shapes.rates, shapes.delta)
+        load = self.regime.pull(theta[None])
+        z = solve_balance(self.chain, *at, load=load).z if z is None else z
+        return Instants(self.body, *at, z=z, unit=shapes.unit, load=load)
+
+    def totals(self, passed: PeriodTotals) -> dict[str, float]:
+        """Totals; NaN where the joints brake."""
+        way = self.regime.travel_along(passed.displacement)
+        work = passed.work + self.regime.grade * passed.displacement.real
+        found = {
+            "distance": way.real,
+            "work": work,
+            "rotation": passed.rotation,
+            "across": way.imag,
+        }
+        return {name: float(value) if work > 0 else np.nan for name, value in found.items()}
+
+    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
+        ahead = np.exp(1j * self.regime.ahead)
+        return {
+            "distance": TotalGradient(ahead),
+            "work": TotalGradient(self.regime.grade, work=1.0),
+            "rotation": TotalGradient(rotation=1.0),
+            "across": TotalGradient(1j * ahead),
+        }
+
+
+class Inertial(QuasiStatic):
+    """Momenta (and on a slope the orientation) as states, periodic over a period; in the axes of
+    the tail link (`colloc.mechanics.inertia`)."""
+
+    followed = True
+    lack = (
+        "no period with inertia was found that repeats itself; give another guess, or a "
+        "smaller froude"
+    )
+
+    @cached_property
+    def slow(self) -> QuasiStatic:
+        """The dynamics in the limit of zero mass."""
+        kind = OnSlope if self.regime.slides else QuasiStatic
+        return kind(self.body, self.law, self.regime, self.symmetry, self.turn)
+
+    @cached_property
+    def chain(self) -> Chain:
+        return checked_mass(self.body)
+
+    @property
+    def states(self) -> tuple[str, ...]:  # type: ignore[override]
+        return STATES + self.slow.states
+
+    @property
+    def static_parameters(self) -> tuple[StaticParameter, ...]:
+        if self.regime.free is None:
+            return self.slow.static_parameters
+        longest, shortest = -0.5 * np.log(self.regime.free)
+        middle = float(np.mean([shortest, longest]))
+        period = StaticParameter("log_period", shortest, longest, middle)
+        return (period, *self.slow.static_parameters)
+
+    @property
+    def _timed(self) -> int:
+        return int(self.regime.free is not None)
+
+    def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
+        return self.slow.instants(shapes, theta, z)
+
+    def totals(self, passed: PeriodTotals) -> dict[str, float]:
+        timed = {"period": float(np.exp(passed.static[0]))} if self._timed else {}
+        return self.slow.totals(passed) | timed
+
+    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
+        found = self.slow.total_gradients(passed)
+        if self._timed:
+            found["period"] = TotalGradient(static=float(np.exp(passed.static[0])))
+        return found
+
+    def equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
+        free = np.array([name in STATES for name in self.states])
+        return CollocatedStates(mesh, free, momenta_image(self.symmetry), unit)
+
+    def simulate(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        static: np.ndarray,
+        near_states: np.ndarray | None = None,
+        near_z: np.ndarray | None = None,
+    ) -> Trajectory:
+        if near_states is None:
+            slow = self.slow.simulate(mesh, shapes, static[self._timed :])
+            posture = self.chain.posture(shapes.angles)
+            link = self.chain.velocity(posture, shapes.rates, slow.now.z)
+            at_first = momenta(self.chain, posture, link)
+            near_states = np.concatenate([at_first, slow.states]) if slow.states.size else at_first
+        states, out, held = self._periodic_states(mesh, shapes, near_states, static)
+        z, centre, power, rates = np.split(out, [3, 5, 6])
+        now = BalancedMotion(z, centre, power[0], power[0])
+        gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
+        before = self.equations(mesh, shapes.unit).integrals(rates)[0][:, 0]
+        first = states[_MOMENTA, 0] - before
+        edges = np.stack([sums(row, start) for row, start in zip(gained, first, strict=True)])
+
+        def slopes() -> tuple[np.ndarray, np.ndarray]:
+            """A free pace has a column after the momenta: a longer period changes them by more."""
+            froude, k = self.froude_at(shapes, static), 2 * self.chain.n_joint
+            found = momenta_at(self.chain, self.law, shapes[:3], states[_MOMENTA], froude)
+            out, slopes = self._with_pull(*found, states, froude)
+            on_pace = np.zeros((len(out), self._timed, out.shape[1]))
+            on_pace[_MORE] = 2.0 * (out[_MORE] - turning(z, states[_MOMENTA]))[:, None]
+            return slopes[:, :k], np.concatenate([slopes[:, k:], on_pace], axis=1)
+
+        return Trajectory(static, now, np.full(mesh.n_point, held), slopes, states, edges)
+
+    def _periodic_states(
+        self, mesh: Mesh, shapes: Shapes, near: np.ndarray, static: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Periodic states, outputs, and whether they exist. Where Newton's method fails from
+        `near`, as on sticking feet, by continuation through more viscous friction."""
+        found = self._newton(mesh, shapes, near, static)
+        if found[-1] or shapes.delta * shapes.unit > _VISCOUS:
+            return found
+        more = shapes._replace(delta=_WETTER * shapes.delta)
+        wetter = self._periodic_states(mesh, more, near, static)
+        return self._newton(mesh, shapes, wetter[0], static) if wetter[-1] else wetter
+
+    def _newton(
+        self, mesh: Mesh, shapes: Shapes, near: np.ndarray, static: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
+        out, first = near, np.append(near[_MOMENTA, 0], static[self._timed :])
+        froude, equations = self.froude_at(shapes, static), self.equations(mesh, shapes.unit)
+        library = None if self.slow.states else native_kernel(self.chain, self.law)
+        if library is not None:
+            moving = Moving(self.chain, self.law, *shapes[:3], None)
+            begun = np.column_stack([near, first])
+            return kernel_repeating(library, moving, begun, froude, equations.scheme)
+
+        def rates(states: np.ndarray) -> Rates:
+            nonlocal out
+            out, found = self._rates(shapes, states, froude)
+            return found
+
+        states, _, held = equations.solve_natural(rates, first, near)
+        return states, out, held
+
+    def alone(
+        self, mesh: Mesh, shapes: Shapes, along: Trajectory, begins: np.ndarray, near: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Outputs and final states of every interval from initial states ``(n_state, n)``, sought
+        near states at the points; and whether they exist, ``(n,)``."""
+        equations, froude = self.equations(mesh, shapes.unit), self.froude_at(shapes, along.static)
+        states, ends, found = equations.alone(
+            lambda states: self._rates(shapes, states, froude)[1], begins, near
+        )
+        return self._rates(shapes, states, froude)[0], ends, found
+
+    def _rates(self, shapes: Shapes, states: np.ndarray, froude: float) -> tuple[np.ndarray, Rates]:
+        at = self.chain, self.law, shapes[:3], states[_MOMENTA], froude
+        out, slopes = self._with_pull(*momenta_at(*at, along_states=True), states, froude)
+        return out, Rates(out[self._grow], slopes[self._grow], bool(np.isfinite(out).all()))
+
+    def _with_pull(
+        self, out: np.ndarray, slopes: np.ndarray, states: np.ndarray, froude: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Outputs with the weight's pull, and derivatives along the orientation after the
+        momenta."""
+        for theta in states[len(STATES) :]:
+            pull: Any = self.regime.pull(theta[None]) / froude  # type: ignore[operator]
+            out[_MORE][:2] += pull
+            on_theta = np.zeros((len(out), 1, theta.size))
+            on_theta[_MORE][:2, 0] = pull[1], -pull[0]  # the pull turns against theta
+            slopes = np.concatenate([slopes, on_theta], axis=1)
+        return out, slopes
+
+    def froude_at(self, shapes: Shapes, static: np.ndarray) -> float:
+        froude = float(np.exp(-2.0 * static[0])) if self._timed else self.regime.froude
+        return froude * shapes.unit**2
+
+
+def dynamics_of(body: Body, law: Law, regime: Regime, *more: Any) -> Any:
+    """The dynamics of a body in a regime; more fields are those of `QuasiStatic`."""
+    usual = Inertial if regime.froude else OnSlope if regime.slides else QuasiStatic
+    return getattr(regime, "dynamics", usual)(body, law, regime, *more)
