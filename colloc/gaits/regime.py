@@ -13,7 +13,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from colloc.gaits.gait import DELTA_START
-from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
@@ -173,7 +172,7 @@ class Regime:
         if not self.slides and not self.froude:
             return
         gaits, name, where = problem.gait, type(problem.gait).__name__, "on a slope"
-        linear = isinstance(gaits, LinearClass) and problem.joint_map is None
+        linear = hasattr(gaits, "functions") and problem.joint_map is None
         if self.slides:
             if not linear:
                 raise ProblemError(
