@@ -24,9 +24,9 @@ from colloc.gaits.problem import Problem
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.search.certify import gait_certificate
+from colloc.system.environment import version_of
 from colloc.system.errors import ProblemError, StoreError
 from colloc.system.files import replaced_file
-from colloc.system.versions import version_of
 from colloc.verification.dry_friction import dry_friction
 
 TABLE = Path(__file__).with_name("known.json")

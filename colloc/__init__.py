@@ -103,7 +103,7 @@ def __getattr__(name: str) -> object:
         value = getattr(importlib.import_module(_HOME[name]), name)
         return _check_arguments(value) if isinstance(value, FunctionType) else value
     if name == "__version__":
-        from colloc.system.versions import version_of
+        from colloc.system.environment import version_of
 
         return version_of("colloc")
     if name in _GONE:

@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc
 
 import colloc
-from colloc.pictures.motion_frames import lab_outline
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, VERMILION, Picture, save, styled
+from colloc.results.motion import lab_outline
 from colloc.results.solution import Solution
 from scripts.program import command_line
 
@@ -101,7 +101,7 @@ def bodies_of_a_gait(ax: Axes, solution: Solution, count: int = 6) -> Axes:
     """One period as bodies, evenly spaced in time, each in the place of its own that its column
     gives it."""
     motion = solution.sample(np.linspace(0, 1, count))
-    ends = lab_outline(solution.problem.body, motion.angles, motion.theta, motion.tail)
+    ends = lab_outline(solution.problem.body, motion)
     for k in range(count):
         row = np.array([[0.0], [-0.62 * k]])
         draw_chain(ax, ends[:, :, k] + row, GREY if k in (0, count - 1) else INK)

@@ -7,7 +7,7 @@ python -m scripts.continue_delta
 import numpy as np
 
 from colloc import Harmonic, Problem, ellipse
-from colloc.pictures.publication import mesh_errors
+from colloc.pictures.figure import mesh_errors
 from colloc.results.answer import Step
 from colloc.results.measured import Limit
 from colloc.results.solution import Solution

@@ -12,7 +12,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from colloc.system.versions import versions
+from colloc.system.environment import versions
 from scripts.program import command_line
 
 CURATED = Path("results/curated")

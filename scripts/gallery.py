@@ -16,17 +16,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
 from colloc.gaits.problem_file import Reference
-from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_shape_path
+from colloc.pictures.figure import draw_filmstrip, draw_gait, draw_lab
 from colloc.pictures.style import styled
 from colloc.results.solution import Solution
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
-from colloc.system.versions import versions
+from colloc.system.environment import versions
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
@@ -79,11 +78,7 @@ def picture(solution: Solution) -> Figure:
         grid = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 1.5))
         draw_filmstrip(figure.add_subplot(grid[0, 0]), solution, count=9)
         draw_lab(figure.add_subplot(grid[1, 0]), solution)
-        t, beside = np.linspace(0.0, 1.0, 801), figure.add_subplot(grid[:, 1])
-        if solution.problem.body.n_joint == 2 and solution.problem.gait.free:
-            draw_shape_path(beside, solution.problem, solution.gait.angles(t))
-        else:
-            draw_angles(beside, t, solution.gait.angles(t), solution.problem.body)
+        draw_gait(figure.add_subplot(grid[:, 1]), solution)
     return figure
 
 

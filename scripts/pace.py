@@ -14,7 +14,7 @@ import numpy as np
 
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
-from colloc.pictures.publication import draw_gait
+from colloc.pictures.figure import draw_gait
 from colloc.pictures.style import BLUE, GREY, Picture, save, styled
 from colloc.results.solution import Solution
 from colloc.search.solve import solve

@@ -29,7 +29,7 @@ from colloc import Chain, Foot, Problem
 from colloc.commands.ending import OK, run
 from colloc.mechanics.inertia import checked_mass
 from colloc.mechanics.law import Law
-from colloc.pictures.robot_model import mjcf
+from colloc.pictures.export import mjcf
 from colloc.results.solution import Solution
 from colloc.system.errors import CollocError
 

@@ -13,8 +13,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from colloc.system.environment import available_processes
 from colloc.system.errors import CollocError
-from colloc.system.processors import available_processes
 from scripts.paper import crawlers, map, pacing, static, three_link, waves
 from scripts.paper.study import PaperStudy, Part
 

@@ -18,10 +18,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import colloc
-from colloc.pictures.figure import FootMarks
-from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
+from colloc.mechanics.bodies import Body
+from colloc.pictures.figure import BodyMarks
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
+from colloc.results.motion import lab_feet, lab_outline
 from colloc.results.solution import Solution
 from scripts.program import command_line
 
@@ -53,7 +54,7 @@ class Crawl:
     feet: np.ndarray
     """Both ends ``(2, 2, n_foot, n_picture)``, and which of them hold ``(n_foot, n_picture)``."""
     holds: np.ndarray
-    kinds: tuple[str, ...]
+    body: Body
 
 
 def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
@@ -70,10 +71,9 @@ def crawl(solution: Solution) -> Crawl:
     """What a gait does with the work."""
     problem, body, least = solution.problem, solution.problem.body, solution.problem.law.smallest
     motion = solution.sample(phases(solution, np.linspace(0.0, least * WORK, PICTURES)))
-    pose = motion.angles, motion.theta, motion.tail
     label, share = FILES.get(problem.name, problem.gait.describe()), least * solution.efficiency
-    feet = lab_feet(body, *pose), solution.holding(motion), foot_kinds(body)
-    return Crawl(label, share, lab_outline(body, *pose), motion.centre, *feet)
+    feet = lab_feet(body, motion), solution.holding(motion), body
+    return Crawl(label, share, lab_outline(body, motion), motion.centre, *feet)
 
 
 def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
@@ -101,29 +101,13 @@ def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
                 0.03 - _BEHIND, -_LANE * row - 0.02, label, va="top", color=colour, weight="bold"
             )
             (trail,) = axes.plot([], [], color=colour, lw=1.2, alpha=0.5)
-            (body,) = axes.plot(
-                [], [], color=INK, lw=4, solid_capstyle="round", solid_joinstyle="round"
-            )
-            (joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
-            (head,) = axes.plot([], [], "o", color=INK, ms=9)
-            (centre,) = axes.plot([], [], "o", color=colour, ms=7)
-            drawn.append(
-                (
-                    one,
-                    np.array([[0.0], [y]]),
-                    (trail, body, joints, head, centre),
-                    FootMarks(axes, one.kinds, 6.0),
-                )
-            )
+            marks = BodyMarks(axes, one.body, INK, (4, 5, 9, 7, 6), ("o", colour))
+            drawn.append((one, np.array([0.0, y]), trail, marks))
         for k in [*range(PICTURES), *[PICTURES - 1] * REST]:
-            for one, lift, (trail, body, joints, head, centre), marks in drawn:
-                ends = one.ends[:, :, k] + lift
-                trail.set_data(*(one.centre[:, : k + 1] + lift))
-                body.set_data(*ends)
-                joints.set_data(*ends[:, 1:-1])
-                head.set_data(*ends[:, -1:])
-                centre.set_data(*(one.centre[:, [k]] + lift))
-                marks.place(one.feet[..., k] + lift[:, None], one.holds[:, k])
+            for one, lift, trail, marks in drawn:
+                trail.set_data(*(one.centre[:, : k + 1] + lift[:, None]))
+                at = (one.ends[:, :, k].T, one.centre[:, k], one.feet[..., k].T)
+                marks.place(((points + lift).T for points in at), one.holds[:, k])
             canvas.draw()
             yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 

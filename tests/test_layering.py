@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 
 import colloc
-from colloc.system.lazy import higher
+from colloc.system.environment import higher
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
@@ -116,7 +116,7 @@ def test_data_classes_that_compare_by_their_fields_hold_no_array():
 
 def test_what_lower_packages_import_on_use_exists():
     """`higher` names what packages above offer: the only imports that do not point down."""
-    for name in MODULES.keys() - {"system.lazy"}:
+    for name in MODULES.keys() - {"system.environment"}:
         text = (ROOT / f"colloc/{name.replace('.', '/')}.py").read_text(encoding="utf-8")
         for place in re.findall(r'higher\(\s*"([^"]+)"', text):
             assert callable(higher(place)), f"{name}: {place}"

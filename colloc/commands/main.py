@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from colloc.commands.ending import BAD_PROBLEM, OK, exit_code, run, show
+from colloc.system.environment import one_thread_each
 from colloc.system.errors import ProblemError
 from colloc.system.files import SUFFIX, reserved_ending
-from colloc.system.processors import one_thread_each
 from colloc.system.progress import StatusLine
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _run(words: list[str]) -> int:
         print(help_text())
         return OK if words else BAD_PROBLEM
     if name == "--version":
-        from colloc.system.versions import versions
+        from colloc.system.environment import versions
 
         print(", ".join(f"{name} {version}" for name, version in versions().items()))
         return OK

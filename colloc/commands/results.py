@@ -244,7 +244,7 @@ def report(options: argparse.Namespace) -> int:
         line.say("writing the page")
         write_report(solution, path, reference, source.parent, robot=robot)
         if options.figures:
-            from colloc.pictures.publication import save_panels
+            from colloc.pictures.figure import save_panels
 
             line.say("drawing the figures")
             figures = [*map(str, save_panels(solution, path.with_suffix("")))]

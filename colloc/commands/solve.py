@@ -369,13 +369,12 @@ def solve(options: argparse.Namespace) -> int:
         gap = gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)
         cli.tell(options, facts | {"kept": kept_facts(records)}, [*lines, gap])
         if saved and not options.no_figure and not solution.interrupted:
-            from colloc.pictures.publication import solution_figure
             from colloc.pictures.style import save as save_figure
 
             with cli.status_line(options) as line:
                 line.say("drawing")
                 try:
-                    figure, kinds = solution_figure(solution), ("png", "pdf")[: 1 + options.pdf]
+                    figure, kinds = solution.plot(), ("png", "pdf")[: 1 + options.pdf]
                     saved += map(str, save_figure(figure, path.with_suffix(""), kinds))
                 except CollocError as error:
                     complaints.append(f"no figure: {error}")

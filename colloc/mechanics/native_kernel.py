@@ -29,8 +29,8 @@ from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
+from colloc.system.environment import available_threads
 from colloc.system.errors import SlowWarning
-from colloc.system.processors import available_threads
 
 SOURCES = resources.files("colloc.mechanics") / "native"
 _PIECE = 4000

@@ -1,4 +1,16 @@
-"""Shape coordinates of a gait over time as CSV or JSON, and the robot as a model for simulators."""
+"""A gait over time as CSV or JSON, and its robot as a model for simulators, MJCF (MuJoCo) and URDF.
+
+Models are in SI units: links have the problem's lengths, masses and inertias; joints are hinges
+about the vertical.
+
+MJCF: each foot is a small body on a vertical slide with a spring that presses with its weight; pads
+and links stand on Gauss points. A contact `<pair>` has two coefficients, the first along the axis
+of a capsule, so a foot with directed friction is a very short capsule. MuJoCo's friction is that of
+`colloc.Elliptic`, also for other laws (`_elliptic`). Its sliding contacts are lifted the more the
+slower they respond: hence short steps, constraints of two steps, and an impedance that begins at 0.
+
+URDF has no friction, springs or motors.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +18,25 @@ import json
 import math
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from colloc.gaits.gait_fields import fields
+from colloc.gaits.limits import range_of
+from colloc.laws.elliptic import Elliptic
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.mechanics.floor_contact import whole_links
+from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
-from colloc.mechanics.law import rate_independent
-from colloc.pictures.robot_model import FORMATS, floor_of, note_of
+from colloc.mechanics.law import Law, rate_independent
+from colloc.pictures.style import render
 from colloc.results.motion import RigidMotion
 from colloc.results.robot import Robot, joint_torques, pressing, quasi_static_torques
 from colloc.results.solution import Solution
@@ -34,12 +53,18 @@ from colloc.verification.trajectory import (
     plan_trajectory,
 )
 
-KINDS = ".csv", ".json", *FORMATS
 _CROSSES = 1e-8  # depth of links in each other above rounding [body lengths]
 _FINE, _ACCURACY = 2000, 1e-5  # samples per period, and error, of where the body ends
 _SETTLED = 10  # periods after which all are alike
 _UNITS = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
-_Way = tuple[np.ndarray, np.ndarray, np.ndarray]  # times up to 0 [periods], angles, rates
+_UNKNOWN = ProblemError, NotConvergedError
+_THIN = 0.02  # width and height of links that have none [body lengths]
+_POINTS = 16  # on which a pad or a link stands
+_STEPS, _LONGEST = 8000, 1e-3  # time steps of a period, and the longest one [s]
+_AXIS, _MASS = 1e-4, 1e-6  # half length of a capsule, and mass of a foot, in those of the body
+_STIFF = 5000.0  # gain of the position servos per rad, over the largest torque of the gait
+_LEAST = 1e-5  # smallest coefficient of friction in MuJoCo
+_RESERVE = 1.5  # effort and speed that a URDF allows a joint, over the largest of the gait
 
 
 @checked_arguments
@@ -90,31 +115,73 @@ def write_export(
         If an argument is missing or unusable, the motion is prescribed, or the ramp crosses itself.
     """
     check_count(periods=periods)
-    problem, is_model = solution.problem, path.suffix in FORMATS
-    if path.suffix not in KINDS:
-        raise ProblemError(f"{path} should end in {' or '.join(KINDS)}.")
+    problem, kinds = solution.problem, (".csv", ".json", *MODELS)
+    if path.suffix not in kinds:
+        raise ProblemError(f"{path} should end in {' or '.join(kinds)}.")
     if not problem.gait.free:
         raise ProblemError(
             f"{problem.name} is a prescribed motion of a smooth body: it has no joints to export."
         )
-    if is_model and (period is None or length is None or mass is None):
-        raise ProblemError(
-            "a model for simulators needs the period [s], the length [m] and the mass [kg] of "
-            "the robot."
-        )
-    if is_model and max_speed is not None:
-        raise ProblemError(
-            "a model for simulators holds no motion: leave max_speed out, and write the angles as "
-            "CSV."
-        )
-    if is_model:
-        return _write_model(Robot(solution, length, mass, period, gravity), path)  # type: ignore[arg-type]
+    if path.suffix in MODELS:
+        if period is None or length is None or mass is None:
+            raise ProblemError(
+                "a model for simulators needs the period [s], the length [m] and the mass [kg] of "
+                "the robot."
+            )
+        if max_speed is not None:
+            raise ProblemError(
+                "a model for simulators holds no motion: leave max_speed out, and write the angles "
+                "as CSV."
+            )
+        return _write_model(Robot(solution, length, mass, period, gravity), path)
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
-    gait, own_timing = solution.gait.motor_gait, bool(problem.paced_by)
-    trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=own_timing)
-    facts = _about(solution, trajectory, rate, limits) | _pace(solution, trajectory.period, gravity)
-    way = _approach(solution, trajectory, rate, limits) if ramp else None
-    parts: list[Approach | Trajectory] = [trajectory] if way is None else [way, trajectory]
+    gait, paced_by, froude = solution.gait.motor_gait, problem.paced_by, solution.froude
+    trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=bool(paced_by))
+    measured = solution.measured
+    facts: dict[str, Any] = {
+        "name": problem.name,
+        "status": solution.status,
+        "period_s": trajectory.period,
+        "rate_hz": float(rate),
+        "samples_per_period": trajectory.time.size,
+        "max_speed_rad_per_s": None if limits is None else np.ravel(limits).tolist(),
+        "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
+        "body": problem.body.describe(),
+        "friction": fields(problem.law),
+        "efficiency": measured.efficiency,
+        "objective": problem.objective.name,
+        "value": measured.value,
+        "distance_per_period_body_lengths": measured.distance,
+        "travels": solution.travels,
+        "rotation_per_period_rad": solution.rotation,
+        "turning_radius_body_lengths": solution.turning_radius if solution.turning else None,
+        "work_per_period_weight_times_length": measured.work,
+        "problem_hash": problem.hash,
+    }
+    if paced_by:
+        holds = "in a period of 1"
+        if froude:
+            size = froude * pressing(solution, gravity) * trajectory.period**2
+            holds = f"at the Froude number {froude:.4g}: of a robot of {size:.3g} m in this period"
+        facts["pace"] = f"the gait's own, as {paced_by}; distance and work are those {holds}"
+        facts |= {"froude_number": froude} if froude else {}
+
+    def into_gait(rate: float) -> Approach:
+        speeds, most = np.abs(trajectory.speeds), limits
+        if limits is None:
+            stated = np.array(problem.largest_speeds) / trajectory.period
+            most = np.maximum(stated, speeds.max(axis=1)) if stated.size else speeds.max()
+        way = approach(trajectory, rate, one_each(most, problem.n_motor, "joint speed limit"))  # type: ignore[arg-type]
+        angles, _ = problem.joint_path(way.angles, way.speeds)
+        crossing = float(crossing_depth(problem.body, angles).max())
+        if max(crossing, passing_depth(problem.body, angles)) > _CROSSES:
+            raise ProblemError(
+                "the body crosses itself on the way from straight into the gait: leave it out "
+                "(ramp=False, --no-ramp), and bring the robot to the first sample by hand."
+            )
+        return way
+
+    parts: list[Approach | Trajectory] = [into_gait(rate), trajectory] if ramp else [trajectory]
     rows = [[part.angles, part.speeds] for part in parts]
     at_pace = None  # the robot, if the timing is the gait's own
     if length is not None or mass is not None:
@@ -123,39 +190,40 @@ def write_export(
         # the period that was requested: that of whole samples may be another pace
         robot = Robot(solution, length, mass, period or trajectory.period, gravity)
         facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
-        if limits is None or own_timing:
-            at_pace, torques = robot, [robot.torques(trajectory.phase)]
+        if limits is None or paced_by:
+            at_pace, torques = robot, robot.torques(trajectory.phase)
             facts["torques"] = "those of this pace; of slow motion before time 0"
-        else:  # inertia with another timing is not known
-            slow = joint_torques(solution, trajectory.phase, froude=solution.froude)
-            torques = [robot.torque_unit * slow]
-            facts["torques"] = "those of slow motion, as the pace is not the gait's own"
-        if way is not None:
-            joints = problem.joint_path(way.angles, trajectory.period * way.speeds)
-            theta = getattr(solution.gait, "theta", None) or 0.0  # the initial heading on a slope
-            pull = problem.regime.pull(np.full((1, way.time.size), theta))
-            slow = quasi_static_torques(solution, *joints, pull)
-            torques.insert(0, robot.torque_unit * slow)
-        for part, row, torque in zip(parts, rows, torques, strict=True):
-            row += [torque, torque * part.speeds]
-        if at_pace is not None:
             facts["distance_at_this_pace_m"] = robot.facts["speed_m_per_s"] * robot.period
+        else:  # inertia with another timing is not known
+            torques = robot.torque_unit * joint_torques(solution, trajectory.phase, froude=froude)
+            facts["torques"] = "those of slow motion, as the pace is not the gait's own"
+        rows[-1].append(torques)
+        if ramp:
+            joints = problem.joint_path(parts[0].angles, trajectory.period * parts[0].speeds)
+            theta = getattr(solution.gait, "theta", None) or 0.0  # the initial heading on a slope
+            pull = problem.regime.pull(np.full((1, parts[0].time.size), theta))
+            rows[0].append(robot.torque_unit * quasi_static_torques(solution, *joints, pull))
+        for row in rows:
+            row.append(row[2] * row[1])
     if periods * trajectory.time.size > MOST_SAMPLES:
         raise ProblemError(
             f"{periods} periods have too many samples: a file holds at most {MOST_SAMPLES}."
         )
     time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
     table = np.tile(rows[-1], periods)  # (unit, joint, time)
-    if way is not None:
-        facts["ramp_s"] = -float(way.time[0])
-        facts |= _end(solution, trajectory, limits, periods, at_pace)
-        time = np.append(way.time, time)
+    if ramp:
+        facts["ramp_s"] = -float(parts[0].time[0])
+        if not problem.regime.slides:
+            fine = into_gait(_FINE / trajectory.period)
+            facts |= _end(solution, trajectory, fine, periods, at_pace)
+        time = np.append(parts[0].time, time)
         table = np.append(np.array(rows[0]), table, axis=2)
-    columns = {unit: table[k] for k, unit in enumerate(_UNITS) if k < len(table)}
+    columns = dict(zip(_UNITS, table, strict=False))
     if path.suffix == ".csv":
+        names = [
+            f"{gait.coordinate}_{j + 1}_{unit}" for unit in columns for j in range(table.shape[1])
+        ]
         lines = [f"# {key}: {json.dumps(value)}" for key, value in facts.items()]
-        count = table.shape[1]
-        names = [f"{gait.coordinate}_{j + 1}_{unit}" for unit in columns for j in range(count)]
         lines.append(",".join(["time_s", *names]))
         lines += [",".join(f"{x:.9g}" for x in row) for row in np.vstack([time, *table]).T]
         write_text(path, "\n".join(lines) + "\n")
@@ -166,151 +234,192 @@ def write_export(
     return facts
 
 
-def _approach(
-    solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None
-) -> Approach:
-    """Way from the straight body into the gait."""
-    problem, speeds = solution.problem, np.abs(trajectory.speeds)
-    most: Any = limits
-    if limits is None:
-        stated = np.array(problem.largest_speeds) / trajectory.period
-        most = np.maximum(stated, speeds.max(axis=1)) if stated.size else speeds.max()
-    way = approach(trajectory, rate, one_each(most, problem.n_motor, "joint speed limit"))
-    angles, _ = problem.joint_path(way.angles, way.speeds)
-    crossing = float(crossing_depth(problem.body, angles).max())
-    if max(crossing, passing_depth(problem.body, angles)) > _CROSSES:
-        raise ProblemError(
-            "the body crosses itself on the way from straight into the gait: leave it out "
-            "(ramp=False, --no-ramp), and bring the robot to the first sample by hand."
-        )
-    return way
-
-
 def _end(
-    solution: Solution,
-    trajectory: Trajectory,
-    limits: np.ndarray | None,
-    periods: int,
-    robot: Robot | None,
+    solution: Solution, trajectory: Trajectory, way: Approach, periods: int, robot: Robot | None
 ) -> dict[str, Any]:
     """Displacement of the centre of mass and turn of the tail link from the straight body along +x
-    to the end, with inertia if the pace is known; nothing on slopes."""
-    if solution.problem.regime.slides:
-        return {}
-    period = trajectory.period
-    way = _approach(solution, trajectory, _FINE / period, limits)
+    over a way into the gait to the end, with inertia if the pace is known."""
+    body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
+    period, froude = trajectory.period, solution.froude or (robot.froude if robot else 0.0)
     time = np.append(way.time, 0.0) / period
-    angles = np.append(way.angles, trajectory.angles[:, :1], axis=1)
-    rates = period * np.append(way.speeds, trajectory.speeds[:, :1], axis=1)
-    angles, rates = solution.problem.joint_path(angles, rates)
-    froude, end = solution.froude or (robot.froude if robot else 0.0), None
-    with suppress(ProblemError, NotConvergedError):
+    angles, rates = solution.problem.joint_path(
+        np.append(way.angles, trajectory.angles[:, :1], axis=1),
+        period * np.append(way.speeds, trajectory.speeds[:, :1], axis=1),
+    )
+    inertial = False
+    with suppress(*_UNKNOWN):
         if froude:
-            end = _end_with_inertia(solution, froude, (time, angles, rates), periods)
-    place, turn = end or _end_slowly(solution, (time, angles, rates), periods)
+            long, gait = -float(time[0]), solution.gait
+            spline = CubicHermiteSpline(1.0 + time / long, angles, long * rates, axis=1)
+
+            def approaching(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+                return spline(t), spline(t, 1)
+
+            pace = froude / long**2
+            begin = GaitWithInertia(body, law, approaching, delta * long, froude=pace, breaks=())
+            cycle = GaitWithInertia(
+                body, law, gait, delta, froude=froude, breaks=gait.corner_phases
+            )
+            state = begin.run(np.zeros(3), _ACCURACY).states[:, -1]
+            state[:3] /= long
+            before = state
+            for _ in range(min(periods, _SETTLED)):
+                before, state = state, cycle.run(state, _ACCURACY).states[:, -1]
+            place, turn = complex(*state[4:6]), state[3] - before[3]
+            last = place - complex(*before[4:6]) * np.exp(1j * turn)
+            more = RigidMotion(turn, last).repeat(periods - min(periods, _SETTLED))
+            place = complex(np.exp(1j * more.rotation) * place + more.shift)
+            turn, inertial = float(state[3] + more.rotation), True
+    if not inertial:
+        z = body.solve(law, angles, rates, delta).z
+        theta = cumulative_trapezoid(z[2], time, initial=0.0)
+        tail = trapezoid(np.exp(1j * theta) * (z[0] + 1j * z[1]), time)
+        first, entry = (complex(*place) for place in body.centre(angles[:, [0, -1]]).T)
+        then = solution.sample(np.array([0.0, float(periods)]))
+        turn = float(theta[-1] - then.theta[0])
+        along = complex(*(then.centre[:, 1] - then.centre[:, 0])) * np.exp(1j * turn)
+        place = tail + np.exp(1j * theta[-1]) * entry - first + along
+        turn += float(then.theta[1])
     return {
         "end_body_lengths": [float(place.real), float(place.imag)],
         "end_turned_deg": math.degrees(turn),
-        "end_includes_inertia": end is not None,
+        "end_includes_inertia": inertial,
     }
-
-
-def _end_slowly(solution: Solution, way: _Way, periods: int) -> tuple[complex, float]:
-    (time, angles, rates), body = way, solution.problem.body
-    z = body.solve(solution.problem.law, angles, rates, solution.delta_per_period).z
-    theta = cumulative_trapezoid(z[2], time, initial=0.0)
-    tail = trapezoid(np.exp(1j * theta) * (z[0] + 1j * z[1]), time)
-    start, end = (complex(*place) for place in body.centre(angles[:, [0, -1]]).T)
-    then = solution.sample(np.array([0.0, float(periods)]))
-    turn = float(theta[-1] - then.theta[0])
-    along = complex(*(then.centre[:, 1] - then.centre[:, 0])) * np.exp(1j * turn)
-    return tail + np.exp(1j * theta[-1]) * end - start + along, turn + float(then.theta[1])
-
-
-def _end_with_inertia(
-    solution: Solution, froude: float, way: _Way, periods: int
-) -> tuple[complex, float]:
-    """Displacement and turn over a way and the periods after it."""
-    body, law, delta = solution.problem.body, solution.problem.law, solution.delta_per_period
-    long, gait = -float(way[0][0]), solution.gait
-    spline = CubicHermiteSpline(1.0 + way[0] / long, way[1], long * way[2], axis=1)
-
-    def approaching(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return spline(t), spline(t, 1)
-
-    pace = froude / long**2
-    begin = GaitWithInertia(body, law, approaching, delta * long, froude=pace, breaks=())
-    cycle = GaitWithInertia(body, law, gait, delta, froude=froude, breaks=gait.corner_phases)
-    state = begin.run(np.zeros(3), _ACCURACY).states[:, -1]
-    state[:3] /= long
-    before = state
-    for _ in range(min(periods, _SETTLED)):
-        before, state = state, cycle.run(state, _ACCURACY).states[:, -1]
-    place, turn = complex(*state[4:6]), state[3] - before[3]
-    last = place - complex(*before[4:6]) * np.exp(1j * turn)
-    more = RigidMotion(turn, last).repeat(periods - min(periods, _SETTLED))
-    return complex(np.exp(1j * more.rotation) * place + more.shift), float(state[3] + more.rotation)
 
 
 def _write_model(robot: Robot, path: Path) -> dict[str, Any]:
-    write_text(path, FORMATS[path.suffix](robot))
+    write_text(path, MODELS[path.suffix](robot))
+    solution, problem = robot.solution, robot.solution.problem
     names = ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")
-    facts = {name: robot.facts[name] for name in names}
+    facts: dict[str, Any] = {name: robot.facts[name] for name in names}
     facts |= {"length_m": robot.length, "mass_kg": robot.mass, "period_s": robot.period}
-    note = (
-        "a URDF says nothing of friction, nor of how the weight is spread over what touches the "
-        "floor"
-    )
-    if path.suffix != ".urdf":
-        note, solution = note_of(robot), robot.solution
-        if rate_independent(solution.problem.law):
-            with suppress(ProblemError, NotConvergedError):
-                facts["moves_body_lengths_per_period"] = inertial_motion(
-                    *floor_of(robot), solution.gait, solution.delta_per_period, robot.froude,
-                    tolerance=1e-3, turn=solution.rotation, breaks=solution.gait.corner_phases,
-                    regime=solution.problem.regime,
-                ).distance  # fmt: skip
+    law, chain = problem.friction, _links(robot)["chain"]
+    if path.suffix == ".urdf":
+        note = (
+            "a URDF says nothing of friction, nor of how the weight is spread over what touches "
+            "the floor"
+        )
+    elif not rate_independent(problem.law):
+        note = (
+            f"contacts of MuJoCo have dry friction alone, not {law.label}: the model touches no "
+            f"floor"
+        )
+    else:
+        laws = dict.fromkeys([foot.friction or law for foot in chain.standing_on] or [law])
+        note = ", ".join(
+            f"{x.label} is {_elliptic(x).label}" for x in laws if _elliptic(x) is not x
+        )
+        note = note and f"friction in MuJoCo is elliptic, and alike forwards and backwards: {note}"
+        feet = tuple(
+            replace(foot, friction=foot.friction and _elliptic(foot.friction))
+            for foot in chain.standing_on
+        )
+        with suppress(*_UNKNOWN):
+            facts["moves_body_lengths_per_period"] = inertial_motion(
+                replace(chain, feet=feet) if chain.feet else chain, _elliptic(law), solution.gait,
+                solution.delta_per_period, robot.froude, tolerance=1e-3, turn=solution.rotation,
+                breaks=solution.gait.corner_phases, regime=problem.regime,
+            ).distance  # fmt: skip
     return facts | ({"note": note} if note else {})
 
 
-def _about(
-    solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None
-) -> dict[str, Any]:
-    measured = solution.measured
+def _links(robot: Robot) -> dict[str, Any]:
+    """Links and joints in SI units; the inertia about a link's length is that of its box."""
+    problem = robot.solution.problem
+    chain, limit = problem.body, problem.joint_limit
+    if problem.joint_map is not None or type(chain) is not Chain:
+        raise ProblemError(
+            "models for simulators are of a Chain with a motor in every joint, without gears and "
+            f"stuck joints: not of {problem.name}."
+        )
+    width, height = robot.length * (chain.width or _THIN), _THIN * robot.length
+    masses = robot.mass * chain.mass_column()[:, 0]
+    upright = robot.mass * robot.length**2 * chain.inertia_column()[:, 0]
     return {
-        "name": solution.problem.name,
-        "status": solution.status,
-        "period_s": trajectory.period,
-        "rate_hz": float(rate),
-        "samples_per_period": trajectory.time.size,
-        "max_speed_rad_per_s": None if limits is None else np.ravel(limits).tolist(),
-        "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
-        "body": solution.problem.body.describe(),
-        "friction": fields(solution.problem.law),
-        "efficiency": measured.efficiency,
-        "objective": solution.problem.objective.name,
-        "value": measured.value,
-        "distance_per_period_body_lengths": measured.distance,
-        "travels": solution.travels,
-        "rotation_per_period_rad": solution.rotation,
-        "turning_radius_body_lengths": solution.turning_radius if solution.turning else None,
-        "work_per_period_weight_times_length": measured.work,
-        "problem_hash": solution.problem.hash,
+        "chain": chain,
+        "lengths": robot.length * np.array(chain.lengths),
+        "masses": masses,
+        "inertias": np.stack([masses * (width**2 + height**2) / 12, upright, upright], axis=1),
+        "width": width,
+        "height": height,
+        "ranges": [
+            range_of(x) for x in (limit if isinstance(limit, tuple) else (limit,) * chain.n_joint)
+        ],
     }
 
 
-def _pace(solution: Solution, period: float, gravity: float) -> dict[str, Any]:
-    """Why the gait's timing is kept, and the robot for which distance and work hold."""
-    reason, froude = solution.problem.paced_by, solution.froude
-    if not reason:
-        return {}
-    if not froude:
-        return {
-            "pace": f"the gait's own, as {reason}; distance and work are those in a period of 1"
-        }
-    length = froude * pressing(solution, gravity) * period**2
-    robot = f"those at the Froude number {froude:.4g}: of a robot of {length:.3g} m in this period"
-    return {
-        "pace": f"the gait's own, as {reason}; distance and work are {robot}",
-        "froude_number": froude,
-    }
+def _xml(template: str, robot: Robot, /, **values: Any) -> str:
+    facts = robot.facts
+    peaks = np.array(facts["peak_torque_N_m"]), np.array(facts["peak_speed_rad_per_s"])
+    text = render(template, name=robot.solution.problem.name, robot=robot, peaks=peaks, **values)
+    root = ElementTree.fromstring(text)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def mjcf(robot: Robot, *, contacts: bool = True) -> str:
+    """The robot as MJCF with position servos and the keyframe "start"; without `contacts`, and
+    under laws that are not dry, it touches no floor. `ProblemError` for other bodies than such
+    chains."""
+    parts, problem, gait = _links(robot), robot.solution.problem, robot.solution.gait
+    chain, feet = parts["chain"], list[dict[str, Any]]()
+    floor = contacts and rate_independent(problem.law)
+    # points on which it stands, each pressed on the floor with its share of the weight
+    standing = chain.standing_on or whole_links(chain.weight_column()[:, 0])
+    for foot in standing if floor else ():
+        law: Any = _elliptic(foot.friction or problem.friction)
+        rule = np.polynomial.legendre.leggauss(_POINTS) if foot.extent else ([0.0], [2.0])
+        for node, share in zip(*rule, strict=True):
+            along = (foot.place + 0.5 * node * foot.extent) * parts["lengths"][foot.link]
+            feet.append(
+                {
+                    "number": len(feet) + 1,
+                    "link": foot.link,
+                    "place": (along, foot.offset * robot.length, 0),
+                    "angle": foot.angle,
+                    "borne": robot.mass * (0.5 * share * float(foot.weight or 0.0)),
+                    "friction": (law.mu_f, law.mu_t, 0, 0, 0),  # a contact has no other resistance
+                    "directed": f"{law.mu_f:.9g}" != f"{law.mu_t:.9g}",
+                }
+            )
+    pull = problem.regime.pull(np.array([[getattr(gait, "theta", None) or 0.0]]))
+    leaning = (0.0, 0.0) if pull is None else pull[:, 0]  # gravity leans, not the floor
+    start = gait.angles(np.zeros(1))[:, 0]
+    posture = [0.0, 0.0, 0.0]  # the tail, joints, and feet on their slides, link by link
+    for k in range(chain.n_link):
+        posture += [*start[max(k - 1, 0) : k], *(0.0 for foot in feet if foot["link"] == k)]
+    return _xml(
+        "robot.xml",
+        robot,
+        parts=parts,
+        step=robot.period / max(_STEPS, np.ceil(robot.period / _LONGEST)),
+        gravity=robot.pressing * np.append(leaning, -1.0) + 0.0,  # no -0
+        floor=floor,
+        feet=feet,
+        foot_mass=_MASS * robot.mass,
+        axis=_AXIS * robot.length,
+        stiff=_STIFF,
+        posture=posture,
+        start=start,
+    )
+
+
+def urdf(robot: Robot) -> str:
+    """The robot as a URDF; link_1 is its tail. Efforts and speeds are 1.5 times the gait's."""
+    return _xml("robot.urdf", robot, parts=_links(robot), reserve=_RESERVE)
+
+
+MODELS = {".xml": mjcf, ".urdf": urdf}
+
+
+def _elliptic(law: Law) -> Law:
+    """The law of MuJoCo that is nearest to a dry one."""
+    if isinstance(law, Friction) and law.associated and law.reversible:
+        return law
+    one, none = np.ones((1, 1)), np.zeros((1, 1))
+    ahead, back, aside = (
+        max(float(np.hypot(*(force[0, 0] for force in law.density(*way, none)))), _LEAST)
+        for way in ((one, none), (-one, none), (none, one))
+    )
+    along = float(np.sqrt(ahead * back))
+    return Elliptic(mu_t=aside, mu_f=along, mu_b=along)

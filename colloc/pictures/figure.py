@@ -1,22 +1,23 @@
-"""Panels about a solution, without titles."""
+"""Figures of solutions, Pareto fronts, gaits that steer and robots, made of panels."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.limits import Limit, under_one_limit
-from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import crossing_depth, link_width
 from colloc.mechanics.floor_contact import FOOT, WHEEL
-from colloc.pictures.motion_frames import foot_kinds, lab_feet, lab_outline
 from colloc.pictures.style import (
     BLUE,
     GREEN,
@@ -27,74 +28,212 @@ from colloc.pictures.style import (
     SEQUENTIAL,
     SERIES,
     VERMILION,
+    Picture,
+    save,
     snapshot_colours,
+    styled,
 )
-from colloc.results.body_marks import hinges, part_speeds
-from colloc.results.solution import Solution
+from colloc.results.motion import foot_kinds, hinges, lab_feet, lab_outline, part_speeds
+from colloc.results.solution import SOLVED, Solution
+from colloc.system.errors import ProblemError
+from colloc.verification.mesh_error import mesh_error
 
+if TYPE_CHECKING:
+    from colloc.results.robot import Robot
+    from colloc.studies.families import ParetoFront, Steering
+
+COLUMN, PAGE = 3.4, 7.0  # widths of a column and of two in journals [inches]
+_T = np.linspace(0.0, 1.0, 1201)
 _GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08  # around snapshots [body lengths]
 _FLAT, _SEEN = 0.12, 0.3  # flatter motions are drawn of this height [body lengths]
 _SMALL = 1.6  # extent [rad] below which a path in shape space is magnified
 _MOST_PERIODS = 3  # drawn in the lab
 _NAMED = 5  # lines that a legend names if there are too many
-_CELLS = 180
-_ROUND = 9  # vertices of the round end of a link
+_TRACK, _DOTS = 6, 60  # periods of a track, and drawn points of each
 _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_QUANTITIES = {"torque": "N·m", "speed": "rad/s", "power": "W"}
 
 
-class FootMarks:
-    """Marks of given sizes [points] for feet (squares), wheels and pads (bars), hollow while they
-    slide; kinds as `colloc.mechanics.floor_contact.Foot.kind`."""
+class Panel(NamedTuple):
+    """Width and height of a picture [inches], and what draws it."""
 
-    def __init__(self, axes: Axes, kinds: Sequence[str], size: float) -> None:
-        self._kinds, self._marks = np.array(kinds), {}
-        for kind in dict.fromkeys(kinds):
-            look: Any = {"zorder": 3} | ({"marker": "s", "ls": ""} if kind == FOOT else {})
-            colour, small = GREEN if kind == WHEEL else VERMILION, 0.55 * size
-            self._marks[kind] = (
-                *axes.plot([], [], c=colour, ms=size, lw=size, solid_capstyle="projecting", **look),
-                *axes.plot([], [], c="white", ms=small, lw=small, solid_capstyle="butt", **look),
+    width: float
+    height: float
+    draw: Callable[[Axes], object]
+
+    def figure(self) -> Figure:
+        with styled(font_size=8):
+            figure = Figure(figsize=(self.width, self.height))
+            self.draw(figure.add_subplot())
+        return figure
+
+
+def _draw_panel(axes: Axes, panels: dict[str, Panel], name: str) -> Axes:
+    if not isinstance(axes, Axes):
+        raise ProblemError(
+            f"ax must be a matplotlib Axes to draw on, not {axes!r}; "
+            f'plot().savefig("mine.png"), or .pdf, or .svg, writes a file.'
+        )
+    if name not in panels:
+        raise ProblemError(f"there is no panel {name!r}; there are {', '.join(panels)}.")
+    panels[name].draw(axes)
+    return axes
+
+
+def panels(solution: Solution) -> dict[str, Panel]:
+
+    def panel(width: float, height: float, draw: Callable[..., object], *more: int) -> Panel:
+        return Panel(width, height, lambda axes: draw(axes, solution, *more))
+
+    problem = solution.problem
+    shapes = range(problem.body.n_joint - 1 if problem.gait.free else 0)
+    return {
+        "filmstrip": panel(PAGE, 1.9, draw_filmstrip, 6),
+        "lab": panel(PAGE, 3.0, draw_lab),
+        "angles": panel(COLUMN, 2.2, _draw_angles),
+        "speeds": panel(COLUMN, 2.4, _draw_speeds),
+        "power": panel(COLUMN, 2.4, _draw_power),
+        "convergence": panel(COLUMN, 2.2, _draw_convergence),
+        "mesh": panel(COLUMN, 2.2, _draw_mesh),
+        **{f"shape-{j + 1}-{j + 2}": panel(COLUMN, 3.2, draw_shape_path, j) for j in shapes},
+    }
+
+
+def save_panels(solution: Solution, stem: Path) -> list[Path]:
+    """Write ``STEM-PANEL.pdf`` and ``.png`` for every panel; returns the PDFs."""
+    return [
+        save(panel.figure(), stem.with_name(f"{stem.name}-{name}"), dpi=300)[-1]
+        for name, panel in panels(solution).items()
+    ]
+
+
+def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait") -> Any:
+    if ax is not None:
+        gait = Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))
+        return _draw_panel(ax, {"gait": gait, **panels(solution)}, panel)
+    problem, solved = solution.problem, solution.status == SOLVED
+    more = [text for text in (problem.scene, solution.turning) if text]
+    headline = (
+        f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}   "
+        f"{problem.law.label},  δ = {solution.answer.delta:.0e}"
+        f"{'' if solved else f'   —   {solution.status.upper()}'}\n"
+        f"class: {';  '.join([problem.gait.describe(), *more])}"
+    )
+    strip = "one period: phase, and below it the displacement of the centre (disc: head)"
+    drawn = (
+        ("in the lab (black: at the end)", draw_lab),
+        ("shape space (disc: t = 0)" if _is_planar(solution) else "shape", draw_gait),
+        ("sliding speeds (near δ: sticking)", _draw_speeds),
+        (f"power; W = {solution.measured.work:.4f} (ticks: mesh)", _draw_power),
+    )
+    with styled():
+        figure = Picture(figsize=(11, 8.2), layout="none")  # type: ignore[arg-type]
+        colour = INK if solved else VERMILION
+        figure.text(0.015, 0.985, headline, fontsize=11, va="top", color=colour)
+        draw_filmstrip(figure.add_axes((0.015, 0.76, 0.97, 0.135)), solution)
+        figure.text(0.015, 0.905, strip)
+        grid = figure.add_gridspec(
+            2, 2, left=0.075, right=0.985, bottom=0.06, top=0.685, wspace=0.2, hspace=0.33,
+            width_ratios=(2, 1), height_ratios=(1.35, 1),
+        )  # fmt: skip
+        for k, (title, draw) in enumerate(drawn):
+            draw(axes := figure.add_subplot(grid[k]), solution)
+            axes.set_title(title)
+    return figure
+
+
+class BodyMarks:
+    """A body that can be moved: its links, hollow joints, a disc for the head, its centre of mass,
+    and feet (squares), wheels and pads (bars), hollow while they slide.
+
+    Sizes [points] are those of links, joints, head, centre and feet.
+    """
+
+    def __init__(
+        self,
+        axes: Axes,
+        body: Body,
+        colour: Any,
+        sizes: tuple[float, float, float, float, float],
+        centre: tuple[str, str] = ("+", VERMILION),
+    ) -> None:
+        link, joint, head, spot, foot = sizes
+
+        def line(marker: str = "", **look: Any) -> Any:
+            return axes.plot([], [], marker=marker, ls="" if marker else "-", **look)[0]
+
+        self._axes, self._hinges, self._width = axes, hinges(body), link_width(body)
+        self._links: Any = PolyCollection([], fc=[colour], ec="white", lw=0.2, zorder=2)
+        if self._width:
+            axes.add_collection(self._links)
+        else:
+            look: Any = {"solid_capstyle": "round", "solid_joinstyle": "round"}
+            self._links = line(color=colour, lw=link, **look)
+        self._joints = line("o", color="white", mec=colour, ms=joint)
+        self._head = line("o", color=colour, ms=head)
+        self._centre = line(centre[0], color=centre[1], ms=spot)
+        self._kinds, self._feet = np.array(foot_kinds(body)), dict[str, Any]()
+        for kind in dict.fromkeys(foot_kinds(body)):
+            square, shade = "s" * (kind == FOOT), GREEN if kind == WHEEL else VERMILION
+            looks = ((shade, foot, "projecting"), ("white", 0.55 * foot, "butt"))
+            self._feet[kind] = tuple(
+                line(square, c=tone, ms=size, lw=size, solid_capstyle=ends, zorder=3)
+                for tone, size, ends in looks
             )
 
-    def place(self, places: np.ndarray, held: np.ndarray) -> None:
-        """Move the marks to both ends of the feet ``(2, 2, n_foot)``, of which some hold."""
+    def place(self, points: Iterable[np.ndarray], held: np.ndarray) -> None:
+        """Move it to an outline ``(2, n_point)``, a centre ``(2,)`` and both ends of the feet ``(2,
+        2, n_foot)``, of which some hold."""
+        ends, centre, feet = points
+        if self._width:  # round-ended polygons
+            along = np.arctan2(*np.diff(ends)[::-1])[:, None]
+            half_turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)
+            rims = [
+                end[:, :, None]
+                + 0.5 * self._width * np.stack([np.cos(along + turn), np.sin(along + turn)])
+                for end, turn in ((ends[:, 1:], half_turn), (ends[:, :-1], half_turn + np.pi))
+            ]
+            self._links.set_verts(list(np.concatenate(rims, axis=2).transpose(1, 2, 0)))
+        else:
+            self._links.set_data(*ends)
+        self._axes.update_datalim(ends.T)
+        self._joints.set_data(*ends[:, self._hinges])
+        self._head.set_data(*ends[:, -1:])
+        self._centre.set_data(*centre[:, None])
         # no line from foot to foot
-        apart = np.concatenate([places, np.full_like(places[:, :1], np.nan)], axis=1)
-        for kind, (filled, hollow) in self._marks.items():
+        apart = np.concatenate([feet, np.full_like(feet[:, :1], np.nan)], axis=1)
+        for kind, marks in self._feet.items():
             of_kind = self._kinds == kind
-            for line, chosen in ((filled, of_kind), (hollow, of_kind & ~held)):
+            for line, chosen in zip(marks, (of_kind, of_kind & ~held), strict=True):
                 line.set_data(*apart[..., chosen].transpose(0, 2, 1).reshape(2, -1))
 
     def key(self) -> dict[str, Any]:
-        """Legend texts and what they explain."""
-        last = next(reversed(self._marks), "")
-        words = {kind: f"{kind} (filled: holds)" if kind == last else kind for kind in self._marks}
-        return {words[kind]: marks for kind, marks in self._marks.items()}
+        last = next(reversed(self._feet), "")
+        words = {kind: f"{kind} (filled: holds)" if kind == last else kind for kind in self._feet}
+        return {words[kind]: marks for kind, marks in self._feet.items()}
 
 
 def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     """The body at equal steps of a period, with the phase and the displacement of its centre."""
     body, motion = solution.problem.body, solution.sample(np.linspace(0.0, 1.0, count))
-    at = (body, motion.angles, motion.theta, motion.tail)
-    x, y = lab_outline(*at)
-    feet, held, rise = lab_feet(*at), solution.holding(motion), float(np.ptp(y))
+    ends, feet, held = lab_outline(body, motion), lab_feet(body, motion), solution.holding(motion)
+    rise = float(np.ptp(ends[1]))
     higher = max(1, round(_SEEN / rise)) if 0 < rise < _FLAT else 1
-    y = higher * y
+    x, y = ends[0], higher * ends[1]
     room = np.maximum(np.ptp(x, axis=0), _NARROWEST) + _GAP
     middle = np.cumsum(room) - 0.5 * room
     shift = middle - 0.5 * (x.min(axis=0) + x.max(axis=0))
     low = float(y.min()) - _MARGIN
     for k, colour in enumerate(snapshot_colours(count)):
-        draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, body)
-        marks = FootMarks(axes, foot_kinds(body), 4.5)
-        marks.place(feet[..., k] * [[[1]], [[higher]]] + [[[shift[k]]], [[0]]], held[:, k])
-        centre = motion.centre[:, k]
-        axes.plot(centre[0] + shift[k], higher * centre[1], "+", color=VERMILION, ms=6)
-        come = f"{round(float(centre[0]), 2) + 0.0:.2f}".replace("-", "−")
-        for text, colour, line in ((f"{motion.t[k]:.2g}", GREY, -3), (come, VERMILION, -13)):
+        scale, place = np.array([1, higher]), np.array([shift[k], 0])
+        at = (ends[:, :, k].T, motion.centre[:, k], feet[..., k].T)
+        placed = [(scale * points + place).T for points in at]
+        BodyMarks(axes, body, colour, (2.4, 3.5, 5, 6, 4.5)).place(placed, held[:, k])
+        come = f"{round(float(motion.centre[0, k]), 2) + 0.0:.2f}".replace("-", "−")
+        for text, shade, line in ((f"{motion.t[k]:.2g}", GREY, -3), (come, VERMILION, -13)):
             axes.annotate(
                 text, (middle[k], low), (0, line), xycoords="data", textcoords="offset points",
-                ha="center", va="top", fontsize=7, color=colour,
+                ha="center", va="top", fontsize=7, color=shade,
             )  # fmt: skip
     axes.set(xlim=(0, float(room.sum())), ylim=(low, float(y.max()) + _MARGIN), aspect="equal")
     axes.set_axis_off()
@@ -105,55 +244,47 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
         )  # fmt: skip
 
 
-def strips(ends: np.ndarray, width: float) -> np.ndarray:
-    """Round-ended polygons ``(n_part, n_vertex, 2)`` around the parts of an outline."""
-    along = np.arctan2(*np.diff(ends)[::-1])[:, None]
-    half_turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ROUND)
-    rims = [
-        end[:, :, None] + 0.5 * width * np.stack([np.cos(along + turn), np.sin(along + turn)])
-        for end, turn in ((ends[:, 1:], half_turn), (ends[:, :-1], half_turn + np.pi))
-    ]
-    return np.concatenate(rims, axis=2).transpose(1, 2, 0)
-
-
-def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body) -> None:
-    """A body with an outline ``(2, n_point)``: hollow joints, the head a disc."""
-    if width := link_width(body):
-        links = list(strips(ends, width))
-        axes.add_collection(PolyCollection(links, facecolors=[colour], edgecolors="white", lw=0.2))
-    else:
-        axes.plot(*ends, "-", color=colour, lw=2.4, solid_capstyle="round", solid_joinstyle="round")
-    axes.plot(*ends[:, hinges(body)], "o", color="white", mec=colour, ms=3.5)
-    axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
-
-
 def draw_lab(axes: Axes, solution: Solution) -> None:
     """Paths of tail, head and centre of mass, over the periods that separate the first body from
     the last one; of one period with one body if these are too many."""
-    body, start = solution.problem.body, solution.sample(0.0)
-    begin = lab_outline(body, start.angles, start.theta, start.tail)[:, :, 0]
-    step = solution.sample(1.0).centre[:, 0] - start.centre[:, 0]
-    needed = 1.05 * float(np.ptp(step @ begin)) / max(float(np.hypot(*step)) ** 2, 1e-300)
+    body, ends = solution.problem.body, solution.sample(np.array([0.0, 1.0]))
+    step = ends.centre[:, 1] - ends.centre[:, 0]
+    needed = 1.05 * float(np.ptp(step @ lab_outline(body, ends)[:, :, 0]))
+    needed /= max(float(np.hypot(*step)) ** 2, 1e-300)
     apart = needed <= _MOST_PERIODS
     periods = max(1, int(np.ceil(needed))) if apart else 1
     fine = solution.sample(np.linspace(0.0, periods, 600 * periods + 1))
-    at = (body, fine.angles, fine.theta, fine.tail)
-    ends, feet, held = lab_outline(*at), lab_feet(*at), solution.holding(fine)
+    outline, feet, held = lab_outline(body, fine), lab_feet(body, fine), solution.holding(fine)
     for path, colour, name in (
-        (ends[:, 0], BLUE, "tail"),
-        (ends[:, -1], ORANGE, "head"),
+        (outline[:, 0], BLUE, "tail"),
+        (outline[:, -1], ORANGE, "head"),
         (fine.centre, VERMILION, "centre"),
     ):
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
-        draw_body(axes, ends[:, :, k], shade, body)
-        marks = FootMarks(axes, foot_kinds(body), 6.0)
-        marks.place(feet[..., k], held[:, k])
-        axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
+        marks = BodyMarks(axes, body, shade, (2.4, 3.5, 5, 7, 6))
+        marks.place((outline[..., k], fine.centre[:, k], feet[..., k]), held[:, k])
+    axes.autoscale_view()
     axes.set_aspect("equal", "datalim")
     counted = f"{periods} period{'s' if periods > 1 else ''}"
     axes.set(xlabel=f"x  [body lengths],  {counted}", ylabel="y  [body lengths]")
-    draw_key(axes, more=marks.key())
+    _draw_key(axes, more=marks.key())
+
+
+def _is_planar(solution: Solution) -> bool:
+    return solution.problem.body.n_joint == 2 and solution.problem.gait.free
+
+
+def draw_gait(axes: Axes, solution: Solution) -> None:
+    """Path in the plane of two shape coordinates, or coordinates over time if there are others."""
+    (draw_shape_path if _is_planar(solution) else _draw_angles)(axes, solution)
+
+
+def _draw_angles(axes: Axes, solution: Solution) -> None:
+    names = solution.problem.body.defaults
+    _draw_series(axes, _T, solution.gait.angles(_T))
+    axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{names.quantity}  [rad]")
+    _draw_key(axes, names.coordinate)
 
 
 def forbidden(
@@ -161,95 +292,223 @@ def forbidden(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Grid ``(n,)`` of two shape coordinates, and ``(n, n)`` values that are positive where a pair
     is infeasible for any values of the others; rows are the second coordinate."""
-    grid = np.linspace(-np.pi, np.pi, _CELLS + 1)
+    grid = np.linspace(-np.pi, np.pi, 181)
     a, b = np.meshgrid(grid, grid)
     shapes = np.zeros((body.n_joint, a.size))
     shapes[[first, second]] = a.ravel(), b.ravel()
     stretched, limit = under_one_limit(shapes, joint_limit)
+    bounded = body.bounded_angles
     if body.n_joint == 2:
-        beyond = body.bounded_angles.largest(stretched) - limit
-        excess = np.maximum(beyond, crossing_depth(body, shapes))
+        excess = np.maximum(bounded.largest(stretched) - limit, crossing_depth(body, shapes))
     else:
-        by_others = np.delete(body.bounded_angles.rows, [first, second], axis=1).any(axis=1)
-        excess = (
-            np.abs(body.bounded_angles.rows[~by_others] @ stretched).max(axis=0, initial=0.0)
-            - limit
-        )
+        rows = bounded.rows[~np.delete(bounded.rows, [first, second], axis=1).any(axis=1)]
+        excess = np.abs(rows @ stretched).max(axis=0, initial=0.0) - limit
     return grid, np.maximum(excess, 0.0).reshape(a.shape)
 
 
-def draw_allowed(
-    axes: Axes, body: Body, joint_limit: Limit, first: int = 0, second: int = 1
-) -> None:
-    grid, excess = forbidden(body, joint_limit, first, second)
+def draw_shape_path(axes: Axes, solution: Solution, first: int = 0) -> None:
+    """Path in the plane of two consecutive joint angles, light to dark, its start a disc; grey:
+    infeasible."""
+    problem, second, angles = solution.problem, first + 1, solution.gait.angles(_T)
+    grid, excess = forbidden(problem.body, problem.joint_limit, first, second)
     if excess.max() > 1e-9:
         axes.contourf(grid, grid, excess, levels=[1e-9, 10.0], colors=[GREY], alpha=0.4)
-
-
-def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> None:
-    draw_series(axes, t, angles)
-    axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{body.defaults.quantity}  [rad]")
-    draw_key(axes, body.defaults.coordinate)
-
-
-def draw_shape_path(
-    axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1
-) -> None:
-    """Path in the plane of two joint angles, light to dark, its start a disc; grey: infeasible."""
-    draw_allowed(axes, problem.body, problem.joint_limit, first, second)
     q = angles[[first, second]]
     colours = colormaps[PHASE](np.linspace(0.1, 0.8, 200))  # visible on white and on black
-    pieces = np.array_split(np.arange(q.shape[1] - 1), min(200, q.shape[1] - 1))
+    pieces = np.array_split(np.arange(_T.size - 1), 200)
     lines = [q[:, piece[0] : piece[-1] + 2].T for piece in pieces]
     axes.add_collection(LineCollection(lines, colors=colours, lw=2.2, capstyle="round"))
     axes.plot(*q[:, 0], "o", color=VERMILION, ms=5)
-    at = angles.shape[1] // 12
+    at = _T.size // 12
     arrow = {"arrowstyle": "-|>", "color": VERMILION, "lw": 1.4}
     axes.annotate("", (q[0, at + 2], q[1, at + 2]), (q[0, at], q[1, at]), arrowprops=arrow)
     middle, half = np.zeros(2), 1.02 * np.pi
     extent = float(np.ptp(angles, axis=1).max())
     if extent < _SMALL:
         middle, half = 0.5 * (q.min(axis=1) + q.max(axis=1)), 0.6 * max(extent, 0.05)
-        axes.xaxis.set_major_locator(MaxNLocator(5))
-        axes.yaxis.set_major_locator(MaxNLocator(5))
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(MaxNLocator(5))
     else:
-        ticks, labels = np.pi * np.array([-1, -0.5, 0, 0.5, 1]), ["−π", "−π/2", "0", "π/2", "π"]
-        axes.set_xticks(ticks, labels)
-        axes.set_yticks(ticks, labels)
-    (x, y) = middle
-    axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_ticks(np.pi * np.linspace(-1, 1, 5), ["−π", "−π/2", "0", "π/2", "π"])
+    (left, low), (right, high) = middle - half, middle + half
+    axes.set(xlim=(left, right), ylim=(low, high), aspect="equal")
     what = problem.body.defaults.quantity
     axes.set(xlabel=f"{what} {first + 1}  [rad]", ylabel=f"{what} {second + 1}  [rad]")
 
 
-def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
+def _draw_speeds(axes: Axes, solution: Solution) -> None:
     """Sliding speeds over a period on a logarithmic scale, with delta: below it, sticking."""
-    problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
-    part, speed = part_speeds(problem.body, motion.angles, motion.rates, motion.z)
+    motion, delta = solution.sample(_T), solution.delta_per_period
+    part, speed = part_speeds(solution.problem.body, motion)
     speed = np.maximum(speed, 0.1 * delta)
-    draw_series(axes, t, speed)
+    _draw_series(axes, _T, speed)
     axes.axhline(delta, color=GREY, lw=1, ls=":")
     axes.annotate("δ", (1.0, delta), (3, 0), textcoords="offset points", color=GREY, va="center")
     axes.set(xlim=(0, 1), ylabel=f"{part} speed  [1/period]", xlabel="phase t")
-    set_log(axes, "y", (0.5 * float(min(speed.min(), delta)), 2 * float(speed.max())))
-    draw_key(axes, part)
+    _set_log(axes, "y", (0.5 * float(min(speed.min(), delta)), 2 * float(speed.max())))
+    _draw_key(axes, part)
 
 
-def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
-    """Power against friction over a period, with the mesh."""
-    motion = solution.sample(t)
-    axes.plot(t, solution.power(motion), color=BLUE, lw=1.5)
+def _draw_power(axes: Axes, solution: Solution) -> None:
+    axes.plot(_T, solution.power(solution.sample(_T)), color=BLUE, lw=1.5)
     axes.set(xlim=(0, 1), xlabel="phase t", ylabel="power  [weight·length/period]")
     axes.set_ylim(bottom=0)
-    draw_mesh_ticks(axes, solution.answer.edges)
+    _draw_mesh_ticks(axes, solution.answer.edges)
 
 
-def draw_mesh_ticks(axes: Axes, edges: np.ndarray) -> None:
+def _draw_convergence(axes: Axes, solution: Solution) -> None:
+    """Objective against delta at every step of the search; crosses did not converge."""
+    deltas, values, good = np.array(
+        [(step.delta, step.value, step.optimal) for step in solution.history]
+    ).T
+    good = good > 0
+    axes.plot(deltas[good], values[good], "o-", color=BLUE, ms=4, lw=1.2)
+    if good.any():
+        axes.set_ylim(*axes.get_ylim())
+    axes.plot(deltas[~good], values[~good], "x", color=VERMILION, ms=5)
+    axes.set(xlabel="δ  [length/period]", ylabel=solution.problem.objective.label)
+    axes.ticklabel_format(axis="y", useOffset=False)
+    _set_log(axes, "x", (deltas.min() / 2, deltas.max() * 2))
+
+
+def mesh_errors(solution: Solution) -> np.ndarray:
+    """Estimated error of the objective from every mesh interval, ``(n,)``."""
+    control = control_problem(solution.answer.problem)
+    at = (solution.mesh, solution.gait, solution.delta_per_period)
+    return np.abs(mesh_error(control, *at).value)
+
+
+def _draw_mesh(axes: Axes, solution: Solution) -> None:
+    edges, shown = solution.mesh.edges, np.maximum(mesh_errors(solution), 1e-12)
+    tolerance, high = solution.problem.mesh_tolerance, float(shown.max())
+    axes.stairs(shown, edges, color=ORANGE, lw=1.2, baseline=None)
+    _draw_mesh_ticks(axes, edges)
+    if tolerance > 0:
+        axes.axhline(tolerance, color=GREY, lw=1, ls=":")
+        high = max(high, tolerance)
+    axes.set(xlim=(0, float(edges[-1])), xlabel="phase t", ylabel="error of an interval")
+    _set_log(axes, "y", (max(0.5 * float(shown.min()), 1e-10 * high), 3 * high))
+
+
+def plot_front(front: ParetoFront, ax: Axes | None = None) -> Any:
+    """Both objectives of every gait, joined but for gaps; in a figure of its own also the paths of
+    the gaits in the plane of the first two joints."""
+    if ax is not None:
+        return _draw_panel(
+            ax, {"": Panel(COLUMN, COLUMN, lambda axes: _draw_front(axes, front))}, ""
+        )
+    planar = front.problem.body.n_joint > 1
+    with styled():
+        figure = Figure(figsize=(7.2 if planar else 3.8, 3.4))
+        axes, *plane = figure.subplots(1, 1 + planar, squeeze=False)[0]
+        _draw_front(axes, front)
+        last = front.points[-1].gait.angles(_T)
+        for panel in plane:
+            colours = snapshot_colours(len(front.points))
+            for point, colour in zip(front.points, colours, strict=True):
+                path = point.gait.angles(_T)
+                # a mirror image is the same gait
+                mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
+                panel.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
+            what = front.problem.body.defaults.quantity
+            panel.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]", aspect="equal")
+    return figure
+
+
+def _draw_front(axes: Axes, front: ParetoFront) -> None:
+    first, second = front.objectives
+    values, after = front.values, [gap.after + 1 for gap in front.gaps]
+    whole = np.insert(values, after, np.nan, axis=0)
+    axes.plot(whole[:, 1], whole[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
+    for k in after:
+        label = "nothing found between" if k == after[0] else None
+        ends = values[k - 1 : k + 1].T[::-1]
+        axes.plot(*ends, ":", color=VERMILION, lw=0.8, zorder=1, label=label)
+    axes.scatter(values[:, 1], values[:, 0], c=snapshot_colours(len(front.points)), s=28, zorder=2)
+    axes.set(xlabel=second.label, ylabel=first.label)
+    axes.set_title(front.problem.name)
+    if after:
+        axes.legend()
+
+
+def plot_steering(family: Steering, ax: Axes | None = None, panel: str = "cost") -> Any:
+    drawn = {
+        "cost": Panel(COLUMN, COLUMN, lambda axes: _draw_cost(axes, family)),
+        "tracks": Panel(COLUMN, COLUMN, lambda axes: _draw_tracks(axes, family)),
+    }
+    if ax is not None:
+        return _draw_panel(ax, drawn, panel)
+    with styled():
+        figure = Figure(figsize=(7.2, 3.4))
+        for axes, each in zip(figure.subplots(1, 2), drawn.values(), strict=True):
+            each.draw(axes)
+    return figure
+
+
+def _draw_cost(axes: Axes, family: Steering) -> None:
+    turns, values = np.degrees(family.turns), family.efficiency
+    axes.plot(turns, values, "-", color=BLUE, lw=0.8, zorder=1)
+    axes.scatter(turns, values, c=snapshot_colours(len(turns)), s=28, zorder=2)
+    failed = ~np.array([point.success for point in family.points])
+    if failed.any():
+        axes.plot(turns[failed], values[failed], "x", color=VERMILION, ms=9, label="not certified")
+    if (spot := family.on_the_spot) is not None:
+        label = "on the spot, with least work"
+        axes.plot(np.degrees(spot.turns), spot.efficiency, "s", color=VERMILION, ms=4, label=label)
+    axes.set(xlabel="turn of a period  [degrees, + left]", ylabel="efficiency, chord / W")
+    axes.set_ylim(0, 1.1 * values.max())
+    axes.set_title(family.problem.name)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend()
+
+
+def _draw_tracks(axes: Axes, family: Steering) -> None:
+    colours = snapshot_colours(len(family.points))
+    tracks: Any = [*zip(family.points, colours, "o" * len(colours), strict=True)]
+    if (spot := family.on_the_spot) is not None:
+        tracks += [(point, VERMILION, "s") for point in spot.points]
+    t = np.linspace(0.0, _TRACK, _TRACK * _DOTS + 1)
+    for point, colour, mark in tracks:
+        track = point.motion.sample(t).centre  # all arcs set out along +x
+        axes.plot(*track, color=colour, lw=1.0)
+        axes.plot(*track[:, ::_DOTS], mark, color=colour, ms=3)
+    what = f"x  [body lengths],  {_TRACK} periods"
+    axes.set(xlabel=what, ylabel="y  [body lengths]", aspect="equal")
+
+
+def robot_panels(robot: Robot) -> dict[str, Panel]:
+    def draw(axes: Axes, what: str, unit: str) -> None:
+        t = robot.columns["t"].values
+        _draw_series(axes, t, robot.columns[f"joint_{what}s"].values)
+        axes.set(xlim=(0, t[-1]), xlabel="time  [s],  one period", ylabel=f"{what}  [{unit}]")
+        _draw_key(axes, "joint")
+
+    def panel(what: str, unit: str) -> Panel:
+        return Panel(COLUMN, 2.2, lambda axes: draw(axes, what, unit))
+
+    return {what: panel(what, unit) for what, unit in _QUANTITIES.items()}
+
+
+def plot_robot(robot: Robot, ax: Axes | None = None, panel: str = "torque") -> Any:
+    drawn = robot_panels(robot)
+    if ax is not None:
+        return _draw_panel(ax, drawn, panel)
+    with styled():
+        figure = Picture(figsize=(6.4, 6.4))
+        rows = figure.subplots(len(drawn), sharex=True)
+        for axes, each in zip(rows, drawn.values(), strict=True):
+            each.draw(axes)
+            axes.label_outer()
+    return figure
+
+
+def _draw_mesh_ticks(axes: Axes, edges: np.ndarray) -> None:
     at_axis = axes.get_xaxis_transform()
     axes.plot(edges, 0.0 * edges, "|", color=GREY, ms=7, transform=at_axis, clip_on=False)
 
 
-def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
+def _set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
     """Logarithmic axis "x" or "y" with plain text labels, ten times as fast as typeset ones."""
     axes.set(**{f"{which}scale": "log", f"{which}lim": limits})
     axis = axes.xaxis if which == "x" else axes.yaxis
@@ -258,7 +517,7 @@ def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
     axis.set_major_formatter(lambda value, _: f"10{f'{np.log10(value):.0f}'.translate(_EXPONENT)}")
 
 
-def draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
+def _draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
     """A line for every joint or part; many are coloured from dark to light, and a few named."""
     count = len(rows)
     many = count > len(SERIES)
@@ -268,7 +527,7 @@ def draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
         axes.plot(t, row, lw=1.4, color=colours[j], label=f"{j + 1}" if j in named else None)
 
 
-def draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) -> None:
+def _draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) -> None:
     """Legend of the lines, and of more marks, in a row above the axes."""
     handles, labels = axes.get_legend_handles_labels()
     handles, labels = [*handles, *(more or {}).values()], [*labels, *(more or {})]

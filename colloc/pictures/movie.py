@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +15,75 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from colloc.mechanics.contact import link_width
-from colloc.pictures.figure import FootMarks, draw_shape_path
-from colloc.pictures.motion_frames import Frames, foot_kinds, frames, frames_of
+from colloc.pictures.figure import BodyMarks, draw_shape_path
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
-from colloc.results.body_marks import hinges
-from colloc.results.motion import rotate
-from colloc.results.solution import Solution
+from colloc.results.motion import (
+    RigidMotion,
+    SampledMotion,
+    friction_arrows,
+    lab_feet,
+    lab_outline,
+    rotate,
+)
+from colloc.results.solution import SOLVED, Solution
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.files import replaced_file
 from colloc.system.progress import StatusLine
 
-_COLOURS = 64
-_MOST_PICTURES = 5000
+_ARROW = 0.12  # length of the arrow of the largest friction [body lengths]
+_COLOURS, _MOST_PICTURES = 64, 5000
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Positions in the lab of a period from phase 0 to 1, or of several from rest."""
+
+    motion: SampledMotion
+    ends: np.ndarray  # (2, n_point, n_time), outline, tail first
+    arrow_base: np.ndarray  # (2, n_arrow, n_time), where friction is shown
+    arrow: np.ndarray  # (2, n_arrow, n_time), force per length
+    holding: np.ndarray  # (n_foot, n_time), feet that stick
+    feet: np.ndarray  # (2, 2, n_foot, n_time), both their ends
+    before: tuple[RigidMotion, ...]  # of the periods before each one that is shown
+
+    @property
+    def window(self) -> tuple[np.ndarray, np.ndarray]:
+        """Low and high corner ``(2,)`` of all periods with their arrows."""
+        ends = self.ends.reshape(2, -1)
+        reach = np.concatenate([moved.of(ends) for moved in self.before], axis=1)
+        return reach.min(axis=1) - _ARROW, reach.max(axis=1) + _ARROW
+
+    @property
+    def arrow_scale(self) -> float:
+        """Length of an arrow [body lengths] per force."""
+        return _ARROW / max(float(np.hypot(*self.arrow).max()), 1e-300)
+
+
+def frames(
+    solution: Solution,
+    count: int = 241,
+    arrows: int = 12,
+    periods: int = 3,
+    motion: SampledMotion | None = None,
+) -> Frames:
+    """Frames at `count` phases of a period, both ends included, or of another motion of the gait,
+    with about so many arrows of friction."""
+    problem, body = solution.problem, solution.problem.body
+    motion = motion or solution.sample(np.linspace(0.0, 1.0, count))
+    at = (motion.angles, motion.rates, solution.delta_per_period, motion.z)
+    places, forces = friction_arrows(body, problem.law, *at, arrows)
+    way = complex(*(motion.centre[:, -1] - motion.centre[:, 0]))
+    period = RigidMotion(float(motion.theta[-1] - motion.theta[0]), way)
+    return Frames(
+        motion,
+        lab_outline(body, motion),
+        motion.tail[:, None] + rotate(places, motion.theta),
+        rotate(forces, motion.theta),
+        solution.holding(motion),
+        lab_feet(body, motion),
+        tuple(period.repeat(k) for k in range(periods)),
+    )
 
 
 def pictures(
@@ -40,95 +96,69 @@ def pictures(
     from_rest: bool = False,
 ) -> Iterator[np.ndarray]:
     """Images ``(height, width, 3)`` of bytes, `count` a period, of an even width [pixels]."""
+    problem, body = solution.problem, solution.problem.body
     if from_rest:
-        t = np.linspace(0.0, periods, periods * count + 1)
-        shown = frames_of(solution, solution.from_rest(t))
+        motion = solution.from_rest(np.linspace(0.0, periods, periods * count + 1))
+        shown = frames(solution, periods=1, motion=motion)
     else:
         shown = frames(solution, count + 1, periods=periods)
+    motion, (low, high) = shown.motion, shown.window
+    planar = problem.gait.free and body.n_joint >= 2
+    share, span = 0.68 if planar else 0.97, high - low
+    tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width
+    height = 2 * round((tall + 0.13 * width) / 2)
+    scale = max(span[0] / (share * width), span[1] / tall)  # body lengths of a pixel
+    middle, half = 0.5 * (low + high), 0.5 * scale * np.array([share * width, tall])
+    verdict = "" if solution.status == SOLVED else f"  ({solution.status})"
+    title = f"{problem.name}   {problem.objective.name} {solution.measured.value:.4f}{verdict}"
     with styled():
-        scene = _Scene(solution, shown, arrows, width)
-        for k in range(periods * count):
-            yield scene.picture(*divmod(k, shown.t.size - 1))
-
-
-class _Scene:
-    """A figure whose artists move."""
-
-    def __init__(self, solution: Solution, shown: Frames, arrows: bool, width: int) -> None:
-        problem, body = solution.problem, solution.problem.body
-        self.shown, self.hinges = shown, hinges(body)
-        low, high = shown.window
-        planar = problem.gait.free and body.n_joint >= 2
-        share, span = 0.68 if planar else 0.97, high - low
-        tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width
-        height = 2 * round((tall + 0.13 * width) / 2)
         figure = Figure(figsize=(width / 100, height / 100), dpi=100)
         figure.set_layout_engine("none")
-        self.canvas, self.size = FigureCanvasAgg(figure), (height, width)
+        canvas = FigureCanvasAgg(figure)
         axes = figure.add_axes((0.015, 0.03, share, tall / height))
-        scale = max(span[0] / (share * width), span[1] / tall)  # body lengths of a pixel
-        middle, half = 0.5 * (low + high), 0.5 * scale * np.array([share * width, tall])
         for axis, a, b in zip("xy", middle - half, middle + half, strict=True):
             ticks = 0.2 * np.arange(np.ceil(a / 0.2), np.floor(b / 0.2) + 1)  # a grid of fifths
             axes.set(**{f"{axis}ticks": ticks, f"{axis}lim": (a, b)})
         axes.grid(color="#e8ecef", lw=0.8)
         axes.tick_params(length=0, labelbottom=False, labelleft=False)
         axes.spines[:].set_visible(False)
-        verdict = "" if solution.status == "solved" else f"  ({solution.status})"
-        value = f"{problem.objective.name} {solution.measured.value:.4f}"
-        title = f"{problem.name}   {value}{verdict}"
         figure.text(0.015, 0.93, title, fontsize=11, weight="bold")
-        self.phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
-
-        def line(*look: str, **more: Any) -> Any:
-            return axes.plot([], [], *look, **more)[0]
-
-        self.trails = [line(color=colour, lw=1) for colour in (SKY, ORANGE, VERMILION)]
-        thickness = 0.72 * link_width(body) / scale or 4  # a pixel is 0.72 points
-        round_ends: Any = {"solid_capstyle": "round", "solid_joinstyle": "round"}
-        self.body = line("-", color=INK, lw=thickness, **round_ends)
-        self.joints = line("o", color="white", mec=INK, ms=5)
-        self.head = line("o", color=INK, ms=9)
-        self.centre = line("o", color=VERMILION, ms=5)
-        self.feet = FootMarks(axes, foot_kinds(body), 8.0)
-        if key := self.feet.key():
+        phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
+        colours = (SKY, ORANGE, VERMILION)
+        trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in colours]
+        marks = BodyMarks(axes, body, INK, (4, 5, 9, 5, 8), ("o", VERMILION))
+        if key := marks.key():
             where: Any = {"loc": "lower right", "ncols": len(key), "borderaxespad": 0}
             axes.legend(key.values(), key.keys(), **where)
-        self.quiver: Any = None
         if arrows:
             base = shown.arrow_base[:, :, 0]
             # below a head's size the head shrinks too, so that weak friction looks weak
-            self.quiver = axes.quiver(
+            quiver = axes.quiver(
                 *base, *base, color=VERMILION, angles="xy", scale_units="xy", scale=1,
                 width=0.0024, headwidth=4, headlength=5, zorder=4,
             )  # fmt: skip
-        self.dot = None
         if planar:
             plane = figure.add_axes((0.755, 0.2, 0.235, 0.62))
-            draw_shape_path(plane, problem, shown.angles)
-            (self.dot,) = plane.plot([], [], "o", color=VERMILION, mec="white", ms=8, zorder=5)
-
-    def picture(self, period: int, k: int) -> np.ndarray:
-        shown, before = self.shown, self.shown.before[period]
-        ends = before.of(shown.ends[:, :, k])
-        self.body.set_data(*ends)
-        self.joints.set_data(*ends[:, self.hinges])
-        self.head.set_data(*ends[:, -1:])
-        self.centre.set_data(*before.of(shown.centre[:, [k]]))
-        paths = shown.ends[:, 0], shown.ends[:, -1], shown.centre
-        for line, path in zip(self.trails, paths, strict=True):
-            whole = [earlier.of(path) for earlier in shown.before[:period]]
-            line.set_data(*np.concatenate([*whole, before.of(path[:, : k + 1])], axis=1))
-        self.feet.place(before.of(shown.feet[..., k]), shown.holding[:, k])
-        if self.quiver is not None:
-            force = shown.arrow_scale * rotate(shown.arrow[:, :, k], before.rotation)
-            self.quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
-            self.quiver.set_UVC(*force)
-        if self.dot is not None:
-            self.dot.set_data(shown.angles[:1, k], shown.angles[1:2, k])
-        self.phase.set_text(f"t = {period + shown.t[k]:.2f} of {len(shown.before) * shown.t[-1]:g}")
-        self.canvas.draw()
-        return np.asarray(self.canvas.buffer_rgba())[: self.size[0], : self.size[1], :3].copy()
+            draw_shape_path(plane, solution)
+            (dot,) = plane.plot([], [], "o", color=VERMILION, mec="white", ms=8, zorder=5)
+        whole = f"{len(shown.before) * motion.t[-1]:g}"
+        for number in range(periods * count):
+            period, k = divmod(number, motion.t.size - 1)
+            before = shown.before[period]
+            at = (shown.ends[:, :, k], motion.centre[:, k], shown.feet[..., k])
+            marks.place(map(before.of, at), shown.holding[:, k])
+            paths = shown.ends[:, 0], shown.ends[:, -1], motion.centre
+            for trail, path in zip(trails, paths, strict=True):
+                past = [earlier.of(path) for earlier in shown.before[:period]]
+                trail.set_data(*np.concatenate([*past, before.of(path[:, : k + 1])], axis=1))
+            if arrows:
+                quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
+                quiver.set_UVC(*shown.arrow_scale * rotate(shown.arrow[:, :, k], before.rotation))
+            if planar:
+                dot.set_data(motion.angles[:1, k], motion.angles[1:2, k])
+            phase.set_text(f"t = {period + motion.t[k]:.2f} of {whole}")
+            canvas.draw()
+            yield np.asarray(canvas.buffer_rgba())[:height, :width, :3].copy()
 
 
 def write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
@@ -145,23 +175,18 @@ def write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
         first.save(temporary, format="GIF", **how)
 
 
-def _ffmpeg() -> str:
-    program = shutil.which("ffmpeg")
-    if program is None:
+def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
+    ffmpeg = shutil.which("ffmpeg")
+    if ffmpeg is None:
         raise ProblemError(
             "MP4 needs the program ffmpeg, which is not installed; install it, or write a GIF: "
             "--format gif."
         )
-    return program
-
-
-def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
-    """Write H.264 video through ffmpeg."""
     first = next(pictures)
     raw = f"-f rawvideo -pix_fmt rgb24 -s {first.shape[1]}x{first.shape[0]} -r {fps:g} -i -"
     coded = "-an -c:v libx264 -pix_fmt yuv420p -movflags +faststart -f mp4"
     with replaced_file(path) as temporary:
-        command = [_ffmpeg(), "-y", "-loglevel", "error", *f"{raw} {coded}".split(), temporary]
+        command = [ffmpeg, "-y", "-loglevel", "error", *f"{raw} {coded}".split(), temporary]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             assert process.stdin is not None
             assert process.stderr is not None
@@ -174,9 +199,8 @@ def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
                 pass  # ffmpeg ended early; its own words follow
             complaint = process.stderr.read().decode(errors="replace").strip()
         if process.returncode:
-            raise ProblemError(
-                f"ffmpeg failed: {complaint.splitlines()[-1] if complaint else process.returncode}."
-            )
+            why = complaint.splitlines()[-1] if complaint else process.returncode
+            raise ProblemError(f"ffmpeg failed: {why}.")
 
 
 @checked_arguments
@@ -230,13 +254,10 @@ def write_movie(
     if path.suffix not in writers:
         raise ProblemError(f"{path} should end in .gif or .mp4.")
     solution.gait  # noqa: B018  raises where there is none
-    if path.suffix == ".mp4":
-        _ffmpeg()  # before anything is drawn
-    even, total = 2 * (width // 2), periods * count
-    drawn = pictures(solution, count, periods, arrows=arrows, width=even, from_rest=from_rest)
+    begin, even, total = time.monotonic(), 2 * (width // 2), periods * count
 
     def with_progress(line: StatusLine) -> Iterator[np.ndarray]:
-        begin = time.monotonic()
+        drawn = pictures(solution, count, periods, arrows=arrows, width=even, from_rest=from_rest)
         for k, picture in enumerate(drawn, 1):
             line.say(f"picture {k} of {total}", (time.monotonic() - begin) / k * (total - k))
             yield picture

@@ -1,4 +1,5 @@
-"""Self-contained HTML page about a result; everything from the file is escaped."""
+"""A result as a self-contained HTML page, and as a small card with a film for notebooks; everything
+from the file is escaped."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ import math
 import re
 from io import StringIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -16,13 +17,12 @@ from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import link_width
+from colloc.mechanics.floor_contact import FOOT, PAD, WHEEL
 from colloc.mechanics.inertia import GRAVITY
-from colloc.pictures.families import robot_panels
-from colloc.pictures.motion_frames import Frames, foot_kinds, foot_words, frames
-from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
-from colloc.pictures.style import INK, styled
-from colloc.pictures.templates import render
-from colloc.results.body_marks import hinges
+from colloc.pictures.figure import Panel, mesh_errors, panels, robot_panels
+from colloc.pictures.movie import Frames, frames
+from colloc.pictures.style import INK, render, styled
+from colloc.results.motion import foot_kinds, hinges
 from colloc.results.robot import SLOW_ENOUGH, Robot
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.arguments import checked_arguments
@@ -31,17 +31,18 @@ from colloc.system.files import write_text
 
 _MOST_PLANES = 6
 _ANY_FLOOR = 0.5  # share of the stated friction for which a period is stated
+_UNKNOWN = ProblemError, NotConvergedError
+_FILM, _FILM_FRAMES, _FILM_PERIODS = (320, 200), 24, 2  # largest size [pixels] of that of a card
+_FOOT_WORDS = {
+    FOOT: "Squares: feet.",
+    WHEEL: "Green bars: wheels, along their rolling direction.",
+    PAD: "Orange bars: pads.",
+}
 
 
-class Drawn(NamedTuple):
-    """A panel as SVG; left, right, top and bottom of its axes [percent], and limits of both."""
-
-    caption: str
-    svg: Markup
-    sides: tuple[float, float, float, float]
-    limits: tuple[float, float, float, float]
-    joints: tuple[int, int] | None
-    has_phase: bool
+def _foot_words(body: Body) -> str:
+    words = [_FOOT_WORDS[kind] for kind in dict.fromkeys(foot_kinds(body))]
+    return " ".join([*words, "Filled: it holds."] if words else [])
 
 
 def report_page(
@@ -52,43 +53,64 @@ def report_page(
     robot: Robot | None = None,
 ) -> str:
     """The page with what exists; `gap` is a sentence about the upper bound, `robot` a section."""
-    problem, body, errors = solution.problem, solution.problem.body, mesh_errors(solution)
-    drawn = panels(solution) | {
-        "mesh": Panel(COLUMN, 2.4, lambda x: draw_mesh(x, solution, errors))
-    }
+    problem, certificate, names = (
+        solution.problem,
+        solution.certificate,
+        solution.problem.body.defaults,
+    )
+    drawn, pace, floor = panels(solution), "", list[list[str]]()
+    if not problem.froude:
+        try:
+            froude = solution.slow_enough(SLOW_ENOUGH)
+            period = math.sqrt(1 / (GRAVITY * _ANY_FLOOR * froude))
+            pace = (
+                f"changes {100 * SLOW_ENOUGH:g} % or less up to a Froude number L/(gT²) of "
+                f"{froude:.2g}: a robot of 1 m on a floor with {_ANY_FLOOR:g} of this friction, "
+                f"from {period:.2g} s a period"
+            )
+        except _UNKNOWN:
+            pass
+    dry = "d/W between {:.8f} and {:.8f}".format(*certificate.dry or (0, 0))
+    if certificate.dry is None:
+        try:
+            dry = str(solution.dry())
+        except _UNKNOWN:
+            dry = ""
+    try:
+        slopes = solution.sensitivity()
+        floor = [[each.name, f"{each.now:.4g}", *slopes.beside(each)] for each in slopes.seen]
+    except _UNKNOWN:
+        pass
     planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
-    captions = {
-        "angles": f"{body.defaults.quantity}s",
+    courses = {
+        "angles": f"{names.quantity}s",
         "speeds": "sliding speeds (near δ: sticking)",
         "power": "power against friction; ticks: mesh",
     }
-    replayed = solution.certificate.replayed
     return render(
         "report.html",
         solution=solution,
         problem=problem,
-        certificate=solution.certificate,
+        certificate=certificate,
         solved=solution.status == SOLVED,
-        pace=_pace(solution),
-        dry=_dry(solution),
-        floor=_floor(solution),
+        pace=pace,
+        dry=dry,
+        floor=floor,
         gap=gap.strip(),
-        reference=reference.verdict(solution.certificate.efficiency)
-        if reference and replayed
+        reference=reference.verdict(certificate.efficiency)
+        if reference and certificate.replayed
         else "",
         degrees=math.degrees,
         fields={name: json.dumps(value) for name, value in problem.to_dict().items()},
         source=solution.source or problem_file_text(problem),
-        motion=motion_data(frames(solution), body),
-        errors=float(errors.sum()),
+        motion=_motion_data(frames(solution), problem.body),
+        errors=float(mesh_errors(solution).sum()),
         gait_pictures=[
             *(
-                _picture(
-                    drawn[name], f"{body.defaults.coordinate}s {j + 1} and {j + 2}", (j, j + 1)
-                )
+                _picture(drawn[name], f"{names.coordinate}s {j + 1} and {j + 2}", (j, j + 1))
                 for j, name in enumerate(planes)
             ),
-            *(_picture(drawn[name], text, has_phase=True) for name, text in captions.items()),
+            *(_picture(drawn[name], text, has_phase=True) for name, text in courses.items()),
         ],
         convergence_pictures=[
             _picture(drawn["convergence"], f"{problem.objective.name} at each level"),
@@ -120,88 +142,58 @@ def write_report(
     return path
 
 
-def _pace(solution: Solution) -> str:
-    """Pace up to which inertia does not matter, if that is known."""
-    if solution.problem.froude:
-        return ""
-    try:
-        froude = solution.slow_enough(SLOW_ENOUGH)
-    except (ProblemError, NotConvergedError):
-        return ""
-    period = math.sqrt(1 / (GRAVITY * _ANY_FLOOR * froude))
-    return (
-        f"changes {100 * SLOW_ENOUGH:g} % or less up to a Froude number L/(gT²) of {froude:.2g}: a "
-        f"robot of 1 m on a floor with {_ANY_FLOOR:g} of this friction, from {period:.2g} s a "
-        f"period"
-    )
-
-
-def _dry(solution: Solution) -> str:
-    """Bounds of the efficiency under dry friction, if there are any."""
-    if solution.certificate.dry is not None:
-        return "d/W between {:.8f} and {:.8f}".format(*solution.certificate.dry)
-    try:
-        return str(solution.dry())
-    except (ProblemError, NotConvergedError):
-        return ""
-
-
-def _floor(solution: Solution) -> list[list[str]]:
-    """Rows of the sensitivities of the best value, if they are known."""
-    try:
-        slopes = solution.sensitivity()
-    except (ProblemError, NotConvergedError):
-        return []
-    return [[effect.name, f"{effect.now:.4g}", *slopes.beside(effect)] for effect in slopes.seen]
-
-
 def _picture(
     panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False
-) -> Drawn:
-    """A panel as SVG with text colour and font of the page; of a file it has only numbers."""
+) -> dict[str, Any]:
+    """A panel as SVG with text colour and font of the page; of a file it has only numbers. Left,
+    right, top and bottom of its axes [percent], and limits of both."""
     text, figure = StringIO(), panel.figure()
     without = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with styled():
         figure.savefig(text, format="svg", transparent=True, metadata=without)
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # it would style the whole page
-    svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg)
-    svg = re.sub(r'<g id="[^"]*"', "<g", svg)  # the same in every panel
-    label = f'role="img" aria-label="{escape(caption)}"'
-    svg = re.sub(
-        r'<svg [^>]*viewBox="([^"]*)"[^>]*>', lambda x: f'<svg viewBox="{x[1]}" {label}>', svg
-    )
+    for pattern, new in (
+        (r"(?s)<style.*?</style>", ""),  # it would style the whole page
+        (r' xmlns(:\w+)?="[^"]*"', ""),
+        (r'<g id="[^"]*"', "<g"),  # the same in every panel
+        (
+            r'<svg [^>]*viewBox="([^"]*)"[^>]*>',
+            rf'<svg viewBox="\1" role="img" aria-label="{escape(caption)}">',
+        ),
+    ):
+        svg = re.sub(pattern, new, svg)
     # hundredths of a point
     svg = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)
-    svg = svg.replace(INK, "currentColor")
     axes = figure.axes[0]
     (left, low), (right, high) = (100 * axes.get_position().get_points()).round(2).tolist()
-    sides = (left, right, round(100 - high, 2), round(100 - low, 2))
-    limits = (*axes.get_xlim(), *axes.get_ylim())
-    return Drawn(caption, Markup(svg), sides, limits, joints, has_phase)
+    return {
+        "caption": caption,
+        "svg": Markup(svg.replace(INK, "currentColor")),
+        "sides": (left, right, round(100 - high, 2), round(100 - low, 2)),
+        "limits": (*axes.get_xlim(), *axes.get_ylim()),
+        "joints": joints,
+        "has_phase": has_phase,
+    }
 
 
-def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
-    """Data that report.js draws."""
-    low, high = shown.window
+def _motion_data(shown: Frames, body: Body) -> dict[str, Any]:
+    motion, (low, high) = shown.motion, shown.window
     steps = (0.1, 0.2, 0.5, 1, 2, 5, 10, 1e9)
-    kinds, (wide, tall) = foot_kinds(body), high - low
+    wide, tall = high - low
     (x, y), (arrow_x, arrow_y), (force_x, force_y) = shown.ends, shown.arrow_base, shown.arrow
-    window = np.array([low[0], high[0], low[1], high[1]])
-    rows = {
-        "t": shown.t, "angles": shown.angles, "x": x, "y": y, "centre": shown.centre,
-        "arrowX": arrow_x, "arrowY": arrow_y, "window": window,
+    rows: dict[str, Any] = {
+        "t": motion.t, "angles": motion.angles, "x": x, "y": y, "centre": motion.centre,
+        "arrowX": arrow_x, "arrowY": arrow_y, "window": [low[0], high[0], low[1], high[1]],
+        "feet": shown.feet,
     }  # fmt: skip
-    data: dict[str, Any] = {name: np.round(row, 4).tolist() for name, row in rows.items()}
     before = [np.array([np.exp(1j * b.rotation), b.shift]).view(float) for b in shown.before]
-    return data | {
+    return {name: np.round(row, 4).tolist() for name, row in rows.items()} | {
         "forceX": np.round(force_x, 3).tolist(),
         "forceY": np.round(force_y, 3).tolist(),
         "holding": shown.holding.astype(int).tolist(),
-        "feet": np.round(shown.feet, 4).tolist(),
-        "footKinds": kinds,
-        "footWords": foot_words(kinds),
+        "footKinds": foot_kinds(body),
+        "footWords": _foot_words(body),
         "hinges": hinges(body).indices(len(x))[:2],
         "width": link_width(body),
         "before": [each.round(6).tolist() for each in before],
@@ -209,3 +201,33 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
         "grid": next(step for step in steps if max(wide, tall) / step < 16),
         "shape": float(np.clip(wide / tall, 1.2, 4.0)),
     }
+
+
+def solution_card(solution: Solution) -> str:
+    """A card with two periods from above, as points of an animated SVG, and the numbers."""
+    body = solution.problem.body
+    shown = frames(solution, _FILM_FRAMES + 1, arrows=1, periods=_FILM_PERIODS)
+    points = np.linspace(0, len(shown.ends[0]) - 1, min(30, len(shown.ends[0]))).round().astype(int)
+    low, high = shown.window
+    scale = min(_FILM / (high - low))
+
+    def texts(places: np.ndarray) -> list[str]:
+        """Points ``(2, n_point, n_time)`` of every frame of all periods; y points down."""
+        once = places[..., :-1]
+        moved = [before.of(once.reshape(2, -1)).reshape(once.shape) for before in shown.before]
+        x, y = np.concatenate(moved, axis=-1)
+        pixels = np.stack([scale * (x - low[0]), scale * (high[1] - y)])
+        return [" ".join(f"{x:.1f},{y:.1f}" for x, y in at.T) for at in np.moveaxis(pixels, -1, 0)]
+
+    slides = np.tile(~shown.holding[:, :-1], _FILM_PERIODS).astype(int)
+    feet = zip(foot_kinds(body), np.moveaxis(shown.feet, 2, 0), slides, strict=True)
+    return render(
+        "card.html",
+        solution=solution,
+        foot_words=_foot_words(body),
+        size=np.ceil(scale * (high - low)).astype(int),
+        width=max(scale * link_width(body), 4.0),
+        spine=texts(shown.ends[:, points]),
+        track=" ".join(texts(shown.motion.centre[:, None])),
+        feet=[{"kind": kind, "frames": texts(at), "slides": row} for kind, at, row in feet],
+    )

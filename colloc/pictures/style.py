@@ -1,4 +1,4 @@
-"""Style, colours (Okabe and Ito) and saving of figures, which are made without pyplot."""
+"""Style, colours (Okabe and Ito) and saving of figures, made without pyplot; text of templates."""
 
 from __future__ import annotations
 
@@ -44,7 +44,6 @@ _STYLE: Any = {
 
 @contextmanager
 def styled(font_size: float = 9) -> Iterator[None]:
-    """Common style of figures made inside."""
     with style.context(
         ["default", {**_STYLE, "font.size": font_size, "axes.labelsize": font_size}]
     ):
@@ -84,3 +83,16 @@ def save(
 def snapshot_colours(count: int) -> np.ndarray:
     """Colours from light (first) to dark (last)."""
     return matplotlib.colormaps[PHASE](np.linspace(0.15, 1.0, count))
+
+
+def render(template: str, /, **values: Any) -> str:
+    """Text of a template in `assets`; its filter ``g`` writes numbers to nine digits."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
+
+    templates = Environment(
+        loader=PackageLoader("colloc.pictures", "assets"), autoescape=True,
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    templates.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
+    templates.filters["g"] = lambda value: " ".join(f"{x:.9g}" for x in np.ravel(value))
+    return templates.get_template(template).render(**values)

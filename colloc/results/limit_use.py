@@ -61,22 +61,25 @@ def lines(solution: Solution) -> list[str]:
         if field and not isinstance(limit := getattr(solution.problem, field), tuple):
             text += f" of {limit:g} {unit}"
         texts.append(text)
-    hints = [*_beyond_any_gait(solution.problem), *_short_swings(solution.problem, used)]
-    return [", ".join(texts), *hints] if used else []
+    if not used:
+        return []
+    if solution.problem.joint_map is not None:  # motors share what their joints need
+        return [", ".join(texts)]
+    return [", ".join(texts), *_hints(solution.problem, used.get("joint speed", 0.0))]
 
 
-def _beyond_any_gait(problem: Problem) -> Iterator[str]:
+def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
     """Limits that cannot bind: torques by statics where no link is accelerated, speeds of a Fourier
-    series by Bernstein's inequality, powers by both."""
-    if problem.joint_map is not None:  # motors share what their joints need
-        return
-    n, gait = problem.body.n_joint, problem.gait
+    series by Bernstein's inequality, powers by both. Binding speed limits: in a period a joint
+    swings to and fro by half of what it can cover."""
+    n, gait, limit = problem.body.n_joint, problem.gait, problem.joint_limit
+    ranges = map(range_of, limit if isinstance(limit, tuple) else (limit,) * n)
+    half = np.array([0.5 * (high - low) for low, high in ranges])
     torque, speed = np.full(n, np.inf), np.full(n, np.inf)
-    quasi_static = not problem.froude
-    if quasi_static and isinstance(problem.body, Chain) and rate_independent(problem.law):
+    if not problem.froude and isinstance(problem.body, Chain) and rate_independent(problem.law):
         torque = largest_moments(problem.body, problem.friction, problem.grade)
     if isinstance(gait, Harmonic) and problem.body.bounded_angles.rows.shape == (n, n):
-        speed = 2 * math.pi * gait.harmonics * _half_ranges(problem)
+        speed = 2 * math.pi * gait.harmonics * half
     power = torque * np.minimum(speed, problem.largest_speeds or np.inf)
     for (field, unit), bound in zip(UNITS.values(), (speed, torque, power), strict=True):
         limit = getattr(problem, field)
@@ -90,22 +93,12 @@ def _beyond_any_gait(problem: Problem) -> Iterator[str]:
                 f"{field} {stated[joint]:g}{of} cannot matter: no gait needs more than "
                 f"{bound[joint]:.3g} {unit}, its unit"
             )
-
-
-def _short_swings(problem: Problem, used: dict[str, float]) -> Iterator[str]:
-    """Binding speed limits: in a period a joint swings to and fro by half of what it can cover."""
-    if used.get("joint speed", 0.0) > _BINDS and problem.joint_map is None:
-        most, whole = np.array(problem.largest_speeds) / 2, 2 * _half_ranges(problem)
-        joint = int(np.argmin(most / whole))
-        if most[joint] < whole[joint]:
-            swing, largest = np.degrees([most[joint], whole[joint]])
+    if speed_used > _BINDS:
+        most = np.array(problem.largest_speeds) / 2
+        joint = int(np.argmin(most / half))
+        if most[joint] < 2 * half[joint]:
+            swing, largest = np.degrees([most[joint], 2 * half[joint]])
             yield (
                 f"speed_limit {2 * most[joint]:g} rad per period, its unit, lets a joint swing by "
                 f"{swing:.3g} of {largest:.3g} degrees at most"
             )
-
-
-def _half_ranges(problem: Problem) -> np.ndarray:
-    n, limit = problem.body.n_joint, problem.joint_limit
-    each = limit if isinstance(limit, tuple) else (limit,) * n
-    return np.array([0.5 * (high - low) for low, high in map(range_of, each)])

@@ -1,30 +1,23 @@
-"""Objective, efficiency, distance and work of a gait by replays, with errors, and for delta ->
-0."""
+"""A gait measured by replays: its value, distance and work, with errors, and for delta -> 0."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import PathLimit, PathLimits, Quantity
 from colloc.mechanics.law import Law
 from colloc.verification.replay import replay
 from colloc.verification.replay_record import Path, Replay
 
 PARTS_OF_DELTA = (1.0, 0.1, 0.01)
 _DECADE = PARTS_OF_DELTA[1]
-_SLOWEST = 0.9
-_FEWER = 4
-"""Factor on the first instants of replays at smaller deltas."""
+_SLOWEST = 0.9  # ratio of the two changes, at most, from which a limit is extrapolated
+_FEWER = 4  # factor on the first instants of replays at smaller deltas
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(NamedTuple):
     value: float
     error: float
 
@@ -34,19 +27,22 @@ class Estimate(NamedTuple):
     limit: Limit
 
 
+class Measured(NamedTuple):
+    fine: Replay
+    errors: dict[str, float]
+    value: Estimate
+    efficiency: Estimate
+
+
 def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limit:
-    """Limit for delta -> 0 of one gait's value, from its values at delta, delta/10 and delta/100.
+    """Limit for delta -> 0 of one gait's value, from its values at delta, delta/10 and delta/100
+    and their own errors, ``(3,)``.
 
     Regularisation acts like c delta at leading order, so a ninth of the last change remains;
     sticking links act like delta log delta, and gaits of the size of delta like delta squared, with
     any signs. So the error is that ninth again; or more where the two changes fall off more slowly;
     and no less than what is left of a linear part of the first change that other parts hide in the
     second.
-
-    Parameters
-    ----------
-    values, errors : (3,)
-        Values of the objective and their own errors.
     """
     first, second = values[1] - values[0], values[2] - values[1]
     linear = _DECADE / (1 - _DECADE)
@@ -56,58 +52,37 @@ def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limi
     return Limit(float(values[2] + linear * second), float(left + own))
 
 
-class Measured(NamedTuple):
-    fine: Replay
-    errors: dict[str, float]
-    value: Estimate
-    efficiency: Estimate
-
-
 def measured(
     body: Body,
     friction: Law,
     path: Path,
     delta: float,
     *,
-    tolerance: float = 1e-6,
-    instants: int = 1600,
-    breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
     rotation: float | None = 0.0,
-    quantities: Iterable[Quantity | str] = (),
-    limits: Iterable[PathLimit] | PathLimits = (),
+    instants: int = 1600,
     run: Callable[..., Replay] = replay,
+    **how: Any,
 ) -> Measured:
-    """Measure a path by replays at delta, delta/10 and delta/100; arguments are those of
-    `colloc.verification.replay.replay`, the prescribed rotation, and the replay `run`."""
+    """Measure a path by replays at delta, delta/10 and delta/100, given the prescribed rotation;
+    other arguments are those of the replay `run`."""
     replays: list[Replay] = []
     smoothed = friction.regularised or any(each.smoothed for each in objective.integrals)
     for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
-        near = replays[-1] if replays else None
-        begin = max(2 * (instants // (2 * _FEWER)), 4) if replays else instants
-        at = (body, friction, path, part * delta)
-        asked: dict[str, Any] = {
-            "objective": objective,
-            "quantities": quantities,
-            "limits": limits,
-            "turn": rotation or 0.0,
-        }
-        replays.append(
-            run(*at, **asked, instants=begin, tolerance=tolerance, breaks=breaks, near=near)
-        )
+        how |= {"objective": objective, "turn": rotation or 0.0, "instants": instants}
+        if replays:
+            how |= {"near": replays[-1], "instants": max(2 * (instants // (2 * _FEWER)), 4)}
+        replays.append(run(body, friction, path, part * delta, **how))
     known = []
     for aim in (objective, EFFICIENCY):
-        values = [aim(each.values) for each in replays]
-        errors = [
-            abs(value) * _error(each, aim, rotation)
-            for value, each in zip(values, replays, strict=True)
-        ]
-        known.append(
-            Estimate(
-                errors[0],
-                extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0]),
-            )
-        )
+        values, errors = [aim(each.values) for each in replays], list[float]()
+        for value, each in zip(values, replays, strict=True):
+            shift = {"distance": astray(each, rotation)}
+            error = each.error if aim == each.objective else each.error_of(aim)
+            error += float(aim.relative_error(each.values, shift))
+            errors.append(abs(value) * (error + each.ambiguity_of(aim)))
+        limit = extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])
+        known.append(Estimate(errors[0], limit))
     fine = replays[0]
     stated = {name: fine.errors[name] + fine.others.get(name, 0.0) for name in ("distance", "work")}
     stated["distance"] += astray(fine, rotation)
@@ -118,9 +93,3 @@ def astray(replayed: Replay, rotation: float | None) -> float:
     """Change of the distance with the point of the body that is followed, by rotation beyond the
     prescribed one."""
     return 0.0 if rotation is None else abs(replayed.rotation - rotation) * replayed.lever
-
-
-def _error(replayed: Replay, aim: Objective, rotation: float | None) -> float:
-    by_lever = float(aim.relative_error(replayed.values, {"distance": astray(replayed, rotation)}))
-    error = replayed.error if aim == replayed.objective else replayed.error_of(aim)
-    return error + by_lever + replayed.ambiguity_of(aim)

@@ -1,4 +1,5 @@
-"""Sampled motion of a body, and its labelled columns for result files, xarray and pandas."""
+"""Sampled motion of a body: its columns for result files, xarray and pandas, and what pictures show
+of it: outline, feet, speeds and friction."""
 
 from __future__ import annotations
 
@@ -9,7 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.system.lazy import optional
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.floor_contact import FOOT
+from colloc.mechanics.law import Law
+from colloc.system.environment import optional
 
 if TYPE_CHECKING:
     import pandas
@@ -17,6 +21,8 @@ if TYPE_CHECKING:
 
 SAMPLES = 401  # of a period in a result file, both ends included
 PHASES = np.linspace(0.0, 1.0, 2001)  # the radius is accurate to 1e-7
+_PARTS, _STEP = 5, 1e-6  # parts whose speeds are drawn, and the time of a difference quotient
+_WHEEL = 0.25  # drawn length of a wheel over that of its link
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +64,7 @@ def rotate(vectors: np.ndarray, theta: np.ndarray | float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """Rotation about the origin [rad], then a shift x + iy: the effect of a period of a gait.
-
-    >>> quarter = RigidMotion(np.pi / 2, 1.0 + 0.0j)
-    >>> np.round(quarter.repeat(np.array([2, 4])).shift, 9) + 0.0
-    array([1.+1.j, 0.+0.j])
-    """
+    """Rotation about the origin [rad], then a shift x + iy: the effect of a period of a gait."""
 
     rotation: float | np.ndarray
     shift: complex | np.ndarray
@@ -103,14 +104,8 @@ class Arc(NamedTuple):
 
 
 def arc(angle: float, centre: np.ndarray) -> Arc:
-    """Arc of a period with a turn [rad] and a path of the centre of mass ``(2, n)`` in equal steps.
-
-    >>> import numpy as np
-    >>> t = np.linspace(0, 1, 2001)
-    >>> wriggle = (2 + 0.1 * np.exp(2j * np.pi * t)) * np.exp(0.5j * t)
-    >>> round(arc(0.5, np.array([wriggle.real, wriggle.imag])).radius, 6)
-    2.0
-    """
+    """Arc of a period with a turn [rad] and a path of the centre of mass ``(2, n)`` in equal
+    steps."""
     path = centre[0] + 1j * centre[1]
     t = np.linspace(0.0, 1.0, path.size)
     turn, displacement = np.exp(1j * angle) - 1, path[-1] - path[0]
@@ -149,7 +144,6 @@ def motion_dataset(columns: dict[str, Column], about: dict[str, Any]) -> xarray.
 
 
 def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
-    """A pandas DataFrame with the phase as index."""
     flat: dict[str, np.ndarray] = {}
     for name, column in columns.items():
         if column.dims == ("t",):
@@ -161,7 +155,95 @@ def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
 
 
 def _labels(columns: dict[str, Column]) -> dict[str, list]:
-    """Labels along dimensions other than time: names, or numbers from 1."""
     named: dict[str, list] = {"velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
     sizes = {c.dims[0]: len(c.values) for c in columns.values() if len(c.dims) > 1}
     return {dim: named.get(dim, [*range(1, size + 1)]) for dim, size in sizes.items()}
+
+
+def hinges(body: Body) -> slice:
+    """Points of the outline that are joints."""
+    return slice(1, -1) if isinstance(body, Chain) else slice(0, 0)
+
+
+def foot_kinds(body: Body) -> tuple[str, ...]:
+    """Kinds of feet (`colloc.mechanics.floor_contact.Foot.kind`); none if it lies on the floor."""
+    return tuple(foot.kind for foot in body.standing_on) if isinstance(body, Chain) else ()
+
+
+def lab_outline(body: Body, motion: SampledMotion) -> np.ndarray:
+    """Outline in the lab, tail first, ``(2, n_point, n_time)``."""
+    return motion.tail[:, None] + rotate(np.stack(body.outline(motion.angles)), motion.theta)
+
+
+def lab_feet(body: Body, motion: SampledMotion) -> np.ndarray:
+    """Both ends of the feet in the lab, ``(2, 2, n_foot, n_time)``."""
+    feet = np.zeros((2, 2, 0, motion.t.size))
+    if isinstance(body, Chain) and body.feet:
+        feet = body.footprints(motion.angles, _WHEEL)
+    return motion.tail[:, None, None] + rotate(feet, motion.theta)
+
+
+def part_speeds(body: Body, motion: SampledMotion) -> tuple[str, np.ndarray]:
+    """What parts are called, and their speeds ``(n_part, n_time)``: of the midpoints of links, of
+    feet, and of pads where they are fastest."""
+    angles, rates, z = motion.angles, motion.rates, motion.z
+    if not isinstance(body, Chain):
+        return "part", np.hypot(*_parts(body, angles, rates, z, _PARTS)[2])
+    contact = body.contact
+    parts = contact.velocities(body.velocity(body.posture(angles), rates, z))
+    vs, vn, w = map(np.abs, parts)
+    turns = 0.5 * contact.length * w if contact.called == FOOT else 0.0
+    return contact.called, np.hypot(vs, vn + turns)
+
+
+def friction_arrows(
+    body: Body,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    z: np.ndarray,
+    count: int = 12,
+) -> tuple[np.ndarray, np.ndarray]:
+    """About `count` points along the body and the force per length there, ``(2, n_point, n_time)``
+    each; every foot has one, with all of its force, and pads beside feet have theirs as if all of
+    them moved alike."""
+    if not isinstance(body, Chain):
+        (x, y), (dx, dy), (vx, vy) = _parts(body, angles, rates, z, count)
+        fs, fn = friction.density(vx * dx + vy * dy, vy * dx - vx * dy, delta)
+        return np.stack([x, y]), np.stack([fs * dx - fn * dy, fs * dy + fn * dx])
+    contact, laws = body.contact, body.contact.laws(friction)
+    many = max(2, count // max(len(contact.pads), 1))
+    share = np.repeat((np.arange(many) + 0.5) / many - 0.5, len(contact.pads))
+    feet = [k for k in range(len(contact.parts)) if k not in contact.pads]
+    part = np.array([*feet, *np.tile(contact.pads, many).astype(int)])
+    along = np.concatenate([np.zeros(len(feet)), share])[:, None] * contact.length[part]
+    vs, vn, w = contact.velocities(body.velocity(body.posture(angles), rates, z))
+    vs, vn = vs[part], vn[part] + along * w[part]
+    forces = [laws[k].density(vs[[i]], vn[[i]], delta) for i, k in enumerate(part)]
+    fs, fn = (np.concatenate([force[side] for force in forces]) for side in (0, 1))
+    pressed = (contact.weight if contact.called == FOOT else contact.pressure)[part]
+    # from the axes of the part to those of its link, and of the body
+    cos, sin, x, y = (row[np.array(contact.links)[part]] for row in body.posture(angles))
+    turn = pressed * (contact.cos + 1j * contact.sin)[part] * (cos + 1j * sin)
+    force = turn * (fs + 1j * fn)
+    place = (
+        x + 1j * y + (contact.along[part] + along + 1j * contact.offset[part]) * (cos + 1j * sin)
+    )
+    return np.stack([place.real, place.imag]), np.stack([force.real, force.imag])
+
+
+def _parts(
+    body: Body, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, count: int
+) -> tuple[np.ndarray, ...]:
+    """Middles of about `count` parts of the outline, their directions and velocities, ``(2, n_part,
+    n_time)`` each."""
+    ahead, now, behind = (
+        np.stack(body.outline(angles + step * rates)) for step in (_STEP, 0.0, -_STEP)
+    )
+    moved = (ahead - behind) / (2 * _STEP) + z[:2, None] + z[2] * np.stack([-now[1], now[0]])
+    n = now.shape[1] - 1
+    parts = ((np.arange(min(count, n)) + 0.5) * n / min(count, n)).astype(int)
+    place, velocity = (0.5 * (a[:, 1:] + a[:, :-1])[:, parts] for a in (now, moved))
+    along = np.diff(now, axis=1)[:, parts]
+    return place, along / np.hypot(*along), velocity

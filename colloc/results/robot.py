@@ -7,7 +7,7 @@ in m g L, power in m g L / T. Inertia depends on the Froude number Fr = L / (g T
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -19,18 +19,13 @@ from colloc.dynamics.chain import joint_torques as inertial_torques
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import (
-    GRAVITY,
-    checked_mass,
-    momenta,
-    tail_velocity,
-)
+from colloc.mechanics.inertia import GRAVITY, checked_mass, momenta, tail_velocity
 from colloc.mechanics.law import rate_independent
 from colloc.results.motion import Column, SampledMotion, arc, motion_dataset, rotate
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.arguments import check_finite
+from colloc.system.environment import higher
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.lazy import higher
 from colloc.verification.trajectory import one_each, shortest_period
 
 if TYPE_CHECKING:
@@ -43,6 +38,17 @@ _SMALLEST_LOSS, _SMALLEST_TURN = 1e-3, 0.1  # share, and degrees per period, tha
 _LARGEST = 1e9  # of metres, kilograms and seconds; the smallest is its inverse
 _INSTANTS, _A_SIDE = 2000, 8  # samples of a period, and of a side of a polygon, at least
 _UNKNOWN = ProblemError, NotConvergedError
+_SHEET = """\
+{name}: {length_m:g} m, {mass_kg:g} kg, {period_s:g} s a period ({status})
+  speed              {speed_m_per_s:.4g} m/s {travels}; \
+{body_lengths_per_period:.4g} body lengths a period
+  work               {work_per_period_J:.4g} J a period; \
+{motor_work_per_period_J:.4g} J without regeneration
+  power              mean {mean_power_W:.4g} W, peak {peak_power_W:.4g} W
+  cost of transport  {cost_of_transport:.4g}
+
+             torque [N m]      speed [rad/s]     power [W]
+             peak     r.m.s.   peak     r.m.s.   peak"""
 
 
 def joint_torques(
@@ -228,22 +234,23 @@ class Robot:
     def plot(self, ax: Any = None, panel: str = "torque") -> Any:
         """Draw torque, speed and power of every joint over a period as a matplotlib Figure; with a
         matplotlib Axes `ax` the panel "torque", "speed" or "power" there, and return the Axes."""
-        if ax is None:
-            return higher("pictures.families:robot_figure")(self)
-        return higher("pictures.families:draw_robot")(ax, self, panel)
+        return higher("pictures.figure:plot_robot")(self, ax, panel)
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """All numbers, by names that end in their units, as JSON can hold them."""
-        motion = self._with_inertia or self.solution.measured
-        work, values = self.torque_unit * motion.work, self.columns
+        """All numbers, by names that end in their units, as JSON can hold them; those that are not
+        known, or of limits that are not stated, are missing."""
+        solution, problem, moving = self.solution, self.solution.problem, self._with_inertia
+        motion, values = moving or solution.measured, self.columns
+        work = self.torque_unit * motion.work
+        # the last sample repeats the first
         torques, speeds, powers = (
-            values[f"joint_{x}"].values for x in ("torques", "speeds", "powers")
+            values[f"joint_{x}"].values[:, :-1] for x in ("torques", "speeds", "powers")
         )
         peak = np.abs(torques).max(axis=1)
         facts = {
-            "name": self.solution.problem.name,
-            "status": self.solution.status,
+            "name": problem.name,
+            "status": solution.status,
             "length_m": float(self.length),
             "mass_kg": float(self.mass),
             "period_s": float(self.period),
@@ -252,151 +259,129 @@ class Robot:
             "body_lengths_per_period": motion.distance,
             "travels": direction_of_travel(values["centre"].values, values["tail"].values),
             "work_per_period_J": work,
-            "motor_work_per_period_J": self.period * float(_mean(np.maximum(powers, 0.0)).sum()),
+            "motor_work_per_period_J": self.period
+            * float(np.maximum(powers, 0.0).mean(axis=1).sum()),
             "mean_power_W": work / self.period,
             "peak_power_W": float(powers.sum(axis=0).max()),
             "cost_of_transport": motion.work / motion.distance * self.pressing / self.gravity,
             "froude_number": self.froude,
             "peak_torque_N_m": peak.tolist(),
-            "rms_torque_N_m": np.sqrt(_mean(torques**2)).tolist(),
+            "rms_torque_N_m": np.sqrt((torques**2).mean(axis=1)).tolist(),
             "peak_speed_rad_per_s": np.abs(speeds).max(axis=1).tolist(),
-            "rms_speed_rad_per_s": np.sqrt(_mean(speeds**2)).tolist(),
+            "rms_speed_rad_per_s": np.sqrt((speeds**2).mean(axis=1)).tolist(),
             "peak_joint_power_W": powers.max(axis=1).tolist(),
         }
-        return facts | dict(self._inertia_facts()) | dict(self._motor_facts(peak))
-
-    def _inertia_facts(self) -> Iterator[tuple[str, Any]]:
-        solution, problem, moving = self.solution, self.solution.problem, self._with_inertia
         if problem.froude:
             with suppress(NotConvergedError):
-                yield "played_slowly", solution.played_slowly
+                facts["played_slowly"] = solution.played_slowly
         elif not problem.regime.slides:
             if moving is not None:
-                lost = 1.0 - moving.distance / moving.work / solution.efficiency
-                yield "inertia_takes", lost
-                yield "rotation_by_inertia_rad", moving.rotation - solution.rotation
+                facts["inertia_takes"] = 1.0 - moving.distance / moving.work / solution.efficiency
+                facts["rotation_by_inertia_rad"] = moving.rotation - solution.rotation
             with suppress(*_UNKNOWN):
                 if rate_independent(problem.law):
-                    froude = solution.slow_enough(SLOW_ENOUGH)
-                    yield "slow_enough_period_s", math.sqrt(self.length / (self.gravity * froude))
-
-    def _motor_facts(self, peak: np.ndarray) -> Iterator[tuple[str, Any]]:
-        solution, gait = self.solution, self.solution.gait.motor_gait
+                    slow = self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH))
+                    facts["slow_enough_period_s"] = math.sqrt(slow)
         if self.max_speed is not None:
-            limits = np.asarray(self.max_speed)
+            gait, limits = solution.gait.motor_gait, np.asarray(self.max_speed)
             shortest = shortest_period(gait, limits, keep_pace=True)
-            yield "max_speed_rad_per_s", limits.tolist()
-            yield "shortest_period_s", shortest
+            facts |= {"max_speed_rad_per_s": limits.tolist(), "shortest_period_s": shortest}
             with suppress(*_UNKNOWN):
-                moving = _MotionWithInertia(solution, self.froude * (self.period / shortest) ** 2)
-                speed = moving.distance * self.length / shortest
-                yield "speed_at_shortest_period_m_per_s", speed
-            if not solution.problem.paced_by:
-                yield "shortest_period_paced_by_speed_s", shortest_period(gait, limits)
+                paced = _MotionWithInertia(solution, self.froude * (self.period / shortest) ** 2)
+                speed = paced.distance * self.length / shortest
+                facts["speed_at_shortest_period_m_per_s"] = speed
+            if not problem.paced_by:
+                facts["shortest_period_paced_by_speed_s"] = shortest_period(gait, limits)
         if self.max_torque is not None:
-            yield "max_torque_N_m", np.asarray(self.max_torque).tolist()
-            yield "torque_used", (peak / self.max_torque).tolist()
-            if self._with_inertia is not None:
-                slow = np.abs(joint_torques(solution, np.arange(_INSTANTS) / _INSTANTS)).max(axis=1)
-                yield "torque_used_slowly", (self.torque_unit * slow / self.max_torque).tolist()
+            facts["max_torque_N_m"] = np.asarray(self.max_torque).tolist()
+            facts["torque_used"] = (peak / self.max_torque).tolist()
+            if moving is not None:
+                slowly = joint_torques(solution, np.arange(_INSTANTS) / _INSTANTS)
+                used = self.torque_unit * np.abs(slowly).max(axis=1) / self.max_torque
+                facts["torque_used_slowly"] = used.tolist()
+        return facts
 
     def lines(self) -> list[str]:
         """Return the data sheet as lines of text."""
-        f, coordinate = self.facts, self.solution.gait.motor_gait.coordinate
+        facts, coordinate = self.facts, self.solution.gait.motor_gait.coordinate
         names = ("torque_N_m", "speed_rad_per_s")
-        columns = [f[f"{kind}_{name}"] for name in names for kind in ("peak", "rms")]
+        columns = [facts[f"{kind}_{name}"] for name in names for kind in ("peak", "rms")]
         rows = (
             f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip()
-            for j, row in enumerate(zip(*columns, f["peak_joint_power_W"], strict=True), 1)
+            for j, row in enumerate(zip(*columns, facts["peak_joint_power_W"], strict=True), 1)
         )
-        return [
-            f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period "
-            f"({f['status']})",
-            f"  speed              {f['speed_m_per_s']:.4g} m/s {f['travels']}; "
-            f"{f['body_lengths_per_period']:.4g} body lengths a period",
-            f"  work               {f['work_per_period_J']:.4g} J a period; "
-            f"{f['motor_work_per_period_J']:.4g} J without regeneration",
-            f"  power              mean {f['mean_power_W']:.4g} W, peak {f['peak_power_W']:.4g} W",
-            f"  cost of transport  {f['cost_of_transport']:.4g}",
-            "",
-            "             torque [N m]      speed [rad/s]     power [W]",
-            "             peak     r.m.s.   peak     r.m.s.   peak",
-            *rows,
-            "",
-            *(f"  {sentence}" for sentence in self.sentences()),
-        ]
+        remarks = [f"  {sentence}" for sentence in self.sentences()]
+        return [*_SHEET.format(**facts).splitlines(), *rows, "", *remarks]
 
     def sentences(self) -> list[str]:
         """Return remarks on the numbers."""
-        return [*self._motor_sentences(), self._inertia_sentence()]
-
-    def _motor_sentences(self) -> Iterator[str]:
-        f, law = self.facts, self.solution.problem.law
+        f, solution, problem, said = self.facts, self.solution, self.solution.problem, list[str]()
         if (shortest := f.get("shortest_period_s")) is not None:
-            speed = f.get("speed_at_shortest_period_m_per_s")
-            retimed = f.get("shortest_period_paced_by_speed_s")
-            yield (
-                f"Shortest period within the speed limits: {shortest:.3g} s with the gait's own "
-                f"timing{'' if speed is None else f' ({speed:.4g} m/s)'}"
-                f"{'' if retimed is None else f', {retimed:.3g} s retimed (export --max-speed)'}."
-            )
+            text = f"Shortest period within the speed limits: {shortest:.3g} s with the gait's own "
+            text += "timing"
+            if (speed := f.get("speed_at_shortest_period_m_per_s")) is not None:
+                text += f" ({speed:.4g} m/s)"
+            if (retimed := f.get("shortest_period_paced_by_speed_s")) is not None:
+                text += f", {retimed:.3g} s retimed (export --max-speed)"
+            said.append(f"{text}.")
             if shortest > self.period * (1 + 1e-9):
-                yield f"{self.period:g} s, the period stated here, is too short for the joints."
+                said.append(
+                    f"{self.period:g} s, the period stated here, is too short for the joints."
+                )
         if (used := f.get("torque_used")) is not None:
             worst = int(np.argmax(used))
             needs = f"Joint {worst + 1} needs {f['peak_torque_N_m'][worst]:.3g} N m"
             has = f"and has {f['max_torque_N_m'][worst]:.3g}"
+            limits = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
             if used[worst] <= 1:
-                share = f"joint {worst + 1} comes closest ({100 * used[worst]:.3g} %)"
-                yield f"Torque limits are met at this pace; {share}."
+                said.append(
+                    f"Torque limits are met at this pace; joint {worst + 1} comes closest "
+                    f"({100 * used[worst]:.3g} %)."
+                )
             elif max(f.get("torque_used_slowly", used)) <= 1:
-                yield f"{needs} at this pace {has}; slow motion needs less: take a longer period."
+                said.append(
+                    f"{needs} at this pace {has}; slow motion needs less: take a longer period."
+                )
             else:
-                limits = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
-                yield (
+                said.append(
                     f"{needs} {has}. Motors are too weak in slow motion as well, so a longer "
                     f"period does not help: solve with torque_limit=({limits})."
                 )
-        if not rate_independent(law):
-            yield (
-                f"Torques depend on the pace under {law.label}: its coefficients are taken to be "
-                f"those in units of this period."
+        if not rate_independent(problem.law):
+            said.append(
+                f"Torques depend on the pace under {problem.law.label}: its coefficients are taken "
+                f"to be those in units of this period."
             )
-
-    def _inertia_sentence(self) -> str:
-        f, solution, objective = self.facts, self.solution, self.solution.problem.objective
-        if solution.problem.froude:
-            text = "Torques and power include inertia"
-            if (value := f.get("played_slowly")) is not None:
-                text += (
-                    f"; in slow motion the gait would have {objective.short} {value:.4g} instead "
-                    f"of {solution.measured.value:.4g}"
-                )
-            return f"{text}."
         pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
         slow, lost = f.get("slow_enough_period_s"), f.get("inertia_takes")
         more = "" if slow is None else f"; 1 % or less for periods of {slow:.3g} s or more"
-        if self._with_inertia is None:
-            return f"Quasi-static values; the effect of inertia {pace} is not known{more}."
-        text = f"Values include inertia {pace}"
-        if lost is not None:
-            share = f"less than {100 * _SMALLEST_LOSS:g} %"
-            if abs(lost) > _SMALLEST_LOSS:
-                share = f"{100 * abs(lost):.2g} %"
-            text = (
-                f"Values include inertia, which {'costs' if lost >= 0 else 'adds'} {share} of the "
-                f"efficiency {pace}{more}"
-            )
-            turns = math.degrees(f["rotation_by_inertia_rad"])
-            if abs(turns) > _SMALLEST_TURN:
-                text += f". It also turns the robot by {turns:.2g}° a period: it moves on an arc"
-        slowly = solution.distance * self.length / self.period
-        return f"{text}. Without inertia it would move at {slowly:.4g} m/s."
+        if problem.froude:
+            text = "Torques and power include inertia"
+            if (value := f.get("played_slowly")) is not None:
+                text += (
+                    f"; in slow motion the gait would have {problem.objective.short} {value:.4g} "
+                    f"instead of {solution.measured.value:.4g}"
+                )
+        elif self._with_inertia is None:
+            text = f"Quasi-static values; the effect of inertia {pace} is not known{more}"
+        else:
+            text = f"Values include inertia {pace}"
+            if lost is not None:
+                share = f"less than {100 * _SMALLEST_LOSS:g} %"
+                if abs(lost) > _SMALLEST_LOSS:
+                    share = f"{100 * abs(lost):.2g} %"
+                text = (
+                    f"Values include inertia, which {'costs' if lost >= 0 else 'adds'} {share} of "
+                    f"the efficiency {pace}{more}"
+                )
+                turns = math.degrees(f["rotation_by_inertia_rad"])
+                if abs(turns) > _SMALLEST_TURN:
+                    text += (
+                        f". It also turns the robot by {turns:.2g}° a period: it moves on an arc"
+                    )
+            slowly = solution.distance * self.length / self.period
+            text += f". Without inertia it would move at {slowly:.4g} m/s"
+        return [*said, f"{text}."]
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
-
-
-def _mean(values: np.ndarray) -> np.ndarray:
-    """Mean over a period of equal steps, whose last sample repeats the first."""
-    return np.asarray(values[..., :-1].mean(axis=-1))

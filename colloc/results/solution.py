@@ -19,7 +19,6 @@ from colloc.mechanics.bodies import Sliding
 from colloc.mechanics.inertia import checked_mass, tail_velocity
 from colloc.numerics.mesh import Mesh
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
-from colloc.results.body_marks import footprints, part_speeds
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import (
@@ -29,15 +28,16 @@ from colloc.results.motion import (
     Column,
     SampledMotion,
     arc,
+    foot_kinds,
     motion_columns,
     motion_dataset,
     motion_frame,
+    part_speeds,
     rotate,
 )
 from colloc.system.arguments import checked_arguments
+from colloc.system.environment import higher, versions
 from colloc.system.errors import ProblemError
-from colloc.system.lazy import higher
-from colloc.system.versions import versions
 from colloc.transcription.layout import Layout
 from colloc.verification.dry_friction import DryFriction, dry_friction
 from colloc.verification.replay import replayer
@@ -347,16 +347,17 @@ class Solution:
     def holding(self, motion: SampledMotion) -> np.ndarray:
         """Sticking feet, slower than 3 delta, ``(n_foot, n_time)``; no rows without feet."""
         body = self.problem.body
-        if not footprints(body, motion.angles).size:
+        if not foot_kinds(body):
             return np.zeros((0, motion.t.size), dtype=bool)
-        speeds = part_speeds(body, motion.angles, motion.rates, motion.z)[1]
+        speeds = part_speeds(body, motion)[1]
         return speeds < _HOLDS * self.delta_per_period
 
     @property
     def share_held(self) -> np.ndarray:
         """Fraction of the period for which each foot sticks, ``(n_foot,)``, from the tail."""
-        stands = footprints(self.problem.body, self.gait.angles(_INSTANTS[:1])).size
-        return self.holding(self.sample(_INSTANTS)).mean(axis=1) if stands else np.empty(0)
+        if not foot_kinds(self.problem.body):
+            return np.empty(0)
+        return self.holding(self.sample(_INSTANTS)).mean(axis=1)
 
     @property
     def travels(self) -> str:
@@ -377,9 +378,7 @@ class Solution:
         or another one of ``colloc report --figures``: "filmstrip", "lab", "angles", "speeds",
         "power", "convergence", "mesh", "shape-1-2". `ProblemError` if there is none of that name.
         """
-        if ax is None:
-            return higher("pictures.publication:solution_figure")(self)
-        return higher("pictures.publication:draw_panel")(ax, self, panel)
+        return higher("pictures.figure:plot_solution")(self, ax, panel)
 
     @checked_arguments
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
@@ -462,7 +461,7 @@ class Solution:
         return motion_columns(motion, self.power(motion), self.problem.body)
 
     def _repr_html_(self) -> str:
-        return higher("pictures.solution_card:solution_card")(self)
+        return higher("pictures.report_page:solution_card")(self)
 
 
 def direction_of_travel(centre: np.ndarray, tail: np.ndarray) -> str:

@@ -15,12 +15,13 @@ import io
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
 from colloc.dynamics.control_problem import control_problem
-from colloc.gaits.gait_fields import AnyGait, fields, gait_from
+from colloc.gaits.gait_fields import fields, gait_from
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
@@ -29,17 +30,7 @@ from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
 from colloc.results.solution import Solution
 from colloc.smooth.smooth_body import on_panels, panels_of
 from colloc.system.errors import ProblemError, StoreError
-from colloc.system.store_file import (
-    BETWEEN_DIMS,
-    array,
-    attribute,
-    child,
-    mark,
-    new_file,
-    open_file,
-    put,
-    put_attribute,
-)
+from colloc.system.store_file import array, attribute, mark, new_file, open_file, put, put_attribute
 from colloc.transcription.layout import layout_of
 
 FORMAT, FORMAT_VERSION = "colloc solution", 6
@@ -105,41 +96,56 @@ def load(path: str | os.PathLike[str]) -> Solution:
     colloc.system.errors.StoreError: there is no file nothing.h5.
     """
     with open_file(path, FORMAT, FORMAT_VERSION) as file:
-        return _read(file)
+        problem = Problem.from_dict(json.loads(array(file, "problem")))
+        answer = _read_answer(file["answer"], file["history"], problem)
+        certificate = UNCERTIFIED
+        if "certificate" in file:
+            certificate = _read_certificate(file["certificate"])
+        solution = Solution(
+            problem,
+            answer,
+            certificate,
+            float(attribute(file, "seconds")),
+            array(file, "source"),
+            str(attribute(file, "message")),
+            json.loads(array(file, "versions")),
+        )
+        others = json.loads(array(file, "others"))
+        solution.others = tuple(Alternative(**x | {"gait": gait_from(x["gait"])}) for x in others)
+        solution.starts = int(attribute(file, "starts"))
+        solution.interrupted = bool(attribute(file, "interrupted"))
+        return solution
 
 
 def holds_more(path: str | os.PathLike[str], solution: Solution) -> bool:
     """True if the file of a solution holds more than `save` writes, such as remarks."""
+
+    def names(file: h5py.File) -> set[str]:
+        found = {f"/@{name}" for name in file.attrs}
+        file.visititems(
+            lambda at, item: found.update([at, *(f"{at}@{name}" for name in item.attrs)])
+        )
+        return found
+
     with h5py.File(path, "r", locking=False) as file, h5py.File(io.BytesIO(), "w") as written:
         _write(written, solution)
-        return not _names(file) <= _names(written)
-
-
-def _names(file: h5py.File) -> set[str]:
-    names = {f"/@{name}" for name in file.attrs}
-    file.visititems(lambda at, item: names.update([at, *(f"{at}@{name}" for name in item.attrs)]))
-    return names
+        return not names(file) <= names(written)
 
 
 def _write(file: h5py.File, solution: Solution) -> None:
+    problem, answer, certificate = solution.problem, solution.answer, solution.certificate
     mark(file, FORMAT, FORMAT_VERSION)
-    put_attribute(file, "name", solution.problem.name)
-    put_attribute(file, "problem_hash", solution.problem.hash)
+    put_attribute(file, "name", problem.name)
+    put_attribute(file, "problem_hash", problem.hash)
     for name in ("status", "message", "seconds", "starts"):
         put_attribute(file, name, getattr(solution, name))
     put_attribute(file, "interrupted", int(solution.interrupted))
-    put(file, "problem", json.dumps(solution.problem.to_dict()))
+    put(file, "problem", json.dumps(problem.to_dict()))
     put(file, "source", solution.source)
     put(file, "versions", json.dumps(solution.versions))
     others = [{**dataclasses.asdict(x), "gait": fields(x.gait)} for x in solution.others]
     put(file, "others", json.dumps(others))
-    _write_answer(file, solution.answer)
-    _write_motion(file, solution)
-    if solution.certificate.replayed:
-        _write_certificate(file.create_group("certificate"), solution.certificate)
 
-
-def _write_answer(file: h5py.File, answer: Answer) -> None:
     group = file.create_group("answer")
     for name, (units, dims) in _ANSWER_ARRAYS.items():
         put(group, name, getattr(answer, name), units=units, dims=dims)
@@ -151,18 +157,40 @@ def _write_answer(file: h5py.File, answer: Answer) -> None:
     put(group, "guess", json.dumps(fields(answer.problem.guess)))
     for field in dataclasses.fields(SecondOrder):
         put_attribute(group, f"second_order_{field.name}", getattr(answer.second_order, field.name))
-    steps = file.create_group("history")
+    group = file.create_group("history")
     for field in dataclasses.fields(Step):
-        put(steps, field.name, [getattr(step, field.name) for step in answer.history], dims="step")
+        put(group, field.name, [getattr(step, field.name) for step in answer.history], dims="step")
+
+    group, coordinate = file.create_group("gait"), problem.body.defaults.coordinate
+    for name, value in fields(solution.gait).items():
+        if name in _GAIT_ARRAYS:
+            units, dims = _GAIT_ARRAYS[name]
+            put(group, name, value, units=units, dims=dims.replace("joint", coordinate))
+        elif isinstance(value, dict):  # a class
+            put(group, name, json.dumps(value))
+        else:
+            put_attribute(group, name, value)
+    group = file.create_group("motion")
+    for name, column in solution.columns().items():
+        put(group, name, column.values, units=column.units, dims=", ".join(column.dims))
+
+    if certificate.replayed:
+        group = file.create_group("certificate")
+        for name, number in certificate.numbers.items():
+            if name != "efficiency":  # distance / work
+                put_attribute(group, name, number)
+        for name, numbers in ((_DRY, certificate.dry), (_OF_SAMPLES, certificate.of_samples)):
+            if numbers is not None:
+                put_attribute(group, name, list(numbers))
+        for name in ("name", "value", "threshold", "passed", "meaning"):
+            put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
 
-def _read_answer(file: h5py.File, problem: Problem) -> Answer:
-    group = child(file, "answer")
+def _read_answer(group: h5py.Group, steps: h5py.Group, problem: Problem) -> Answer:
     arrays = {name: array(group, name) for name in _ANSWER_ARRAYS}
     names = [f.name for f in dataclasses.fields(Answer) if f.name not in _SEPARATE]
     plain = {name: attribute(group, name) for name in names}
-    panels = int(attribute(group, "panels"))
-    if panels:
+    if panels := int(attribute(group, "panels")):
         problem = problem.with_(body=on_panels(problem.body, panels))
     if plain["delta"] < problem.delta:  # lowered for a small gait
         problem = problem.with_(delta=plain["delta"])
@@ -173,7 +201,6 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         )
     names = [f.name for f in dataclasses.fields(SecondOrder)]
     second = SecondOrder(**{name: attribute(group, f"second_order_{name}") for name in names})
-    steps = child(file, "history")
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
     rows = zip(*columns.values(), strict=True)
     history = tuple(Step(**dict(zip(columns, row, strict=True))) for row in rows)
@@ -183,36 +210,6 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
         raise StoreError("its variables do not fit its mesh.")
     gait = control.admissible.member(arrays["x"][layout.decisions])
     return Answer(problem, gait, **arrays, **plain, second_order=second, history=history)
-
-
-def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
-    for name, value in fields(gait).items():
-        if name in _GAIT_ARRAYS:
-            units, dims = _GAIT_ARRAYS[name]
-            put(group, name, value, units=units, dims=dims.replace("joint", coordinate))
-        elif isinstance(value, dict):  # a class
-            put(group, name, json.dumps(value))
-        else:
-            put_attribute(group, name, value)
-
-
-def _write_motion(file: h5py.File, solution: Solution) -> None:
-    _write_gait(file.create_group("gait"), solution.gait, solution.problem.body.defaults.coordinate)
-    group = file.create_group("motion")
-    for name, column in solution.columns().items():
-        put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
-
-
-def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
-    for name, number in certificate.numbers.items():
-        if name != "efficiency":  # distance / work
-            put_attribute(group, name, number)
-    if certificate.dry is not None:
-        put_attribute(group, _DRY, list(certificate.dry))
-    if certificate.of_samples is not None:
-        put_attribute(group, _OF_SAMPLES, list(certificate.of_samples))
-    for name in ("name", "value", "threshold", "passed", "meaning"):
-        put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
 
 def _read_certificate(group: h5py.Group) -> Certificate:
@@ -225,32 +222,10 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     names = ("distance", "work", "rotation", *integrals)
     values = {name: float(attribute(group, name)) for name in names}
     errors = {name: float(attribute(group, f"{name}_error")) for name in ("distance", "work")}
-    dry = tuple(attribute(group, _DRY)) if _DRY in group.attrs else None
-    samples = None
-    if _OF_SAMPLES in group.attrs:
-        value, efficiency, distance, work = map(float, attribute(group, _OF_SAMPLES))
-        samples = value, efficiency, distance, work
+    pairs: Any = {
+        field: tuple(map(float, attribute(group, name)))
+        for field, name in (("dry", _DRY), ("of_samples", _OF_SAMPLES))
+        if name in group.attrs
+    }
     others = {name: type(getattr(UNCERTIFIED, name))(attribute(group, name)) for name in NUMBERS}
-    return Certificate(values, errors, {}, checks, **others, dry=dry, of_samples=samples)
-
-
-def _read(file: h5py.File) -> Solution:
-    problem = Problem.from_dict(json.loads(array(file, "problem")))
-    answer = _read_answer(file, problem)
-    certificate = UNCERTIFIED
-    if "certificate" in file:
-        certificate = _read_certificate(child(file, "certificate"))
-    solution = Solution(
-        problem,
-        answer,
-        certificate,
-        float(attribute(file, "seconds")),
-        array(file, "source"),
-        str(attribute(file, "message")),
-        json.loads(array(file, "versions")),
-    )
-    others = json.loads(array(file, "others"))
-    solution.others = tuple(Alternative(**x | {"gait": gait_from(x["gait"])}) for x in others)
-    solution.starts = int(attribute(file, "starts"))
-    solution.interrupted = bool(attribute(file, "interrupted"))
-    return solution
+    return Certificate(values, errors, {}, checks, **others, **pairs)

@@ -16,9 +16,9 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.search.checkpoint import Run, active_run
 from colloc.search.options import OPTIONS
+from colloc.system.environment import available_threads
 from colloc.system.errors import CollocError
 from colloc.system.interruption import interruptible
-from colloc.system.processors import available_threads
 from colloc.system.task_pool import process_pool, worker_environment
 
 _MOMENT = 0.1  # longest time for which Ctrl-C is held back [s]

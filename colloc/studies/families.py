@@ -29,8 +29,8 @@ from colloc.results.solution import Solution
 from colloc.search.options import OPTIONS
 from colloc.studies.solve import solve_member
 from colloc.system.arguments import check_count, is_number
+from colloc.system.environment import higher
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.system.lazy import higher
 from colloc.verification.replay import replayer
 
 _MOST_POINTS = 1000
@@ -74,9 +74,7 @@ class ParetoFront:
     def plot(self, ax: Any = None) -> Any:
         """Draw the front and its gaits as a matplotlib Figure; with a matplotlib Axes `ax` the
         front there, and return the Axes."""
-        if ax is None:
-            return higher("pictures.families:front_figure")(self)
-        return higher("pictures.families:draw_front")(ax, self)
+        return higher("pictures.figure:plot_front")(self, ax)
 
     def __repr__(self) -> str:
         first, second = (aim.name for aim in self.objectives)
@@ -301,9 +299,7 @@ class Steering:
     def plot(self, ax: Any = None, panel: str = "cost") -> Any:
         """Draw efficiency against the turn, and the tracks, as a matplotlib Figure; with a
         matplotlib Axes `ax` the panel "cost" or "tracks" there, and return the Axes."""
-        if ax is None:
-            return higher("pictures.families:steering_figure")(self)
-        return higher("pictures.families:draw_steering")(ax, self, panel)
+        return higher("pictures.figure:plot_steering")(self, ax, panel)
 
     def __repr__(self) -> str:
         turns = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)

@@ -9,60 +9,41 @@ import reprlib
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import NoneType, UnionType
-from typing import Any, ParamSpec, TypeGuard, TypeVar, Union, get_args, get_origin
+from typing import Any, TypeGuard, TypeVar, Union, cast, get_args, get_origin
 
 import numpy as np
 
 from colloc.system.errors import OrderWarning, ProblemError
 
 T = TypeVar("T")
-P = ParamSpec("P")
+Function = TypeVar("Function", bound=Callable[..., Any])
 MOST_PERIODS = 10_000  # simulated one by one
 STATED_IF_SET = {"stated if set": True}
 """Metadata of a dataclass field that is left out of statements while it has its default."""
+_signature = functools.cache(inspect.signature)
 
 
 def named_arguments(cls: type[T]) -> type[T]:
     """Make a dataclass check its arguments, and convert numbers to the type of their field.
 
     Positional ones among `by_name`, if the class has it, cause an `OrderWarning` if they differ.
-
-    >>> from colloc import Friction
-    >>> Friction(mu_x=1)
-    Traceback (most recent call last):
-    colloc.system.errors.ProblemError: Friction has no argument 'mu_x'; did you mean mu_t, mu_f or
-    mu_b?
-    >>> Friction(1) == Friction(1.0)
-    True
     """
     init, owner = cls.__init__, cls.__name__
-    _, *parameters = inspect.signature(init).parameters.values()  # without self
-    known = [each.name for each in parameters]
-    required = [each.name for each in parameters if each.default is each.empty]
 
     @functools.wraps(init)
     def checked(self: T, *values: Any, **named: Any) -> None:
-        for name in named:
-            if name not in known:
-                import difflib
-
-                close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
-                hint = f"did you mean {_or(close)}?" if close else f"it takes {', '.join(known)}."
-                raise ProblemError(f"{owner} has no argument {name!r}; {hint}")
-        if (count := len(values)) > len(known):
-            raise ProblemError(
-                f"{owner} has {len(known)} arguments, {', '.join(known)}, and {count} were given."
-            )
-        if missing := [x for x in required if x in known[count:] and x not in named]:
-            raise ProblemError(f"{owner} needs {' and '.join(missing)}.")
-        stated = {**dict(zip(known, values, strict=False)), **named}
-        if len(stated) < count + len(named):
-            raise ProblemError(
-                f"{owner} was given {known[count - 1]} twice, by its place and by its name."
-            )
-        scalars = {x: types for x, types in _types(init).items() if set(types) <= _SCALARS}
+        stated = _bind(owner, init, (self, *values), named)
+        by_place = list(stated)[1 : len(values) + 1]
+        del stated["self"]
+        scalars = {x: kinds for x, kinds in _types(init).items() if set(kinds) <= _SCALARS}
+        plain = dict(stated)
+        for name, kinds in scalars.items():
+            for kind in (float, int, bool):
+                if kind in kinds and name in stated and _fits(stated[name], kind):
+                    plain[name] = kind(stated[name])
+                    break
         try:
-            init(self, **{x: _plain(value, scalars.get(x, ())) for x, value in stated.items()})
+            init(self, **plain)
         except ProblemError:
             raise
         except Exception:
@@ -70,7 +51,7 @@ def named_arguments(cls: type[T]) -> type[T]:
             raise
         _check_types(scalars, stated)  # last: the class knows better what is wrong
         order = {name: getattr(self, name) for name in getattr(cls, "by_name", ())}
-        if len(set(order.values())) > 1 and order.keys() & known[:count]:
+        if len(set(order.values())) > 1 and order.keys() & by_place:
             read = ", ".join(f"{name}={value:g}" for name, value in order.items())
             warnings.warn(
                 "coefficients by their place, which others write in another order, are read as "
@@ -83,26 +64,38 @@ def named_arguments(cls: type[T]) -> type[T]:
     return cls
 
 
-def checked_arguments(function: Callable[P, T]) -> Callable[P, T]:
+def checked_arguments(function: Function) -> Function:
     """Make a function check its arguments against their annotations."""
 
     @functools.wraps(function)
-    def checked(*values: P.args, **named: P.kwargs) -> T:
-        try:
-            stated = inspect.signature(function).bind(*values, **named).arguments
-        except TypeError as error:
-            raise ProblemError(f"{function.__name__}: {error}.") from None
-        _check_types(_types(function), stated)
+    def checked(*values: Any, **named: Any) -> Any:
+        _check_types(_types(function), _bind(function.__name__, function, values, named))
         return function(*values, **named)
 
-    return checked
+    return cast(Function, checked)
+
+
+def _bind(owner: str, function: Callable[..., Any], values: Any, named: Any) -> dict[str, Any]:
+    parameters = _signature(function).parameters
+    known = [name for name in parameters if name != "self"]
+    try:
+        return _signature(function).bind(*values, **named).arguments
+    except TypeError as error:
+        unknown = next((name for name in named if name not in known), "")
+        if not unknown or any(each.kind is each.VAR_KEYWORD for each in parameters.values()):
+            raise ProblemError(f"{owner}: {error}.") from None
+        import difflib
+
+        close = difflib.get_close_matches(unknown, known, n=3, cutoff=0.6)
+        hint = f"did you mean {_or(close)}?" if close else f"it takes {', '.join(known)}."
+        raise ProblemError(f"{owner} has no argument {unknown!r}; {hint}") from None
 
 
 @functools.cache
 def _types(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
     """Allowed types by argument; without those that only type checkers can resolve."""
     types = {}
-    for name, each in inspect.signature(function).parameters.items():
+    for name, each in _signature(function).parameters.items():
         try:
             types[name] = _alternatives(eval(each.annotation, function.__globals__))
         except (NameError, TypeError):
@@ -126,57 +119,58 @@ def _check_types(types: Mapping[str, tuple[Any, ...]], stated: Mapping[str, Any]
             raise ProblemError(f"{name} must be {words}, not {shown(value)}.")
 
 
+def _are_numbers(value: Any) -> bool:
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        return False
+    numbers = array.dtype.kind in "iuf"
+    if array.ndim == 1 and array.size and numbers:
+        return bool(np.isfinite(array).all())
+    return (numbers or not array.size) and array.ndim >= 1
+
+
+_SEQUENCES = tuple, list, Sequence, Iterable
+_SCALARS = {float, int, bool, str, NoneType}
+_KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
+    # infinite numbers are checked elsewhere
+    float: ("a number", lambda x: is_number(x) or (isinstance(x, (float, np.floating)) and x == x)),
+    int: ("a whole number", lambda x: is_whole(x, -(2**63), 2**63)),
+    bool: ("True or False", lambda x: isinstance(x, (bool, np.bool_))),
+    str: ("text", lambda x: isinstance(x, str)),
+    NoneType: ("None", lambda x: x is None),
+    np.ndarray: ("numbers", _are_numbers),
+    Callable: ("a function", callable),
+}
+
+
 def _fits(value: Any, kind: Any) -> bool:
-    if kind is float:  # infinite ones are checked elsewhere
-        return is_number(value) or (isinstance(value, (float, np.floating)) and not np.isnan(value))
-    if kind is int:
-        return is_whole(value, -(2**63), 2**63)
-    if kind is bool:
-        return isinstance(value, (bool, np.bool_))
-    if kind is np.ndarray:
-        try:
-            array = np.asarray(value)
-        except ValueError:  # rows of different lengths
-            return False
-        if array.ndim == 1 and array.size and array.dtype.kind in "iuf":
-            return bool(np.isfinite(array).all())
-        return (array.dtype.kind in "iuf" or not array.size) and array.ndim >= 1
     kind, (item, *_) = get_origin(kind) or kind, (*get_args(kind), Any)
-    if kind is Callable:
-        return callable(value)
+    if kind in _KINDS:
+        return _KINDS[kind][1](value)
     if kind in _SEQUENCES:
-        if not isinstance(value, Iterable) or isinstance(value, (str, bytes, Mapping)):
-            return False
+        listed = isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping))
         items = _alternatives(item)
-        return hasattr(value, "__len__") and all(any(_fits(x, t) for t in items) for x in value)
+        return (
+            listed
+            and hasattr(value, "__len__")
+            and all(any(_fits(x, t) for t in items) for x in value)
+        )
     if kind is Any or not isinstance(kind, type):
         return True
     return not isinstance(value, type) and isinstance(value, kind)
 
 
-_SEQUENCES = tuple, list, Sequence, Iterable
-_SCALARS = {float, int, bool, str, NoneType}
-_WORDS = {
-    float: "a number", int: "a whole number", bool: "True or False", str: "text", NoneType: "None",
-    np.ndarray: "numbers", Callable: "a function",
-}  # fmt: skip
-
-
 def _words(kind: Any) -> str:
     kind, items = get_origin(kind) or kind, get_args(kind)
+    if kind in _KINDS:
+        return _KINDS[kind][0]
     if kind in _SEQUENCES:
         return "a sequence of numbers" if float in items else "a sequence"
-    return _WORDS.get(kind) or f"a {kind.__name__.removeprefix('PathLike') or 'path'}"
-
-
-def _plain(value: Any, types: tuple[Any, ...]) -> Any:
-    """Convert a number to the scalar type of its field; leave all else."""
-    scalars = (each(value) for each in types if each in (float, int, bool) and _fits(value, each))
-    return next(scalars, value)
+    return f"a {kind.__name__.removeprefix('PathLike') or 'path'}"
 
 
 def shown(value: object) -> str:
-    """Short text of a value for a message."""
     try:
         return reprlib.repr(value)
     except Exception:  # of somebody's `__repr__`

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections import Counter
 from pathlib import Path
@@ -47,11 +48,17 @@ def read_table(path: Path) -> Table:
     """
     lines = _text(path).splitlines()
     plain = [line for line in lines[: 4 * _MANY] if line.strip() and not _COMMENT.match(line)]
-    delimiter = max(_DELIMITERS, key=lambda mark: _fit(plain[-_MANY:], mark))
+
+    def fit(delimiter: str) -> tuple[float, float]:
+        split = filter(None, (_split(line, delimiter) for line in plain[-_MANY:]))
+        counts = sorted((sum(map(_is_number, row)) / len(row), len(row)) for row in split)
+        return counts[len(counts) // 2] if counts else (0.0, 0.0)
+
+    delimiter = max(_DELIMITERS, key=fit)
     rows = []
-    for k, line in enumerate(lines):
+    for k, line in enumerate(lines, 1):
         if cells := _split(_COMMENT.sub("", line, count=1), delimiter):
-            rows.append(_Row(k + 1, cells, bool(_COMMENT.match(line))))
+            rows.append(_Row(k, cells, bool(_COMMENT.match(line))))
     usual = [row.cells for row in rows[: 4 * _MANY] if not row.comment][-_MANY:]
     if usual and all(cells[-1] == "" for cells in usual):  # a delimiter at the end of every line
         rows = [row._replace(cells=row.cells[: -1 if not row.cells[-1] else None]) for row in rows]
@@ -75,32 +82,30 @@ def read_table(path: Path) -> Table:
                 f"of them."
             )
     some = [cell for row in data[:_MANY] for cell in row.cells]
-    if any("," in cell for cell in some if _number(cell) is not None):
+    if any("," in cell for cell in some if _is_number(cell)):
         points = any("." in cell for cell in some)
         notes.append("commas in numbers" if points else "decimal commas")
     texts = [row.cells for row in data]
-    numbers = [[np.nan if (x := _number(cell)) is None else x for cell in row] for row in texts]
-    values = np.array(numbers).reshape(len(data), width)
+    values = np.array([list(map(_number, row)) for row in texts]).reshape(len(data), width)
     before = "\n".join(lines[: rows[first].line - 1 if first < len(rows) else None])
     return Table(names, units, values, texts, [row.line for row in data], before, notes)
 
 
 def _first_row(rows: list[_Row], width: int, usual: list[list[str]]) -> int:
     """Index of the first row with numbers in the columns where most rows have some."""
-    count = [sum(_number(cells[j]) is not None for cells in usual) for j in range(width)]
-    numeric = [j for j in range(width) if 2 * count[j] >= len(usual)]
+    columns = zip(*usual, strict=True)
+    numeric = [j for j, x in enumerate(columns) if 2 * sum(map(_is_number, x)) >= len(usual)]
 
     def is_data(row: _Row) -> bool:
-        if row.comment or len(row.cells) != width:
+        if row.comment or len(row.cells) != width or not numeric:
             return False
-        numbers = [_number(row.cells[j]) is not None for j in numeric]
+        numbers = [_is_number(row.cells[j]) for j in numeric]
         fits = [x or is_blank(row.cells[j]) for x, j in zip(numbers, numeric, strict=True)]
-        return 2 * sum(fits) >= len(fits) and fits[:1] == [True] and any(numbers)
+        return 2 * sum(fits) >= len(fits) and fits[0] and any(numbers)
 
     first = next((i for i, row in enumerate(rows) if is_data(row)), len(rows))
     if first + 1 < len(rows) and rows[first].cells == [str(j) for j in range(width)]:
-        after = _number(rows[first + 1].cells[0])
-        first += after is not None and after <= 0  # columns that are numbered, not named
+        first += _number(rows[first + 1].cells[0]) <= 0  # columns that are numbered, not named
     return first
 
 
@@ -151,7 +156,6 @@ def _text(path: Path) -> str:
 
 
 def _split(line: str, delimiter: str) -> list[str]:
-    """Cells of a line; none if it is blank."""
     if delimiter == " ":
         return line.split()
     try:
@@ -162,19 +166,16 @@ def _split(line: str, delimiter: str) -> list[str]:
     return cells if any(cells) else []
 
 
-def _fit(lines: list[str], delimiter: str) -> tuple[float, float]:
-    """Share of numbers among the cells, and cells, of the median line."""
-    rows = [row for line in lines if (row := _split(line, delimiter))]
-    counts = sorted((sum(_number(x) is not None for x in row) / len(row), len(row)) for row in rows)
-    return counts[len(counts) // 2] if counts else (0.0, 0.0)
-
-
 def is_blank(cell: str) -> bool:
     return cell.lower() in _BLANK
 
 
-def _number(cell: str) -> float | None:
-    """Parse a number with a decimal point or comma; None if it is not finite."""
+def _is_number(cell: str) -> bool:
+    return not math.isnan(_number(cell))
+
+
+def _number(cell: str) -> float:
+    """Parse a number with a decimal point or comma; NaN if it is not finite."""
     try:
         number = float(cell)
     except ValueError:
@@ -183,9 +184,9 @@ def _number(cell: str) -> float | None:
             decimal = "." if cell.rfind(".") > cell.rfind(",") or cell.count(",") > 1 else ","
             cell = cell.replace("." if decimal == "," else ",", "").replace(",", ".")
         if not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", cell):
-            return None
+            return np.nan
         number = float(cell)
-    return number if abs(number) < np.inf and "_" not in cell else None
+    return number if abs(number) < np.inf and "_" not in cell else np.nan
 
 
 def _names(path: Path, rows: list[_Row], width: int) -> tuple[list[str], list[str]]:

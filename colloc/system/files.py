@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import re
+import reprlib
 import secrets
 import socket
 import time
@@ -23,7 +24,7 @@ FAILED, INTERRUPTED, SHRUNK, RUN = "failed", "interrupted", "shrunk", "run"
 _ENDING = re.compile(
     r"\.(failed|interrupted|shrunk|run|starts|front|(?:start|former)-\d+)$", re.IGNORECASE
 )
-LONGEST_NAME = 200  # file systems allow 255 bytes, and endings are added
+_LONGEST = 200  # characters of a name; file systems allow 255 bytes, and endings are added
 
 
 @contextlib.contextmanager
@@ -55,7 +56,6 @@ def replaced_file(path: Path) -> Iterator[str]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Replace a file by a text. `StoreError` if it cannot be written."""
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8", newline="")
 
@@ -108,27 +108,15 @@ def reserved_ending(name: str) -> str:
 
 
 def check_name(name: object) -> None:
-    """Raise a `ProblemError` for a name that files cannot have.
-
-    >>> check_name("mine.failed")
-    Traceback (most recent call last):
-    colloc.system.errors.ProblemError: name must not end in '.failed': colloc itself names files
-    like that; not 'mine.failed'.
-    """
-    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9_.-]+", name):
-        raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {name!r}.")
-    if name[0] in ".-":
+    """Raise a `ProblemError` for a name that files cannot have."""
+    if not isinstance(name, str) or not re.fullmatch(rf"\w[\w.-]{{,{_LONGEST - 1}}}", name, re.A):
         raise ProblemError(
-            f"name must begin with a letter, a digit or '_', not with '{name[0]}': {name!r}."
+            f"name must be at most {_LONGEST} letters, digits, '_', '-' or '.', the first of them "
+            f"no '-' or '.': files are named after it; not {reprlib.repr(name)}."
         )
     if ending := reserved_ending(name):
         raise ProblemError(
             f"name must not end in '.{ending}': colloc itself names files like that; not {name!r}."
-        )
-    if len(name) > LONGEST_NAME:
-        raise ProblemError(
-            f"name has {len(name)} characters; files are named after it, and {LONGEST_NAME} are "
-            f"allowed."
         )
 
 
@@ -138,5 +126,4 @@ def beside(path: Path, ending: str) -> Path:
 
 
 def run_file(path: Path) -> Path:
-    """Checkpoint of the run whose result goes to a path."""
     return beside(path, RUN).with_suffix(".sqlite")

@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-KIND, ARRAY = "kind", "array"
-
 
 class Encoding(NamedTuple):
     """Encoder and decoder of a class whose fields are not what should be stored."""
@@ -24,15 +22,6 @@ class Encoding(NamedTuple):
 
 
 class Codec:
-    """Encoder and decoder of values of listed classes; those of `own` have their own encoding.
-
-    >>> from colloc.system.plain_values import Codec
-    >>> from colloc.mechanics.friction import Friction
-    >>> codec = Codec([Friction])
-    >>> codec.decode(codec.encode((Friction(mu_t=2.0), 0.1)))
-    (Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.1)
-    """
-
     def __init__(self, kinds: Iterable[type], own: Mapping[type, Encoding] | None = None) -> None:
         self._kinds = {kind.__name__: kind for kind in kinds}
         self._own = {kind.__name__: how for kind, how in (own or {}).items()}
@@ -40,33 +29,27 @@ class Codec:
     def encode(self, value: Any) -> Any:
         """Encode a value as plain JSON. `TypeError` for a class that is not listed."""
         name = type(value).__name__
-        if name in self._own:
-            return {KIND: name, "of": self._own[name].encode(value)}
-        if name in self._kinds:
-            if isinstance(value, tuple):
-                named = value._asdict()  # type: ignore[attr-defined]
-            else:
-                named = {x.name: getattr(value, x.name) for x in dataclasses.fields(value)}
-            return {KIND: name, "of": {key: self.encode(part) for key, part in named.items()}}
-        if isinstance(value, np.ndarray):
-            data = np.ascontiguousarray(value)
-            return {
-                ARRAY: base64.b64encode(data.tobytes()).decode(),
-                "type": data.dtype.str,
-                "shape": list(value.shape),
-            }
         if isinstance(value, np.generic):
             return value.item()
-        if isinstance(value, tuple):
-            return {KIND: "tuple", "of": [self.encode(part) for part in value]}
-        if isinstance(value, list):
-            return [self.encode(part) for part in value]
-        if isinstance(value, dict):
-            items = [[self.encode(k), self.encode(v)] for k, v in value.items()]
-            return {KIND: "dict", "of": items}
         if value is None or isinstance(value, (bool, int, float, str)):
             return value
-        raise TypeError(f"cannot write a {name}.")
+        if isinstance(value, list):
+            return [self.encode(part) for part in value]
+        if isinstance(value, np.ndarray):
+            text = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
+            return {"array": text, "type": value.dtype.str, "shape": list(value.shape)}
+        if name in self._own:
+            of = self._own[name].encode(value)
+        elif name in self._kinds:
+            names = getattr(value, "_fields", None) or [x.name for x in dataclasses.fields(value)]
+            of = {each: self.encode(getattr(value, each)) for each in names}
+        elif name == "tuple":
+            of = [self.encode(part) for part in value]
+        elif name == "dict":
+            of = [[self.encode(k), self.encode(v)] for k, v in value.items()]
+        else:
+            raise TypeError(f"cannot write a {name}.")
+        return {"kind": name, "of": of}
 
     def decode(self, plain: Any) -> Any:
         """Decode. `KeyError`, `TypeError` or `ValueError` if `encode` did not make it."""
@@ -74,10 +57,10 @@ class Codec:
             return [self.decode(part) for part in plain]
         if not isinstance(plain, dict):
             return plain
-        if ARRAY in plain:
-            data = np.frombuffer(base64.b64decode(plain[ARRAY]), dtype=np.dtype(plain["type"]))
+        if "array" in plain:
+            data = np.frombuffer(base64.b64decode(plain["array"]), dtype=np.dtype(plain["type"]))
             return data.reshape(plain["shape"]).copy()
-        name, of = plain[KIND], plain["of"]
+        name, of = plain["kind"], plain["of"]
         if name == "tuple":
             return tuple(self.decode(part) for part in of)
         if name == "dict":

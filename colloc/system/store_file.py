@@ -16,14 +16,12 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from colloc.system.environment import optional
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.files import replaced_file
-from colloc.system.lazy import optional
 
 if TYPE_CHECKING:
     import xarray
-
-BETWEEN_DIMS = ", "
 
 
 @contextlib.contextmanager
@@ -80,7 +78,7 @@ def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Data
         put_attribute(dataset, "_Encoding", "utf-8")  # xarray would give bytes
     for key, text in described.items():
         put_attribute(dataset, key, text)
-    dims = described["dims"].split(BETWEEN_DIMS) if described.get("dims") else []
+    dims = described["dims"].split(", ") if described.get("dims") else []
     if dims == [name]:
         dataset.make_scale(name)
         return dataset
@@ -108,8 +106,8 @@ def _encode(value: Any) -> np.ndarray:
 
 
 def _decode(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return np.char.decode(value, "utf-8") if value.dtype.kind == "S" else value
+    if isinstance(value, np.ndarray) and value.dtype.kind == "S":
+        return np.char.decode(value, "utf-8")
     return value.decode("utf-8") if isinstance(value, bytes) else value
 
 
@@ -122,17 +120,9 @@ def attribute(owner: h5py.Group | h5py.Dataset, name: str) -> Any:
 
 
 def array(group: h5py.Group, name: str) -> Any:
-    """A dataset as a NumPy array or text. `StoreError` if it is missing."""
     if not isinstance(group.get(name), h5py.Dataset):
         raise StoreError(f"{group.name.rstrip('/')}/{name} is missing, or not a dataset.")
     return _decode(group[name][()])
-
-
-def child(group: h5py.Group, name: str) -> h5py.Group:
-    """A subgroup. `StoreError` if it is missing."""
-    if not isinstance(group.get(name), h5py.Group):
-        raise StoreError(f"{name} is missing, or not a group.")
-    return group[name]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,12 +154,9 @@ def save_table(table: Table, path: str | os.PathLike[str], kind: str, version: i
         for name, value in {"name": table.name, **table.attributes}.items():
             put_attribute(file, name, value)
         for name, values in {**table.coordinates, **table.variables}.items():
-            described = {}
-            if dimensions[name]:
-                described["dims"] = BETWEEN_DIMS.join(dimensions[name])
-                described["units"] = table.units.get(name, "1")
-            if name in table.labels:
-                described["long_name"] = table.labels[name]
+            described = {"long_name": table.labels[name]} if name in table.labels else {}
+            if dims := ", ".join(dimensions[name]):
+                described = {"dims": dims, "units": table.units.get(name, "1"), **described}
             stored = values.astype("i1") if values.dtype.kind == "b" else values
             dataset = put(file, name, stored, **described)
             if dataset.dtype.kind == "f" and name in table.variables:

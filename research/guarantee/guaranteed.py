@@ -24,8 +24,8 @@ from colloc.bounds.sampled import Bound
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_sums
 from colloc.mechanics.friction import Friction
+from colloc.system.environment import available_threads
 from colloc.system.errors import ProblemError
-from colloc.system.processors import available_threads
 from research.guarantee.enclosure import (
     CORNERS,
     WIDER,

@@ -10,7 +10,7 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import track
 
-from colloc.system.processors import available_processes
+from colloc.system.environment import available_processes
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

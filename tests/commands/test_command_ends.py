@@ -201,13 +201,14 @@ def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(
     assert {p.suffix for p in tmp_path.iterdir()} == {".py", ".h5"}
 
 
-@pytest.mark.parametrize("where", ["bounds.optimality_gap.upper", "pictures.publication.solution"])
+@pytest.mark.parametrize(
+    "where", ["bounds.optimality_gap.upper_bound", "pictures.figure.plot_solution"]
+)
 def test_ctrl_c_after_the_result_is_saved_says_that_it_is(where, solve, tmp_path, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    name = f"colloc.{where}_{'bound' if 'bounds' in where else 'figure'}"
-    monkeypatch.setattr(name, interrupt)
+    monkeypatch.setattr(f"colloc.{where}", interrupt)
     code, _, complaint = solve()
     (result,) = tmp_path.glob("*.h5")
     assert (code, complaint) == (130, f"colloc: interrupted; {result} is saved.\n")

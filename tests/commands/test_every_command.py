@@ -136,7 +136,7 @@ BAD_PROBLEMS = {
     GOOD.replace("intervals=12", "intervals=1"): "mesh is too small",
     GOOD.replace("ellipse(0.0, 1.4, 0.8)", "Fourier([0], [[1]], [[1]])"): "1 joints",
     GOOD.replace('"quick"', '"../quick"'): "name must be",
-    GOOD.replace('"quick"', f'"{"x" * 300}"'): "name has 300 characters; files are named after it",
+    GOOD.replace('"quick"', f'"{"x" * 300}"'): "name must be at most 200 letters",
     GOOD.replace("1.4, 0.8", "0.0, 0.0"): "hardly moves",
 }
 

@@ -7,7 +7,7 @@ import pytest
 import colloc
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.regime import Regime
-from colloc.pictures.robot_model import mjcf
+from colloc.pictures.export import mjcf
 from colloc.reduced.motion import ReducedMotion
 from colloc.results.robot import joint_torques
 from colloc.search.spaces import space_near

@@ -8,7 +8,6 @@ from shared.instants import random_instants
 
 from colloc import Chain, Foot, Friction, Pad, Problem, ProblemError, Viscous, Wheel, solve_balance
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
-from colloc.results.body_marks import footprints
 from tests.mechanics.test_chain_mechanics import LAWS, LENGTHS, STANDS, each_law, wrench
 
 AHEAD, BACK = Friction(mu_t=1.0, mu_f=0.2, mu_b=0.9), Friction(mu_t=1.0, mu_f=0.9, mu_b=0.2)
@@ -222,10 +221,9 @@ def test_a_foot_without_a_weight_bears_what_the_others_of_its_link_leave_in_equa
 
 def test_prints_of_pads_lie_where_they_press():
     body, (angles, _) = Chain(LENGTHS, feet=(Pad(0, 0.1, 0.6), Foot(1), Pad(2))), random_instants(4)
-    (x0, x1), (y0, y1) = footprints(body, angles)
+    (x0, x1), (y0, y1) = body.footprints(angles)
     np.testing.assert_allclose(np.hypot(x1 - x0, y1 - y0).T, [[0.15, 0.0, 0.25]] * 4, atol=1e-15)
     np.testing.assert_allclose([x1[2], y1[2]], np.stack(body.outline(angles))[:, -1], atol=1e-14)
-    assert footprints(Chain(), angles).size == 0
 
 
 @pytest.mark.parametrize(

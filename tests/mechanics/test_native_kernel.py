@@ -16,8 +16,8 @@ from shared.instants import random_instants
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics import native_kernel as native_kernel_module
 from colloc.mechanics.native_kernel import library, native_kernel
+from colloc.system.environment import available_threads
 from colloc.system.errors import SlowWarning
-from colloc.system.processors import available_threads
 
 needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 N_TIME = 9001

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 
 from colloc.commands.results import animate as main
-from colloc.pictures.motion_frames import frames, lab_outline
-from colloc.pictures.movie import pictures, write_movie
-from colloc.pictures.publication import save_panels
+from colloc.pictures.figure import save_panels
+from colloc.pictures.movie import frames, pictures, write_movie
+from colloc.results.motion import lab_outline
 from colloc.results.store import save
 
 
@@ -31,7 +31,7 @@ def test_every_picture_shows_the_body_where_it_is_then(three_link):
     assert (wide, tall % 2, {picture.shape for picture in drawn}) == (900, 0, {drawn[0].shape})
     scale = 0.68 * wide / (high - low)[0]
     motion = three_link.sample(np.arange(6) / 2)
-    x, y = lab_outline(three_link.problem.body, motion.angles, motion.theta, motion.tail)
+    x, y = lab_outline(three_link.problem.body, motion)
     room = tall - 0.13 * wide  # the lower part, of this height
     columns = 0.015 * wide + scale * (0.5 * (x.min(axis=0) + x.max(axis=0)) - low[0])
     rows = (
@@ -48,34 +48,20 @@ def test_every_picture_shows_the_body_where_it_is_then(three_link):
 
 def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")
-    assert (
-        main([str(file), "--periods", "1", "--seconds", "1", "--fps", "10", "--width", "300"]) == 0
-    )
+    words = "--periods 1 --seconds 1 --fps 10 --width 300"
+    assert main([str(file), *words.split()]) == 0
     assert "saved" in capsys.readouterr().out
     with Image.open(tmp_path / "x.gif") as image:
-        assert image.n_frames == 10
-        assert image.info["duration"] == 100
-        assert image.info["loop"] == 0
-        assert image.size[0] == 300
+        found = image.n_frames, image.info["duration"], image.info["loop"], image.size[0]
+        assert found == (10, 100, 0, 300)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_mp4_plays(three_link, tmp_path):
     path = write_movie(three_link, tmp_path / "x.mp4", periods=1, seconds=1.0, fps=10.0, width=301)
-    probe = [
-        "ffprobe",
-        "-v",
-        "error",
-        "-count_frames",
-        "-show_entries",
-        "stream=nb_read_frames,width",
-        "-of",
-        "csv=p=0",
-        path,
-    ]
-    assert (
-        subprocess.run(probe, capture_output=True, text=True, check=True).stdout.strip() == "300,10"
-    )
+    asked = "ffprobe -v error -count_frames -show_entries stream=nb_read_frames,width -of csv=p=0"
+    probe = subprocess.run([*asked.split(), path], capture_output=True, text=True, check=True)
+    assert probe.stdout.strip() == "300,10"
 
 
 def test_without_ffmpeg_an_mp4_is_refused_before_anything_is_drawn(

@@ -18,9 +18,10 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.motion_frames import frames, lab_outline
+from colloc.pictures.movie import frames
 from colloc.pictures.report_page import report_page
 from colloc.results.checks import Check
+from colloc.results.motion import lab_outline
 from colloc.results.solution import Solution
 from colloc.results.store import save
 from colloc.search.certify import certify
@@ -93,35 +94,16 @@ def page(three_link):
 
 
 def test_the_page_needs_no_network_and_no_other_file(page):
-    seen = outline(page)
+    seen, links = outline(page), ("src", "srcset", "href", "action", "background", "poster")
     for tag, name, value in seen.attributes:
-        assert name not in ("src", "srcset", "href", "action", "background", "poster"), (
-            tag,
-            name,
-            value,
-        )
+        assert name not in links, (tag, name, value)
         # a mark drawn again
         assert name != "xlink:href" or (tag == "use" and value.startswith("#")), (tag, name, value)
-        assert "://" not in (value or ""), (tag, name, value)
         assert not name.startswith("on"), (tag, name)
-    assert "://" not in page
-    assert "@import" not in page
-    assert not re.findall(r"url\((?!#)", page)
-    for call in (
-        "fetch(",
-        "XMLHttpRequest",
-        "WebSocket",
-        "import(",
-        "eval(",
-        "innerHTML",
-        "document.write",
-    ):
-        assert call not in page
-    policy = [
-        value
-        for tag, name, value in seen.attributes
-        if tag == "meta" and name == "content" and "default-src" in value
-    ]
+    assert not re.findall(r"://|@import|url\((?!#)", page)
+    calls = "fetch( XMLHttpRequest WebSocket import( eval( innerHTML document.write"
+    assert not [call for call in calls.split() if call in page]
+    policy = [value for tag, _, value in seen.attributes if tag == "meta" and "default" in value]
     assert policy[0].startswith("default-src 'none'")
     assert not {tag for tag, _, _ in seen.attributes} & {"link", "iframe", "object", "embed", "img"}
 
@@ -147,15 +129,8 @@ def test_everything_from_the_file_is_escaped(three_link):
     history = (*three_link.history, replace(three_link.history[0], status=EVIL, optimal=False))
     answer = replace(three_link.answer, history=history)
     versions = {EVIL: EVIL, "colloc": EVIL}
-    evil = Solution(
-        three_link.problem,
-        answer,
-        replace(three_link.certificate, checks=checks),
-        1.0,
-        EVIL,
-        EVIL,
-        versions,
-    )
+    certificate = replace(three_link.certificate, checks=checks)
+    evil = Solution(three_link.problem, answer, certificate, 1.0, EVIL, EVIL, versions)
     page = report_page(evil, Reference(0.2, 0.1, EVIL), EVIL)
     seen = outline(page)
     assert "<img" not in page
@@ -202,18 +177,20 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     # bound on a mesh of eight intervals
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
-    spent = -(shown.arrow * np.gradient(shown.arrow_base, shown.t, axis=2)).sum(axis=0).mean(axis=0)
-    assert np.trapezoid(spent, shown.t) == pytest.approx(solution.measured.work, rel=5e-3)
+    spent = (
+        -(shown.arrow * np.gradient(shown.arrow_base, shown.motion.t, axis=2))
+        .sum(axis=0)
+        .mean(axis=0)
+    )
+    assert np.trapezoid(spent, shown.motion.t) == pytest.approx(solution.measured.work, rel=5e-3)
     drawn, (low, high) = shown.arrow_scale * shown.arrow, shown.window
     assert np.hypot(*drawn).max() == pytest.approx(0.12)
     tips = np.concatenate(
         [before.of((shown.arrow_base + drawn).reshape(2, -1)) for before in shown.before], axis=1
     )
-    assert np.all(
-        (low < tips.min(axis=1))
-        & (tips.max(axis=1) < high)
-        & (high - low < np.ptp(tips, axis=1) + 0.48)
-    )
+    assert np.all(low < tips.min(axis=1))
+    assert np.all(tips.max(axis=1) < high)
+    assert np.all(high - low < np.ptp(tips, axis=1) + 0.48)
 
 
 @pytest.fixture(scope="module")
@@ -251,7 +228,7 @@ def test_the_browser_draws_every_period_where_the_body_is_then(turning, tmp_path
     seen = np.array(json.loads(unescape(re.search('data-seen="([^"]*)"', result.stdout).group(1))))
     motion = turning.sample(np.array([0.3, 1.5, 2.7]))
     # hinges, then the head
-    joints = lab_outline(turning.problem.body, motion.angles, motion.theta, motion.tail)[:, 1:]
+    joints = lab_outline(turning.problem.body, motion)[:, 1:]
     x, y = (
         np.concatenate([joints, motion.centre[:, None]], axis=1).transpose(0, 2, 1).reshape(2, -1)
     )
@@ -277,19 +254,12 @@ def browsed(page, folder):
     file = folder / "page.html"
     file.write_text(page, encoding="utf-8")
     options = (
-        "headless no-sandbox disable-gpu disable-quic no-first-run "
-        "disable-background-networking disable-component-update"
+        "headless no-sandbox disable-gpu disable-quic no-first-run disable-background-networking "
+        "disable-component-update disable-sync enable-logging=stderr virtual-time-budget=1500 "
+        "dump-dom"
     )
-    command = [
-        BROWSER,
-        *(f"--{option}" for option in options.split()),
-        "--disable-sync",
-        f"--user-data-dir={folder / 'profile'}",
-        "--enable-logging=stderr",
-        "--virtual-time-budget=1500",
-        "--dump-dom",
-        f"file://{file}",
-    ]
+    command = [BROWSER, *(f"--{option}" for option in options.split())]
+    command += [f"--user-data-dir={folder / 'profile'}", f"file://{file}"]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
 
 
@@ -333,7 +303,7 @@ def test_a_notebook_shows_a_card_with_a_film_of_two_periods(three_link):
     moved = np.linalg.norm(steps, axis=2)
     np.testing.assert_allclose(moved, scale * three_link.measured.distance, atol=0.3)
     start = three_link.sample(0.0)
-    up = lab_outline(three_link.problem.body, start.angles, start.theta, start.tail)[1, :, 0]
+    up = lab_outline(three_link.problem.body, start)[1, :, 0]
     np.testing.assert_allclose(drawn[0, :, 1] - drawn[0, 0, 1], scale * (up[0] - up), atol=0.3)
     failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     assert "not converged" in " ".join(outline(failed._repr_html_()).text)
@@ -342,11 +312,7 @@ def test_a_notebook_shows_a_card_with_a_film_of_two_periods(three_link):
 def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three_link, tmp_path):
     solution = replace(three_link, source="")
     text = unescape(report_page(solution))
-    stated = text[
-        text.index("from colloc import Problem") : text.index(
-            "</code>", text.index("from colloc import Problem")
-        )
-    ]
+    stated = text[text.index("from colloc import Problem") :].partition("</code>")[0]
     (tmp_path / "stated.py").write_text(stated, encoding="utf-8")
     assert load_problem(tmp_path / "stated.py").hash == three_link.problem.hash
     assert "save the problem source above" in text

@@ -14,13 +14,8 @@ COMMANDS = ("report one.h5", "animate one.h5 --periods 1 --seconds 0.2 --width 2
 
 
 def python(*words, folder=None, **environment):
-    done = subprocess.run(
-        [sys.executable, *words],
-        capture_output=True,
-        text=True,
-        env=os.environ | environment,
-        cwd=folder,
-    )
+    how = {"capture_output": True, "text": True, "env": os.environ | environment, "cwd": folder}
+    done = subprocess.run([sys.executable, *words], **how)
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
 
@@ -42,16 +37,10 @@ def test_a_script_draws_whatever_backend_is_named_and_one_that_there_is_stays(
     before, backend, three_link, tmp_path
 ):
     save(three_link, tmp_path / "one.h5")
-    drawn = (
-        f"import os, {before}colloc; colloc.load('one.h5').plot().savefig('one.png'); import "
-        f"matplotlib"
-    )
-    said = python(
-        "-c",
-        f"{drawn}; print(matplotlib.rcParams['backend'] == 'svg', os.environ['MPLBACKEND'])",
-        folder=tmp_path,
-        MPLBACKEND=backend,
-    )
+    drawn = f"import os, {before}colloc; colloc.load('one.h5').plot().savefig('one.png')"
+    asked = "print(matplotlib.rcParams['backend'] == 'svg', os.environ['MPLBACKEND'])"
+    script = f"{drawn}; import matplotlib; {asked}"
+    said = python("-c", script, folder=tmp_path, MPLBACKEND=backend)
     assert (tmp_path / "one.png").exists()
     assert said == f"{backend == 'svg'} {backend}\n"
 

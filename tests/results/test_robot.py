@@ -58,13 +58,8 @@ def friction_of_points(solution, seconds, gravity=9.81):
         )
         return (weight * np.sqrt(abs(velocity) ** 2 + slow**2)).sum(), left_over
 
-    found = minimize(
-        dissipated,
-        np.zeros(3),
-        jac=True,
-        method="BFGS",
-        options={"gtol": 1e-4 * SIZE["mass"] * gravity},
-    )
+    how = {"method": "BFGS", "options": {"gtol": 1e-4 * SIZE["mass"] * gravity}}
+    found = minimize(dissipated, np.zeros(3), jac=True, **how)
     assert found.success
     return *moved(found.x), points
 
@@ -101,13 +96,9 @@ def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
     """Friction is proportional to the weight, torques to the length too; at one Froude number the
     pace is in speeds and powers alone."""
     other = three_link.robot(length=2.4, mass=6, period=10, gravity=9.81 / 2).facts
-    for name, factor in (
-        ("work_per_period_J", 2),
-        ("mean_power_W", 1),
-        ("speed_m_per_s", 1),
-        ("froude_number", 1),
-    ):
-        assert other[name] == pytest.approx(factor * robot.facts[name]), name
+    assert other["work_per_period_J"] == pytest.approx(2 * robot.facts["work_per_period_J"])
+    for name in ("mean_power_W", "speed_m_per_s", "froude_number"):
+        assert other[name] == pytest.approx(robot.facts[name]), name
     assert other["peak_torque_N_m"] == pytest.approx(2 * np.array(robot.facts["peak_torque_N_m"]))
     assert other["rms_speed_rad_per_s"] == pytest.approx(
         np.array(robot.facts["rms_speed_rad_per_s"]) / 2
@@ -137,15 +128,8 @@ def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
         froude=robot.froude, gait=colloc.Harmonic(1), delta=1e-3, name="paced"
     )
     paced = colloc.evaluate(problem, three_link.gait).robot(**size).facts
-    names = (
-        "speed_m_per_s",
-        "work_per_period_J",
-        "mean_power_W",
-        "cost_of_transport",
-        "peak_torque_N_m",
-        "peak_power_W",
-    )
-    for name in names:
+    names = "speed_m_per_s work_per_period_J mean_power_W cost_of_transport peak_torque_N_m"
+    for name in [*names.split(), "peak_power_W"]:
         assert robot.facts[name] == pytest.approx(paced[name], rel=0.01), name
     played = colloc.inertial_motion(
         problem.body, problem.friction, three_link.gait, 1e-4, robot.froude, tolerance=1e-4
@@ -185,18 +169,10 @@ def test_weak_motors_are_told_whether_a_longer_period_helps(three_link):
 
 def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
     friction = colloc.Viscous(normal=2, tangential=1)
-    problem = colloc.Problem(
-        "paced",
-        colloc.ellipse(0.0, 1.2, 0.8),
-        gait=colloc.Harmonic(1),
-        delta=1e-2,
-        friction=friction,
-        objective="towing",
-    )
-    swimmer = unsolved(problem)
-    assert "coefficients are taken to be those in units of this period" in str(
-        swimmer.robot(**SIZE)
-    )
+    gait, drag = colloc.ellipse(0.0, 1.2, 0.8), {"friction": friction, "objective": "towing"}
+    swimmer = unsolved(colloc.Problem("paced", gait, gait=colloc.Harmonic(1), delta=1e-2, **drag))
+    sheet = str(swimmer.robot(**SIZE))
+    assert "coefficients are taken to be those in units of this period" in sheet
     for name in ("max_speed", "max_torque"):
         with pytest.raises(
             colloc.ProblemError, match=f"{name} asks for another pace, and torques depend on it"
@@ -245,12 +221,8 @@ def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, r
 
 @pytest.fixture(scope="module")
 def fast():
-    stated = colloc.Problem(
-        "fast",
-        gait=colloc.Harmonic(1, "antipodal"),
-        guess=colloc.ellipse(A0=0, A1=2.3, B1=1.3),
-        froude=0.05,
-    )
+    guess, gait = colloc.ellipse(A0=0, A1=2.3, B1=1.3), colloc.Harmonic(1, "antipodal")
+    stated = colloc.Problem("fast", guess, gait=gait, froude=0.05)
     return colloc.solve(stated.with_(delta=1e-2, mesh_tolerance=1e-6), starts=1)
 
 

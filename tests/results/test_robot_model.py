@@ -10,7 +10,7 @@ import colloc
 from colloc import Chain, Coupled, Foot, Friction, Harmonic, Pad, Problem, ProblemError, Wheel
 from colloc.commands.results import export as main
 from colloc.mechanics.inertia import kinetic_energy
-from colloc.pictures.robot_model import mjcf, urdf
+from colloc.pictures.export import mjcf, urdf
 from colloc.results.solution import direction_of_travel
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
@@ -31,14 +31,8 @@ def uneven():
         (0.2, 0.5, 0.3), weights=(0.2, 0.5, 0.3), feet=feet, masses=MASSES, inertias=INERTIAS
     )
     limits = ((-1.0, 2.0), 1.5)
-    problem = Problem(
-        "uneven",
-        body=body,
-        friction=Friction(mu_t=2, mu_f=1, mu_b=1),
-        gait=Harmonic(1),
-        joint_limit=limits,
-        delta=1e-2,
-    )
+    friction, how = Friction(mu_t=2, mu_f=1, mu_b=1), {"joint_limit": limits, "delta": 1e-2}
+    problem = Problem("uneven", body=body, friction=friction, gait=Harmonic(1), **how)
     return colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
 
 
@@ -70,12 +64,8 @@ def links_of_mjcf(root):
         if body.get("name").startswith("link"):
             own = body.find("inertial")
             inertia = numbers(own.get("diaginertia"))[2]
-            yield (
-                numbers(body.get("pos"))[0],
-                numbers(own.get("pos"))[0],
-                float(own.get("mass")),
-                inertia,
-            )
+            place, middle = numbers(body.get("pos"))[0], numbers(own.get("pos"))[0]
+            yield place, middle, float(own.get("mass")), inertia
 
 
 def links_of_urdf(root):

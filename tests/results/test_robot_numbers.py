@@ -79,14 +79,8 @@ def test_the_sheet_of_a_gait_with_inertia_is_of_its_own_pace_alone(braking):
 @pytest.fixture(scope="module")
 def towards_left(once):
     """A gait asked to go half a radian to the left of straight uphill."""
-    problem = Problem(
-        "aside",
-        friction=Friction(mu_t=2, mu_f=1, mu_b=1),
-        gait=Harmonic(1),
-        grade=0.1,
-        towards=0.5,
-        delta=1e-2,
-    )
+    friction, slope = Friction(mu_t=2, mu_f=1, mu_b=1), {"grade": 0.1, "towards": 0.5}
+    problem = Problem("aside", friction=friction, gait=Harmonic(1), delta=1e-2, **slope)
     return once("aside", lambda: solve(problem.with_(intervals=24, mesh_tolerance=1e-3), 1))
 
 

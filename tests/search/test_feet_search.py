@@ -14,8 +14,8 @@ from colloc.bounds.optimality_gap import refusal
 from colloc.commands.solve import summary_lines
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
-from colloc.pictures.motion_frames import frames
-from colloc.results.body_marks import friction_arrows
+from colloc.pictures.movie import frames
+from colloc.results.motion import friction_arrows
 from colloc.verification.replay import replay
 from research.small_gaits import small_gait
 

@@ -12,10 +12,9 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.motion_frames import frames
-from colloc.pictures.publication import solution_figure
+from colloc.pictures.movie import frames
 from colloc.pictures.report_page import report_page
-from colloc.results.body_marks import friction_arrows
+from colloc.results.motion import friction_arrows
 from colloc.results.solution import SOLVED
 from colloc.results.store import load, save
 from colloc.search.explore import first_optimum
@@ -72,7 +71,7 @@ def test_it_is_read_as_it_was_written(wave, tmp_path):
 @pytest.mark.slow
 def test_it_gets_a_report_and_a_figure(wave):
     assert "a sine wave of amplitude 1 rad" in report_page(wave)
-    assert len(solution_figure(wave).axes) == 5
+    assert len(wave.plot().axes) == 5
 
 
 def test_the_friction_that_is_drawn_has_no_resultant():

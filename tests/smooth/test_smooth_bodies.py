@@ -8,7 +8,7 @@ from scipy.integrate import cumulative_trapezoid
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.friction import Friction
-from colloc.results.body_marks import friction_arrows
+from colloc.results.motion import friction_arrows
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Concertina, Wave

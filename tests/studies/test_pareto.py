@@ -18,7 +18,7 @@ from colloc import (
     pareto_front,
     replay,
 )
-from colloc.pictures.families import front_figure
+from colloc.pictures.figure import plot_front
 from colloc.search.solve import solve
 from colloc.studies.families import Gap, ParetoFront
 
@@ -88,7 +88,7 @@ def test_points_differ_and_what_lies_empty_is_listed():
 
 
 def test_the_figure_draws_no_line_over_a_gap(front):
-    axes = front_figure(replace(front, gaps=(Gap(1, "nothing is better", True),))).axes[0]
+    axes = plot_front(replace(front, gaps=(Gap(1, "nothing is better", True),))).axes[0]
     drawn = axes.lines[0].get_xydata()
     assert np.isnan(drawn[2]).all()
     np.testing.assert_array_equal(np.delete(drawn, 2, axis=0), front.values[:, ::-1])
@@ -115,10 +115,12 @@ def test_the_figure_draws_every_value_and_mirror_images_alike(front, signs):
         replace(p, answer=replace(p.answer, gait=gait))
         for p, gait in zip(front.points, gaits, strict=True)
     ]
-    values, plane = front_figure(replace(front, points=tuple(points))).axes
+    values, plane = plot_front(replace(front, points=tuple(points))).axes
     np.testing.assert_array_equal(values.lines[0].get_xydata(), front.values[:, ::-1])
     *others, last = (line.get_xydata() for line in plane.lines)
-    np.testing.assert_allclose(last.T, gaits[-1].angles(np.linspace(0.0, 1.0, 1001)), atol=1e-12)
+    np.testing.assert_allclose(
+        last.T, gaits[-1].angles(np.linspace(0.0, 1.0, len(last))), atol=1e-12
+    )
     assert len(others) == len(signs) - 1
     assert all(np.abs(path - last).sum() < np.abs(path + last).sum() for path in others)
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from colloc import Chain, Coupled, Fourier, Friction, Harmonic, Problem, ProblemError, replay, steer
 from colloc.gaits.fitted_gait import fitted_gait
-from colloc.pictures.families import steering_figure
+from colloc.pictures.figure import plot_steering
 from colloc.studies.families import Steering
 
 PROBLEM = Problem(
@@ -94,7 +94,7 @@ def test_on_the_spot_a_turn_takes_the_least_work_and_leads_nowhere():
     assert spot.points[0].work < 0.8 * on_the_way.points[0].work
     assert spot.points[0].arc.radius < 0.3 * on_the_way.points[0].arc.radius
     assert on_the_way.table(4)["on_the_spot"]["turn_rad"] == [0.2]
-    marks = {line.get_marker() for line in steering_figure(on_the_way).axes[1].lines}
+    marks = {line.get_marker() for line in plot_steering(on_the_way).axes[1].lines}
     assert marks == {"None", "o", "s"}
 
 
@@ -127,7 +127,7 @@ def test_the_figure_shows_every_efficiency_at_its_turn_and_crosses_what_is_not_c
     bad = replace(bad, answer=replace(bad.answer, optimal=False))
     known = np.array([np.degrees(TURNS), family.efficiency]).T
     for points, crossed in ((family.points, []), ((*family.points[:2], bad), [2])):
-        cost = steering_figure(replace(family, points=points)).axes[0]
+        cost = plot_steering(replace(family, points=points)).axes[0]
         line, *crosses = (each.get_xydata() for each in cost.lines)
         np.testing.assert_allclose(line, known)
         np.testing.assert_allclose(np.concatenate([*crosses, np.empty((0, 2))]), known[crossed])

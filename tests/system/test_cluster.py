@@ -59,13 +59,8 @@ def test_a_local_cluster_listens_to_this_machine_alone():
     executor, _ = connect("local", 1)
     try:
         processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
-        listening = [
-            each
-            for process in processes
-            for each in process.net_connections("inet")
-            if each.status == "LISTEN"
-        ]
-        assert {each.laddr.ip for each in listening} == {"127.0.0.1"}
+        open_to = [each for process in processes for each in process.net_connections("inet")]
+        assert {x.laddr.ip for x in open_to if x.status == "LISTEN"} == {"127.0.0.1"}
     finally:
         executor(1)._client.shutdown()
 
@@ -86,15 +81,8 @@ def test_a_scheduler_that_is_stopped_ends_the_run():
 
 def study_file(folder, cells):
     (folder / "s.py").write_text(f"CELLS = {cells}\n{STUDY}")
-    return [
-        sys.executable,
-        "-m",
-        "colloc",
-        "sweep",
-        str(folder / "s.py"),
-        "--output",
-        str(folder / "out"),
-    ]
+    words = ["sweep", str(folder / "s.py"), "--output", str(folder / "out")]
+    return [sys.executable, "-m", "colloc", *words]
 
 
 def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
@@ -114,12 +102,8 @@ def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
     for victim, most in (("scheduler", 3), ("run", 7)):
         with DaskProcesses() as dask:
             dask.worker()
-            run = subprocess.Popen(
-                [*command, "--dask", dask.address],
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-            )
+            piped = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+            run = subprocess.Popen([*command, "--dask", dask.address], text=True, **piped)
             until(most)
             (dask.scheduler if victim == "scheduler" else run).kill()
             said, errors = run.communicate(timeout=90)
@@ -132,9 +116,5 @@ def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
     assert 7 <= kept < cells
     done = subprocess.run([*command, "--json"], capture_output=True, text=True)
     assert json.loads(done.stdout)["counts"] == {"solved": cells}
-    keys = [
-        (record.problem_hash, attempt.key)
-        for record in read_journal(journal)
-        for attempt in record.attempts
-    ]
+    keys = [(each.problem_hash, a.key) for each in read_journal(journal) for a in each.attempts]
     assert len(keys) == len(set(keys))  # nothing was solved twice

@@ -84,14 +84,14 @@ def child(kind, folder, pipe):
     if kind == "multistart":
         campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)
         Archive.add = told(
-            say, kind, Archive.add, lambda archive, outcomes: start_facts(archive.outcomes)
+            say, kind, Archive.add, lambda archive, found: start_facts(archive.outcomes)
         )
-        return multistart(
-            [str(folder / "p.py"), "--output", str(folder), "--starts", "4", "--quiet"]
-        )
+        words = ["--output", str(folder), "--starts", "4", "--quiet"]
+        return multistart([str(folder / "p.py"), *words])
     task_pool.process_pool = ThreadPoolExecutor
+    appended = study_run.append_visits
     study_run.append_visits = told(
-        say, kind, study_run.append_visits, lambda folder, records: attempt_facts(records)
+        say, kind, appended, lambda folder, records: attempt_facts(records)
     )
     return sweep_study([str(folder / "s.py"), "--output", str(folder), "--quiet"])
 

@@ -56,10 +56,8 @@ def test_a_full_disk_is_a_clear_error_and_keeps_the_old_file(samples, kind, shar
     path = samples.write(kind)
     before, names = samples.read(kind), sorted(p.name for p in path.parent.iterdir())
     size = path.stat().st_size
-    with (
-        no_file_larger_than(int(share * size)),
-        pytest.raises(CollocError, match="cannot write") as caught,
-    ):
+    refused = pytest.raises(CollocError, match="cannot write")
+    with no_file_larger_than(int(share * size)), refused as caught:
         samples.write(kind, 1)
     assert str(path.parent) in str(caught.value)
     assert samples.read(kind) == before
@@ -86,9 +84,8 @@ def open_to_others(folder, root):
     system's temporary folder."""
     temporary = Path(tempfile.gettempdir())
     top = temporary if root.is_relative_to(temporary) else root.parent
-    before = {
-        p: p.stat().st_mode for p in (folder, *folder.parents) if p.is_relative_to(top) and p != top
-    }
+    inside = [p for p in (folder, *folder.parents) if p.is_relative_to(top) and p != top]
+    before = {p: p.stat().st_mode for p in inside}
     try:
         for p, mode in before.items():
             p.chmod(mode | 0o011)
@@ -185,9 +182,8 @@ def _write_many(kind, folder, who, count):
         if kind == "cache":
             put_rows(folder / "c.sqlite", CACHE, {f"{who}-{k}": {"value": k}})
         elif kind == "archive":
-            open_archive(problem(), folder / "a.h5").add(
-                {StartName("sobol", who, k): outcome(k, 0.1 + 0.001 * k)}
-            )
+            made = {StartName("sobol", who, k): outcome(k, 0.1 + 0.001 * k)}
+            open_archive(problem(), folder / "a.h5").add(made)
         else:
             append_visits(folder, [record(1000 * who + k)])
 
@@ -196,13 +192,11 @@ def _write_many(kind, folder, who, count):
 def test_two_writers_at_once_end_with_both_results(kind, tmp_path):
     count = 12
     context = multiprocessing.get_context("fork")
-    writers = [
-        context.Process(target=_write_many, args=(kind, tmp_path, who, count)) for who in (1, 2)
-    ]
-    for writer in writers:
-        writer.start()
-    for writer in writers:
-        writer.join()
+    arguments = [(kind, tmp_path, who, count) for who in (1, 2)]
+    writers = [context.Process(target=_write_many, args=each) for each in arguments]
+    for step in ("start", "join"):
+        for writer in writers:
+            getattr(writer, step)()
     if kind == "cache":
         found = set(read_rows(tmp_path / "c.sqlite", CACHE))
         assert found == {f"{who}-{k}" for who in (1, 2) for k in range(count)}
@@ -211,9 +205,8 @@ def test_two_writers_at_once_end_with_both_results(kind, tmp_path):
         assert sorted(outcomes) == [("sobol", who, k) for who in (1, 2) for k in range(count)]
         assert outcomes["sobol", 2, 3].efficiency == 0.1 + 0.001 * 3
     else:
-        assert sorted(r.attempts[0].key for r in read_journal(tmp_path)) == sorted(
-            f"key{1000 * w + k}" for w in (1, 2) for k in range(count)
-        )
+        keys = {f"key{1000 * w + k}" for w in (1, 2) for k in range(count)}
+        assert {r.attempts[0].key for r in read_journal(tmp_path)} == keys
 
 
 def test_readers_see_the_old_file_or_the_new_one_while_it_is_replaced(samples):

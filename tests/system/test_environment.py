@@ -6,7 +6,7 @@ import sys
 
 PROGRAM = """
 import os
-from colloc.system.processors import one_thread_each
+from colloc.system.environment import one_thread_each
 one_thread_each()
 print(os.environ["OPENBLAS_NUM_THREADS"])
 """
