@@ -14,7 +14,7 @@ from colloc import Objective, PathLimit, Polygon, Problem, ProblemError, Quantit
 from colloc.gaits import gait_fields
 from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Harmonic
-from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import DRIVEN_WORK

@@ -20,7 +20,7 @@ import numpy as np
 
 from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.contact import crossing_bounds, gap
+from colloc.mechanics.contact import crossing_depth, near_contacts
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
@@ -112,11 +112,10 @@ def balanced_motion(
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:
     """Mask ``(n,)`` of shapes whose links i, i + 2 do not cross (to within `margin`) and keep their
     width."""
-    bounds = crossing_bounds(body, angles)
-    if bounds is None:
-        return np.ones(angles.shape[1], dtype=bool)
-    uncrossed = (bounds <= np.pi + margin).all(axis=0)
-    return uncrossed & (gap(body, angles) >= body.width - margin) if body.width else uncrossed
+    inside = np.ones(angles.shape[1], dtype=bool)
+    for each in near_contacts(body):
+        inside &= each.excess(angles)[0] <= margin
+    return inside & (crossing_depth(body, angles) <= margin) if body.width else inside
 
 
 def move_inside(

@@ -15,10 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import Instants, Quantity
-from colloc.mechanics.joint_map import JointMap
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import Instants, JointMap, Quantity
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import Links
 from colloc.mechanics.solution_branches import Branches, all_balanced_velocities
 from colloc.system.errors import NotConvergedError
 
@@ -67,7 +66,7 @@ def followed_motion(
     joint_map : JointMap, optional
         From the motors, of which quantities speak, to the joints.
     """
-    if not isinstance(body, Links):
+    if not isinstance(body, Chain):
         return None
     found = all_balanced_velocities(body, friction, angles, rates, delta)
     if not found.number.all():
@@ -105,7 +104,7 @@ def on_one_branch(
     Each is solved for again from the one before, round the period, until none changes; of those
     that change, the nearest stable solution is taken. Where none changes, z itself is returned.
     """
-    if friction.associated or not isinstance(body, Links):
+    if friction.associated or not isinstance(body, Chain):
         return z
     followed, at, moves = z.copy(), np.arange(z.shape[1]), np.zeros(z.shape[1], dtype=bool)
     for _ in range(2 * z.shape[1]):

@@ -19,13 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colloc.gaits.regime import Regime
-from colloc.mechanics.actuators import joint_moments
-from colloc.mechanics.balance import Moving
+from colloc.mechanics.balance import Moving, joint_moments
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import motion_and_derivatives
 from colloc.mechanics.densities import Instants, PathLimits
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.fixed_point import motion_and_derivatives, solve_balance
+from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.inertia import (
     STATES,
     Path,
@@ -35,7 +34,6 @@ from colloc.mechanics.inertia import (
     tail_velocity,
 )
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import LinkVelocity
 from colloc.mechanics.native_kernel import kernel_momenta, native_kernel
 
 N_OUT = 9

@@ -36,11 +36,9 @@ from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction
 from colloc.mechanics.balance import Moving
 from colloc.mechanics.bodies import BalancedMotion, Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import motion_and_derivatives
-from colloc.mechanics.densities import Instants
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.densities import Instants, JointMap
+from colloc.mechanics.fixed_point import motion_and_derivatives, solve_balance
 from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
-from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import kernel_repeating, native_kernel
 from colloc.numerics.mesh import Mesh

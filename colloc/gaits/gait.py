@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.symmetry import SYMMETRIES, fraction
+from colloc.mechanics.densities import JointMap
 from colloc.mechanics.inertia import GRAVITY
-from colloc.mechanics.joint_map import JointMap
 from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
 

@@ -15,7 +15,7 @@ from scipy.linalg import qr
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.joint_map import JointMap
+from colloc.mechanics.densities import JointMap
 from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import STATED_IF_SET, named_arguments
 from colloc.system.errors import ProblemError

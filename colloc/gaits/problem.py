@@ -19,10 +19,11 @@ from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_va
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Free, Regime, regime_of
 from colloc.gaits.symmetry import ANTIPODAL, NONE, check_symmetric, fraction
-from colloc.mechanics.bodies import FULL, Body, formulations
-from colloc.mechanics.chain import Chain
+from colloc.mechanics.bodies import FULL, Body
+from colloc.mechanics.chain import Chain, formulations
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.densities import (
+    JointMap,
     PathLimit,
     PathLimits,
     Quantity,
@@ -30,9 +31,7 @@ from colloc.mechanics.densities import (
     torque_and_power,
 )
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law, rate_independent
-from colloc.mechanics.links import Links
 from colloc.numerics.schemes import scheme
 from colloc.smooth.prescribed_body import schedule
 from colloc.system.arguments import (
@@ -410,7 +409,7 @@ class Problem:
     def law(self) -> Law:
         """The law of friction of all contacts: `friction`, unless feet have their own."""
         body = self.body
-        return body.law(self.friction) if isinstance(body, Links) else self.friction
+        return body.law(self.friction) if isinstance(body, Chain) else self.friction
 
     @cached_property
     def regime(self) -> Regime:

@@ -15,7 +15,6 @@ import numpy as np
 
 from colloc.mechanics.contact import Contact
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import Links
 from colloc.numerics.arrays import Array
 from colloc.system.errors import NotConvergedError, ProblemError
 
@@ -230,8 +229,3 @@ class Body(Protocol):
         """Matrix ``(n_joint, n_joint of a chain)`` from the shapes of a chain to the nearest ones
         of this body."""
         raise ProblemError(f"no gait of a chain can be laid into {self.describe()}.")
-
-
-def formulations(body: Body) -> tuple[str, ...]:
-    """`FORMULATIONS` that can be stated for a body, the usual one first."""
-    return FORMULATIONS if isinstance(body, Links) else (IMPLICIT,)

@@ -7,14 +7,22 @@ reweighted least squares on a majorant) goes on. "Natural" steps count if the ne
 the same matrix, is shorter (Deuflhard, Numer. Math. 22, 1974): the residual may rise.
 
 Velocities are those of a *reference* of the body, which moves to the slowest part, the *anchor*: at
-stick, speeds of order delta keep their relative precision there.
+stick, speeds of order delta keep their relative precision there. Time points that share a reference
+are a *batch*, with the law `friction` and the methods
+
+    evaluate(select, z, delta)       the body's state ``(k, n_body, n)`` at the selected time points
+                                     and z ``(3, n)``, the net force ``(3, n)`` and, of an
+                                     associated law, the potential ``(n,)`` whose gradient is minus
+                                     that force, else None
+    matrix(state, delta, newton)     minus the derivative of the net force, or the fixed point's
+                                     matrix, ``(n, 3, 3)``
+    slowest(z, delta)                the slowest reference ``(n,)``, and its velocity ``(3, n)``
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -33,27 +41,8 @@ _LADDER_ITERATIONS = 240
 _DRY, _VISCOUS = 1e-100, 1e8
 _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
 METHODS = ("auto", "newton", "fixed_point", "direct", "natural")
-
-
-Evaluated = tuple[np.ndarray, np.ndarray, np.ndarray | None]
-"""Body state ``(k, n_body, n)``, net force ``(3, n)`` and, of an associated law, the potential
-``(n,)`` whose gradient is minus that force."""
-
-
-class Batch(Protocol):
-    """Time points that share a reference."""
-
-    @property
-    def friction(self) -> Law: ...
-
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
-        """State and forces of the selected time points at z ``(3, n)``."""
-
-    def matrix(self, state: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
-        """Minus the derivative of the net force, or the fixed point's matrix, ``(n, 3, 3)``."""
-
-    def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The slowest reference ``(n,)``, and its velocity ``(3, n)``."""
+MakeBatch = Callable[[np.ndarray, int], Any]
+"""Indices of time points, and their reference, to a batch."""
 
 
 def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
@@ -63,36 +52,20 @@ def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
         return np.clip(delta / speed, _DRY, _VISCOUS)[None]
 
 
-def force_unit(friction: Law, delta: np.ndarray) -> np.ndarray:
-    """Friction on a body that moves at unit speed; above unit delta dry friction is viscous, and
-    falls with delta."""
-    degree = 1.0 if friction.degree is None else friction.degree
-    return friction.largest * np.hypot(1.0, delta) ** (degree - 1.0)
-
-
 def groups(anchor: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     """The anchors ``(n_time,)`` that occur, and the time points of each."""
     for reference in np.unique(anchor):
         yield int(reference), np.flatnonzero(anchor == reference)
 
 
-MakeBatch = Callable[[np.ndarray, int], Batch]
-"""Indices of time points, and their reference."""
-
-
-@dataclass(eq=False)
 class State:
     """Anchors ``(n_time,)``, their velocities ``(3, n_time)``, residuals (as of `BalanceSolution`)
     and step counts; updated in place."""
 
-    anchor: np.ndarray
-    velocity: np.ndarray
-    residual: np.ndarray
-    iterations: np.ndarray
-
-
-def starting_state(anchor: np.ndarray, velocity: np.ndarray) -> State:
-    return State(anchor, velocity, np.full(anchor.size, np.inf), np.zeros(anchor.size, dtype=int))
+    def __init__(self, anchor: np.ndarray, velocity: np.ndarray) -> None:
+        self.anchor, self.velocity = anchor, velocity
+        self.residual = np.full(anchor.size, np.inf)
+        self.iterations = np.zeros(anchor.size, dtype=np.int64)
 
 
 def solve(
@@ -112,11 +85,28 @@ def solve(
     comparison.
     """
 
-    def attempt(which: np.ndarray, delta: np.ndarray, budget: int, method: str = method) -> None:
-        _advance(state, make_batch, n_reference, which, delta, tolerance, budget, method)
-
-    def failed() -> np.ndarray:
-        return np.flatnonzero(state.residual > tolerance)
+    def attempt(todo: np.ndarray, delta: np.ndarray, budget: int, method: str = method) -> None:
+        # anchors move to the slowest part as long as that helps
+        for _ in range(n_reference):
+            moved = []
+            for reference, at in groups(state.anchor[todo]):
+                members = todo[at]
+                batch, d = make_batch(members, reference), delta[:, members]
+                z, residual, iterations = _iterate(
+                    batch, state.velocity[:, members], d, tolerance, budget, method
+                )
+                state.iterations[members] += iterations
+                state.residual[members], state.velocity[:, members] = residual, z
+                failed = residual > tolerance
+                if failed.any():
+                    anchor, velocity = batch.slowest(z, d)
+                    change = failed & (anchor != reference)
+                    state.anchor[members[change]] = anchor[change]
+                    state.velocity[:, members[change]] = velocity[:, change]
+                    moved.append(members[change])
+            todo = np.concatenate(moved) if moved else todo[:0]
+            if not todo.size:
+                return
 
     everything, first_anchor = np.arange(state.residual.size), state.anchor.copy()
     direct = min(budget, _DIRECT_ITERATIONS) if method in ("auto", "direct", "natural") else budget
@@ -127,51 +117,18 @@ def solve(
     if (bad := np.flatnonzero((state.residual > tolerance) & ~at_rest)).size:
         state.velocity[:, bad], state.anchor[bad] = 0.0, first_anchor[bad]
         attempt(bad, delta, direct)
-    if (bad := failed()).size:
+    if (bad := np.flatnonzero(state.residual > tolerance)).size:
         state.velocity[:, bad] = 0.0
         least = float(delta[0, bad].min())
         count = max(2, int(np.ceil(-np.log10(least) / 0.5)) + 1)
         for level in np.geomspace(1.0, least, count):
             attempt(bad, np.maximum(delta, level), min(budget, _LADDER_ITERATIONS))
-        if (bad := failed()).size:
+        if (bad := np.flatnonzero(state.residual > tolerance)).size:
             attempt(bad, delta, budget, "fixed_point")
 
 
-def _advance(
-    state: State,
-    make_batch: MakeBatch,
-    n_reference: int,
-    chosen: np.ndarray,
-    delta: np.ndarray,
-    tolerance: float,
-    max_iterations: int,
-    method: str,
-) -> None:
-    """Iterate the chosen time points, moving anchors to the slowest part as long as that helps."""
-    todo = chosen
-    for _ in range(n_reference):
-        moved = []
-        for reference, at in groups(state.anchor[todo]):
-            members = todo[at]
-            batch, d = make_batch(members, reference), delta[:, members]
-            start = state.velocity[:, members]
-            z, residual, iterations = iterate(batch, start, d, tolerance, max_iterations, method)
-            state.iterations[members] += iterations
-            state.residual[members], state.velocity[:, members] = residual, z
-            failed = residual > tolerance
-            if failed.any():
-                anchor, velocity = batch.slowest(z, d)
-                change = failed & (anchor != reference)
-                state.anchor[members[change]] = anchor[change]
-                state.velocity[:, members[change]] = velocity[:, change]
-                moved.append(members[change])
-        todo = np.concatenate(moved) if moved else np.array([], dtype=int)
-        if not todo.size:
-            return
-
-
-def iterate(
-    batch: Batch,
+def _iterate(
+    batch: Any,
     z: np.ndarray,
     delta: np.ndarray,
     tolerance: float,
@@ -180,63 +137,63 @@ def iterate(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Damped Newton from z ``(3, n)``, with fixed-point steps where one fails: z, residual, number
     of steps."""
+    friction: Law = batch.friction
 
-    def evaluate(select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, ...]:
+    def evaluate(select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> list[np.ndarray]:
         # the merit that a step has to reduce: the potential, or half the squared residual
         with np.errstate(over="ignore", invalid="ignore"):  # such far steps are not taken
             state, force, potential = batch.evaluate(select, z, delta)
             squared = 0.5 * np.sum(force * force, axis=0)
-            return state, force, squared if potential is None else potential
+            return [state, force, squared if potential is None else potential]
 
-    backtracking = (
-        _BACKTRACKING if batch.friction.associated or method == "natural" else _SHORT_BACKTRACKING
-    )
-    n_time = z.shape[1]
-    z = z.copy()
+    long = friction.associated or method == "natural"
+    n_time, z = z.shape[1], z.copy()
     residual, iterations = np.full(n_time, np.inf), np.zeros(n_time, dtype=int)
     fixed_point_steps_due = np.full(n_time, np.iinfo(int).max if method == "fixed_point" else 0)
+    # friction on a body that moves at unit speed; above unit delta dry friction is viscous, and
+    # falls with delta
+    degree = 1.0 if friction.degree is None else friction.degree
+    unit = friction.largest * np.hypot(1.0, delta[0]) ** (degree - 1.0)
     active = np.arange(n_time)
-    links, force, merit = evaluate(active, z, delta)
+    now = evaluate(active, z, delta)
     while True:
-        residual[active] = np.abs(force).max(axis=0) / force_unit(batch.friction, delta[0, active])
+        residual[active] = np.abs(now[1]).max(axis=0) / unit[active]
         keep = (residual[active] > tolerance) & (iterations[active] < max_iterations)
         if not keep.any():
             return z, residual, iterations
-        active, links, force, merit = active[keep], links[:, :, keep], force[:, keep], merit[keep]
+        active, now = active[keep], [each[..., keep] for each in now]
+        state, force, merit = now
         d, newton = delta[:, active], fixed_point_steps_due[active] == 0
         matrix = np.empty((active.size, 3, 3))
         for by_newton, some in ((True, newton), (False, ~newton)):
             if some.any():
-                matrix[some] = batch.matrix(links[:, :, some], d[:, some], newton=by_newton)
+                matrix[some] = batch.matrix(state[..., some], d[:, some], newton=by_newton)
         step = solve3(matrix, force)
-        if batch.friction.associated:
+        if friction.associated:
             slope, slack = -np.sum(force * step, axis=0), _ROUNDING * merit
         else:
             slope, slack = -2.0 * merit, np.zeros_like(merit)
         alpha, failed = np.ones(active.size), np.ones(active.size, dtype=bool)
-        trial, new_links, new_force, new_merit = (
-            z[:, active],
-            links.copy(),
-            force.copy(),
-            merit.copy(),
-        )
-        for shrink in (1.0, *backtracking):
+        here = z[:, active]
+        trial, new = here.copy(), [each.copy() for each in now]
+        for shrink in (1.0, *(_BACKTRACKING if long else _SHORT_BACKTRACKING)):
             retry = np.flatnonzero(failed)
             if not retry.size:
                 break
             alpha[retry] *= shrink
-            trial[:, retry] = z[:, active[retry]] + alpha[retry] * step[:, retry]
+            trial[:, retry] = here[:, retry] + alpha[retry] * step[:, retry]
             again = evaluate(active[retry], trial[:, retry], d[:, retry])
-            new_links[:, :, retry], new_force[:, retry], new_merit[retry] = again
+            for each, some in zip(new, again, strict=True):
+                each[..., retry] = some
             if method == "natural":
-                following = np.abs(solve3(matrix, new_force)).max(axis=0)
+                following = np.abs(solve3(matrix, new[1])).max(axis=0)
                 fell = following <= (1 - _NATURAL_GAIN * alpha) * np.abs(step).max(axis=0)
             else:
-                fell = new_merit <= merit + _ARMIJO * alpha * slope + slack
+                fell = new[2] <= merit + _ARMIJO * alpha * slope + slack
             failed = newton & ~fell
-        trial[:, failed], new_links[:, :, failed] = z[:, active[failed]], links[:, :, failed]
-        new_force[:, failed], new_merit[failed] = force[:, failed], merit[failed]
-        z[:, active], links, force, merit = trial, new_links, new_force, new_merit
+        for each, before in zip((trial, *new), (here, *now), strict=True):
+            each[..., failed] = before[..., failed]
+        z[:, active], now = trial, new
         iterations[active] += 1
         fixed_point_steps_due[active[~newton]] -= 1
         fixed_point_steps_due[active[failed]] = _FIXED_POINT_STEPS_AFTER_FAILURE

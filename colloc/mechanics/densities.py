@@ -8,16 +8,15 @@ and with CasADi where derivatives are needed.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from keyword import iskeyword
 from typing import Any
 
 import numpy as np
 
-from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.expression import FUNCTIONS, Formula, formula
@@ -38,6 +37,51 @@ _WITH_PACE, _WITH_FRICTION = ("rate", "power", "idle"), ("moment", "power", "idl
 _DOUBLINGS = -20, 1, 4, 20
 """Powers of two by which a formula's degree is found, beyond whatever scale it has of its own."""
 _TAKEN = ("distance", "work", "rotation", "across", "period", "efficiency", "value", "instants")
+
+
+@dataclass(frozen=True)
+class JointMap:
+    """Joints that share motors, or are stuck: ``q = gears @ m + rest``.
+
+    gears: turn of each joint per motor, ``(n_joint, n_motor)``. rest: joint angles with all motors
+    at 0, ``(n_joint,)``; no motor turns a joint that is not at 0 there.
+    """
+
+    gears: tuple[tuple[float, ...], ...]
+    rest: tuple[float, ...]
+
+    @cached_property
+    def matrix(self) -> np.ndarray:
+        return np.array(self.gears)
+
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """Nearest motor angles to joint angles, ``(n_motor, n_joint)``."""
+        return np.linalg.pinv(self.matrix)
+
+    @cached_property
+    def offset(self) -> np.ndarray:
+        return np.array(self.rest)[:, None]
+
+    @property
+    def n_motor(self) -> int:
+        return len(self.gears[0])
+
+    def joint_angles(self, motors: Array) -> Array:
+        return self.joint_rates(motors) + self.offset
+
+    def joint_rates(self, motors: Array) -> Array:
+        return namespace(motors).matmul(self.matrix, motors)
+
+    def motor_angles(self, joints: Array) -> Array:
+        return self.motor_rates(joints - self.offset)
+
+    def motor_rates(self, joints: Array) -> Array:
+        return namespace(joints).matmul(self.inverse, joints)
+
+    def motor_moments(self, joints: Array) -> Array:
+        """Moments of the motors: each does the work of all joints that hang on it."""
+        return namespace(joints).matmul(self.matrix.T, joints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +112,6 @@ class Instants:
         some = {name: row[:, which] for name, row in rows.items() if row is not None}
         return replace(self, **some)
 
-    @property
-    def angle(self) -> Array:
-        return self.joint_map.motor_angles(self.angles) if self.joint_map else self.angles
-
-    @property
-    def rate(self) -> Array:
-        rates = self.joint_map.motor_rates(self.rates) if self.joint_map else self.rates
-        return self.unit * rates
-
     @cached_property
     def moment(self) -> Array:
         body: Any = self.body
@@ -91,13 +126,18 @@ class Instants:
         return self.moment * self.rate
 
     @property
+    def angle(self) -> Array:
+        return self.joint_map.motor_angles(self.angles) if self.joint_map else self.angles
+
+    @property
+    def rate(self) -> Array:
+        rates = self.joint_map.motor_rates(self.rates) if self.joint_map else self.rates
+        return self.unit * rates
+
+    @property
     def idle(self) -> Array:
         degree = self.friction.degree or 0.0
         return self.unit * self.friction.largest * self.delta ** (1.0 + degree)
-
-
-def _read(text: str) -> Formula:
-    return formula(text, tuple(VARIABLES), SUMMED)
 
 
 def sample() -> dict[str, Any]:
@@ -107,14 +147,14 @@ def sample() -> dict[str, Any]:
     return {"angle": angle, "rate": rate, "moment": moment, "power": moment * rate, "idle": 1e-3}
 
 
-class OfInstants:
-    """A function of a time point by the formula `text`."""
+class _OfInstants:
+    """A function of a time point by a formula, the field `_text`."""
 
-    text: str
+    _text: str
 
     @property
     def _formula(self) -> Formula:
-        return _read(self.text)
+        return formula(getattr(self, self._text), tuple(VARIABLES), SUMMED)
 
     @cached_property
     def needs_forces(self) -> bool:
@@ -127,9 +167,8 @@ class OfInstants:
         return "idle" in self._formula.names
 
     def _value(self, now: Instants) -> Array:
-        return self._formula(
-            {name: getattr(now, name) for name in VARIABLES if name in self._formula.names}
-        )
+        names = self._formula.names & VARIABLES.keys()
+        return self._formula({name: getattr(now, name) for name in names})
 
     @cached_property
     def friction_degree(self) -> float | None:
@@ -154,18 +193,25 @@ class OfInstants:
         return near if np.allclose(np.concatenate(powers), near, rtol=0, atol=1e-9) else None
 
     def _check(self, what: str, rows: tuple[int, ...], instead: str) -> None:
-        """A `ProblemError` for a formula without as many rows, or without a finite value."""
+        """Normalise the formula; a `ProblemError` if it has other rows, or no finite value."""
+        text = self._formula.text
+        object.__setattr__(self, self._text, text)
         with np.errstate(all="ignore"):
             value = self._formula(sample())
         if np.shape(value) not in [(n, 5) for n in rows]:
-            raise ProblemError(f"{what}: '{self.text}' {instead}.")
+            raise ProblemError(f"{what}: '{text}' {instead}.")
         if not np.isfinite(value).all():
-            raise ProblemError(f"{what}: '{self.text}' has no finite value at a usual instant.")
+            raise ProblemError(f"{what}: '{text}' has no finite value at a usual instant.")
+
+    def fields(self) -> dict[str, Any]:
+        """Return it as plain numbers and text (JSON)."""
+        stated: dict[str, Any] = asdict(self)  # type: ignore[call-overload]
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in stated.items()}
 
 
 @named_arguments
 @dataclass(frozen=True)
-class Quantity(OfInstants):
+class Quantity(_OfInstants):
     """An integral over a period, for objectives to speak of.
 
     Parameters
@@ -195,24 +241,19 @@ class Quantity(OfInstants):
     density: str
     meaning: str = ""
 
+    _text = "density"
+
     def __post_init__(self) -> None:
         name = self.name
-        known = (
-            isinstance(name, str)
-            and name.isidentifier()
-            and not iskeyword(name)
-            and not name.endswith(("_error", "_delta"))
-        )
-        if not known or name in (*_TAKEN, *SUMMED):
+        if (
+            not (isinstance(name, str) and name.isidentifier())
+            or iskeyword(name)
+            or name.endswith(("_error", "_delta"))
+            or name in (*_TAKEN, *SUMMED)
+        ):
             raise ProblemError(f"a quantity needs a name of its own that is a word, not {name!r}.")
-        object.__setattr__(self, "density", _read(self.density).text)
         instead = "is no sum over the joints; put sum(...) around it"
         self._check(f"the quantity {name}", (1,), instead)
-
-    @property
-    def text(self) -> str:  # type: ignore[override]
-        """The formula."""
-        return self.density
 
     def at(self, now: Instants) -> Array:
         """Density per unit of time of the instants, ``(1, n_time)``."""
@@ -221,10 +262,6 @@ class Quantity(OfInstants):
     def of_shapes(self, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
         """Density of shapes and their rates ``(n_joint, n_time)``, where it needs no forces."""
         return np.asarray(self._formula({"angle": angles, "rate": rates}))
-
-    def fields(self) -> dict[str, str]:
-        """Return it as plain text (JSON)."""
-        return {"name": self.name, "density": self.density, "meaning": self.meaning}
 
 
 # the small number is for a derivative where a joint turns back
@@ -253,7 +290,7 @@ def quantities_of(asked: Any) -> tuple[Quantity, ...]:
 
 @named_arguments
 @dataclass(frozen=True)
-class PathLimit(OfInstants):
+class PathLimit(_OfInstants):
     """An upper bound on a function of a time point, throughout a period.
 
     Parameters
@@ -284,10 +321,11 @@ class PathLimit(OfInstants):
     most: float | tuple[float, ...]
     both_ways: bool = True
 
+    _text = "function"
+
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ProblemError(f"a path limit needs a name, not {self.name!r}.")
-        object.__setattr__(self, "function", _read(self.function).text)
         instead = "has no value at an instant: let it speak of joints"
         self._check(f"the limit {self.name}", (1, 3), instead)
         each = tuple(np.ravel(np.asarray(self.most, dtype=object)).tolist())
@@ -297,11 +335,6 @@ class PathLimit(OfInstants):
             )
         most = tuple(map(float, each)) if np.ndim(self.most) else float(each[0])
         object.__setattr__(self, "most", most)
-
-    @property
-    def text(self) -> str:  # type: ignore[override]
-        """The formula."""
-        return self.function
 
     @cached_property
     def of_each(self) -> bool:
@@ -327,16 +360,6 @@ class PathLimit(OfInstants):
     def at(self, now: Instants) -> Array:
         """Values over their bounds, ``(n_row, n_time)``."""
         return self._value(now) / np.array(self.most)[:, None]
-
-    def fields(self) -> dict[str, Any]:
-        """Return it as plain numbers and text (JSON)."""
-        most = list(self.most) if isinstance(self.most, tuple) else self.most
-        return {
-            "name": self.name,
-            "function": self.function,
-            "most": most,
-            "both_ways": self.both_ways,
-        }
 
 
 @dataclass(frozen=True)
@@ -370,15 +393,12 @@ class PathLimits:
 
     def in_units_of(self, unit: float) -> PathLimits:
         """The limits for friction that is divided by a unit."""
-        return PathLimits(
-            tuple(
-                replace(
-                    limit,
-                    most=tuple(np.array(limit.most) / unit ** (limit.friction_degree or 0.0)),
-                )
-                for limit in self.each
-            )
-        )
+
+        def scaled(limit: PathLimit) -> PathLimit:
+            most = np.array(limit.most) / unit ** (limit.friction_degree or 0.0)
+            return replace(limit, most=tuple(most))
+
+        return PathLimits(tuple(map(scaled, self.each)))
 
 
 def stated_limit(stated: Any) -> PathLimit:

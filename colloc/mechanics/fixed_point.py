@@ -1,4 +1,4 @@
-"""Solver of the balance of chains: tail velocities from shapes and shape rates.
+"""Balance of chains and the motion that follows: by the compiled kernel, or by NumPy and CasADi.
 
 The NumPy solver (`colloc.mechanics.damped_newton`) and the compiled kernel take the same steps.
 Velocities are solved for at the midpoint of the slowest link, the *anchor*, so forces stay accurate
@@ -8,33 +8,28 @@ down to delta = 1e-14.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
 from colloc.mechanics.balance import (
+    TAIL,
     Instant,
     Moving,
+    Posture,
     balance_jacobian,
-    dissipation_potential,
-    instant,
-    load_power,
+    is_chain,
     load_wrench,
+    moments_of_links,
     net_force,
-    secant_matrix,
+    total_power,
 )
-from colloc.mechanics.bodies import BalanceSolution
-from colloc.mechanics.damped_newton import (
-    METHODS,
-    Evaluated,
-    groups,
-    relative_delta,
-    solve,
-    starting_state,
-)
+from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
+from colloc.mechanics.damped_newton import METHODS, State, groups, relative_delta, solve
+from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
-from colloc.mechanics.native_kernel import compiled_balance, native_kernel
+from colloc.mechanics.native_kernel import call_for_all, native_kernel
 from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 
@@ -48,62 +43,8 @@ Found = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 n_time)``."""
 
 
-class _Batch:
-    """Time points that share a reference link."""
-
-    def __init__(self, moving: Moving, reference: int | None) -> None:
-        self.moving, self.friction, self.reference = moving, moving.friction, reference
-
-    def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
-        body, friction, angles, rates, *_ = self.moving
-        return instant(
-            body, friction, angles[:, select], rates[:, select], z, delta, self.reference
-        )
-
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
-        """Posture and velocity of the links ``(7, n_link, n)``; net force and potential."""
-        now, body = self.at(select, z, delta), self.moving.body
-        force, potential = net_force(now.posture, now.force), None
-        if self.friction.associated:
-            potential = dissipation_potential(body, self.friction, now.velocity, delta)
-        if self.moving.load is not None:
-            load = self.moving.load[:, select]
-            force += load_wrench(body, now.posture, load)
-            if potential is not None:
-                potential = potential - load_power(body, now.posture, now.velocity, load)
-        return np.stack([*now.posture, *now.velocity]), force, potential
-
-    def matrix(self, links: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
-        matrix = balance_jacobian if newton else secant_matrix
-        at = Posture(*links[:4]), LinkVelocity(*links[4:])
-        return matrix(self.moving.body, self.friction, *at, delta)
-
-    def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        velocity = self.at(np.arange(z.shape[1]), z, delta).velocity
-        anchor = np.argmin(self.moving.body.contact.slowest(velocity), axis=0)
-        return anchor, self.rereference(z, delta, anchor)
-
-    def rereference(self, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
-        """Velocity ``(3, n)`` of the midpoints of the links `anchor`."""
-        now = self.at(np.arange(z.shape[1]), z, delta)
-        vs, vn, w = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.velocity)
-        c, s = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.posture[:2])
-        return np.stack([vs * c - vn * s, vs * s + vn * c, w])
-
-
-def _real(name: str, values: np.ndarray) -> np.ndarray:
-    """A two-dimensional array of floats, or a `ProblemError`."""
-    try:
-        array = np.atleast_2d(np.asarray(values))
-    except ValueError:  # rows of different lengths
-        array = np.array([[None]])
-    if array.dtype.kind not in "iuf":
-        raise ProblemError(f"{name} must be an array of real numbers, not {values!r:.80}.")
-    return array.astype(float)
-
-
 def solve_balance(
-    body: Links,
+    body: Any,
     friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
@@ -160,41 +101,43 @@ def solve_balance(
     >>> solved.require().z.round(3).ravel().tolist()
     [0.02, 0.255, -0.887]
     """
-    angles, rates = _real("angles", angles), _real("rates", rates)
-    n_time = angles.shape[1]
     if body.n_joint != body.n_link - 1:
         raise ProblemError(
             f"the shape coordinates of {type(body).__name__} are not its {body.n_link - 1} joints: "
             f"use its solve()."
         )
-    if angles.shape != (body.n_joint, n_time) or rates.shape != angles.shape:
-        raise ProblemError(
-            f"angles and rates must both have shape (n_joint, n_time) = ({body.n_joint}, n), "
-            f"not {angles.shape} and {rates.shape}."
-        )
+    angles = _checked("angles", angles, body.n_joint)
+    n_time = angles.shape[1]
+    rates = _checked("rates", rates, body.n_joint, n_time)
     check_finite(positive=True, delta=delta, tolerance=tolerance)
     if method not in METHODS:
         raise ProblemError(f"method must be one of {METHODS}, not {method!r}.")
-    if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
-        raise ProblemError("angles and rates must be finite.")
-    if start is not None:
-        start = _real("start", start)
-        if start.shape != (3, n_time) or not np.isfinite(start).all():
-            raise ProblemError(f"start must be finite with shape (3, {n_time}).")
-    if load is not None:
-        load = _real("load", load)
-        if load.shape != (2, n_time) or not np.isfinite(load).all():
-            raise ProblemError(f"load must be finite with shape (2, {n_time}).")
-    friction = body.law(friction)
-    library = native_kernel(body, friction)
-    attempt = _numpy_balance if library is None else partial(compiled_balance, library)
-    moving = Moving(body, friction, angles, rates, float(delta), load)
-    search = partial(_search, attempt) if method == "auto" else attempt
+    start = None if start is None else _checked("start", start, 3, n_time)
+    load = None if load is None else _checked("load", load, 2, n_time)
+    moving = Moving(body, body.law(friction), angles, rates, float(delta), load)
+    search = _search if method == "auto" else _attempt
     z, residual, iterations, anchor, velocity = search(
         moving, start, float(tolerance), int(max_iterations), method
     )
     converged = residual <= _reachable(moving, tolerance)
     return BalanceSolution(z, residual, iterations, converged, anchor, velocity)
+
+
+def _checked(name: str, values: np.ndarray, rows: int, n_time: int | None = None) -> np.ndarray:
+    """Finite floats ``(rows, n_time)``, or a `ProblemError`."""
+    try:
+        array = np.atleast_2d(np.asarray(values))
+    except ValueError:  # rows of different lengths
+        array = np.array([[None]])
+    shape = rows, array.shape[-1] if n_time is None else n_time
+    is_real = array.dtype.kind in "iuf"
+    if not is_real or array.shape != shape or not np.isfinite(array).all():
+        given = f"shape {array.shape}" if is_real and array.shape != shape else f"{values!r:.80}"
+        raise ProblemError(
+            f"{name} must be finite real numbers of shape ({rows}, {n_time or 'n_time'}), "
+            f"not {given}."
+        )
+    return array.astype(float)
 
 
 def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
@@ -207,19 +150,14 @@ def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
 
 
 def _search(
-    attempt: Callable[..., Found],
-    moving: Moving,
-    start: np.ndarray | None,
-    tolerance: float,
-    max_iterations: int,
-    method: str,
+    moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> Found:
     """Attempts from one initial guess after another, until all time points converge."""
-    found = attempt(moving, start, tolerance, max_iterations, "direct")
+    found = _attempt(moving, start, tolerance, max_iterations, "direct")
     enough, contact = _reachable(moving, tolerance), moving.body.contact
 
     def direct(there: Moving, start: np.ndarray | None) -> np.ndarray:
-        return _search(attempt, there, start, tolerance, max_iterations, "direct")[0]
+        return _search(there, start, tolerance, max_iterations, "direct")[0]
 
     def smoother(there: Moving) -> np.ndarray:
         return direct(there._replace(delta=_SMOOTHER * there.delta), None)
@@ -252,17 +190,66 @@ def _search(
         if not failed.size:
             break
         there = moving.at(failed)
-        new = attempt(there, guess(there), tolerance, max_iterations, how)
+        new = _attempt(there, guess(there), tolerance, max_iterations, how)
         better = new[1] < found[1][failed]
         for old, some in zip(found, new, strict=True):
             old[..., failed[better]] = some[..., better]
     return found
 
 
-def _numpy_balance(
+class _Batch:
+    """Time points that share a reference link (`colloc.mechanics.damped_newton`)."""
+
+    def __init__(self, moving: Moving, reference: int) -> None:
+        self.moving, self.friction, self.reference = moving, moving.friction, reference
+
+    def evaluate(
+        self, select: np.ndarray, z: np.ndarray, delta: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """Posture and velocity of the links ``(7, n_link, n)``; net force and potential."""
+        moving, potential = self.moving.at(select), None
+        body, load = moving.body, moving.load
+        posture, velocity, link_force = moving.instant(z, self.reference, delta)
+        force = net_force(posture, link_force)
+        if self.friction.associated:
+            potential = body.contact.potential(self.friction, velocity, delta).sum(axis=0)
+        if load is not None:
+            force += load_wrench(body, posture, load)
+            if potential is not None:
+                vx, vy = body.centre_velocity(posture, velocity)
+                potential = potential - (load[0] * vx + load[1] * vy)[0]
+        return np.stack([*posture, *velocity]), force, potential
+
+    def matrix(self, links: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
+        at = Posture(*links[:4]), LinkVelocity(*links[4:])
+        return balance_jacobian(self.moving.body, self.friction, *at, delta, secant=not newton)
+
+    def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        now = self.moving.instant(z, self.reference, delta)
+        anchor = np.argmin(self.moving.body.contact.slowest(now.velocity), axis=0)
+        return anchor, _midpoint_velocity(now, anchor)
+
+
+def _midpoint_velocity(now: Instant, link: np.ndarray) -> np.ndarray:
+    """Velocity ``(3, n_time)`` of the midpoint of a link ``(n_time,)``."""
+    c, s, *_, vs, vn, w = (
+        np.take_along_axis(row, link[None], 0)[0] for row in (*now.posture, *now.velocity)
+    )
+    return np.stack([vs * c - vn * s, vs * s + vn * c, w])
+
+
+def _attempt(
     moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> Found:
-    """The reference of `colloc.mechanics.native_kernel.compiled_balance`."""
+    """By the compiled kernel, or the same steps by NumPy."""
+    if (library := native_kernel(moving.body, moving.friction)) is not None:
+        n_time = moving.angles.shape[1]
+        z, velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
+        iterations, anchor = np.empty((2, n_time), dtype=np.int64)
+        settings = moving.load, start, tolerance, max_iterations, METHODS.index(method)
+        found = z, residual, iterations, anchor, velocity
+        call_for_all(library.colloc_balance, moving, *settings, *found)
+        return found
     body, friction, angles, rates, delta, load = moving
     n_time = angles.shape[1]
     # work in units of the largest rate, where the law is homogeneous once delta scales along
@@ -277,8 +264,8 @@ def _numpy_balance(
     scaled_delta = relative_delta(delta, speed)
     anchor, velocity = np.full(n_time, body.n_link // 2), np.zeros((3, n_time))
     if start is not None:
-        velocity = _Batch(scaled, TAIL).rereference(start / speed, scaled_delta, anchor)
-    state = starting_state(anchor, velocity)
+        velocity = _midpoint_velocity(scaled.instant(start / speed, TAIL, scaled_delta), anchor)
+    state = State(anchor, velocity)
 
     def batch(members: np.ndarray, link: int) -> _Batch:
         return _Batch(scaled.at(members), link)
@@ -289,3 +276,85 @@ def _numpy_balance(
         posture, velocity = body.posture(angles[:, at], link), state.velocity[:, at]
         z[:, at] = body.tail_velocity(posture, scaled.rates[:, at], velocity, link)
     return z * speed, state.residual, state.iterations, state.anchor, state.velocity * speed
+
+
+def chain_motion(
+    body: Any,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    solved: BalanceSolution,
+    load: np.ndarray | None = None,
+) -> BalancedMotion:
+    """The motion of a chain; under a load the actuators' power is that of friction less the
+    load's. Arguments as for `solve_balance`."""
+    return _following(Moving(body, body.law(friction), angles, rates, delta, load), solved)[0]
+
+
+def motion_and_derivatives(
+    body: Any,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    solved: BalanceSolution,
+    load: np.ndarray | None = None,
+) -> tuple[BalancedMotion, np.ndarray]:
+    """The motion of a `Body`, and derivatives ``(6, 2 n_joint, n_time)`` of (tail velocity,
+    velocity of the centre, power) with respect to (angles, rates); under a load two columns more,
+    with respect to its components."""
+    if is_chain(body):
+        moving = Moving(body, body.law(friction), angles, rates, delta, load)
+        return _following(moving, solved, differentiated=True)
+    slopes = _derivatives(body, friction, TAIL, pulled=False)
+    motion = body.motion(friction, angles, rates, delta, solved)
+    return motion, slopes(np.concatenate([angles, rates]), solved.z, delta)
+
+
+def _following(
+    moving: Moving, solved: BalanceSolution, *, differentiated: bool = False
+) -> tuple[BalancedMotion, np.ndarray]:
+    """The motion of a chain, and its derivatives if asked for."""
+    body, friction, angles, rates, delta, load = moving
+    n_time, columns = angles.shape[1], 2 * len(angles) + 2 * (load is not None)
+    values = np.empty((7, n_time))
+    slopes = np.empty((6, columns, n_time) if differentiated else 0)
+    if (library := native_kernel(body, friction)) is not None:
+        given = load, solved.anchor, solved.anchor_velocity, values
+        call_for_all(library.colloc_motion, moving, *given, slopes if differentiated else None)
+        return BalancedMotion(values[:3], values[3:5], values[5], values[6]), slopes
+    y = np.concatenate([angles, rates] if load is None else [angles, rates, load])
+    values[:3] = solved.z
+    for link, at in groups(solved.anchor):  # seen from what rests, which loses no digits
+        there, z = moving.at(at), solved.anchor_velocity[:, at]
+        posture, velocity, force = there.instant(z, link)
+        moments = moments_of_links(body, there.angles, force, there.load)
+        values[3:5, at] = np.concatenate(body.centre_velocity(posture, velocity))
+        values[5, at] = total_power(velocity, force)
+        values[6, at] = (moments * there.rates).sum(axis=0)
+        if differentiated:
+            evaluate = _derivatives(body, friction, link, pulled=load is not None)
+            slopes[..., at] = evaluate(y[:, at], z, delta)
+    return BalancedMotion(values[:3], values[3:5], values[5], values[6]), slopes
+
+
+@lru_cache(maxsize=128)
+def _derivatives(body: Any, friction: Law, anchor: int | None, *, pulled: bool) -> Any:
+    """Derivatives along (angles, rates, load) at the velocity of a chain's anchor, or of a tail, by
+    the implicit function theorem."""
+    from colloc.numerics.implicit import implicit_derivatives  # loads CasADi
+
+    n = body.n_joint
+
+    def equations(y: Any, z: Any, delta: Any) -> tuple[Any, Any]:
+        angles, rates, load = y[:n], y[n : 2 * n], y[2 * n :]
+        if anchor is TAIL:
+            slides = body.sliding(friction, angles, rates, z, delta)
+            return [z, slides.centre, slides.power], slides.force
+        slides = body.sliding(friction, angles, rates, z, delta, anchor)
+        posture = body.posture(angles, anchor)
+        balance = slides.force + (load_wrench(body, posture, load) if pulled else 0.0)
+        return [body.tail_velocity(posture, rates, z, anchor), slides.centre, slides.power], balance
+
+    return implicit_derivatives(equations, 2 * n + 2 * pulled, 3)

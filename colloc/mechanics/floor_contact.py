@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction, LinkForce, line_integrals
+from colloc.mechanics.friction import Friction, LinkForce, LinkVelocity, line_integrals
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments, shown
@@ -75,44 +74,37 @@ class Foot:
     extent: float = field(default=0.0, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
-        if not is_whole(self.link):
-            raise ProblemError(
-                f"the link of a foot must be a whole number, 0 for the tail's, not {self.link!r}."
-            )
-        if not (is_number(self.place) and 0 <= self.place <= 1):
-            raise ProblemError(
-                f"the place of a foot must lie on its link, from 0 (the end towards the tail) to "
-                f"1, not {self.place!r}."
-            )
-        if self.weight is not None and not (is_number(self.weight) and 0 < self.weight <= 1):
-            raise ProblemError(
-                f"the weight of a foot must be a positive part of the body's, at most 1, not "
-                f"{self.weight!r}."
-            )
-        for name in ("offset", "angle"):
-            if not is_number(getattr(self, name)):
+        def lies(name: str, low: float = -np.inf, high: float = np.inf) -> bool:
+            value = getattr(self, name)
+            return is_number(value) and low <= value <= high
+
+        law, bears = self.friction, self.weight is None or (self.weight and lies("weight", 0, 1))
+        on_link = "lie on its link, from 0 (the end towards the tail) to 1"
+        for name, valid, what in (
+            ("link", is_whole(self.link), "be a whole number, 0 for the tail's"),
+            ("place", lies("place", 0, 1), on_link),
+            ("weight", bears, "be a positive part of the body's, at most 1"),
+            ("offset", lies("offset"), "be a finite number"),
+            ("angle", lies("angle"), "be a finite number"),
+            ("extent", lies("extent", 0, 1), "be a part of its link, from 0 (a point) to 1"),
+            (
+                "friction",
+                isinstance(law, Law | None) and not isinstance(law, type),
+                "be a law of friction, as Friction()",
+            ),
+        ):
+            if not valid:
                 raise ProblemError(
-                    f"the {name} of a foot must be a finite number, not {getattr(self, name)!r}."
+                    f"the {name} of a foot must {what}, not {shown(getattr(self, name))}."
                 )
-        if not (is_number(self.extent) and 0 <= self.extent <= 1):
-            raise ProblemError(
-                f"the extent of a foot must be a part of its link, from 0 (a point) to 1, not "
-                f"{self.extent!r}."
-            )
         if abs(self.place - 0.5) + 0.5 * self.extent > 0.5 + _TOLERANCE:
             raise ProblemError(
-                "a pad must lie on its link, from 0 (the end towards the tail) to 1, "
-                f"not from {self.first:.6g} to {self.last:.6g}."
+                f"a pad must {on_link}, not from {self.first:.6g} to {self.last:.6g}."
             )
         if self.extent and self.angle:
             raise ProblemError(
                 "a pad presses along its link: only a foot, without extent, may be turned by an "
                 "angle."
-            )
-        if isinstance(self.friction, type) or not isinstance(self.friction, Law | None):
-            raise ProblemError(
-                f"the friction of a foot must be a law of friction, as Friction(), not "
-                f"{shown(self.friction)}."
             )
 
     @property
@@ -184,11 +176,11 @@ def Wheel(
     >>> Wheel(0).friction.label
     'friction (1, 0.02, 0.02)'
     """
-    for name, value in (("rolling", rolling), ("sideways", sideways)):
-        if not (is_number(value) and value > 0):
-            raise ProblemError(
-                f"the coefficient {name} of a wheel must be positive and finite, not {value!r}."
-            )
+    if not (is_number(rolling) and is_number(sideways) and min(rolling, sideways) > 0):
+        raise ProblemError(
+            f"the coefficients rolling and sideways of a wheel must be positive and finite, not "
+            f"{rolling!r} and {sideways!r}."
+        )
     if "friction" in foot:
         raise ProblemError(
             "the friction of a wheel is stated by rolling and sideways; for another law of its own "
@@ -220,15 +212,10 @@ def Pad(link: int, first: float = 0.0, last: float = 1.0, **foot: Any) -> Foot:
     >>> len(Chain(feet=tuple(Pad(link, 0.25, 0.75) for link in range(3))).feet)
     3
     """
-    for name, value in (("begins", first), ("ends", last)):
-        if not (is_number(value) and 0 <= value <= 1):
-            raise ProblemError(
-                f"the place where a pad {name} must lie on its link, from 0 to 1, not {value!r}."
-            )
-    if not first < last:
+    if not (is_number(first) and is_number(last) and 0 <= first < last <= 1):
         raise ProblemError(
-            f"a pad must end behind where it begins, not at {last!r} and {first!r}: a point is "
-            f"a Foot."
+            f"a pad must lie on its link, from 0 to 1, and must end behind where it begins, not "
+            f"from {first!r} to {last!r}: a point is a Foot."
         )
     return Foot(link, 0.5 * (first + last), extent=last - first, **foot)
 
@@ -267,7 +254,21 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
                 f"a foot stands on link {foot.link}, but the links are numbered 0 to "
                 f"{weights.size - 1}."
             )
-    feet = tuple(replace(foot, weight=_weight(foot, stated, weights)) for foot in stated)
+
+    def weight(foot: Foot) -> float:
+        """Its stated load, or its share of what the other feet leave of the link's weight."""
+        if foot.weight is not None:
+            return float(foot.weight)
+        others = [other.weight for other in stated if other.link == foot.link]
+        left = float(weights[foot.link]) - sum(each for each in others if each is not None)
+        if left <= 0:
+            raise ProblemError(
+                f"the feet on link {foot.link} bear all that it weighs: give the last of them a "
+                f"weight, too."
+            )
+        return left / others.count(None)
+
+    feet = tuple(replace(foot, weight=weight(foot)) for foot in stated)
     total = sum(foot.weight or 0.0 for foot in feet)
     if abs(total - 1.0) > _TOLERANCE:
         carried = sorted(set(range(weights.size)) - {foot.link for foot in feet})
@@ -282,24 +283,9 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
     if not _same_set(feet, [foot.mirrored for foot in feet]):
         raise ProblemError(
             "the feet differ between left and right (offset, angle), which the search takes for "
-            "alike: give every foot that is "
-            "offset or turned its mirror image on the same link."
+            "alike: give every foot that is offset or turned its mirror image on the same link."
         )
     return tuple(sorted(feet, key=lambda foot: (foot.link, foot.place, foot.offset)))
-
-
-def _weight(foot: Foot, feet: Sequence[Foot], weights: np.ndarray) -> float:
-    """Its stated load, or its share of what the other feet leave of the link's weight."""
-    if foot.weight is not None:
-        return float(foot.weight)
-    others = [other.weight for other in feet if other.link == foot.link]
-    left = float(weights[foot.link]) - sum(weight for weight in others if weight is not None)
-    if left <= 0:
-        raise ProblemError(
-            f"the feet on link {foot.link} bear all that it weighs: give the last of them a "
-            f"weight, too."
-        )
-    return left / others.count(None)
 
 
 def symmetric_feet(feet: Sequence[Foot], n_link: int) -> bool:
@@ -326,10 +312,10 @@ class FeetLaw:
 
     laws: tuple[Law, ...]
 
+    kernel_numbers = ()
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "laws", tuple(self.laws))
-
-    kernel_numbers = ()
 
     @property
     def degree(self) -> float | None:
@@ -382,26 +368,6 @@ class FeetLaw:
     density_jacobian = density_secant = density_potential = density
 
 
-class Velocities(Protocol):
-    """As `colloc.mechanics.links.LinkVelocity`."""
-
-    @property
-    def vs(self) -> Array: ...
-    @property
-    def vn(self) -> Array: ...
-    @property
-    def w(self) -> Array: ...
-
-
-class PartVelocity(NamedTuple):
-    """Velocity of the parts' middles along and across their directions, and their rotation rate,
-    ``(n_part, n_time)`` each."""
-
-    vs: Array
-    vn: Array
-    w: Array
-
-
 class Group(NamedTuple):
     """Feet, or pads, under one law."""
 
@@ -443,6 +409,7 @@ class FloorContact:
         # some units of rounding of the largest, and its friction changes within delta.
         short = any(part.extent < 1 for part in parts)
         self.rounding = 16 * float(np.finfo(float).eps) if short else 0.0
+        self._groups: dict[Law, list[Group]] = {}
 
     @property
     def force_names(self) -> tuple[str, ...]:
@@ -468,15 +435,25 @@ class FloorContact:
 
     def groups(self, friction: Law) -> list[Group]:
         """The parts, by kind and law."""
-        return _groups(self, friction)
+        if friction not in self._groups:
+            groups: dict[tuple[bool, Law], list[int]] = {}
+            laws, feet = self.laws(friction), set(range(len(self.parts))) - set(self.pads)
+            for k in (*sorted(feet), *self.pads):
+                groups.setdefault((k in self.pads, laws[k]), []).append(k)
+            self._groups[friction] = [
+                Group(rows, law, pads) for (pads, law), rows in groups.items()
+            ]
+        return self._groups[friction]
 
-    def velocities(self, velocity: Velocities) -> PartVelocity:
-        vs, vn, w = (row[self.links, :] for row in (velocity.vs, velocity.vn, velocity.w))
+    def velocities(self, velocity: LinkVelocity) -> LinkVelocity:
+        """Velocity of the parts' middles along and across their directions, and their rotation
+        rate, ``(n_part, n_time)`` each."""
+        vs, vn, w = (row[self.links, :] for row in velocity)
         vs, vn = vs - self.offset * w, vn + self.along * w
-        return PartVelocity(self.cos * vs + self.sin * vn, self.cos * vn - self.sin * vs, w)
+        return LinkVelocity(self.cos * vs + self.sin * vn, self.cos * vn - self.sin * vs, w)
 
     def _evaluate(
-        self, friction: Law, velocity: Velocities, delta: Array, name: str
+        self, friction: Law, velocity: LinkVelocity, delta: Array, name: str
     ) -> list[tuple[Group, Any]]:
         """A quantity of the law at feet, or integrated along pads, by groups."""
         parts, values = self.velocities(velocity), []
@@ -489,18 +466,18 @@ class FloorContact:
                 values.append((group, getattr(group.law, _AT_POINT[name])(vs, vn, delta)))
         return values
 
-    def forces(self, friction: Law, velocity: Velocities, delta: Array) -> Array:
+    def forces(self, friction: Law, velocity: LinkVelocity, delta: Array) -> Array:
         """Contact forces ``(n_force, n_time)``, see `force_names`."""
         values, rows = self._evaluate(friction, velocity, delta, "force"), []
+        stack = namespace(velocity.vs).stack
         for k in range(3):
             pieces = [(g.rows, self.pressure[g.rows] * f[k]) for g, f in values if k < len(f)]
             if len(pieces) == 1:
                 rows.append(pieces[0][1])
             elif pieces:
-                stacked = namespace(velocity.vs).stack([piece for _, piece in pieces])
                 order = np.argsort([part for parts, _ in pieces for part in parts])
-                rows.append(stacked[order.tolist(), :])
-        return namespace(velocity.vs).stack(rows)
+                rows.append(stack([piece for _, piece in pieces])[order.tolist(), :])
+        return stack(rows)
 
     def on_links(self, forces: Array) -> LinkForce:
         """Force and couple on the links from contact forces: T' f."""
@@ -512,24 +489,22 @@ class FloorContact:
             couple = couple + matmul(self.scatter[:, self.pads], forces[2 * n :, :])
         return LinkForce(matmul(self.scatter, fs), matmul(self.scatter, fn), couple)
 
-    def force(self, friction: Law, velocity: Velocities, delta: Array) -> LinkForce:
+    def force(self, friction: Law, velocity: LinkVelocity, delta: Array) -> LinkForce:
         return self.on_links(self.forces(friction, velocity, delta))
 
     def stiffness(
-        self, friction: Law, velocity: Velocities, delta: Array, *, secant: bool = False
+        self, friction: Law, velocity: LinkVelocity, delta: Array, *, secant: bool = False
     ) -> np.ndarray:
         """Minus the derivative of the force on links with respect to (vs, vn, w), or the matrix of
         the fixed point (`Law.density_secant`), ``(3, 3, n_link, n_time)``: sum of T' K T."""
-        total = np.zeros((3, 3, *velocity.vs.shape))
-        for group, block in self._evaluate(
-            friction, velocity, delta, "secant" if secant else "jacobian"
-        ):
-            T, rows = self._T[: len(block), :, group.rows], group.rows
+        total, name = np.zeros((3, 3, *velocity.vs.shape)), "secant" if secant else "jacobian"
+        for (rows, *_), block in self._evaluate(friction, velocity, delta, name):
+            T = self._T[: len(block), :, rows]
             KT = np.einsum("pqnt,qjn->pjnt", self.pressure[rows] * np.array(block), T)
             total += self.scatter[:, rows] @ np.einsum("pin,pjnt->ijnt", T, KT)
         return total
 
-    def potential(self, friction: Law, velocity: Velocities, delta: Array) -> np.ndarray:
+    def potential(self, friction: Law, velocity: LinkVelocity, delta: Array) -> np.ndarray:
         """Dissipation potential of the parts, ``(n_part, n_time)``; of associated laws only."""
         values = self._evaluate(friction, velocity, delta, "potential")
         return np.concatenate([self.pressure[group.rows] * value for group, value in values])
@@ -549,7 +524,7 @@ class FloorContact:
         """Largest pull on the body that friction may hold, over its weight."""
         return float(self.weight[:, 0] @ [law.largest for law in self.laws(friction)])
 
-    def slowest(self, velocity: Velocities) -> np.ndarray:
+    def slowest(self, velocity: LinkVelocity) -> np.ndarray:
         """Speed of the slowest part of each link, ``(n_link, n_time)``; infinite where there is
         none."""
         vs, vn, w = map(np.abs, self.velocities(velocity))
@@ -557,7 +532,7 @@ class FloorContact:
         np.minimum.at(speed, self.links, vs + vn + 0.5 * self.length * w)
         return speed
 
-    def sticking_speeds(self, friction: Law, velocity: Velocities) -> np.ndarray:
+    def sticking_speeds(self, friction: Law, velocity: LinkVelocity) -> np.ndarray:
         """Speeds that vanish at kinks of the velocity in time, ``(n_part, n_time)``: of the slowest
         point of each part, or along it where directions differ."""
         vs, vn, w = map(np.abs, self.velocities(velocity))
@@ -575,13 +550,3 @@ class FloorContact:
         head = len(self.scatter), len(self.parts), law.largest, float(law.associated), *first
         places = self.along, self.offset, self.cos, self.sin, self.length, self.pressure
         return (*head, *np.hstack([*places, numbers]).ravel())
-
-
-@lru_cache(maxsize=64)
-def _groups(contact: FloorContact, friction: Law) -> list[Group]:
-    laws, groups = contact.laws(friction), []
-    for pads in (False, True):
-        parts = [k for k, part in enumerate(contact.parts) if (part.extent > 0) == pads]
-        for law in dict.fromkeys(laws[k] for k in parts):
-            groups.append(Group([k for k in parts if laws[k] == law], law, pads))
-    return groups

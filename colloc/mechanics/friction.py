@@ -170,6 +170,15 @@ def regularised_speed(vs: Array, vn: Array, delta: Array) -> Array:
     return namespace(vs, vn, delta).sqrt(vs * vs + vn * vn + delta * delta)
 
 
+class LinkVelocity(NamedTuple):
+    """Velocity of links along and across themselves at their midpoints, and rotation rates,
+    ``(n_link, n_time)`` each; or of parts of links."""
+
+    vs: Array
+    vn: Array
+    w: Array
+
+
 class LinkForce(NamedTuple):
     """Friction on a link: tangential force, normal force, couple about the midpoint."""
 

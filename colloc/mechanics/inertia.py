@@ -17,10 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.mechanics.balance import Posture
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.errors import ProblemError
 

@@ -9,16 +9,15 @@ a motion of negative sign.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import Moving, balance_jacobian, instant
+from colloc.mechanics.balance import TAIL, Moving, balance_jacobian
 from colloc.mechanics.bodies import BalanceSolution
 from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import TAIL, Links
 
 DISTINCT = 1e-5
 """Difference of distinct velocities, in units of the largest rate."""
@@ -54,7 +53,7 @@ class Branches(NamedTuple):
 
 
 def all_balanced_velocities(
-    body: Links,
+    body: Any,
     friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
@@ -65,9 +64,9 @@ def all_balanced_velocities(
 
     Three links with friction (1, 0.01, 100), the first joint turning:
 
-    >>> from colloc.mechanics.friction import Friction
+    >>> from colloc import Chain, Friction
     >>> at = np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
-    >>> found = all_balanced_velocities(Links(), Friction(mu_t=1, mu_f=0.01, mu_b=100), *at, 1e-4)
+    >>> found = all_balanced_velocities(Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), *at, 1e-4)
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
     (array([3]), array([2.998, 2.96 , 2.994]), array([ 1.,  1., -1.]))
     """
@@ -128,11 +127,9 @@ def _determinant(moving: Moving, solved: BalanceSolution, where: np.ndarray) -> 
 
 
 def _jacobian(moving: Moving, z: np.ndarray, reference: int | None = TAIL) -> np.ndarray:
-    body, friction, angles, rates, delta, _ = moving
-    now = instant(body, friction, angles, rates, z, delta, reference)
-    return balance_jacobian(
-        body, friction, now.posture, now.velocity, np.full((1, z.shape[1]), delta)
-    )
+    posture, velocity, _ = moving.instant(z, reference)
+    delta = np.full((1, z.shape[1]), moving.delta)
+    return balance_jacobian(moving.body, moving.friction, posture, velocity, delta)
 
 
 def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:

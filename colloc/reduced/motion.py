@@ -30,9 +30,8 @@ from colloc.dynamics.dynamics import (
 from colloc.dynamics.dynamics import Shapes as Moving
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import Instants, PathLimits, Quantity
+from colloc.mechanics.densities import Instants, JointMap, PathLimits, Quantity
 from colloc.mechanics.inertia import STATES
-from colloc.mechanics.joint_map import JointMap
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 
@@ -296,7 +295,7 @@ def _density_slopes(
     if of.needs_forces:
         balance = body.sliding(friction, angles, rates, z, delta).force
         if pulled:
-            balance += load_wrench(body, body.posture(angles), load)  # type: ignore[attr-defined, arg-type]
+            balance += load_wrench(body, body.posture(angles), load)  # type: ignore[attr-defined]
         by_z = ca.solve(ca.jacobian(balance, z).T, ca.jacobian(out, z).T)
         slope -= ca.jacobian(balance, y).T @ by_z
     return ca.Function("slopes", [y, z, delta], [ca.vec(ca.densify(slope))], {"cse": True})

@@ -54,7 +54,7 @@ class CollocatedMotion:
         now, body = self.sliding(*self._points), self.problem.body
         force = np.array(now.force)
         if (load := self.problem.regime.pull(self._theta[None])) is not None:
-            force += load_wrench(body, body.posture(self._points[0]), load)  # type: ignore[attr-defined, arg-type]
+            force += load_wrench(body, body.posture(self._points[0]), load)  # type: ignore[attr-defined]
         if self.problem.froude:
             force -= self._growth
         return now._replace(force=force)

@@ -10,7 +10,7 @@ import numpy as np
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.limits import of_each, range_of, under_one_limit
 from colloc.gaits.problem import Problem
-from colloc.mechanics.actuators import largest_moments
+from colloc.mechanics.balance import largest_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.law import rate_independent

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.dynamics.chain import joint_torques as inertial_torques
-from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import GRAVITY, checked_mass, momenta, tail_velocity

@@ -18,7 +18,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.contact import crossing_depth
-from colloc.mechanics.joint_map import JointMap
+from colloc.mechanics.densities import JointMap
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.reduced.motion import ReducedMotion

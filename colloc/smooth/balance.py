@@ -23,7 +23,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.mechanics.balance import pull_back
-from colloc.mechanics.damped_newton import Evaluated, groups, relative_delta, solve, starting_state
+from colloc.mechanics.damped_newton import State, groups, relative_delta, solve
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.schemes import Scheme, scheme
@@ -176,8 +176,8 @@ def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
 
 
 class PanelBatch:
-    """Time points `members` that share a reference edge, as `colloc.mechanics.damped_newton.Batch`;
-    rows as of `_fields`."""
+    """Time points `members` that share a reference edge, a batch of
+    `colloc.mechanics.damped_newton`; rows as of `_fields`."""
 
     def __init__(
         self,
@@ -195,7 +195,9 @@ class PanelBatch:
         now = curve(self.panels, self.angle, self.rate, reference, anchor_rate)
         self.curve = now._replace(weight=np.broadcast_to(now.weight, self.angle.shape))
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+    def evaluate(
+        self, select: np.ndarray, z: np.ndarray, delta: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         """Nodes ``(9, n_node, n)``, curve, then velocity; net force and potential at z."""
         body, potential = Curve(*(row[:, select] for row in self.curve)), None
         vs, vn = node_velocity(body, z)
@@ -353,7 +355,7 @@ def solve_smooth(
         now = PanelGrid(edges, order) if grid is None else grid
         rows, speed = _fields(motion, t[active], now, unit)
         d, batch_of = relative_delta(delta, speed), partial(PanelBatch, now, rows, friction)
-        state = starting_state(anchor, velocity / speed)
+        state = State(anchor, velocity / speed)
         if slide is not None:
             state.residual[:] = 0.0
         else:
@@ -363,7 +365,7 @@ def solve_smooth(
                 for reference, at in groups(state.anchor):
                     slow = batch_of(at, reference).slowest(state.velocity[:, at], d[:, at])
                     state.anchor[at], state.velocity[:, at] = slow
-                state = starting_state(state.anchor, state.velocity)
+                state = State(state.anchor, state.velocity)
             solve(state, batch_of, ANCHOR_MOVES, d, tolerance, max_iterations, method)
         velocity, split = state.velocity * speed, np.zeros((len(edges) - 1, active.size), bool)
         middle = 0.5 * (edges[1:] + edges[:-1])

@@ -17,7 +17,6 @@ from colloc.mechanics.bodies import FULL
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
-from colloc.mechanics.links import Links
 from colloc.numerics.mesh import Mesh
 
 RADIANS = 2 * np.pi
@@ -93,7 +92,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
     body, gait, dynamics = control.dynamics.body, control.admissible.gait, control.dynamics
     n_joint, inertial = body.n_joint, bool(dynamics.regime.froude)
     lifted = mesh.n_point * (control.formulation == FULL)
-    contacts = len(body.contact.force_names) if isinstance(body, Links) else 0
+    contacts = len(body.contact.force_names) if isinstance(body, Chain) else 0
     balanced, moved = (0, lifted) if inertial else (lifted, 0)
     mapped = mesh.n_point - lifted
     sizes = {

@@ -28,7 +28,7 @@ from colloc.mechanics.contact import (
     smooth_minimum,
     tangent_of_minimum,
 )
-from colloc.mechanics.joint_map import JointMap
+from colloc.mechanics.densities import JointMap
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, peaks, vertex

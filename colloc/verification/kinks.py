@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import Links
 from colloc.verification.adaptive_motion import FineMotion, rates_at
 from colloc.verification.replay_record import Path
 
@@ -50,7 +50,7 @@ def _slowness(
     body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray
 ) -> np.ndarray:
     """Speeds that vanish at kinks, ``(n_part, n_time)``; smooth bodies, and drag, make none."""
-    if not (isinstance(body, Links) and body.law(friction).regularised):
+    if not (isinstance(body, Chain) and body.law(friction).regularised):
         return np.empty((0, z.shape[1]))
     velocity = body.velocity(body.posture(angles), rates, z)
     return body.contact.sticking_speeds(friction, velocity)

@@ -20,6 +20,7 @@ from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.regime import Regime
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import (
     LENGTH,
     Instants,
@@ -30,7 +31,6 @@ from colloc.mechanics.densities import (
     quantities_of,
 )
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import Links
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
 from colloc.verification.panels import (
@@ -182,7 +182,7 @@ def replay(
             f"instants must be an even number of at least 4, and at most {MOST_INSTANTS}, not "
             f"{instants!r}."
         )
-    law = body.law(friction) if isinstance(body, Links) else friction
+    law = body.law(friction) if isinstance(body, Chain) else friction
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     joint_map = getattr(path, "joint_map", None)
     limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)

@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from colloc.mechanics import native_kernel
+from colloc.mechanics.balance import Moving
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import Links
-from colloc.mechanics.native_kernel import BODY, address, call_for_all
+from colloc.mechanics.native_kernel import call_for_all, with_signatures
 from research.guarantee.c_compiler import c_compiler, compiled_library
 
 SOURCES = Path(__file__).with_name("native")
 FLAGS = tuple((native_kernel.SOURCES / "flags.txt").read_text("ascii").split())
 """Those of the library's C: nothing that reorders arithmetic."""
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
-_SIGNATURES = {"colloc_loaded": (*BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6)}
 _PROOFS = {
     "colloc_states": (_COUNT, *[_ARRAY] * 5, _REAL, _ARRAY),
     "colloc_by_convexity": (_COUNT, *[_ARRAY] * 7, _REAL, _ARRAY),
@@ -31,7 +31,7 @@ _PROOFS = {
 }
 
 
-def guarantee_kernel(body: Links) -> ctypes.CDLL | None:
+def guarantee_kernel(body: Chain) -> ctypes.CDLL | None:
     """The compiled functions, or None without a compiler, or where NumPy has to do. `StoreError` if
     the compiler fails."""
     return None if c_compiler() is None or native_kernel.native_kernel(body) is None else _library()
@@ -40,7 +40,10 @@ def guarantee_kernel(body: Links) -> ctypes.CDLL | None:
 @cache
 def proofs() -> ctypes.CDLL:
     """What is proved in interval arithmetic. `StoreError` without a C++ compiler."""
-    return _with_signatures(compiled_library(SOURCES / "proofs.cpp", proof_flags(), {}), _PROOFS)
+    library = compiled_library(SOURCES / "proofs.cpp", proof_flags(), {})
+    for name, arguments in _PROOFS.items():
+        getattr(library, name).argtypes = arguments
+    return library
 
 
 def proof_flags() -> list[str]:
@@ -59,14 +62,8 @@ def call(name: str, *arguments: np.ndarray | float) -> None:
         np.ascontiguousarray(each) if isinstance(each, np.ndarray) else each for each in arguments
     ]
     getattr(proofs(), name)(
-        *(address(each) if isinstance(each, np.ndarray) else each for each in given)
+        *(each.ctypes.data if isinstance(each, np.ndarray) else each for each in given)
     )
-
-
-def _with_signatures(library: ctypes.CDLL, signatures: dict) -> ctypes.CDLL:
-    for name, arguments in signatures.items():
-        getattr(library, name).argtypes = arguments
-    return library
 
 
 @cache
@@ -76,12 +73,14 @@ def _library() -> ctypes.CDLL:
         for each in native_kernel.SOURCES.iterdir()
         if each.name.endswith(".h")
     }
-    return _with_signatures(compiled_library(SOURCES / "guarantee.c", FLAGS, headers), _SIGNATURES)
+    return with_signatures(
+        compiled_library(SOURCES / "guarantee.c", FLAGS, headers), {"colloc_loaded": "ppipppppp"}
+    )
 
 
 def compiled_loaded(
     library: ctypes.CDLL,
-    body: Links,
+    body: Chain,
     friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
@@ -92,7 +91,6 @@ def compiled_loaded(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The fields of `research.guarantee.loaded_balance.Loaded`."""
     n_time = angles.shape[1]
-    given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, load, start)]
     velocity, potential, power = np.empty((3, n_time)), np.empty(n_time), np.empty(n_time)
     forces, residual, leftover_power = (
         np.empty((body.n_link, 3, n_time)),
@@ -100,14 +98,6 @@ def compiled_loaded(
         np.empty(n_time),
     )
     found = velocity, potential, power, forces, residual, leftover_power
-    call_for_all(
-        library.colloc_loaded,
-        body,
-        friction,
-        n_time,
-        *map(address, given),
-        delta,
-        steps,
-        *map(address, found),
-    )
+    moving = Moving(body, friction, angles, rates, delta)
+    call_for_all(library.colloc_loaded, moving, load, start, steps, *found)
     return found

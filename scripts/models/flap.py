@@ -35,9 +35,7 @@ class FlapBody(Chain):
 
     lengths: tuple[float, ...] = (0.8, 0.1, 0.1)
 
-    @property
-    def in_series(self) -> bool:
-        return False
+    in_series = False
 
     def _joint_sum(self, reference: int | None) -> np.ndarray:
         full = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])

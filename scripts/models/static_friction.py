@@ -18,8 +18,7 @@ import numpy as np
 from colloc.mechanics.balance import Instant, instant, net_force
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.links import LinkVelocity
+from colloc.mechanics.friction import Friction, LinkVelocity
 
 SLOW = 1e-3
 """Speed below which the paper counts a link as held (its figure 9)."""

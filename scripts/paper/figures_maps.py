@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.contact import SMOOTHING, crossing_bounds
+from colloc.mechanics.contact import SMOOTHING, near_contacts
 from colloc.pictures import style
 from scripts import panel_marks
 from scripts.models.ellipses import ellipse_angles
@@ -26,9 +26,9 @@ _MEASURES = (("distance", "d"), ("work", "W"), ("efficiency", r"$\lambda = d/W$"
 
 def _admissible_square(nodes: np.ndarray) -> np.ndarray:
     a1, a2 = np.meshgrid(nodes, nodes, indexing="ij")
-    bounds = crossing_bounds(Chain(), np.stack([a1.ravel(), a2.ravel()]))
-    assert bounds is not None  # three links
-    return (bounds.max(axis=0) <= np.pi + SMOOTHING).reshape(a1.shape)
+    angles = np.stack([a1.ravel(), a2.ravel()])
+    excess = np.max([each.excess(angles)[0] for each in near_contacts(Chain())], axis=0)
+    return (excess <= SMOOTHING).reshape(a1.shape)
 
 
 def _label_angles(axes: Any) -> None:

@@ -7,8 +7,7 @@ import pytest
 from colloc.dynamics.branches import BACKWARDS, FORWARDS, followed_motion, on_one_branch
 from colloc.gaits.harmonic import Fourier, ellipse
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import chain_motion
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.fixed_point import chain_motion, solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import Branches, all_balanced_velocities
 from colloc.system.errors import NotConvergedError

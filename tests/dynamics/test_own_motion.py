@@ -16,9 +16,8 @@ from colloc.dynamics.follow import integrate_period
 from colloc.gaits import gait_fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
-from colloc.mechanics.chain_motion import chain_motion, motion_and_derivatives
 from colloc.mechanics.densities import LENGTH, Instants
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives, solve_balance
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
 from colloc.verification.adaptive_motion import whole_totals

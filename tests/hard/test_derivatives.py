@@ -128,10 +128,8 @@ def test_point_function_where_nothing_moves(formulation):
 )
 def test_contact_at_its_corners(angles):
     """The smoothed minimum bends within 1e-3 rad of the corner; its derivatives hold there too."""
-    from colloc.mechanics.contact import crossing_bounds
-
     q = ca.SX.sym("q", 2)
-    bounds = crossing_bounds(THREE, q)
+    bounds = ca.vertcat(*(each.excess(q) for each in THREE.contacts()))
     value, slope = ca.Function("c", [q], [bounds]), ca.Function("d", [q], [ca.jacobian(bounds, q)])
     found = derivative(lambda at: np.array(value(at)).ravel(), np.array(angles), 1e-5)
     np.testing.assert_allclose(found, np.array(slope(np.array(angles))), atol=1e-8)

@@ -6,7 +6,7 @@ import pytest
 from cases import COEFFICIENTS, DELTAS, HARD
 
 from colloc import Chain, Friction, solve_balance
-from colloc.mechanics.balance import dissipation_potential, instant, net_force, total_power
+from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from research.guarantee.loaded_balance import loaded_balance
 from tests.shared.laws import coulomb
@@ -87,7 +87,7 @@ def test_bodies_under_load_are_in_the_state_that_they_state(lengths, delta):
     np.testing.assert_allclose(
         found.leftover_power / scale, (left * z).sum(axis=0) / scale, rtol=0, atol=1e-10
     )
-    potential = dissipation_potential(body, law, now.velocity, np.full((1, n), delta))
+    potential = body.contact.potential(law, now.velocity, np.full((1, n), delta)).sum(axis=0)
     np.testing.assert_allclose(found.potential / scale, potential / scale, rtol=0, atol=1e-10)
     np.testing.assert_allclose(
         found.power / scale, total_power(now.velocity, now.force)[0] / scale, rtol=0, atol=1e-10

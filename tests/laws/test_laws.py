@@ -15,7 +15,7 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import motion_and_derivatives
+from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import ClosedForm, Friction, line_integrals
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead

@@ -12,7 +12,7 @@ from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import motion_and_derivatives
+from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import Friction
 from colloc.search.solve import solve
 from colloc.system.errors import ProblemError

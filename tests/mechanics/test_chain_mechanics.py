@@ -19,10 +19,9 @@ from colloc import (
     Wheel,
     solve_balance,
 )
-from colloc.mechanics.actuators import joint_moments
-from colloc.mechanics.balance import balance_jacobian, dissipation_potential, instant
-from colloc.mechanics.chain_motion import chain_motion, motion_and_derivatives
+from colloc.mechanics.balance import balance_jacobian, instant, joint_moments
 from colloc.mechanics.densities import Instants
+from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives
 from colloc.mechanics.native_kernel import native_kernel
 
 LENGTHS, SKEW = (0.3, 0.45, 0.25), Friction(mu_t=0.5, mu_f=1, mu_b=2)
@@ -240,9 +239,8 @@ def test_the_stiffness_of_an_associated_law_is_symmetric_and_its_dissipation_has
     assert (np.linalg.eigvalsh(matrix) > 0).all()
 
     def dissipation(z):
-        return dissipation_potential(
-            body, law, instant(body, law, angles, rates, z, delta).velocity, delta
-        )
+        velocity = instant(body, law, angles, rates, z, delta).velocity
+        return body.contact.potential(law, velocity, delta).sum(axis=0)
 
     force = body.sliding(law, angles, rates, z, delta).force
     for row, unit in enumerate(1e-5 * np.eye(3)):

@@ -1,5 +1,7 @@
 """Admissible shapes: smooth bounds against plain segment intersection."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,8 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import (
     SMOOTHING,
-    crossing_bounds,
     crossing_depth,
     far_pairs,
-    gap,
     overlapping_pairs,
     passing_depth,
     share_of_first,
@@ -34,10 +34,11 @@ def test_bounds_never_allow_a_crossing_and_forbid_little_else(lengths):
     body = Chain(lengths)
     rng = np.random.default_rng(1)
     angles = rng.uniform(-np.pi, np.pi, (2, 40000))
-    allowed = crossing_bounds(body, angles).max(axis=0) <= np.pi
+    excess = np.max([each.excess(angles)[0] for each in body.contacts()], axis=0)
+    allowed = excess <= 0
     crossing = crossing_depth(body, angles) > 0
     assert not np.any(allowed & crossing)
-    exact = crossing_bounds(body, angles).max(axis=0) <= np.pi + 0.5 * SMOOTHING + 1e-9
+    exact = excess <= 0.5 * SMOOTHING + 1e-9
     assert np.array_equal(exact[~allowed] | crossing[~allowed], np.ones((~allowed).sum(), bool))
     assert (crossing.mean() > 0.02) == (lengths[0] + lengths[2] > lengths[1])
 
@@ -69,14 +70,17 @@ def test_the_gap_between_links_is_that_of_their_points():
         return np.hypot(*(points[i][:, :, :, None] - other[:, :, None, :])).min(axis=(1, 2))
 
     naive = np.min([distance(i, j) for i in range(4) for j in range(4) if i != j], axis=0)
-    assert np.abs(naive - gap(body, angles)).max() < 0.35 / 200
     crossing = crossing_depth(body, angles) > 0
+    wide = replace(body, width=0.149)
+    lacks = crossing_depth(wide, angles) - crossing_depth(body, angles)
     assert crossing.any()
-    assert np.all(gap(body, angles)[crossing] == 0)
+    np.testing.assert_allclose(lacks[crossing], wide.width, rtol=1e-14)
+    known = np.maximum(wide.width - naive, 0.0)
+    assert np.abs(lacks - known)[~crossing].max() < 0.35 / 200
 
 
 def test_two_links_cannot_cross():
-    assert crossing_bounds(Chain((0.5, 0.5)), np.zeros((1, 3))) is None
+    assert not Chain((0.5, 0.5)).contacts()
     assert np.array_equal(crossing_depth(Chain((0.5, 0.5)), np.array([[3.0, 0.0]])), [0.0, 0.0])
 
 

@@ -7,7 +7,7 @@ import pytest
 import colloc
 from colloc import Chain, Coupled, Friction, Harmonic, Problem, ProblemError
 from colloc.gaits.gait_fields import class_from, fields, gait_from
-from colloc.mechanics.joint_map import JointMap
+from colloc.mechanics.densities import JointMap
 from colloc.results.robot import joint_torques
 
 LAW = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5)

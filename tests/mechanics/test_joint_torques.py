@@ -6,7 +6,7 @@ import pytest
 from shared.instants import random_instants
 
 from colloc import Chain, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscous, replay
-from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.search.spaces import program_of
 from colloc.transcription.full_program import ACTUATORS

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Elliptic, Foot, Friction, Pad, Wheel, solve_balance
-from colloc.mechanics.actuators import joint_moments, largest_moments
+from colloc.mechanics.balance import joint_moments, largest_moments
 
 FEET = (
     Foot(0),

@@ -126,7 +126,7 @@ WITHIN_ITS_ARRAYS = """
 import numpy as np
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics import native_kernel
-from colloc.mechanics.chain_motion import motion_and_derivatives
+from colloc.mechanics.fixed_point import motion_and_derivatives
 from research.guarantee.c_compiler import compiled_library
 from research.guarantee.kernel import FLAGS
 

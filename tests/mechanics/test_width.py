@@ -9,9 +9,7 @@ from colloc.bounds.motions import admissible
 from colloc.mechanics.contact import (
     crossing_depth,
     ends_and_links,
-    excess,
-    gap,
-    square_distance,
+    lacking_width,
 )
 
 
@@ -23,6 +21,10 @@ def nearest(body, angles, first, second, points=301):
         ends[:, k, :, None] * (1 - part) + ends[:, k + 1, :, None] * part for k in (first, second)
     )
     return np.hypot(*(a[:, :, :, None] - b[:, :, None, :])).min(axis=(1, 2))
+
+
+def distance(body, angles, end, link):
+    return np.sqrt(body.width**2 - 2 * body.width * lacking_width(body, angles, end, link)[0])
 
 
 @pytest.mark.parametrize("lengths", [(1 / 3, 1 / 3, 1 / 3), (0.2, 0.35, 0.15, 0.3)])
@@ -44,9 +46,7 @@ def test_the_distance_that_a_search_sees_is_that_of_the_points_of_a_link():
     for end, link in ends_and_links(body):
         points = ends[:, link, :, None] * (1 - part) + ends[:, link + 1, :, None] * part
         naive = np.hypot(*(points - ends[:, end, :, None])).min(axis=1)
-        assert np.sqrt(square_distance(body, angles, end, link)[0]) == pytest.approx(
-            naive, abs=0.35 / 2000
-        )
+        assert distance(body, angles, end, link) == pytest.approx(naive, abs=0.35 / 2000)
 
 
 def test_what_a_search_bounds_is_to_first_order_the_width_that_is_lacking():
@@ -54,10 +54,10 @@ def test_what_a_search_bounds_is_to_first_order_the_width_that_is_lacking():
     angles = np.random.default_rng(7).uniform(-np.pi, np.pi, (3, 4000))
     checked = 0
     for end, link in ends_and_links(body):
-        lacks = body.width - np.sqrt(square_distance(body, angles, end, link)[0])
+        lacks = body.width - distance(body, angles, end, link)
         near = np.abs(lacks) < 2e-3
         np.testing.assert_allclose(
-            excess(body, angles, end, link)[0, near], lacks[near], atol=2e-3**2 / 0.05
+            lacking_width(body, angles, end, link)[0, near], lacks[near], atol=2e-3**2 / 0.05
         )
         checked += near.sum()
     assert checked > 50
@@ -120,4 +120,5 @@ def test_the_best_folded_gait_keeps_its_width_and_pays_for_it():
     angles = wide.gait.angles(np.linspace(0.0, 1.0, 4001))
     assert np.max(np.abs(angles)) < np.pi - np.arcsin(width * 3) + 1e-6
     assert nearest(Chain(), angles[:, ::20], 0, 2).min() > width
-    assert gap(Chain(), angles).min() == pytest.approx(width, abs=1e-6)
+    wider = Chain(width=width + 1e-4)
+    assert crossing_depth(wider, angles).max() == pytest.approx(1e-4, abs=1e-6)

@@ -8,7 +8,7 @@ from colloc.bounds.motions import CoulombMotion, Domain, balanced_motion
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.laws.elliptic import Elliptic
-from colloc.mechanics.balance import dissipation_potential, instant, net_force
+from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
@@ -126,7 +126,7 @@ def test_what_is_left_unbalanced_is_counted_however_early_the_solver_stops(steps
         (np.stack(now.force, axis=1)[:, k] * part).sum(axis=0)
         for k, part in enumerate(BODY.velocity(now.posture, r, 0 * z, 1))
     )
-    dissipation = dissipation_potential(BODY, UNIT, now.velocity, np.full((1, n), DELTA))
+    dissipation = BODY.contact.potential(UNIT, now.velocity, np.full((1, n), DELTA)).sum(axis=0)
     expected = dissipation, held, np.hypot(*left[:2]), np.abs(left[2])
     np.testing.assert_allclose(proved_at(q, r, state, load), expected, rtol=1e-8, atol=1e-8)
 

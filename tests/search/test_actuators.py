@@ -7,8 +7,7 @@ import pytest
 from shared.instants import random_instants
 
 from colloc import Chain, Friction, Harmonic, PowerLaw, Problem, Viscous, ellipse, replay
-from colloc.mechanics.actuators import joint_moments
-from colloc.mechanics.balance import instant
+from colloc.mechanics.balance import instant, joint_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve

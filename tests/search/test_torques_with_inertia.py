@@ -7,14 +7,14 @@ import pytest
 import colloc
 from colloc.dynamics.chain import joint_torques, torque_function
 from colloc.dynamics.control_problem import control_problem
-from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.balance import joint_moments
+from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.inertia import (
     inertial_moments,
     kinetic_energy,
     momentum_rates,
     tail_velocity,
 )
-from colloc.mechanics.links import LinkVelocity
 from colloc.reduced.program import ReducedProgram
 from colloc.results.limit_use import lines
 from colloc.results.robot import joint_torques as sheet_torques

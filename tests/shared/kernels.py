@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.bodies import BalancedMotion
-from colloc.mechanics.chain_motion import motion_and_derivatives
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.fixed_point import motion_and_derivatives, solve_balance
 from colloc.mechanics.native_kernel import numpy_instead
 
 

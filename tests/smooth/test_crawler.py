@@ -10,7 +10,7 @@ from colloc.commands.main import main as colloc_main
 from colloc.gaits.bspline import Polygon
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
-from colloc.mechanics.chain_motion import motion_and_derivatives
+from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution

@@ -7,7 +7,7 @@ import pytest
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
-from colloc.mechanics.chain_motion import motion_and_derivatives
+from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import Friction
 from colloc.reduced.linear_space import LinearSpace
 from colloc.results.distinct_optima import distance, reversed_in_time, swap_ends

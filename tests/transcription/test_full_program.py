@@ -7,7 +7,7 @@ import pytest
 
 import colloc
 from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Quantity, Wheel, ellipse
-from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.balance import joint_moments
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver, solve_in_regions
 from colloc.search.spaces import program_of, space_near

@@ -15,7 +15,7 @@
    axes (n, 3, n_time), force and torque left over (2, n_time), and what power these have (n_time). */
 int colloc_loaded(
     int n, const double *length, const double *pressure, const double *mass, const double law_numbers[6], ptrdiff_t n_time,
-    ptrdiff_t first, ptrdiff_t last, const double *angles, const double *rates, const double *load, const double *start, double delta, int steps, double *velocity, double *potential,
+    ptrdiff_t first, ptrdiff_t last, const double *angles, const double *rates, double delta, const double *load, const double *start, int steps, double *velocity, double *potential,
     double *power, double *forces, double *residual, double *leftover_power)
 {
     Link *link = malloc((size_t)n * sizeof *link);
