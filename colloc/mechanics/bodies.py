@@ -73,36 +73,28 @@ class BoundedAngles:
 
 
 class Sliding(NamedTuple):
-    """A body that slides with a given tail velocity."""
+    """A body that slides with a given tail velocity.
+
+    force: net force and torque about the tail, zero in balance (paper, eq. ftb), ``(3, n_time)``.
+    centre: velocity of the centre of mass, in the body's axes, ``(2, n_time)``. power: dissipated
+    by friction (integrand of the paper's eq. W), ``(1, n_time)``.
+    """
 
     force: Array
-    """Net force and torque about the tail, zero in balance (paper, eq. ftb), ``(3, n_time)``."""
     centre: Array
-    """Velocity of the centre of mass, in the body's axes, ``(2, n_time)``."""
     power: Array
-    """Power dissipated by friction (integrand of the paper's eq. W), ``(1, n_time)``."""
 
 
 @dataclass(frozen=True, eq=False)
 class BalanceSolution:
-    """Tail velocities that balance a body, time point by time point.
+    """Tail velocities z ``(3, n_time)`` that balance a body, time point by time point.
 
-    Attributes
-    ----------
-    z : (3, n_time)
-        Tail velocity (u, v, omega) in the body frame.
-    residual : (n_time,)
-        Largest of |net force| and |torque about the anchor| / body length, in units of the friction
-        on a body that moves at the largest rate: the largest coefficient, or less where delta
-        exceeds that rate.
-    iterations : (n_time,)
-        Newton and fixed-point steps taken.
-    converged : (n_time,)
-        True where the residual reached the tolerance.
-    anchor : (n_time,)
-        The slowest part (link of a chain, edge of a panel), in whose velocity it was solved.
-    anchor_velocity : (3, n_time)
-        Velocity of the anchor (the midpoint of a link), and its rotation rate, in body-frame axes.
+    residual: largest of |net force| and |torque about the anchor| / body length, in units of the
+    friction on a body that moves at the largest rate: the largest coefficient, or less where delta
+    exceeds that rate. iterations: Newton and fixed-point steps. converged: where the residual
+    reached the tolerance. anchor: the slowest part (link of a chain, edge of a panel), in whose
+    velocity it was solved; that of its midpoint, and its rotation rate, in body-frame axes:
+    anchor_velocity ``(3, n_time)``. The others ``(n_time,)``.
     """
 
     z: np.ndarray
@@ -113,13 +105,7 @@ class BalanceSolution:
     anchor_velocity: np.ndarray
 
     def require(self) -> BalanceSolution:
-        """Return this solution.
-
-        Raises
-        ------
-        NotConvergedError
-            If any time point failed; it names them.
-        """
+        """This solution; a `NotConvergedError` that names the time points if any failed."""
         if not self.converged.all():
             bad = np.flatnonzero(~self.converged)
             raise NotConvergedError(
@@ -130,17 +116,14 @@ class BalanceSolution:
 
 
 class BalancedMotion(NamedTuple):
-    """Motion of a balanced body."""
+    """Motion of a balanced body: tail velocity z ``(3, n_time)``, velocity of the centre of mass in
+    the body frame ``(2, n_time)``, power dissipated by friction, and power of what bends the body,
+    from the moments of friction, ``(n_time,)`` each: equal in balance."""
 
     z: np.ndarray
-    """Tail velocity, ``(3, n_time)``."""
     centre: np.ndarray
-    """Velocity of the centre of mass, in the body frame, ``(2, n_time)``."""
     power: np.ndarray
-    """Power dissipated by friction, ``(n_time,)``."""
     actuator_power: np.ndarray
-    """Power of what bends the body, from the moments of friction, ``(n_time,)``; equals `power` in
-    balance."""
 
 
 @runtime_checkable

@@ -7,19 +7,12 @@ counter-clockwise, counted from the tail. For references see `colloc.mechanics.b
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from colloc.mechanics.balance import (
-    TAIL,
-    Posture,
-    instant,
-    net_force,
-    total_power,
-)
+from colloc.mechanics.balance import TAIL, Posture, instant, net_force, total_power
 from colloc.mechanics.bodies import FORMULATIONS, IMPLICIT, Body, Sliding
 from colloc.mechanics.contact import link_contacts
 from colloc.mechanics.fixed_point import chain_motion, solve_balance
@@ -27,7 +20,7 @@ from colloc.mechanics.floor_contact import (
     FloorContact,
     Foot,
     checked_feet,
-    symmetric_feet,
+    same_feet,
     whole_links,
 )
 from colloc.mechanics.friction import LinkVelocity
@@ -94,7 +87,13 @@ class Chain(Body):
             "inertias": "",
         }
         for name, whole in wholes.items():
-            values = _numbers(name, getattr(self, name))
+            given = getattr(self, name)
+            try:
+                values = tuple(float(value) for value in given)
+            except (TypeError, ValueError):
+                raise ProblemError(
+                    f"body.{name} must be a sequence of numbers, not {given!r}."
+                ) from None
             object.__setattr__(self, name, values)
             if name == "lengths" and len(values) < 2:
                 raise ProblemError("body.lengths needs at least two links.")
@@ -254,7 +253,8 @@ class Chain(Body):
         """Whether lengths, weights, masses and feet are the same from both ends."""
         parts = self.lengths, self.weights, self.masses, self.inertias
         same = all(np.allclose(row, row[::-1], rtol=0, atol=1e-14) for row in parts)
-        return same and symmetric_feet(self.standing_on, self.n_link)
+        feet = self.standing_on
+        return same and same_feet(feet, [foot.from_head(self.n_link) for foot in feet])
 
     @property
     def symmetries(self) -> tuple[str, ...]:
@@ -337,13 +337,6 @@ class Chain(Body):
         overlap = np.minimum(ours[1:, None], theirs[1:]) - np.maximum(ours[:-1, None], theirs[:-1])
         means = np.maximum(overlap, 0.0) / self.length_column()
         return np.diff(means @ np.tril(np.ones((lengths.size, lengths.size - 1)), -1), axis=0)
-
-
-def _numbers(name: str, values: Iterable) -> tuple[float, ...]:
-    try:
-        return tuple(float(value) for value in values)
-    except (TypeError, ValueError):
-        raise ProblemError(f"body.{name} must be a sequence of numbers, not {values!r}.") from None
 
 
 def formulations(body: Body) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ other: the joint turns up to ``pi - asin(w / l)``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -71,10 +71,6 @@ class Contact:
     def excess(self, angles: Array) -> Array:
         """The smoothed minimum ``(1, n_time)``."""
         return smooth_minimum(*self.pair(angles), self.width)
-
-    def after(self, joints_at: Callable[[Array], Array]) -> Contact:
-        """The contact as a function of other coordinates."""
-        return replace(self, pair=lambda shape: self.pair(joints_at(shape)))
 
 
 # smooth functions of joint angles, for programs

@@ -128,12 +128,7 @@ def solve(
 
 
 def _iterate(
-    batch: Any,
-    z: np.ndarray,
-    delta: np.ndarray,
-    tolerance: float,
-    max_iterations: int,
-    method: str,
+    batch: Any, z: np.ndarray, delta: np.ndarray, tolerance: float, max_iterations: int, method: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Damped Newton from z ``(3, n)``, with fixed-point steps where one fails: z, residual, number
     of steps."""

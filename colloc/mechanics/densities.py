@@ -73,9 +73,6 @@ class JointMap:
     def joint_rates(self, motors: Array) -> Array:
         return namespace(motors).matmul(self.matrix, motors)
 
-    def motor_angles(self, joints: Array) -> Array:
-        return self.motor_rates(joints - self.offset)
-
     def motor_rates(self, joints: Array) -> Array:
         return namespace(joints).matmul(self.inverse, joints)
 
@@ -127,7 +124,8 @@ class Instants:
 
     @property
     def angle(self) -> Array:
-        return self.joint_map.motor_angles(self.angles) if self.joint_map else self.angles
+        joints = self.joint_map
+        return joints.motor_rates(self.angles - joints.offset) if joints else self.angles
 
     @property
     def rate(self) -> Array:

@@ -280,7 +280,7 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
     points = {(foot.link + foot.place, foot.offset) for foot in feet}
     if len(points) < 2 and not any(foot.extent for foot in feet):
         raise ProblemError("a body needs feet at two points at least: on one it would spin freely.")
-    if not _same_set(feet, [foot.mirrored for foot in feet]):
+    if not same_feet(feet, [foot.mirrored for foot in feet]):
         raise ProblemError(
             "the feet differ between left and right (offset, angle), which the search takes for "
             "alike: give every foot that is offset or turned its mirror image on the same link."
@@ -288,12 +288,8 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
     return tuple(sorted(feet, key=lambda foot: (foot.link, foot.place, foot.offset)))
 
 
-def symmetric_feet(feet: Sequence[Foot], n_link: int) -> bool:
-    """Whether the feet are the same counted from the other end of the body."""
-    return _same_set(feet, [foot.from_head(n_link) for foot in feet])
-
-
-def _same_set(feet: Sequence[Foot], others: Sequence[Foot]) -> bool:
+def same_feet(feet: Sequence[Foot], others: Sequence[Foot]) -> bool:
+    """Whether they are the same in any order, up to rounding."""
     left = list(others)
     for foot in feet:
         match = next((other for other in left if foot.is_like(other)), None)

@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import Posture
+from colloc.mechanics.balance import Posture, moments_of_links
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import LinkVelocity
+from colloc.mechanics.friction import LinkForce, LinkVelocity
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.errors import ProblemError
@@ -46,20 +46,15 @@ def momenta(body: Chain, posture: Posture, link: LinkVelocity) -> Array:
     (x, y), (vx, vy) = body.centre_of_mass(posture), body.centre_velocity(posture, link)
     link_vx = link.vs * posture.cos - link.vn * posture.sin
     link_vy = link.vs * posture.sin + link.vn * posture.cos
-    swing = (posture.x - _tile(body, x)) * link_vy - (posture.y - _tile(body, y)) * link_vx
+    swing = (posture.x - x) * link_vy - (posture.y - y) * link_vx
     return xp.stack([vx, vy, xp.sum_rows(mass * swing + body.inertia_column() * link.w)])
 
 
 def moment_of_inertia(body: Chain, posture: Posture) -> Array:
     """Moment of inertia about the centre of mass, ``(1, n_time)``."""
     xp, (x, y) = namespace(posture.x), body.centre_of_mass(posture)
-    square = (posture.x - _tile(body, x)) ** 2 + (posture.y - _tile(body, y)) ** 2
+    square = (posture.x - x) ** 2 + (posture.y - y) ** 2
     return xp.sum_rows(body.mass_column() * square + body.inertia_column())
-
-
-def _tile(body: Chain, row: Array) -> Array:
-    """A row ``(1, n_time)`` for every link."""
-    return namespace(row).matmul(np.ones((body.n_link, 1)), row)
 
 
 def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
@@ -74,14 +69,10 @@ def inertial_moments(
 ) -> np.ndarray:
     """Joint moments of mass times acceleration, by virtual power, of a body of mass 1, ``(n_joint,
     n_time)``; `growth` is the rate of the velocities `link` in the turning axes of the links."""
-    mass, posture, still = body.mass_column(), body.posture(angles), np.zeros((3, angles.shape[1]))
+    mass = body.mass_column()
     along, across = growth.vs - link.w * link.vn, growth.vn + link.w * link.vs
     spin = body.inertia_column() * growth.w
-    moments = []
-    for unit in np.eye(body.n_joint):
-        turns = body.velocity(posture, np.repeat(unit[:, None], angles.shape[1], axis=1), still)
-        moments.append((mass * (along * turns.vs + across * turns.vn) + spin * turns.w).sum(axis=0))
-    return np.array(moments)
+    return np.asarray(-moments_of_links(body, angles, LinkForce(mass * along, mass * across, spin)))
 
 
 def tail_velocity(body: Chain, angles: Array, rates: Array, states: Array) -> Array:
@@ -111,22 +102,12 @@ def momentum_rates(
     return MomentumRates(growth, z, slides.power)
 
 
-def about_centre(body: Chain, angles: Array, force: Array) -> Array:
+def about_centre(body: Chain, angles: Array, force: Array, sign: float = 1.0) -> Array:
     """Force and moment about the centre of mass, from force and torque about the tail, ``(3,
-    n_time)`` both."""
-    return _shift(body, angles, force, -1.0)
-
-
-def about_tail(body: Chain, angles: Array, force: Array) -> Array:
-    """Force and torque about the tail, from force and moment about the centre of mass, ``(3,
-    n_time)`` both."""
-    return _shift(body, angles, force, 1.0)
-
-
-def _shift(body: Chain, angles: Array, force: Array, sign: float) -> Array:
+    n_time)`` both; with `sign` -1 the other way round."""
     x, y = body.centre_of_mass(body.posture(angles))
     torque = x * force[1:2, :] - y * force[0:1, :]
-    return namespace(angles, force).stack([force[0:2, :], force[2:3, :] + sign * torque])
+    return namespace(angles, force).stack([force[0:2, :], force[2:3, :] - sign * torque])
 
 
 def turning(z: Array, states: Array) -> Array:

@@ -50,8 +50,8 @@ _TYPES = {
     "l": ctypes.c_longlong,
     "n": ctypes.c_ssize_t,
 }
-_CHAIN = "ippppnnnppd"
-"""Number of links, lengths, pressures, masses, law; time points in all, first and last; angles,
+_CHAIN = "ipppnnnppd"
+"""Number of links, lengths, masses, law; time points in all, first and last; angles,
 rates and delta."""
 _SIGNATURES = {
     "colloc_balance": "ppdlippppp",
@@ -157,11 +157,10 @@ def call_for_all(
 
 @lru_cache(maxsize=64)
 def _parameters(body: Any, friction: Law) -> tuple[Any, ...]:
-    """Number of links, lengths, pressures, masses, and contacts with their laws; empty where the
+    """Number of links, lengths, masses, and contacts with their laws; empty where the
     kernel lacks a law."""
     law = np.array(body.contact.kernel_numbers(friction), dtype=float)
-    mass, length = body.mass_column(), body.length_column()
-    return (body.n_link, length, body.weight_column() / length, mass, law) if law.size else ()
+    return (body.n_link, body.length_column(), body.mass_column(), law) if law.size else ()
 
 
 def kernel_momenta(

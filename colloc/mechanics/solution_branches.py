@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colloc.mechanics.balance import TAIL, Moving, balance_jacobian
-from colloc.mechanics.bodies import BalanceSolution
 from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
@@ -77,20 +76,17 @@ def all_balanced_velocities(
     z, sign = _solve(moving, np.stack([moving.at_rest(link) for link in body.contact.rests]))
     found = _distinct(z, sign, _speed(rates))
     doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
-    if not doubtful.size:
-        return found
-    # where a branch has just ended the solver may hang with a small residual; the solution then
-    # lies beside
-    part, known = moving.at(doubtful), (z[:, :, doubtful], sign[:, doubtful])
-    more = _solve(part, _between_and_beside(part, known[0]))
-    z, sign = (np.concatenate(pair) for pair in zip(known, more, strict=True))
-    found = _replace(found, doubtful, _distinct(z, sign, _speed(part.rates)))
+    if doubtful.size:
+        # where a branch has just ended the solver may hang with a small residual; the solution
+        # then lies beside
+        part, known = moving.at(doubtful), (z[:, :, doubtful], sign[:, doubtful])
+        more = _solve(part, _between_and_beside(part, known[0]))
+        found = _replace(found, part, doubtful, *map(np.concatenate, zip(known, more, strict=True)))
     missed = np.flatnonzero(found.number == 0)
-    if not missed.size:
-        return found
-    part = moving.at(missed)  # the long way, which is hardly ever needed
-    z, sign = _solve(part, np.zeros((1, 3, missed.size)), "auto")
-    return _replace(found, missed, _distinct(z, sign, _speed(part.rates)))
+    if doubtful.size and missed.size:
+        part = moving.at(missed)  # the long way, which is hardly ever needed
+        found = _replace(found, part, missed, *_solve(part, np.zeros((1, 3, missed.size)), "auto"))
+    return found
 
 
 def _speed(rates: np.ndarray) -> np.ndarray:
@@ -112,18 +108,12 @@ def _solve(
     z = np.stack(np.split(solved.z, count, axis=1))
     found = ((solved.residual <= _ACCEPTED) | solved.converged).reshape(count, -1)
     repeated = _repeat(np.where(found[:, None], z, np.nan), _speed(moving.rates))
-    new = np.flatnonzero(found & ~repeated)
-    return z, np.sign(_determinant(tiled, solved, new)).reshape(count, -1)
-
-
-def _determinant(moving: Moving, solved: BalanceSolution, where: np.ndarray) -> np.ndarray:
-    """Determinant of `balance_jacobian`, ``(n_time,)``, else 0; seen from the slowest link, which
-    loses no digits."""
-    result = np.zeros(solved.anchor.size)
-    for link, chosen in groups(solved.anchor[where]):
-        at = where[chosen]
-        result[at] = np.linalg.det(_jacobian(moving.at(at), solved.anchor_velocity[:, at], link))
-    return result
+    new, sign = np.flatnonzero(found & ~repeated), np.zeros(solved.anchor.size)
+    for link, chosen in groups(solved.anchor[new]):  # seen from what rests, which loses no digits
+        at = new[chosen]
+        jacobian = _jacobian(tiled.at(at), solved.anchor_velocity[:, at], link)
+        sign[at] = np.sign(np.linalg.det(jacobian))
+    return z, sign.reshape(count, -1)
 
 
 def _jacobian(moving: Moving, z: np.ndarray, reference: int | None = TAIL) -> np.ndarray:
@@ -162,12 +152,14 @@ def _repeat(z: np.ndarray, speed: np.ndarray) -> np.ndarray:
     )
 
 
-def _replace(everywhere: Branches, chosen: np.ndarray, there: Branches) -> Branches:
-    """Branches with those at the chosen time points replaced."""
-    most = max(len(everywhere.z), len(there.z))
-    z = np.full((most, *everywhere.z.shape[1:]), np.nan)
-    sign = np.zeros((most, everywhere.sign.shape[1]))
-    z[: len(everywhere.z)], sign[: len(everywhere.z)] = everywhere
+def _replace(
+    everywhere: Branches, part: Moving, chosen: np.ndarray, z: np.ndarray, sign: np.ndarray
+) -> Branches:
+    """Branches with distinct ones of these at the chosen time points, `part`."""
+    there = _distinct(z, sign, _speed(part.rates))
+    more = max(0, len(there.z) - len(everywhere.z))
+    z = np.pad(everywhere.z, ((0, more), (0, 0), (0, 0)), constant_values=np.nan)
+    sign = np.pad(everywhere.sign, ((0, more), (0, 0)))
     z[:, :, chosen], sign[:, chosen] = np.nan, 0.0
-    z[: len(there.z), :, chosen], sign[: len(there.z), chosen] = there.z, there.sign
+    z[: len(there.z), :, chosen], sign[: len(there.z), chosen] = there
     return Branches(z, sign)

@@ -15,7 +15,7 @@ from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import Sliding
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.inertia import about_tail, checked_mass, turning
+from colloc.mechanics.inertia import about_centre, checked_mass, turning
 from colloc.numerics.mesh import Mesh
 from colloc.results.motion import RigidMotion, SampledMotion, rotate
 from colloc.transcription.layout import RADIANS, Layout
@@ -72,8 +72,8 @@ class CollocatedMotion:
         at_points = np.empty_like(growth)
         at_points[:, mesh.points] = momenta[:, mesh.sites]
         chain, (angles, _, z) = checked_mass(self.problem.body), self._points
-        return self.problem.regime.at(self.gait).froude * about_tail(
-            chain, angles, growth - turning(z, at_points)
+        return self.problem.regime.at(self.gait).froude * about_centre(
+            chain, angles, growth - turning(z, at_points), -1.0
         )
 
     @property

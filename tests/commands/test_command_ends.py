@@ -357,7 +357,7 @@ def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_pat
     installed beside is not taken for it."""
     library, kernel = Path(ending.__file__).parents[1], shutil.ignore_patterns("_kernel.*")
     copied = shutil.copytree(library, tmp_path / "colloc", ignore=kernel)
-    (copied / "mechanics" / "native" / "vectors.h").write_text("/* another */")
+    (copied / "mechanics" / "native" / "parts.h").write_text("/* another */")
     environment = {**os.environ, "PATH": "", "PYTHONPATH": str(tmp_path)}
     words = f"-m colloc multistart {quick} --starts 2 --workers 2 --quiet --output {tmp_path}/"
     code, _, complaint = python(*words.split(), env=environment, cwd=tmp_path)

@@ -62,7 +62,9 @@ def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_b
     slopes = (joints.angles(t + h) - joints.angles(t - h)) / (2 * h)
     np.testing.assert_allclose(joints.rates(t), slopes, atol=1e-7)
     np.testing.assert_allclose(joints.angles(t)[1], -0.5 * motors.angles(t)[0], atol=1e-12)
-    np.testing.assert_allclose(joints.joint_map.motor_angles(joints.angles(t)), motors.angles(t))
+    np.testing.assert_allclose(
+        joints.joint_map.motor_rates(joints.angles(t) - joints.joint_map.offset), motors.angles(t)
+    )
 
 
 @pytest.mark.parametrize("symmetry", ["bilateral", "antipodal"])

@@ -102,7 +102,7 @@ def test_without_a_kernel_of_its_own_sources_numpy_gives_the_answer(fresh, tmp_p
     known = solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z
     changed = tmp_path / "native"
     shutil.copytree(native_kernel_module.SOURCES, changed)
-    (changed / "vectors.h").write_text((changed / "vectors.h").read_text() + "/* changed */")
+    (changed / "parts.h").write_text((changed / "parts.h").read_text() + "/* changed */")
     fresh.setattr(native_kernel_module, "SOURCES", changed)
     library.cache_clear()
     with pytest.warns(SlowWarning, match="by NumPy.*not built, or its sources changed since"):

@@ -6,11 +6,7 @@ import pytest
 
 from colloc import Chain, Harmonic, Problem, ProblemError, ellipse, solve
 from colloc.bounds.motions import admissible
-from colloc.mechanics.contact import (
-    crossing_depth,
-    ends_and_links,
-    lacking_width,
-)
+from colloc.mechanics.contact import crossing_depth, ends_and_links, lacking_width
 
 
 def nearest(body, angles, first, second, points=301):

@@ -1,4 +1,4 @@
-/* A chain of straight links at one instant, seen from one of its links, the reference: colloc/mechanics/links.py and
+/* A chain of straight links at one instant, seen from one of its links, the reference: colloc/mechanics/chain.py and
    colloc/mechanics/balance.py. Positions and velocities are added up from the reference outwards, so that links that rest
    beside it keep the relative precision of their speed. */
 
@@ -6,12 +6,9 @@
 
 #include <stddef.h>
 
-#include "vectors.h"
-
 typedef struct {
     int number;                        /* from 0 at the tail */
-    double length, pressure, mass, cos, sin; /* pressure: weight per length over the body's, mass: over the body's; direction in the
-                                                 body frame */
+    double length, mass, cos, sin; /* mass: over the body's; direction in the body frame */
     double x, y;             /* midpoint, seen from that of the reference */
     double rate;             /* of the joint behind the link (0 at the tail) */
     double load_x, load_y;   /* its share of an outside force on the body */
@@ -28,8 +25,8 @@ typedef struct {
 
 /* Directions of the links, from joint angles that lie `stride` apart; and rates in units of `speed`. */
 static inline void find_directions(
-    const int n, Link *link, const double *length, const double *pressure, const double *mass, const double *angle,
-    const double *rate, double speed, ptrdiff_t stride)
+    const int n, Link *link, const double *length, const double *mass, const double *angle, const double *rate, double speed,
+    ptrdiff_t stride)
 {
     double phi = 0.0;
     for (int i = 0; i < n; ++i) {
@@ -37,21 +34,11 @@ static inline void find_directions(
             phi += angle[(i - 1) * stride];
         link[i].number = i;
         link[i].length = length[i];
-        link[i].pressure = pressure[i];
         link[i].mass = mass[i];
         link[i].cos = cos(phi);
         link[i].sin = sin(phi);
         link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : 0.0;
         link[i].load_x = link[i].load_y = 0.0;
-    }
-}
-
-/* An outside force on the body, in its axes, whose components lie `stride` apart: the links share it as they share the mass. */
-static inline void find_loads(const int n, Link *link, const double *load, ptrdiff_t stride)
-{
-    for (int i = 0; i < n; ++i) {
-        link[i].load_x = link[i].mass * load[0];
-        link[i].load_y = link[i].mass * load[stride];
     }
 }
 
@@ -166,16 +153,12 @@ static inline Total evaluate(
 static inline void pull_back(
     const int n, const Link *link, const Sliding *k, const Law *law, double delta, bool newton, Matrix3 total)
 {
-    for (int j = 0; j < 9; ++j)
-        total[j / 3][j % 3] = 0.0;
+    memset(total, 0, sizeof(Matrix3));
     for (int i = 0; i < n; ++i) {
         const double c = link[i].cos, s = link[i].sin;
         const double arm_s = link[i].x * s - link[i].y * c, arm_n = link[i].x * c + link[i].y * s;
         Matrix3 K;
-        if (newton)
-            find_slopes(&k[i], law, &link[i], delta, K);
-        else
-            find_secants(&k[i], law, &link[i], delta, K);
+        find_slopes(&k[i], law, &link[i], delta, !newton, K);
         for (int j = 0; j < 3; ++j) {
             Vector3 column;
             for (int row = 0; row < 3; ++row)

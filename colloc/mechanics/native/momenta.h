@@ -109,41 +109,11 @@ static inline void momentum_rate_changes(
     change[RATES_ROW + 2] = (df[2] - c->x * df[1] + c->y * df[0] - moved[0] * force[1] + moved[1] * force[0]) / froude;
 }
 
-/* A chain at many instants, and room for its links at one. */
-typedef struct {
-    int n;
-    const double *length, *pressure, *mass, *spin;
-    Law law;
-    ptrdiff_t n_time;
-    const double *angles, *rates;
-    double delta, froude;
-    Link *link;
-    Sliding *k;
-    Matrix3 *K;
-    Change *d;
-} Played;
-
-static inline bool new_room(Played *b)
-{
-    b->link = malloc((size_t)b->n * sizeof *b->link);
-    b->k = new_slidings(b->n, 1, &b->law);
-    b->K = malloc((size_t)b->n * sizeof *b->K);
-    b->d = malloc((size_t)b->n * sizeof *b->d);
-    return b->link && b->k && b->K && b->d;
-}
-
-static inline void free_room(Played *b)
-{
-    free(b->link);
-    free(b->k);
-    free(b->K);
-    free(b->d);
-}
-
 /* At momenta `states` (3, n_time): `values` (MOMENTA_ROWS, n_time), and their derivatives (MOMENTA_ROWS, columns, n_time) with
    respect to joint angles and rates, as far as there are columns, and to the states, the last three. */
 static inline void momenta_instants(
-    Played *b, ptrdiff_t first, ptrdiff_t last, const double *states, int columns, double *values, double *slopes)
+    Played *b, ptrdiff_t first, ptrdiff_t last, const double *spin, double froude, const double *states, int columns, double *values,
+    double *slopes)
 {
     const int n = b->n, n_joint = n - 1, n_shape = columns - 3;
     const ptrdiff_t n_time = b->n_time;
@@ -151,14 +121,14 @@ static inline void momenta_instants(
     for (ptrdiff_t t = first; t < last; ++t) {
         const Vector3 p = {states[t], states[n_time + t], states[2 * n_time + t]};
         double value[MOMENTA_ROWS], change[MOMENTA_ROWS];
-        find_directions(n, b->link, b->length, b->pressure, b->mass, b->angles + t, b->rates + t, 1.0, n_time);
+        find_instant(b, t, 1.0, NULL);
         find_midpoints(n, b->link, 0);
-        const Centre centre = find_centre(n, b->link, b->spin);
-        const Total total = find_momentum_rates(n, b->link, b->k, &centre, b->spin, p, &b->law, delta, b->froude, value);
+        const Centre centre = find_centre(n, b->link, spin);
+        const Total total = find_momentum_rates(n, b->link, b->k, &centre, spin, p, &b->law, delta, froude, value);
         for (int row = 0; row < MOMENTA_ROWS; ++row)
             values[row * n_time + t] = value[row];
         for (int i = 0; i < n; ++i)
-            find_slopes(&b->k[i], &b->law, &b->link[i], delta, b->K[i]);
+            find_slopes(&b->k[i], &b->law, &b->link[i], delta, false, b->K[i]);
         for (int column = 0; column < columns; ++column) {
             Vector3 dp = {0.0, 0.0, 0.0};
             if (column < n_shape)
@@ -167,7 +137,7 @@ static inline void momenta_instants(
                 memset(b->d, 0, (size_t)n * sizeof *b->d);
                 dp[column - n_shape] = 1.0;
             }
-            momentum_rate_changes(n, b->link, b->k, b->K, &centre, b->spin, p, total.force, b->froude, b->d, dp, change);
+            momentum_rate_changes(n, b->link, b->k, b->K, &centre, spin, p, total.force, froude, b->d, dp, change);
             for (int row = 0; row < MOMENTA_ROWS; ++row)
                 slopes[(row * columns + column) * n_time + t] = change[row];
         }

@@ -1,5 +1,5 @@
 /* What follows from a balance: velocities of the tail and of the centre of mass, power, and how they change with joint
-   angles and rates, by the implicit function theorem: colloc/mechanics/chain_motion.py. All about the anchor, whose velocity is known
+   angles and rates, by the implicit function theorem: colloc/mechanics/fixed_point.py. All about the anchor, whose velocity is known
    to full relative precision. */
 
 #pragma once
@@ -133,5 +133,46 @@ static inline void value_changes(
         change[4] += link[i].mass * d[i].vy;
         change[5] -= df[0] * k[i].vs + df[1] * k[i].vn + df[2] * k[i].w;
         change[5] -= k[i].fs * d[i].vs + k[i].fn * d[i].vn + k[i].couple * d[i].w;
+    }
+}
+
+/* A chain at many instants, (n - 1, n_time), and room for its links at one. */
+typedef struct {
+    int n;
+    const double *length, *mass;
+    Law law;
+    ptrdiff_t n_time;
+    const double *angles, *rates;
+    double delta;
+    Link *link;
+    Sliding *k; /* twice */
+    Matrix3 *K;
+    Change *d;
+} Played;
+
+static inline bool new_room(Played *b)
+{
+    b->link = malloc((size_t)b->n * sizeof *b->link);
+    b->k = new_slidings(b->n, 2, &b->law);
+    b->K = malloc((size_t)b->n * sizeof *b->K);
+    b->d = malloc((size_t)b->n * sizeof *b->d);
+    return b->link && b->k && b->K && b->d;
+}
+
+static inline void free_room(Played *b)
+{
+    free(b->link);
+    free(b->k);
+    free(b->K);
+    free(b->d);
+}
+
+/* The links at an instant, their rates in units of `speed`; under `load` (2, n_time), in the body's axes, or NULL. */
+static inline void find_instant(const Played *b, ptrdiff_t t, double speed, const double *load)
+{
+    find_directions(b->n, b->link, b->length, b->mass, b->angles + t, b->rates + t, speed, b->n_time);
+    for (int i = 0; load && i < b->n; ++i) { /* which they share as they share the mass */
+        b->link[i].load_x = b->link[i].mass * load[t];
+        b->link[i].load_y = b->link[i].mass * load[b->n_time + t];
     }
 }

@@ -1,10 +1,17 @@
 /* Friction on one link at its feet and pads: what colloc/mechanics/floor_contact.py states for arrays, under the law of Coulomb or
-   the elliptic one (colloc/mechanics/friction.py), each part's own. */
+   the elliptic one, each part's own; in closed form on pads, with the names of colloc/mechanics/friction.py, where the formulas
+   are explained. */
 
 #pragma once
 
 #include <math.h>
 #include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Rows of three numbers: a motion (two velocities and a rotation rate), forces and a torque. */
+typedef double Vector3[3];
+typedef Vector3 Matrix3[3];
 
 /* Where it is, seen from the link's midpoint; the direction it is turned to; its length, 0 of a foot; its weight, of a pad per
    length; and its law. */
@@ -21,16 +28,123 @@ typedef struct {
     const Part *part;
 } Law;
 
-#include "link_friction.h"
+/* Velocities of a part and, of a pad, everything that its friction is expressed through; then the friction itself. */
+typedef struct {
+    double vs, vn, w;
+    double stretched; /* vs, as it counts in the speed */
+    double a2, r0r1, S, Q, g, h; /* of a foot S alone, the speed r */
+    double fs, fn, couple;
+} PartSliding;
+
+static inline double tangential(const Part *p, double vs)
+{
+    return vs > 0 ? p->mu_f : p->mu_b;
+}
+
+static inline double stretch(const Part *p, double vs)
+{
+    return vs > 0 ? p->stretch_f : p->stretch_b;
+}
+
+/* (g - 1)/q: sum of q^j / (2 j + 3) below the limit of 0.1, where the closed form would cancel. */
+static inline double h_series(double q)
+{
+    const double q2 = q * q;
+    double even = 1.0 / 31, odd = 1.0 / 33; /* two sums, each half as long a chain of operations */
+    even = even * q2 + 1.0 / 27, odd = odd * q2 + 1.0 / 29;
+    even = even * q2 + 1.0 / 23, odd = odd * q2 + 1.0 / 25;
+    even = even * q2 + 1.0 / 19, odd = odd * q2 + 1.0 / 21;
+    even = even * q2 + 1.0 / 15, odd = odd * q2 + 1.0 / 17;
+    even = even * q2 + 1.0 / 11, odd = odd * q2 + 1.0 / 13;
+    even = even * q2 + 1.0 / 7, odd = odd * q2 + 1.0 / 9;
+    even = even * q2 + 1.0 / 3, odd = odd * q2 + 1.0 / 5;
+    return even + odd * q;
+}
+
+/* Fill in a2 to h from vs, vn, w. */
+static inline void find_roots_of_part(PartSliding *k, const Part *p, double delta)
+{
+    const double length = p->length;
+    const double vs = k->stretched = stretch(p, k->vs) * k->vs;
+    if (!(length > 0)) {
+        k->S = sqrt(vs * vs + k->vn * k->vn + delta * delta);
+        return;
+    }
+    const double a2 = vs * vs + delta * delta, half = 0.5 * length * k->w;
+    const double y0 = k->vn - half, y1 = k->vn + half;
+    const double r0 = sqrt(a2 + y0 * y0), r1 = sqrt(a2 + y1 * y1);
+    const double S = r0 + r1, r0r1 = r0 * r1, T = a2 + y0 * y1;
+    k->a2 = a2, k->r0r1 = r0r1, k->S = S;
+    /* a^2 / P; P = T + r0 r1 cancels where T < 0 */
+    k->Q = T < 0 ? (r0r1 - T) / (4.0 * half * half) : a2 / (r0r1 + T);
+    const double root_q = 2.0 * fabs(half) / S, q = root_q * root_q;
+    if (q < 0.1)
+        k->h = h_series(q);
+    else {
+        const double one = 1.0 + root_q;
+        k->h = (0.5 * log(one * one * k->Q * S * S / (2.0 * a2)) / root_q - 1.0) / q;
+    }
+    k->g = 1.0 + q * k->h;
+}
+
+/* Friction on the part from a2 to h; its pressure multiplies it, here and below. */
+static inline void find_force_of_part(PartSliding *k, const Part *p)
+{
+    const double length = p->length, per_S = 1.0 / k->S, l3 = length * length * length;
+    const double mu_s = p->pressure * tangential(p, k->vs), mu_t = p->pressure * p->mu_t;
+    if (!(length > 0)) {
+        k->fs = -mu_s * k->stretched / k->S, k->fn = -mu_t * k->vn / k->S, k->couple = 0.0;
+        return;
+    }
+    k->fs = -mu_s * k->stretched * 2.0 * length * k->g * per_S;
+    k->fn = -mu_t * 2.0 * k->vn * length * per_S;
+    k->couple = -mu_t * k->w * l3 * per_S * (0.5 * k->Q - k->a2 * k->h * per_S * per_S);
+}
+
+/* Dissipation potential of the part: mu times the integral of r. */
+static inline double dissipation_of_part(const PartSliding *k, const Part *p)
+{
+    if (!(p->length > 0))
+        return p->pressure * (p->mu_t * k->S);
+    return p->pressure * (p->mu_t * p->length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g));
+}
+
+/* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w); or, where `steep`, minus force over velocity with r frozen,
+   the law of the paper's fixed point. */
+static inline void find_slopes_of_part(const PartSliding *k, const Part *p, double delta, bool steep, Matrix3 K)
+{
+    const double vs = k->stretched, vn = k->vn, w = k->w, length = p->length, S = k->S, per_S = 1.0 / S;
+    const double mu_s = p->pressure * tangential(p, k->vs), mu_t = p->pressure * p->mu_t, more = stretch(p, k->vs);
+    const double l3 = length * length * length;
+    memset(K, 0, sizeof(Matrix3));
+    if (!(length > 0)) {
+        const double es = steep ? 0.0 : vs / S, en = steep ? 0.0 : vn / S, ed = steep ? 1.0 : delta / S;
+        K[0][0] = more * mu_s * (en * en + ed * ed) / S, K[0][1] = -mu_s * es * en / S;
+        K[1][0] = -more * mu_t * es * en / S, K[1][1] = mu_t * (es * es + ed * ed) / S;
+    } else if (steep) {
+        const double I0 = 2.0 * length * k->g / S, I1 = -2.0 * vn * w * l3 * k->h / (S * S * S);
+        const double I2 = l3 / S * (0.5 * k->Q + (2.0 * vn * vn - k->a2) * k->h / (S * S));
+        K[0][0] = more * mu_s * I0;
+        K[1][1] = mu_t * I0, K[1][2] = K[2][1] = mu_t * I1, K[2][2] = mu_t * I2;
+    } else {
+        const double per_r = 1.0 / k->r0r1, E = k->a2 + vn * vn;
+        const double a2J0 = length * S * k->Q * per_r, a2J1 = -vn * w * l3 * k->Q * per_r * per_S;
+        const double a2J2 = 2.0 * l3 * k->a2 * k->h * per_S * per_S * per_S + l3 * (E * k->Q - 0.5 * k->a2) * per_S * per_r;
+        const double y_r3 = 2.0 * vn * length * per_S * per_r;
+        const double sy_r3 = w * l3 * per_S * (2.0 * k->h * per_S * per_S + (k->Q - 0.5) * per_r);
+        const double along = a2J0 * (delta * delta / k->a2) + vn * y_r3 + w * sy_r3;
+        K[0][0] = more * mu_s * along, K[0][1] = -mu_s * vs * y_r3, K[0][2] = -mu_s * vs * sy_r3;
+        K[1][0] = -more * mu_t * vs * y_r3, K[1][1] = mu_t * a2J0, K[1][2] = mu_t * a2J1;
+        K[2][0] = -more * mu_t * vs * sy_r3, K[2][1] = mu_t * a2J1, K[2][2] = mu_t * a2J2;
+    }
+}
 
 /* Velocities of the link, then the friction on it; and all parts of the body. */
 typedef struct {
-    double vs, vn, w, delta;
+    double vs, vn, w;
     double fs, fn, couple;
     PartSliding *part;
 } Sliding;
-
-typedef double Matrix2[2][2];
 
 /* Of `FloorContact.kernel_numbers` in colloc/mechanics/floor_contact.py. */
 static Law law_of(const double *number)
@@ -51,34 +165,6 @@ static Sliding *new_slidings(const int n, const int copies, const Law *law)
     return k;
 }
 
-/* The speed r, in which the velocity along the foot counts as it is stretched. */
-static inline double speed(const Part *f, const PartSliding *v, double delta)
-{
-    const double along = stretch(f, v->vs) * v->vs;
-    return sqrt(along * along + v->vn * v->vn + delta * delta);
-}
-
-static inline void point_force(const Part *f, const PartSliding *v, double delta, double force[2])
-{
-    const double r = speed(f, v, delta);
-    force[0] = -tangential(f, v->vs) * stretch(f, v->vs) * v->vs / r;
-    force[1] = -f->mu_t * v->vn / r;
-}
-
-static inline double point_potential(const Part *f, const PartSliding *v, double delta)
-{
-    return f->mu_t * speed(f, v, delta);
-}
-
-/* Minus the derivative of the force; or, where `steep`, force over velocity with r frozen. */
-static inline void point_slopes(const Part *f, const PartSliding *v, double delta, bool steep, Matrix2 K)
-{
-    const double more = stretch(f, v->vs), r = speed(f, v, delta), mu_s = tangential(f, v->vs);
-    const double es = steep ? 0.0 : more * v->vs / r, en = steep ? 0.0 : v->vn / r, ed = steep ? 1.0 : delta / r;
-    K[0][0] = more * mu_s * (en * en + ed * ed) / r, K[0][1] = -mu_s * es * en / r;
-    K[1][0] = -more * f->mu_t * es * en / r, K[1][1] = f->mu_t * (es * es + ed * ed) / r;
-}
-
 static inline int first_part(const Law *law, const Link *link)
 {
     return (int)law->first[link->number];
@@ -89,17 +175,15 @@ static inline int last_part(const Law *law, const Link *link)
     return (int)law->first[link->number + 1];
 }
 
-/* Velocities of the link's parts, and what the friction on its pads is expressed through. */
+/* Velocities of the link's parts, and what the friction on them is expressed through. */
 static inline void find_roots(Sliding *k, const Law *law, const Link *link, double delta)
 {
-    k->delta = delta;
     for (int i = first_part(law, link); i < last_part(law, link); ++i) {
         const Part *f = &law->part[i];
         PartSliding *own = &k->part[i];
         const double vs = k->vs - f->offset * k->w, vn = k->vn + f->along * k->w;
         own->vs = f->cos * vs + f->sin * vn, own->vn = f->cos * vn - f->sin * vs, own->w = k->w;
-        if (f->length > 0)
-            pad_roots(own, f, delta);
+        find_roots_of_part(own, f, delta);
     }
 }
 
@@ -109,13 +193,7 @@ static inline void find_force(Sliding *k, const Law *law, const Link *link)
     for (int i = first_part(law, link); i < last_part(law, link); ++i) {
         const Part *f = &law->part[i];
         PartSliding *own = &k->part[i];
-        if (f->length > 0)
-            pad_force(own, f);
-        else {
-            double force[2];
-            point_force(f, own, k->delta, force);
-            own->fs = f->pressure * force[0], own->fn = f->pressure * force[1], own->couple = 0.0;
-        }
+        find_force_of_part(own, f);
         const double fs = f->cos * own->fs - f->sin * own->fn, fn = f->sin * own->fs + f->cos * own->fn;
         k->fs += fs;
         k->fn += fn;
@@ -137,37 +215,24 @@ static inline double slowest_speed(const Sliding *k, const Law *law, const Link 
 static inline double dissipation(const Sliding *k, const Law *law, const Link *link)
 {
     double total = 0.0;
-    for (int i = first_part(law, link); i < last_part(law, link); ++i) {
-        const Part *f = &law->part[i];
-        const PartSliding *own = &k->part[i];
-        total += f->length > 0 ? pad_dissipation(own, f) : f->pressure * point_potential(f, own, k->delta);
-    }
+    for (int i = first_part(law, link); i < last_part(law, link); ++i)
+        total += dissipation_of_part(&k->part[i], &law->part[i]);
     return total;
 }
 
-/* Sum over the parts of turn' K turn, turn being the velocity of a part in its own directions per (vs, vn, w). */
-static inline void add_slopes(const Sliding *k, const Law *law, const Link *link, double delta, bool steep, Matrix3 total)
+/* Slopes, or where `steep` secants, of the link's friction: the sum over its parts of turn' K turn, turn being the velocity of a
+   part in its own directions per (vs, vn, w). */
+static inline void find_slopes(const Sliding *k, const Law *law, const Link *link, double delta, bool steep, Matrix3 total)
 {
-    for (int j = 0; j < 9; ++j)
-        total[j / 3][j % 3] = 0.0;
+    memset(total, 0, sizeof(Matrix3));
     for (int i = first_part(law, link); i < last_part(law, link); ++i) {
         const Part *f = &law->part[i];
-        const PartSliding *own = &k->part[i];
         const Matrix3 turn = {
             {f->cos, f->sin, f->along * f->sin - f->offset * f->cos},
             {-f->sin, f->cos, f->along * f->cos + f->offset * f->sin},
             {0.0, 0.0, 1.0}};
-        Matrix3 K = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-        if (f->length > 0 && steep)
-            pad_secants(own, f, K);
-        else if (f->length > 0)
-            pad_slopes(own, f, delta, K);
-        else {
-            Matrix2 point;
-            point_slopes(f, own, delta, steep, point);
-            for (int j = 0; j < 4; ++j)
-                K[j / 2][j % 2] = f->pressure * point[j / 2][j % 2];
-        }
+        Matrix3 K;
+        find_slopes_of_part(&k->part[i], f, delta, steep, K);
         for (int p = 0; p < 3; ++p)
             for (int j = 0; j < 3; ++j) {
                 const double moved = K[p][0] * turn[0][j] + K[p][1] * turn[1][j] + K[p][2] * turn[2][j];
@@ -175,16 +240,4 @@ static inline void add_slopes(const Sliding *k, const Law *law, const Link *link
                     total[row][j] += turn[p][row] * moved;
             }
     }
-}
-
-/* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w). */
-static inline void find_slopes(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 slopes)
-{
-    add_slopes(k, law, link, delta, false, slopes);
-}
-
-/* The law of the paper's fixed point. */
-static inline void find_secants(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 secants)
-{
-    add_slopes(k, law, link, delta, true, secants);
 }

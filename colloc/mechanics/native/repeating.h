@@ -1,4 +1,4 @@
-/* Momenta that repeat every period: `CollocatedStates.settled` of colloc/motion/states.py, step by step, with the rates of
+/* Momenta that repeat every period: `CollocatedStates.solve_natural` of colloc/dynamics/states.py, step by step, with the rates of
    momenta.h. On an interval the stages are `own + response begin`, and its end is `through begin + gain own`. */
 
 #pragma once
@@ -10,6 +10,8 @@ static const double CLOSED = 1e-12, ROUNDED = 1e-11, LEAST_SHARE = 1.0 / 16;
 
 typedef struct {
     Played *played;
+    const double *spin;
+    double froude;
     ptrdiff_t intervals;
     int s;
     const double *A, *b; /* (intervals, s, s), (intervals, s), times the lengths of the intervals */
@@ -108,7 +110,7 @@ static inline double find_residual(Periods *q, const double *x)
     const ptrdiff_t n_time = q->played->n_time;
     const double *start = x + MOMENTA * n_time;
     double off = 0.0;
-    momenta_instants(q->played, 0, n_time, x, MOMENTA, q->values, q->slopes);
+    momenta_instants(q->played, 0, n_time, q->spin, q->froude, x, MOMENTA, q->values, q->slopes);
     for (int state = 0; state < MOMENTA; ++state) {
         double gained = 0.0;
         for (ptrdiff_t i = 0; i < q->intervals; ++i) {
@@ -227,14 +229,6 @@ static inline bool find_step(Periods *q, double *step)
     return true;
 }
 
-static inline double length_of(ptrdiff_t n, const double *x)
-{
-    double sum = 0.0;
-    for (ptrdiff_t k = 0; k < n; ++k)
-        sum += x[k] * x[k];
-    return sqrt(sum);
-}
-
 /* Of x - share y. */
 static inline double length_apart(ptrdiff_t n, const double *x, const double *y, double share)
 {
@@ -262,7 +256,7 @@ static inline bool repeats(Periods *q, double *x)
     for (int steps = 0; steps < NEWTON_STEPS && isfinite(off) && off >= CLOSED; ++steps) {
         if (!find_derivatives(q) || !find_step(q, q->step))
             return false;
-        const double size = length_of(all, q->step);
+        const double size = length_apart(all, q->step, q->step, 0.0);
         if (!isfinite(size))
             return false;
         if (largest_size(all, q->step) < ROUNDED)
@@ -278,7 +272,7 @@ static inline bool repeats(Periods *q, double *x)
                 break;
             double closer = 0.25 * share;
             if (isfinite(off) && find_step(q, q->next)) {
-                const double next = length_of(all, q->next);
+                const double next = length_apart(all, q->next, q->next, 0.0);
                 trusted = share * size * next;
                 if (next < size)
                     break;
@@ -293,17 +287,4 @@ static inline bool repeats(Periods *q, double *x)
         memcpy(x, q->trial, (size_t)all * sizeof *x);
     }
     return isfinite(off) && off < CLOSED;
-}
-
-/* The same, from states and start to those found and their rows. */
-static inline bool find_repeating(Periods *q, double *states, double *start, double *values)
-{
-    const size_t n_time = (size_t)q->played->n_time;
-    memcpy(q->x, states, MOMENTA * n_time * sizeof *states);
-    memcpy(q->x + MOMENTA * n_time, start, MOMENTA * sizeof *start);
-    const bool held = repeats(q, q->x);
-    memcpy(states, q->x, MOMENTA * n_time * sizeof *states);
-    memcpy(start, q->x + MOMENTA * n_time, MOMENTA * sizeof *start);
-    memcpy(values, q->values, MOMENTA_ROWS * n_time * sizeof *values);
-    return held;
 }

@@ -14,7 +14,7 @@
    velocities and loads in the middle link's axes. Then potential and power (n_time), minus the friction on each link in its own
    axes (n, 3, n_time), force and torque left over (2, n_time), and what power these have (n_time). */
 int colloc_loaded(
-    int n, const double *length, const double *pressure, const double *mass, const double law_numbers[6], ptrdiff_t n_time,
+    int n, const double *length, const double *mass, const double law_numbers[6], ptrdiff_t n_time,
     ptrdiff_t first, ptrdiff_t last, const double *angles, const double *rates, double delta, const double *load, const double *start, int steps, double *velocity, double *potential,
     double *power, double *forces, double *residual, double *leftover_power)
 {
@@ -26,7 +26,7 @@ int colloc_loaded(
         State s = {.law = law, .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
         for (ptrdiff_t t = first; t < last; ++t) {
             Vector3 own = {load[t], load[n_time + t], load[2 * n_time + t]};
-            find_directions(n, link, length, pressure, mass, angles + t, rates + t, 1.0, n_time);
+            find_directions(n, link, length, mass, angles + t, rates + t, 1.0, n_time);
             find_midpoints(n, link, middle);
             const double c = link[middle].cos, q = link[middle].sin;
             const Vector3 body_load = {c * own[0] - q * own[1], q * own[0] + c * own[1], own[2]};
