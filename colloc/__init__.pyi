@@ -28,7 +28,7 @@ from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, elli
 from colloc.gaits.regime import Free as Free
 from colloc.gaits.bspline import BSpline as BSpline, Polygon as Polygon
 from colloc.gaits.columns import Basis as Basis
-from colloc.gaits.polygon import Corners as Corners
+from colloc.gaits.bspline import Corners as Corners
 from colloc.studies.solve import solve as solve, multistart as multistart, Starts as Starts
 from colloc.studies.sweep import sweep as sweep
 from colloc.studies.study import Study as Study, Axis as Axis

@@ -7,18 +7,27 @@ a program spends as much time on each side, and members are run through at const
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import DELTA_START
+from colloc.gaits.gait import DELTA_START, GaitFunction, finite_array
 from colloc.gaits.harmonic import Harmonic, series_of
 from colloc.gaits.linear import LinearClass
-from colloc.gaits.polygon import Corners
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, symmetric_samples
+from colloc.gaits.symmetry import (
+    ANTIPODAL,
+    BILATERAL,
+    NONE,
+    SYMMETRIES,
+    both_halves,
+    fraction,
+    reduced,
+    symmetric_samples,
+    take_images,
+)
 from colloc.numerics.mesh import Mesh
-from colloc.system.arguments import is_whole, named_arguments
+from colloc.system.arguments import STATED_IF_SET, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _DRAWN = 3  # harmonics of starts, at most: random coefficients would make rough gaits
@@ -26,6 +35,121 @@ _INSTANTS = 32  # phases a side at which polygons are fitted
 _INTERVALS, _A_SIDE = 24, 4  # of the first mesh of a polygon, and of each of its sides, at least
 _POINTS = 241
 _AT_A_CORNER = 1e-9  # distance at which an edge of a mesh is at a corner
+_EVENLY = np.linspace(0.0, 1.0, 1001)[:-1]
+_MOST_LISTED = 64  # vertices
+
+
+@named_arguments
+@dataclass(frozen=True, eq=False, repr=False)
+class Corners(GaitFunction):
+    """A closed polygon, run through at constant shape speed: the phase is the arc length from the
+    start over that of the whole path.
+
+    Parameters
+    ----------
+    corners : (n_joint, n)
+        Joint angles [rad] at the corners, in order. Without a symmetry the last is joined to the
+        first. With one these are the vertices of half the path, ends included; an end that lies
+        within an edge is no corner of the polygon.
+    symmetry : {"none", "bilateral", "antipodal"}
+    theta : float, optional
+        On a slope: angle of the tail link at phase 0 from straight uphill, positive to the left
+        [rad].
+
+    Examples
+    --------
+    >>> from colloc import Corners
+    >>> triangle = Corners([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]])
+    >>> round(triangle.length, 3)
+    3.073
+    """
+
+    corners: np.ndarray
+    symmetry: str = "none"
+    theta: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if self.symmetry not in SYMMETRIES:
+            raise ProblemError(
+                f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not "
+                f"{self.symmetry!r}."
+            )
+        object.__setattr__(self, "corners", finite_array("polygon.corners", self.corners, 2))
+        if self.corners.shape[0] < 1 or self.corners.shape[1] < 2:
+            raise ProblemError("polygon.corners needs a row per joint and at least two columns.")
+        with np.errstate(invalid="ignore"):
+            apart = np.diff(self.phases) > 0  # as far as rounding shows
+        if not apart.all():
+            raise ProblemError("polygon.corners has two equal neighbours.")
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Ends of the sides of the solved part, ``(n_joint, n_side + 1)``."""
+        if self.symmetry != NONE:
+            return self.corners
+        return np.concatenate([self.corners, self.corners[:, :1]], axis=1)
+
+    @property
+    def n_joint(self) -> int:
+        return self.corners.shape[0]
+
+    @property
+    def _along(self) -> np.ndarray:
+        """Length of the path up to each vertex [rad]."""
+        sides = np.linalg.norm(np.diff(self.vertices), axis=0)
+        return np.concatenate([[0.0], np.cumsum(sides)])
+
+    @property
+    def length(self) -> float:
+        """Length of the whole closed path [rad]."""
+        return float(self._along[-1]) / fraction(self.symmetry)
+
+    @property
+    def shape_speed(self) -> float:
+        """Shape speed [rad per radian of phase]."""
+        return self.length / (2 * np.pi)
+
+    @property
+    def phases(self) -> np.ndarray:
+        """Phases of `vertices`, from 0 to the solved part of the period."""
+        return fraction(self.symmetry) * self._along / self._along[-1]
+
+    @property
+    def corner_phases(self) -> np.ndarray:
+        return both_halves(self.symmetry, self.phases)
+
+    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angles and rates; at a corner those of the side ahead."""
+        phase, image = reduced(self.symmetry, t)
+        phases, vertices = self.phases, self.vertices
+        k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
+        rates = (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k])
+        angles = vertices[:, k] + rates * (phase - phases[k])
+        return (
+            take_images(self.symmetry, angles, image),
+            take_images(self.symmetry, rates, image, derivative=1),
+        )
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        return self(t)[0]
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        return self(t)[1]
+
+    def mapped(self, matrix: np.ndarray) -> Corners:
+        """The polygon with corners multiplied by a matrix ``(m, n_joint)``."""
+        return Corners(matrix @ self.corners, self.symmetry)
+
+    def grown(self, factor: float) -> Corners:
+        mean = self.angles(_EVENLY).mean(axis=1, keepdims=True)
+        return Corners(mean + factor * (self.corners - mean), self.symmetry)
+
+    def lines(self) -> list[str]:
+        first, n = f"path of length {self.length:.4f} rad", self.corners.shape[1]
+        if n > _MOST_LISTED:
+            return [f"{first}, {n} vertices", *self.pointing]
+        vertices = (", ".join(f"{a:+.4f}" for a in corner) for corner in self.corners.T)
+        return [first, *(f"vertex ({each})" for each in vertices), *self.pointing]
 
 
 class Splines(LinearClass):
@@ -33,7 +157,7 @@ class Splines(LinearClass):
 
     knots: int
     degree: int
-    shift = 0.0  # phase of the first knot, in spacings of knots
+    first_knot = 0.0  # its phase, in spacings of knots
     series = series_of
 
     @property
@@ -55,7 +179,7 @@ class Splines(LinearClass):
         width = self.degree + 1
         one = Piecewise.basis_element(np.arange(width + 1), extrapolate=False)
         knots = np.arange(self.knots)[:, None]
-        since = (self.knots * t - knots - self.shift + 0.5 * width) % self.knots
+        since = (self.knots * t - knots - self.first_knot + 0.5 * width) % self.knots
         values = self.knots**derivative * np.nan_to_num(one(since, nu=derivative), nan=0.0)
         return np.where(since < width, values, 0.0)
 
@@ -84,47 +208,35 @@ class Splines(LinearClass):
 
     # polygons
     @property
-    def corners_in_time(self) -> np.ndarray:
-        """Times of the corners of the solved part, and of its ends, ``(n_side + 1,)``."""
-        corners = (np.arange(self.knots + 1) + self.shift) / self.knots
+    def pieces(self) -> np.ndarray:
+        if not self.relative_delta:
+            return super().pieces
+        corners = (np.arange(self.knots + 1) + self.first_knot) / self.knots
         inner = corners[(corners > _AT_A_CORNER) & (corners < self.fraction - _AT_A_CORNER)]
         return np.concatenate([[0.0], inner, [self.fraction]])
-
-    @property
-    def _n_side(self) -> int:
-        return self.corners_in_time.size - 1
 
     def intervals(self, n_joint: int) -> int:
         if not self.relative_delta:
             return super().intervals(n_joint)
-        return max(_INTERVALS, _A_SIDE * self._n_side)
+        return max(_INTERVALS, _A_SIDE * (self.pieces.size - 1))
 
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         if not self.relative_delta:
             return super().fewest_intervals(per_interval)
-        return 2 * self._n_side, "the sides"
-
-    def edges(self, n: int) -> np.ndarray:
-        if not self.relative_delta:
-            return super().edges(n)
-        corners = self.corners_in_time
-        counts = np.maximum(2, np.round(n * np.diff(corners) / corners[-1]).astype(int))
-        sides = zip(corners, corners[1:], counts, strict=False)
-        return np.concatenate([*(np.linspace(a, b, k + 1)[:-1] for a, b, k in sides), corners[-1:]])
+        return 2 * (self.pieces.size - 1), "the sides"
 
     def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
-        if not self.relative_delta:
-            return super().rates_on(mesh, n_joint)
-        times = np.empty(mesh.n_point)
-        times[mesh.points] = (mesh.edges[:-1] + 0.5 * mesh.h)[:, None]
-        return self.rate_matrix(times, n_joint)
+        times = mesh.times
+        if self.relative_delta:
+            times = np.empty(mesh.n_point)
+            times[mesh.points] = (mesh.edges[:-1] + 0.5 * mesh.h)[:, None]
+        return self.angle_matrix(times, n_joint, 1)
 
     def side_rates(self, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
         """Fraction of the time of each side ``(n_side,)``, and joint rates on it per parameter
         ``(n_side, n_joint, n_parameter)``."""
-        corners = self.corners_in_time
-        middles = 0.5 * (corners[1:] + corners[:-1])
-        return np.diff(corners) / corners[-1], self.rate_matrix(middles, n_joint)
+        middles = 0.5 * (self.pieces[1:] + self.pieces[:-1])
+        return np.diff(self.pieces) / self.pieces[-1], self.angle_matrix(middles, n_joint, 1)
 
     def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
         return super().member(parameters, n_joint)
@@ -133,24 +245,23 @@ class Splines(LinearClass):
         gait = self.trajectory(parameters, n_joint)
         if not self.relative_delta:
             return gait
-        return Corners.through(gait.angles(self.corners_in_time), self.symmetry)
+        vertices = gait.angles(self.pieces)
+        return Corners(vertices[:, :-1] if self.symmetry == NONE else vertices, self.symmetry)
 
     def _has_corners_of(self, gait: Any) -> bool:
         return (
             isinstance(gait, Corners)
             and gait.symmetry == self.symmetry
-            and gait.phases.size == self._n_side + 1
+            and gait.phases.size == self.pieces.size
         )
 
     def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
-        if not self.relative_delta:
-            return times
-        return np.interp(times, self.corners_in_time, gait.phases)
+        return np.interp(times, self.pieces, gait.phases) if self.relative_delta else times
 
     def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
         if not self.relative_delta:
             return phases
-        corners, edges = self.corners_in_time, phases
+        corners, edges = self.pieces, phases
         if self._has_corners_of(gait):
             edges = np.interp(phases, gait.phases, corners)
         apart = np.abs(edges[:, None] - corners).min(axis=1)
@@ -159,7 +270,7 @@ class Splines(LinearClass):
     def nearest(self, gait: Any) -> np.ndarray:
         if not self.relative_delta or getattr(gait, "basis", None) == self:
             return super().nearest(gait)
-        times = self.corners_in_time
+        times = self.pieces
         if self._has_corners_of(gait):
             points = gait.vertices
         else:  # on the path, evenly in arc length
@@ -168,8 +279,8 @@ class Splines(LinearClass):
             along = np.concatenate([[0.0], np.cumsum(steps)])
             even = np.linspace(0.0, along[-1], _POINTS)
             path = np.stack([np.interp(even, along, row) for row in samples])
-            points = path[:, _best_corners(path, self._n_side)]
-        knots = self.knots * times - self.shift
+            points = path[:, _best_corners(path, times.size - 1)]
+        knots = self.knots * times - self.first_knot
         corners = np.abs(knots - np.round(knots)) < _AT_A_CORNER  # others are middles of sides
         matrix = self.angle_matrix(times[corners], gait.n_joint)
         values = points[:, corners].T.ravel()
@@ -185,8 +296,7 @@ def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
         # the chord from point i to each later one, and all points between
         seen = points[:, i + 1 :] - points[:, i : i + 1]
         dots, squares = seen.T @ seen, np.sum(seen**2, axis=0)
-        along = dots / np.maximum(squares, 1e-300)
-        np.clip(along, 0.0, 1.0, out=along)
+        along = np.clip(dots / np.maximum(squares, 1e-300), 0.0, 1.0)
         nearer = along * (2 * dots - along * squares)
         between = before[: n - i - 1, : n - i - 1]
         cost[i, i + 1 :] = np.cumsum(squares) - squares - np.einsum("kj,kj->j", nearer, between)
@@ -307,7 +417,7 @@ class Polygon(Splines):
         return self.symmetry == BILATERAL and self.corners % 2 == 0
 
     @property
-    def shift(self) -> float:  # type: ignore[override]
+    def first_knot(self) -> float:  # type: ignore[override]
         return 0.5 if self._has_axis and self.axis == "side" else 0.0
 
     def describe(self) -> str:

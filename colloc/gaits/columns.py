@@ -102,10 +102,7 @@ class Basis(LinearClass):
         if not self._whole:
             return super().table_basis(n_joint)
         count = len(self.columns)
-        table = np.zeros((n_joint, count, n_joint, count))
-        for j in range(n_joint):
-            table[j, np.arange(count), j, np.arange(count)] = 1.0
-        return table.reshape(-1, count)
+        return np.einsum("jk,cp->jckp", np.eye(n_joint), np.eye(count)).reshape(-1, count)
 
     def check_joints(self, n_joint: int) -> None:
         if self._whole and len(self.columns[0]) != n_joint:
@@ -151,9 +148,9 @@ def _interpolate(kind: Basis) -> tuple[Any, float, int]:
 
 def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
     """Sample or read columns; as nested tuples."""
+    phases = np.arange(_SAMPLED) / _SAMPLED
     if isinstance(columns, (str, os.PathLike)):
         columns = _read(Path(columns))
-    phases = np.arange(_SAMPLED) / _SAMPLED
     try:
         arrays = [np.array(each(phases) if callable(each) else each, float) for each in columns]
     except (TypeError, ValueError):
@@ -161,22 +158,20 @@ def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
             "gait.columns must be a sequence of columns: samples over a period, or functions of "
             "the phase."
         ) from None
-    if (
-        not arrays
-        or arrays[0].ndim not in (1, 2)
-        or any(each.shape != arrays[0].shape for each in arrays)
-    ):
+    shapes = {each.shape for each in arrays}
+    if len(shapes) != 1 or arrays[0].ndim not in (1, 2):
         raise ProblemError(
             "gait.columns must be alike: each (n_time,), or each (n_joint, n_time), with as many "
             "samples."
         )
-    if arrays[0].shape[-1] < _FEWEST:
+    values = np.array(arrays)
+    if values.shape[-1] < _FEWEST:
         raise ProblemError(
-            f"gait.columns have {arrays[0].shape[-1]} samples of a period: give at least {_FEWEST}."
+            f"gait.columns have {values.shape[-1]} samples of a period: give at least {_FEWEST}."
         )
-    if not all(np.isfinite(each).all() for each in arrays):
+    if not np.isfinite(values).all():
         raise ProblemError("gait.columns must be finite numbers.")
-    if max(np.ptp(each, axis=-1).max() for each in arrays) == 0:
+    if np.ptp(values, axis=-1).max() == 0:
         raise ProblemError("gait.columns do not change over time: nothing would move.")
     return tuple(_nested_tuple(each.tolist()) for each in arrays)
 

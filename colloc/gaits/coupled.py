@@ -57,16 +57,36 @@ class Coupled(LinearClass):
     stuck: tuple[tuple[int, float], ...] = ()
 
     def __post_init__(self) -> None:
-        kind = self.gait
+        kind, stuck, gears = self.gait, self.stuck, self.gears
         if not isinstance(kind, LinearClass) or isinstance(kind, Coupled) or not kind.linear:
             raise ProblemError(
                 "Coupled takes the class of gaits of the motors, linear in its parameters: "
                 "Problem(body=Chain(...), gait=Coupled(Harmonic(1), stuck={1: 0.4})), not a "
                 f"{type(kind).__name__}."
             )
-        object.__setattr__(self, "stuck", _check_stuck(self.stuck))
-        default = isinstance(self.gears, (tuple, list)) and not self.gears
-        object.__setattr__(self, "gears", () if default else _check_gears(self.gears))
+        try:
+            pairs: Any = stuck.items() if isinstance(stuck, Mapping) else stuck
+            pairs = sorted((joint, angle) for joint, angle in pairs)
+            fits = all(is_whole(j, 0) and is_number(a) and abs(a) < np.pi for j, a in pairs)
+        except (TypeError, ValueError):
+            fits = False
+        if not fits or len({joint for joint, _ in pairs}) < len(pairs):
+            raise ProblemError(
+                f"stuck gives joints and their angles, as {{1: 0.4}}: joints count from 0 at the "
+                f"tail, each is named once, and its angle lies between -pi and pi [rad]; not "
+                f"{stuck!r}."
+            )
+        object.__setattr__(self, "stuck", tuple((int(joint), float(a)) for joint, a in pairs))
+        if isinstance(gears, (tuple, list)) and not gears:
+            object.__setattr__(self, "gears", ())
+            return
+        try:
+            table = np.array(gears, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            table = np.empty(0)
+        if table.ndim != 2 or not table.shape[1] or not np.isfinite(table).all():
+            raise ProblemError("gears must be a row of numbers for each joint, one for each motor.")
+        object.__setattr__(self, "gears", tuple(map(tuple, table.tolist())))
 
     def joint_map(self, n_joint: int) -> JointMap:
         return _joint_map(self, n_joint)
@@ -113,11 +133,6 @@ class Coupled(LinearClass):
         stuck = "".join(f", joint {j + 1} stuck at {angle:.4g} rad" for j, angle in self.stuck)
         return f"{self.gait.describe()}{motors}{stuck}"
 
-    def lines(self, gait: Any) -> list[str]:
-        """A member as a formula of its motors, and the joints that are stuck."""
-        stuck = [f"joint {j + 1}: {angle:+.4f}" for j, angle in self.stuck]
-        return [*self.motor_gait(gait).lines(), *stuck]
-
     def _basis(self, n_joint: int) -> np.ndarray:
         joints = self.joint_map(n_joint)
         motors = self.gait._basis(joints.n_motor)
@@ -153,58 +168,23 @@ class Coupled(LinearClass):
 
 @lru_cache(maxsize=32)
 def _joint_map(kind: Coupled, n_joint: int) -> JointMap:
-    for joint, _ in kind.stuck:
-        if joint >= n_joint:
-            raise ProblemError(
-                f"stuck names joint {joint}: the chain has joints 0 to {n_joint - 1}, from the "
-                f"tail."
-            )
-    if len(kind.stuck) == n_joint:
+    rest, broken = np.zeros(n_joint), [joint for joint, _ in kind.stuck]
+    if broken and broken[-1] >= n_joint:
+        raise ProblemError(
+            f"stuck names joint {broken[-1]}: the chain has joints 0 to {n_joint - 1}, from the "
+            f"tail."
+        )
+    if len(broken) == n_joint:
         raise ProblemError("all joints are stuck: nothing would move.")
-    rest = np.zeros(n_joint)
-    broken = [joint for joint, _ in kind.stuck]
     rest[broken] = [angle for _, angle in kind.stuck]
     gears = np.array(kind.gears) if kind.gears else np.delete(np.eye(n_joint), broken, axis=1)
     if len(gears) != n_joint:
         raise ProblemError(f"gears have {len(gears)} rows, and the chain has {n_joint} joints.")
     for joint, row in enumerate(gears):
         if row.any() == (joint in broken):
-            what = (
-                "is stuck, and hangs on a motor"
-                if row.any()
-                else "hangs on no motor: give its angle in stuck"
-            )
+            hangs = "hangs on no motor: give its angle in stuck"
+            what = "is stuck, and hangs on a motor" if row.any() else hangs
             raise ProblemError(f"joint {joint} (counted from 0 at the tail) {what}.")
     if np.linalg.matrix_rank(gears) < gears.shape[1]:
         raise ProblemError("two motors do the same, or one moves nothing: leave it out of gears.")
     return JointMap(tuple(map(tuple, gears.tolist())), tuple(rest.tolist()))
-
-
-def _check_stuck(stuck: Any) -> tuple[tuple[int, float], ...]:
-    try:
-        pairs = stuck.items() if isinstance(stuck, Mapping) else stuck
-        pairs = [(joint, angle) for joint, angle in pairs]
-    except (TypeError, ValueError):
-        raise ProblemError(
-            f"stuck gives joints and their angles, as {{1: 0.4}}, not {stuck!r}."
-        ) from None
-    for joint, angle in pairs:
-        if not is_whole(joint, 0):
-            raise ProblemError(f"stuck names joint {joint!r}: they count from 0 at the tail.")
-        if not (is_number(angle) and abs(angle) < np.pi):
-            raise ProblemError(
-                f"joint {joint} is stuck at {angle!r}: give an angle between -pi and pi [rad]."
-            )
-    if len({joint for joint, _ in pairs}) < len(pairs):
-        raise ProblemError("stuck names a joint twice.")
-    return tuple(sorted((int(joint), float(angle)) for joint, angle in pairs))
-
-
-def _check_gears(gears: Any) -> tuple[tuple[float, ...], ...]:
-    try:
-        table = np.array(gears, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        table = np.empty(0)
-    if table.ndim != 2 or not table.shape[1] or not np.isfinite(table).all():
-        raise ProblemError("gears must be a row of numbers for each joint, one for each motor.")
-    return tuple(tuple(row) for row in table.tolist())

@@ -24,7 +24,7 @@ from colloc.system.errors import ProblemError
 
 _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
 _WORTH, _EXACT = 1.05, 1e-16  # factor and mean square [rad^2] by which scores count as equal
-_PHASES = 1024  # at which a function is sampled
+_PHASES = np.arange(1024) / 1024  # at which a function is sampled
 _GAP = 5  # most steps from the last sample to the next period
 _DRIFT = 0.1  # drift a period that still closes, of a joint's range
 _LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
@@ -40,6 +40,7 @@ _STEP = 1e-5  # relative, of differences by the period
 _HIGHEST = 64  # harmonics of a class at most
 _CHANCE = 0.05  # that noise alone seems worth more harmonics
 _COVERED = 0.97725  # standard normal distribution at two standard deviations
+_TINY = 1e-300
 
 Given = Fourier | np.ndarray | str | os.PathLike[str] | Callable[[np.ndarray], np.ndarray]
 """A series; angles ``(n_joint, n_time)`` at equal steps of a period, or labelled by xarray; a CSV
@@ -107,15 +108,13 @@ def fitted_gait(
     """
     name, record = "the gait", None
     if isinstance(source, Fourier):
-        _check_joints(name, source.n_joint, n_joint)
-        return FittedGait(source)
-    if isinstance(source, (str, os.PathLike)):
-        name = str(source)
-        record = read_record(Path(source), n_joint, degrees=degrees)
-        time, angles = record.time, record.angles
-        period, degrees = period or record.period, record.degrees
+        angles = source.mean[:, None]
+    elif isinstance(source, (str, os.PathLike)):
+        name, record = str(source), read_record(Path(source), n_joint, degrees=degrees)
+        time, angles, degrees = record.time, record.angles, record.degrees
+        period = period or record.period
     elif callable(source):
-        time, period = np.arange(_PHASES) / _PHASES, 1.0
+        time, period = _PHASES, 1.0
         function = source.angles if isinstance(source, GaitFunction) else source
         angles = _numbers(name, function(time))
     elif {"joint"} < set(getattr(source, "dims", ())):  # labelled, as `Solution.to_xarray` has them
@@ -125,7 +124,12 @@ def fitted_gait(
     else:
         angles = _numbers(name, source)
         time = np.arange(angles.shape[1], dtype=float)
-    _check_joints(name, len(angles), n_joint)
+    if (count := len(angles)) != n_joint:
+        raise ProblemError(
+            f"{name} has angles of {count} joint{'s' * (count != 1)}, and the body has {n_joint}."
+        )
+    if isinstance(source, Fourier):
+        return FittedGait(source)
     if record is None and degrees:
         angles = np.radians(angles)
     elif record is None and (largest := np.abs(angles).max()) > _LARGEST:
@@ -136,13 +140,6 @@ def fitted_gait(
     samples = _Samples(name, time - time[0], angles, degrees)
     fitted = samples.gait(samples.best_fit(period, harmonics))
     return replace(fitted, taken=record.taken, centre=record.centre) if record else fitted
-
-
-def _check_joints(name: str, count: int, n_joint: int) -> None:
-    if count != n_joint:
-        raise ProblemError(
-            f"{name} has angles of {count} joint{'s' * (count != 1)}, and the body has {n_joint}."
-        )
 
 
 def _numbers(name: str, source: object) -> np.ndarray:
@@ -182,6 +179,10 @@ class _Fit(NamedTuple):
         return np.column_stack([*drift, np.ones(phases.size), waves])
 
 
+def _best(fits: list[_Fit]) -> float:
+    return min(fit.score for fit in fits)
+
+
 class _Samples(NamedTuple):
     name: str
     time: np.ndarray
@@ -194,62 +195,60 @@ class _Samples(NamedTuple):
         time = self.time
         return float(np.median(np.diff(time))) or float(time[-1] - time[0]) / (time.size - 1)
 
-    def table(self, fit: _Fit) -> np.ndarray:
-        """Coefficients of the columns of a fit, ``(n_joint, n_number)``."""
-        return np.linalg.lstsq(fit.columns(self.time), self.angles.T, rcond=None)[0].T
+    def fitted(self, fit: _Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients of the columns of a fit, ``(n_joint, n_number)``, and the residuals."""
+        columns = fit.columns(self.time)
+        table = np.linalg.lstsq(columns, self.angles.T, rcond=None)[0].T
+        return table, self.angles - table @ columns.T
 
-    def fits(self, fit: _Fit, fewest: int = 1, chosen: int = 0) -> list[_Fit]:
-        """Scores of `fewest` to all harmonics of a fit, with `chosen` more numbers, by one QR."""
+    def scores(self, fit: _Fit, fewest: int, chosen: int) -> list[_Fit]:
+        """Fits of `fewest` to all harmonics of a fit, with `chosen` more numbers, by one QR."""
         q = np.linalg.qr(fit.columns(self.time))[0]
         parts = q.T @ self.angles.T
         gains, left = (parts**2).sum(axis=1), ((self.angles.T - q @ parts) ** 2).sum()
         residual = left + np.append(np.cumsum(gains[::-1])[::-1], 0.0)
-        numbers = 1 + fit.drifts + 2 * np.arange(1, fit.harmonics + 1)
-        free = 1 - (numbers + chosen) / self.time.size
-        scores = (residual[numbers] / self.angles.size / free**2).tolist()
-        fits = [
-            fit._replace(harmonics=k, score=score, chosen=chosen > 0)
-            for k, score in enumerate(scores, 1)
-        ]
-        return fits[fewest - 1 :]
+        fits = []
+        for k in range(fewest, fit.harmonics + 1):
+            numbers = 1 + fit.drifts + 2 * k
+            free = 1 - (numbers + chosen) / self.time.size
+            score = float(residual[numbers] / self.angles.size / free**2)
+            fits.append(fit._replace(harmonics=k, score=score, chosen=chosen > 0))
+        return fits
 
     def check(self, period: float | None, harmonics: int | None) -> None:
         """Raise a `ProblemError` if the samples do not determine such a series."""
-        step, most = self.step, (self.time.size - 3) // 2
-        if period is not None:
-            if not np.isfinite(period) or period <= 0:
-                raise ProblemError(f"the period must be positive, not {period:g}.")
-            if self.time[-1] < 0.5 * period:
-                raise ProblemError(
-                    f"{self.name} holds {self.time[-1]:.4g} of a period of {period:.4g}: record at "
-                    f"least one."
-                )
-            if period < FEWEST * step:
-                raise ProblemError(
-                    f"{self.name} has a sample every {step:.4g}, fewer than {FEWEST} in a period "
-                    f"of {period:.4g}: give the period in the file's unit of time."
-                )
-        if harmonics is not None and not 1 <= harmonics <= most:
-            raise ProblemError(
-                f"{self.time.size} samples determine 1 to {most} harmonics, not {harmonics}."
+        step, most, span = self.step, (self.time.size - 3) // 2, self.time[-1]
+        what = ""
+        if period is not None and (not np.isfinite(period) or period <= 0):
+            what = f"the period must be positive, not {period:g}."
+        elif period is not None and span < 0.5 * period:
+            what = f"{self.name} holds {span:.4g} of a period of {period:.4g}: record at least one."
+        elif period is not None and period < FEWEST * step:
+            what = (
+                f"{self.name} has a sample every {step:.4g}, fewer than {FEWEST} in a period of "
+                f"{period:.4g}: give the period in the file's unit of time."
             )
+        elif harmonics is not None and not 1 <= harmonics <= most:
+            what = f"{self.time.size} samples determine 1 to {most} harmonics, not {harmonics}."
+        if what:
+            raise ProblemError(what)
 
     def best_fit(self, period: float | None, harmonics: int | None) -> _Fit:
         """The fit of the fewest numbers that scores about as well as any."""
         self.check(period, harmonics)
-        time, step = self.time, self.step
+        end, step = self.time[-1], self.step
 
-        def up_to(most: int, period: float, chosen: int, drifts: bool) -> list[_Fit]:
-            many = min(time.size, int(period / step))  # samples of a period
+        def up_to(most: int, period: float, chosen: int, drifts: bool = False) -> list[_Fit]:
+            many = min(self.time.size, int(period / step))  # samples of a period
             most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
-            return self.fits(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
+            return self.scores(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
 
         def fits(period: float, chosen: int) -> list[_Fit]:
-            closed = up_to(_MOST_HARMONICS, period, chosen, False)
-            return closed + up_to(_MOST_HARMONICS, period, chosen, True)
+            closed = up_to(_MOST_HARMONICS, period, chosen)
+            return closed + up_to(_MOST_HARMONICS, period, chosen, drifts=True)
 
         def score(period: float) -> float:
-            return _best(up_to(_ROUGH, period, 0, False))
+            return _best(up_to(_ROUGH, period, 0))
 
         def best_period(low: float, high: float) -> float:
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
@@ -259,19 +258,20 @@ class _Samples(NamedTuple):
             candidates = fits(period, 0)
         else:
             # the next period begins with the last sample, or some steps later, or was recorded
-            gaps = time[-1] + step * np.arange(_GAP + 1)
+            gaps = end + step * np.arange(_GAP + 1)
             later = min(map(best_period, gaps[:-1], gaps[1:]), key=score)
             repeats = [best_period(*bracket) for bracket in self.find_repeats()]
             candidates = fits(gaps[0], 0) + fits(gaps[1], 0)
-            for each in (later, *(each for each in repeats if each > 0.5 * time[-1])):
+            for each in (later, *(each for each in repeats if each > 0.5 * end)):
                 candidates += fits(each, 1)
-            several = [fits(each, 1) for each in repeats if each <= 0.5 * time[-1]]
+            several = [fits(each, 1) for each in repeats if each <= 0.5 * end]
             enough = _REPEATED * min(map(_best, (candidates, *several))) + _EXACT
             candidates = next((each for each in several if _best(each) <= enough), candidates)
         closed = [fit for fit in candidates if not fit.drifts]
         if _best(closed) <= _DRIFTS * _best(candidates) + _EXACT:
             candidates = closed
-        return _cheapest(candidates)
+        enough = max(_WORTH * _best(candidates), _EXACT)
+        return min(fit for fit in candidates if fit.score <= enough)
 
     def find_repeats(self) -> list[tuple[float, float]]:
         """Likely brackets of the period: least differences of the record from itself that much
@@ -283,7 +283,7 @@ class _Samples(NamedTuple):
         alike, later = _autocorrelation(moved), np.arange(n)
         squares = np.append(0.0, np.cumsum((moved**2).sum(axis=0)))
         differs = squares[n - later] + squares[n] - squares[later] - 2 * alike
-        differs = (differs / (n - later) / (2 * squares[n] / n + 1e-300))[: n - 1]
+        differs = (differs / (n - later) / (2 * squares[n] / n + _TINY))[: n - 1]
         inner = np.arange(FEWEST, differs.size - 1)
         falls, rises = differs[inner] <= differs[inner - 1], differs[inner] < differs[inner + 1]
         least = inner[falls & rises]
@@ -301,17 +301,17 @@ class _Samples(NamedTuple):
 
     def gait(self, fit: _Fit) -> FittedGait:
         """The gait without the drift of its record. `ProblemError` if that is not small."""
-        table = self.table(fit)
+        table, _ = self.fitted(fit)
         gait = Fourier.from_table(table[:, int(fit.drifts) :])
         drift = np.abs(table[:, 0]) * fit.drifts  # a period
-        ranges = np.ptp(gait.angles(np.arange(_PHASES) / _PHASES), axis=1)
+        ranges = np.ptp(gait.angles(_PHASES), axis=1)
         if drift.max() > _DRIFT * ranges.max():
             joint = int(drift.argmax())
+            off, moves = (_format(each[joint], self.degrees) for each in (drift, ranges))
             raise ProblemError(
-                f"{self.name} does not close: after a period joint {joint + 1} is off by "
-                f"{_format(drift[joint], self.degrees)}, and it moves "
-                f"through {_format(ranges[joint], self.degrees)}. Give one whole period, or say "
-                f"how long it is (period=, --period)."
+                f"{self.name} does not close: after a period joint {joint + 1} is off by {off}, "
+                f"and it moves through {moves}. Give one whole period, or say how long it is "
+                f"(period=, --period)."
             )
         off = gait.angles(self.time / fit.period) - self.angles
         return FittedGait(
@@ -323,10 +323,10 @@ class _Samples(NamedTuple):
             degrees=self.degrees,
             periods=self.time[-1] / fit.period,
             period=fit.period,
-            uncertainty=self.uncertainty(fit, table),
+            uncertainty=self.uncertainty(fit),
         )
 
-    def uncertainty(self, fit: _Fit, table: np.ndarray) -> Uncertainty:
+    def uncertainty(self, fit: _Fit) -> Uncertainty:
         """Covariance of a least-squares fit, and of the period if it was told from the samples.
 
         Harmonics up to twice the highest are in it, as large as the samples leave open.
@@ -335,51 +335,35 @@ class _Samples(NamedTuple):
         most = min(time.size - first, round(fit.period / self.step))
         most = min(max((most - 1) // 2, fit.harmonics), _HIGHEST)
         twice, far = (fit._replace(harmonics=min(most, k * fit.harmonics + 1)) for k in (2, 4))
-        richer, used = self.richer(fit, table, far), table
-        residuals = self.angles - table @ fit.columns(time).T
-        if richer is not None and richer.shape[1] < time.size:
+        (table, residuals), (richer, rest) = self.fitted(fit), self.fitted(far)
+        joints, used = len(table), table.shape[1]
+        # whether more harmonics fit better than by chance (F test)
+        more, left = richer.shape[1] - used, time.size - richer.shape[1]
+        ratio = ((residuals**2).sum() / ((rest**2).sum() + _TINY) - 1) * left / max(more, 1)
+        by_chance = left > 0 and fdtrc(joints * more, joints * left, ratio) > _CHANCE
+        is_richer = more >= 1 and not by_chance
+        if is_richer and left > 0:
             # what is left of the residuals is noise; where nothing is left, all of them may be
-            residuals, used = self.angles - richer @ far.columns(time).T, richer
-        columns, left = twice.columns(time), (residuals**2).sum(axis=1)
-        freedom = max(time.size - used.shape[1], 1)
-        u, s, v = np.linalg.svd(columns, full_matrices=False)
-        deviation = np.sqrt(left / freedom * _correlation_time(residuals)) + 1e-300
+            residuals, used = rest, richer.shape[1]
+        freedom = max(time.size - used, 1)
+        u, s, v = np.linalg.svd(twice.columns(time), full_matrices=False)
+        variance = (residuals**2).sum(axis=1) / freedom * _correlation_time(residuals)
+        deviation = np.sqrt(variance) + _TINY
         root = (v.T / s)[first:].T  # a row for each direction
-        shape = -1, len(table), root.shape[1]
-        directions = np.einsum("j,jk,ri->jrki", deviation, np.eye(len(table)), root).reshape(shape)
+        each = deviation[:, None] * np.eye(joints)
+        directions = np.einsum("jk,ri->jrki", each, root).reshape(-1, joints, root.shape[1])
         if fit.chosen:
-            longer, shorter = (
+            ends = (
                 fit._replace(period=fit.period * (1 + by)).columns(time) for by in (_STEP, -_STEP)
             )
+            longer, shorter = ends
             by_period = table @ (longer - shorter).T / (2 * _STEP)
             along = by_period @ u
             orthogonal = ((by_period - along @ u.T) / deviation[:, None]) ** 2
-            change = -((along / s) @ v)[None, :, first:] / np.sqrt(orthogonal.sum() + 1e-300)
+            change = -((along / s) @ v)[None, :, first:] / np.sqrt(orthogonal.sum() + _TINY)
             directions = np.concatenate([directions, change])
-        series = None if richer is None else Fourier.from_table(richer[:, first:])
+        series = Fourier.from_table(richer[:, first:]) if is_richer else None
         return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), series)
-
-    def richer(self, fit: _Fit, table: np.ndarray, far: _Fit) -> np.ndarray | None:
-        """Coefficients of more harmonics, if they fit better than by chance (F test)."""
-        columns, joints = far.columns(self.time), len(table)
-        more, left = columns.shape[1] - table.shape[1], self.time.size - columns.shape[1]
-        richer = self.table(far)
-        before = ((self.angles - table @ fit.columns(self.time).T) ** 2).sum()
-        after = ((self.angles - richer @ columns.T) ** 2).sum()
-        ratio = (before / (after + 1e-300) - 1) * left / max(more, 1)
-        if more < 1 or (left > 0 and fdtrc(joints * more, joints * left, ratio) > _CHANCE):
-            return None
-        return richer
-
-
-def _best(fits: list[_Fit]) -> float:
-    return min(fit.score for fit in fits)
-
-
-def _cheapest(fits: list[_Fit]) -> _Fit:
-    """The fit of the fewest numbers whose score is about the best."""
-    enough = max(_WORTH * _best(fits), _EXACT)
-    return min(fit for fit in fits if fit.score <= enough)
 
 
 def _autocorrelation(rows: np.ndarray) -> np.ndarray:
@@ -391,7 +375,7 @@ def _autocorrelation(rows: np.ndarray) -> np.ndarray:
 def _correlation_time(residuals: np.ndarray) -> float:
     """Samples in a row that share a residual: 1 for white noise, more if a fit lacks something."""
     correlation = _autocorrelation(residuals)
-    correlation /= correlation[0] + 1e-300
+    correlation /= correlation[0] + _TINY
     ends = np.flatnonzero(correlation <= 0)
     end = ends[0] if ends.size else correlation.size
     return float(1 + 2 * correlation[1:end].sum())

@@ -1,21 +1,18 @@
-"""Gaits, functions of the phase in [0, 1], and classes of gaits, known by vectors of parameters."""
+"""Gaits: functions of the phase in [0, 1]."""
 
 from __future__ import annotations
 
 import copy
-import dataclasses
 from typing import Any
 
 import numpy as np
 
-from colloc.gaits.symmetry import SYMMETRIES, fraction
 from colloc.mechanics.densities import JointMap
 from colloc.mechanics.inertia import GRAVITY
 from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
 
-_DENSE = 2000
-_SEED_HARMONICS = 2
+_DENSE = np.linspace(0.0, 1.0, 2001)
 DELTA_START = 0.01
 """First delta of a search, relative to the shape speed [body lengths per radian of path]."""
 
@@ -23,6 +20,7 @@ DELTA_START = 0.01
 class GaitFunction:
     """Base of gaits: ``gait(t)`` is joint angles and rates ``(n_joint, n_time)`` at phases t."""
 
+    n_joint: Any
     is_series = False  # a sum of functions of the phase
     theta: float | None = None  # orientation of the tail link at phase 0, on a slope [rad]
     log_period: float | None = None  # logarithm of the period [sqrt(length / gravity)]
@@ -30,27 +28,25 @@ class GaitFunction:
     joint_map: JointMap | None = None
     rest: np.ndarray | float = 0.0  # part of the angles that scaling leaves as it is
 
-    @property
-    def n_joint(self) -> int:
-        raise NotImplementedError
-
     def angles(self, t: np.ndarray) -> np.ndarray:
-        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
         raise NotImplementedError
 
     def rates(self, t: np.ndarray) -> np.ndarray:
-        """Joint rates ``(n_joint, n_time)`` per period at phases t."""
+        """Joint rates per period."""
         raise NotImplementedError
-
-    @property
-    def length(self) -> float:
-        """Length of the closed path [rad], the mean shape speed per period."""
-        points = self.angles(np.linspace(0.0, 1.0, _DENSE + 1))
-        return float(np.linalg.norm(np.diff(points), axis=0).sum())
 
     def mapped(self, matrix: np.ndarray) -> Any:
         """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
         raise NotImplementedError
+
+    def lines(self) -> list[str]:
+        """The gait as a formula or in words, a line each."""
+        return []
+
+    @property
+    def length(self) -> float:
+        """Length of the closed path [rad], the mean shape speed per period."""
+        return float(np.linalg.norm(np.diff(self.angles(_DENSE)), axis=0).sum())
 
     @property
     def motor_gait(self) -> Any:
@@ -74,10 +70,6 @@ class GaitFunction:
     def corner_phases(self) -> np.ndarray:
         """Phases in (0, 1) where the rates jump."""
         return np.empty(0)
-
-    def lines(self) -> list[str]:
-        """The gait as a formula or in words, a line each."""
-        raise NotImplementedError
 
     @property
     def pointing(self) -> list[str]:
@@ -113,97 +105,7 @@ class GaitFunction:
         return f"<{type(self).__name__} of {self.n_joint} {self.coordinate}{plural}>"
 
 
-class ClassOfGaits:
-    """Base of classes of gaits."""
-
-    symmetry: str
-    free = True  # has parameters
-    stages: tuple[float, ...] = ()  # phases that every mesh has as edges
-    relative_delta = False  # delta is relative to the shape speed, as the pace does not matter
-    delta_start: float | None = None  # first delta of a search; None: the body's default
-    linear = True  # angles are linear in the parameters of the search
-
-    def _check_symmetry(self) -> None:
-        if self.symmetry not in SYMMETRIES:
-            raise ProblemError(
-                f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}."
-            )
-
-    def with_symmetry(self, symmetry: str) -> Any:
-        return dataclasses.replace(self, symmetry=symmetry)  # type: ignore[type-var]
-
-    def check_joints(self, n_joint: int) -> None:
-        """Raise a `ProblemError` if bodies with so many shape coordinates have no such gaits."""
-        if self.relative_delta and n_joint < 2:
-            raise ProblemError(
-                f"the class {type(self).__name__} needs a body of at least three links, or two "
-                f"modes."
-            )
-
-    def joint_map(self, n_joint: int) -> JointMap | None:
-        """The map from motors to joints, if several joints hang on one or some are stuck."""
-        return None
-
-    @property
-    def fraction(self) -> float:
-        """Part of the period that is solved; symmetry gives the rest."""
-        return fraction(self.symmetry)
-
-    def describe(self) -> str:
-        """The class in words, for reports."""
-        raise NotImplementedError
-
-    def intervals(self, n_joint: int) -> int:
-        """Intervals of a first mesh."""
-        raise NotImplementedError
-
-    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
-        """Least intervals of a mesh with so many points on each, and the reason."""
-        return 4, "a gait"
-
-    def edges(self, n: int) -> np.ndarray:
-        """Edges of a mesh of about n intervals on the solved part of the period."""
-        return np.linspace(0.0, self.fraction, n + 1)
-
-    def series(self, harmonics: int) -> Any:
-        """The class of Fourier series with about so many harmonics that stand for the gaits."""
-        raise NotImplementedError
-
-    @property
-    def start_class(self) -> Any:
-        """The class that starts of a search are drawn from."""
-        return self.series(_SEED_HARMONICS)
-
-    def size(self, n_joint: int) -> int:
-        """Number of parameters."""
-        raise NotImplementedError
-
-    def member(self, parameters: np.ndarray, n_joint: int) -> Any:
-        """The gait of a parameter vector."""
-        raise NotImplementedError
-
-    def parameters(self, gait: Any) -> np.ndarray:
-        """Parameters of the member nearest to a gait."""
-        raise NotImplementedError
-
-    def in_phase(self, gait: Any) -> bool:
-        """True if a gait starts in the phase in which members do."""
-        return True
-
-    def through(self, gait: Any) -> Any:
-        """The gait that a search in the class begins with, for any gait."""
-        return gait
-
-    def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
-        """Phases of a member at times of its program."""
-        return times
-
-    def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
-        """Edges of a program's mesh, from phases of a member."""
-        return phases
-
-
-def delta_per_period(gait_class: ClassOfGaits, gait: GaitFunction, delta: float) -> float:
+def delta_per_period(gait_class: Any, gait: GaitFunction, delta: float) -> float:
     """Convert delta in the units of a class to body lengths per period of a gait."""
     return delta * gait.length if gait_class.relative_delta else delta
 
@@ -214,9 +116,7 @@ def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise ProblemError(f"{name} must be numbers, not {shown(value)}.") from None
-    if (
-        array.ndim != ndim
-        or not (np.abs(array) < np.sqrt(np.finfo(float).max) / (array.size + 1)).all()
-    ):
+    largest = np.sqrt(np.finfo(float).max) / (array.size + 1)
+    if array.ndim != ndim or not (np.abs(array) < largest).all():
         raise ProblemError(f"{name} must be a finite {ndim}-D array.")
     return array

@@ -10,12 +10,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from colloc.gaits.bspline import BSpline, Polygon
+from colloc.gaits.bspline import BSpline, Corners, Polygon
 from colloc.gaits.columns import Basis
 from colloc.gaits.coupled import Coupled
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.linear import Combination
-from colloc.gaits.polygon import Corners
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
 from colloc.laws.elliptic import Elliptic

@@ -14,7 +14,6 @@ import numpy as np
 
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.limits import Limit, under_one_limit
-from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import crossing_depth, link_width
@@ -25,11 +24,10 @@ WAVES = -1.0
 _SHARE, _LARGEST, _MOVING = 0.6, 1.5, 1.05
 """Amplitude: a share of the largest admissible one, and at most so much [rad], or so many times the
 least that moves enough."""
-_PHASES = np.linspace(0.0, 1.0, 201)
+_PHASES, _CHECKED = np.linspace(0.0, 1.0, 201), np.arange(2000) / 2000
 SAFE = 1 - 1e-3
 """Shapes as large as may be are scaled by this, to be clearly admissible."""
 _BISECTIONS = 21  # to a thousandth of the margin above
-_CHECKED_PHASES = 2000
 _SLACK = 1e-6  # depth of a crossing that a certificate allows
 _AT_THE_BOUND = 1e-2
 """Sampling cuts the corners of an optimum on the lower bound of the shape speed: it is still a good
@@ -47,26 +45,28 @@ def largest_factor(
     peak = body.bounded_angles.largest(stretched).max()
     if peak == 0:
         return np.inf
+
+    def crosses(factor: float) -> bool:
+        return bool(crossing_depth(body, factor * angles + rest).any())
+
     low, high = 0.0, joint_limit / peak
-    if not crossing_depth(body, high * angles + rest).any():
+    if not crosses(high):
         return high * SAFE
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        crossing = bool(crossing_depth(body, middle * angles + rest).any())
-        low, high = (low, middle) if crossing else (middle, high)
+        low, high = (low, middle) if crosses(middle) else (middle, high)
     return low * SAFE
 
 
 def travelling_wave(
-    body: Body, joint_limit: Limit, waves: float = WAVES, share: float = _SHARE, least: float = 0.0
+    body: Body, joint_limit: Limit, waves: float = WAVES, least: float = 0.0
 ) -> Fourier:
-    """A wave along a body whose amplitude is a share of the largest admissible one, at most 1.5
-    rad. If its shape speed were below `least` it is larger, and each joint bends in proportion to
-    its own limit."""
+    """A wave along a body. If its shape speed were below `least` it is larger, and each joint bends
+    in proportion to its own limit."""
     cos, sin = body.wave(waves)
     unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
     angles = unit.angles(_PHASES)
-    wave = unit.grown(min(share * largest_factor(body, joint_limit, angles), _LARGEST))
+    wave = unit.grown(min(_SHARE * largest_factor(body, joint_limit, angles), _LARGEST))
     if wave.shape_speed >= least:
         return wave
     stretched = np.abs(under_one_limit(angles, joint_limit)[0]).max(axis=1)
@@ -87,8 +87,7 @@ def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
 def initial_member(gait_class: Any, wave: Fourier) -> Any:
     """The gait that stands for a wave in a class: itself, or the nearest member as fast, or if
     there is none all its functions at once."""
-    by_path = gait_class.relative_delta or not isinstance(gait_class, LinearClass)
-    if by_path or isinstance(gait_class, Harmonic):
+    if gait_class.relative_delta or not gait_class.free or isinstance(gait_class, Harmonic):
         return wave
     member = gait_class.through(wave)
     if member.shape_speed <= _MOVES * wave.shape_speed:
@@ -99,7 +98,7 @@ def initial_member(gait_class: Any, wave: Fourier) -> Any:
 def checked_member(gait_class: Any, gait: Any) -> tuple[Any, float]:
     """The gait of a class that a guess stands for, a path itself, and its shape speed [rad per
     radian of phase]."""
-    if isinstance(gait_class, LinearClass) and not gait_class.relative_delta:
+    if gait_class.free and not gait_class.relative_delta:
         member = gait_class.member(gait_class.parameters(gait_class.through(gait)), gait.n_joint)
         return member, member.shape_speed
     points = symmetric_samples(gait, gait_class.symmetry)
@@ -126,9 +125,8 @@ def default_guess(
     if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
         raise ProblemError(
             f"with {'speed_limit' if share > 1 else 'joint_limit'} the usual first gait has a "
-            f"root-mean-square shape speed of "
-            f"{rms:.2g}, less than smallest_shape_speed = {smallest_shape_speed:g}: make that "
-            f"smaller, or give a guess."
+            f"root-mean-square shape speed of {rms:.2g}, less than smallest_shape_speed = "
+            f"{smallest_shape_speed:g}: make that smaller, or give a guess."
         )
     return gait
 
@@ -149,16 +147,15 @@ def check_guess(
             f"{smallest_shape_speed:g}); does it have the symmetry {gait_class.symmetry!r} of its "
             f"class?"
         )
-    angles = member.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
+    angles, bounded = member.angles(_CHECKED), body.bounded_angles
     stretched, limit = under_one_limit(angles, joint_limit)
-    largest = body.bounded_angles.largest(stretched).max()
+    largest, depth, what = bounded.largest(stretched).max(), crossing_depth(body, angles), ""
     if largest > limit + body.defaults.excess:
-        each = np.abs(body.bounded_angles.rows @ stretched).max(axis=1, initial=0.0)
-        which = body.bounded_angles.names[np.argmax(each)] if each.size else "the tangent"
-        beyond = f"{which} reaches {largest:.4g} rad, beyond the limit {limit:.4g}"
-        raise ProblemError(f"guess is inadmissible: {beyond}; make its amplitude smaller.")
-    depth = crossing_depth(body, angles)
-    if depth.max() > _SLACK:
-        when = np.argmax(depth) / _CHECKED_PHASES
+        each = np.abs(bounded.rows @ stretched).max(axis=1, initial=0.0)
+        which = bounded.names[np.argmax(each)] if each.size else "the tangent"
+        what = f"{which} reaches {largest:.4g} rad, beyond the limit {limit:.4g}"
+    elif depth.max() > _SLACK:
         how = "overlap" if link_width(body) else "cross each other"
-        raise ProblemError(f"guess is inadmissible: links {how} at phase {when:.3f}.")
+        what = f"links {how} at phase {_CHECKED[np.argmax(depth)]:.3f}"
+    if what:
+        raise ProblemError(f"guess is inadmissible: {what}; make its amplitude smaller.")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
+from colloc.gaits.gait import GaitFunction, finite_array
 from colloc.gaits.linear import LinearClass, largest_coordinate
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, symmetric_samples
 from colloc.mechanics.bodies import Body
@@ -119,7 +120,6 @@ class Fourier(GaitFunction):
         return Fourier(matrix @ self.mean, matrix @ self.cos, matrix @ self.sin)
 
     def grown(self, factor: float) -> Fourier:
-        """The gait with all angles multiplied by a factor about their mean."""
         return Fourier(self.mean, factor * self.cos, factor * self.sin)
 
     def resize(self, n_harmonic: int) -> Fourier:
@@ -198,13 +198,11 @@ class Harmonic(LinearClass):
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         # 1, cos 1, sin 1, cos 2, ...
         k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
+        cos, sin = np.cos(k * t), np.sin(k * t)
+        pairs = ((cos, sin), (-sin, cos), (-cos, -sin))
         waves = np.empty((2 * self.harmonics + 1, t.size))
-        if derivative % 2:
-            waves[0], waves[1::2], waves[2::2] = 0.0, -k * np.sin(k * t), k * np.cos(k * t)
-        else:
-            waves[0], waves[1::2], waves[2::2] = 1.0, np.cos(k * t), np.sin(k * t)
-        if derivative == 2:
-            waves *= np.concatenate([[0.0], np.repeat(-(k[:, 0] ** 2), 2)])[:, None]
+        waves[0] = derivative == 0
+        waves[1::2], waves[2::2] = (k**derivative * wave for wave in pairs[derivative])
         return waves
 
     @property
@@ -213,22 +211,20 @@ class Harmonic(LinearClass):
         return np.arange(n) / n
 
     def _basis(self, n_joint: int) -> np.ndarray:
-        columns = []
-        for function in range(2 * self.harmonics + 1):
-            if self.symmetry == ANTIPODAL and (function + 1) // 2 % 2 == 0:
-                continue  # even harmonics
-            sine = function > 0 and function % 2 == 0
-            for joint in range(n_joint):
-                column = np.zeros((n_joint, 2 * self.harmonics + 1))
-                column[joint, function] = 1.0
-                if self.symmetry == BILATERAL:
-                    partner = n_joint - 1 - joint
-                    if partner < joint or (partner == joint and not sine):
-                        continue
-                    column[partner, function] = 1.0 if sine else -1.0
-                elif joint == 0 and function == 2:
-                    continue  # the start phase is free: no first sine of the first joint
-                columns.append(column.ravel())
+        columns, n_function = [], 2 * self.harmonics + 1
+        for function, joint in product(range(n_function), range(n_joint)):
+            harmonic, sine = (function + 1) // 2, function > 0 and function % 2 == 0
+            column, partner = np.zeros((n_joint, n_function)), n_joint - 1 - joint
+            column[joint, function] = 1.0
+            if self.symmetry == ANTIPODAL and harmonic % 2 == 0:
+                continue
+            if self.symmetry == BILATERAL:
+                if partner < joint or (partner == joint and not sine):
+                    continue
+                column[partner, function] = 1.0 if sine else -1.0
+            elif joint == 0 and function == 2:
+                continue  # the start phase is free: no first sine of the first joint
+            columns.append(column.ravel())
         return np.array(columns).T
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Fourier:
@@ -257,11 +253,10 @@ class Harmonic(LinearClass):
         if isinstance(gait, Fourier):
             return gait
         half = symmetric_samples(gait, self.symmetry)
-        if self.symmetry == NONE:
-            whole = half[:, :-1]
-        else:
+        whole = half[:, :-1]
+        if self.symmetry != NONE:
             image = -half[::-1, ::-1] if self.symmetry == BILATERAL else -half
-            whole = np.concatenate([half[:, :-1], image[:, :-1]], axis=1)
+            whole = np.concatenate([whole, image[:, :-1]], axis=1)
         spectrum = np.fft.rfft(whole, axis=1)[:, : self.harmonics + 1] * (2 / whole.shape[1])
         return Fourier(0.5 * spectrum[:, 0].real, spectrum[:, 1:].real, -spectrum[:, 1:].imag)
 
@@ -282,22 +277,18 @@ class Harmonic(LinearClass):
     def perturb(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Fourier:
         series = self.through(gait).resize(self.harmonics)
         steps = step / np.arange(1, self.harmonics + 1) ** fall
-        moved = Fourier(
-            series.mean + step * rng.normal(size=series.mean.shape),
-            series.cos + steps * rng.normal(size=series.cos.shape),
-            series.sin + steps * rng.normal(size=series.sin.shape),
-        )
+        parts = (series.mean, step), (series.cos, steps), (series.sin, steps)
+        moved = Fourier(*(part + size * rng.normal(size=part.shape) for part, size in parts))
         return self.member(self.parameters(moved), gait.n_joint)
 
 
 def harmonics_within(highest: int, symmetry: str) -> Harmonic:
     """The class of all harmonics up to `highest` that gaits of a symmetry have."""
-    return Harmonic(
-        highest - 1 if symmetry == ANTIPODAL and highest % 2 == 0 else highest, symmetry
-    )
+    even = symmetry == ANTIPODAL and highest % 2 == 0
+    return Harmonic(highest - 1 if even else highest, symmetry)
 
 
-def series_of(gait_class: ClassOfGaits, harmonics: int) -> Harmonic:
+def series_of(gait_class: LinearClass, harmonics: int) -> Harmonic:
     return harmonics_within(harmonics, gait_class.symmetry)
 
 

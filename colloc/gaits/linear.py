@@ -5,6 +5,7 @@ q_j(t) = sum_i T_ji phi_i(t) + rest_j,      T = B p.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -12,16 +13,16 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
-from colloc.gaits.symmetry import BILATERAL, NONE
+from colloc.gaits.gait import GaitFunction, finite_array
+from colloc.gaits.symmetry import BILATERAL, NONE, SYMMETRIES, fraction
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import JointMap
 from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import STATED_IF_SET, named_arguments
 from colloc.system.errors import ProblemError
 
-_SERIES = 64
-"""Harmonics of the Fourier series in arc length that a path is projected through."""
+_SERIES, _START_SERIES = 64, 2
+"""Harmonics of the Fourier series in arc length that a path is projected through, and of starts."""
 _CLOSED = 1e-6
 """Relative distance of an image from the class at which it counts as a member."""
 
@@ -83,13 +84,13 @@ class Combination(GaitFunction):
         return self.basis.motor_gait(self)
 
     def lines(self) -> list[str]:
-        if self.joint_map is not None:
-            lines: list[str] = self.basis.lines(self)
-            return lines
-        names = [self.basis.label(i) for i in range(self.table.shape[1])]
+        if (joints := self.joint_map) is not None:
+            stuck = [j for j, gears in enumerate(joints.matrix) if not gears.any()]
+            at = [f"joint {j + 1}: {joints.rest[j]:+.4f}" for j in stuck]
+            return [*self.motor_gait.lines(), *at]
         formulas = []
         for j, row in enumerate(np.round(self.table, 4) + 0.0, 1):
-            terms = [f"{c:+.4f} {name}" for c, name in zip(row, names, strict=True) if c != 0]
+            terms = [f"{c:+.4f} {self.basis.label(i)}" for i, c in enumerate(row) if c != 0]
             formulas.append(f"{self.coordinate} {j}: {' '.join(terms) or '0'}")
         return [f"φ: {self.basis.describe()}", *formulas, *self.pointing]
 
@@ -100,19 +101,31 @@ class Combination(GaitFunction):
     def scaled(self, factor: float) -> Combination:
         return Combination(self.basis, factor * self.table)
 
-    def grown(self, factor: float) -> Combination:
-        return self.scaled(factor)  # a class need not have constant angles
+    grown = scaled  # a class need not have constant angles
 
 
-class LinearClass(ClassOfGaits):
-    """Base of classes in whose parameters angles are linear. A class has to define `functions`,
-    `harmonics`, ``series`` and `describe`; docs/howto/own_gait_class.md."""
+class LinearClass:
+    """Base of classes of gaits. A class has to define `functions`, `harmonics`, `series` and
+    `describe`; docs/howto/own_gait_class.md."""
 
+    symmetry: str
     harmonics: int
     """Harmonics that resolve the functions."""
+    free = True  # has parameters
+    linear = True  # angles are linear in the parameters of the search
+    relative_delta = False  # delta is relative to the shape speed, as the pace does not matter
+    delta_start: float | None = None  # first delta of a search; None: the body's default
+    stages: tuple[float, ...] = ()  # phases that every mesh has as edges
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """phi ``(n_function, n_time)`` at phases t, or the derivatives per period."""
+        raise NotImplementedError
+
+    def series(self, harmonics: int) -> Any:
+        """The class of Fourier series with about so many harmonics that stand for the gaits."""
+        raise NotImplementedError
+
+    def describe(self) -> str:
         raise NotImplementedError
 
     def label(self, number: int) -> str:
@@ -127,6 +140,38 @@ class LinearClass(ClassOfGaits):
         """B ``(n_joint * n_function, n_parameter)``: from parameters to tables."""
         return _symmetric_tables(self, n_joint)
 
+    def _check_symmetry(self) -> None:
+        if self.symmetry not in SYMMETRIES:
+            raise ProblemError(
+                f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}."
+            )
+
+    def with_symmetry(self, symmetry: str) -> Any:
+        return dataclasses.replace(self, symmetry=symmetry)  # type: ignore[type-var]
+
+    def check_joints(self, n_joint: int) -> None:
+        """Raise a `ProblemError` if bodies with so many shape coordinates have no such gaits."""
+        if self.relative_delta and n_joint < 2:
+            raise ProblemError(
+                f"the class {type(self).__name__} needs a body of at least three links, or two "
+                f"modes."
+            )
+        self._basis(n_joint)
+
+    def joint_map(self, n_joint: int) -> JointMap | None:
+        """The map from motors to joints, if several joints hang on one or some are stuck."""
+        return None
+
+    def motor_gait(self, gait: Any) -> Any:
+        """The gait of the motors, of a member."""
+        return gait
+
+    @property
+    def fraction(self) -> float:
+        """Part of the period that is solved; symmetry gives the rest."""
+        return fraction(self.symmetry)
+
+    # meshes
     @property
     def instants(self) -> np.ndarray:
         """Phases at which means are taken and gaits are fitted."""
@@ -134,26 +179,38 @@ class LinearClass(ClassOfGaits):
         return np.arange(n) / n
 
     @property
-    def start_class(self) -> Any:
-        return super().start_class if self.relative_delta else self
+    def pieces(self) -> np.ndarray:
+        """Times from 0 to the end of the solved part between which members are smooth."""
+        return np.array([0.0, self.fraction])
 
     def intervals(self, n_joint: int) -> int:
-        # enough for the waves, and some for stick and slip
+        """Intervals of a first mesh: enough for the waves, and some for stick and slip."""
         return round(self.fraction * (30 + 10 * self.harmonics))
 
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
+        """Least intervals of a mesh with so many points on each, and the reason."""
         return max(2, -(-4 * self.harmonics // per_interval)), f"{self.harmonics} harmonics"
 
+    def edges(self, n: int) -> np.ndarray:
+        """Edges of a mesh of about n intervals on the solved part of the period."""
+        ends = self.pieces
+        shares = np.round(n * np.diff(ends) / ends[-1]).astype(int)
+        counts = np.maximum(2 if self.relative_delta else 1, shares)
+        pieces = zip(ends, ends[1:], counts, strict=False)
+        return np.concatenate([*(np.linspace(a, b, k + 1)[:-1] for a, b, k in pieces), ends[-1:]])
+
+    def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
+        """Phases of a member at times of its program."""
+        return times
+
+    def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
+        """Edges of a program's mesh, from phases of a member."""
+        return phases
+
+    # from parameters to gaits
     def size(self, n_joint: int) -> int:
+        """Number of parameters."""
         return self._basis(n_joint).shape[1]
-
-    def check_joints(self, n_joint: int) -> None:
-        super().check_joints(n_joint)
-        self._basis(n_joint)
-
-    def motor_gait(self, gait: Any) -> Any:
-        """The gait of the motors, of a member."""
-        return gait
 
     def offset(self, n_joint: int) -> np.ndarray:
         """Joint angles ``(n_joint, 1)`` that do not depend on the parameters."""
@@ -161,13 +218,39 @@ class LinearClass(ClassOfGaits):
         return np.zeros((n_joint, 1)) if joint_map is None else joint_map.offset
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Any:
+        """The gait of a parameter vector."""
         return Combination(self, (self._basis(n_joint) @ parameters).reshape(n_joint, -1))
 
     def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
         """The gait in the time of a program, in which angles are linear in the parameters."""
         return self.member(parameters, n_joint)
 
+    def angle_matrix(self, t: np.ndarray, n_joint: int, derivative: int = 0) -> np.ndarray:
+        """Joint angles per parameter at phases t, ``(n_time, n_joint, n_parameter)``, or their
+        derivatives per period."""
+        functions = self.functions(t, derivative)
+        basis = self._basis(n_joint).reshape(n_joint, functions.shape[0], -1)
+        return np.einsum("wt,jwp->tjp", functions, basis)
+
+    def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
+        """Joint rates per parameter at the points of a mesh, at corners that of the interval."""
+        return self.angle_matrix(mesh.times, n_joint, 1)
+
+    def mean_square_rate(self, n_joint: int) -> np.ndarray:
+        """Quadratic form ``(n_parameter, n_parameter)`` of the mean square shape speed."""
+        rates = self.angle_matrix(self.instants, n_joint, 1)
+        return np.einsum("tjp,tjq->pq", rates, rates) / self.instants.size
+
+    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest parameters ``(n_parameter,)`` of gaits whose angles keep a limit."""
+        matrix = self.angle_matrix(self.instants, body.n_joint)
+        inverse = np.linalg.pinv(matrix.reshape(-1, matrix.shape[2]))
+        largest = largest_coordinate(body) * limit * np.abs(inverse).sum(axis=1)
+        return -largest, largest
+
+    # from gaits to parameters
     def parameters(self, gait: Any) -> np.ndarray:
+        """Parameters of the member nearest to a gait."""
         return self.nearest(gait)
 
     def nearest(self, gait: Any) -> np.ndarray:
@@ -178,40 +261,24 @@ class LinearClass(ClassOfGaits):
         angles = (gait.angles(self.instants) - self.offset(gait.n_joint)).T
         return np.linalg.lstsq(matrix.reshape(angles.size, -1), angles.ravel(), rcond=None)[0]
 
+    def in_phase(self, gait: Any) -> bool:
+        """True if a gait starts in the phase in which members do."""
+        return True
+
     def through(self, gait: Any) -> Any:
-        """The member nearest to a gait; of a path without a phase, to its Fourier series."""
+        """The gait that a search in the class begins with: the member nearest to a gait; of a path
+        without a phase, to its Fourier series."""
         if self.relative_delta or getattr(gait, "basis", None) == self:
             return gait
         timed = gait if gait.is_series else self.series(_SERIES).through(gait)
         return self.member(self.parameters(timed), gait.n_joint)
 
-    def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest parameters ``(n_parameter,)`` of gaits whose angles keep a limit."""
-        matrix = self.angle_matrix(self.instants, body.n_joint)
-        inverse = np.linalg.pinv(matrix.reshape(-1, matrix.shape[2]))
-        largest = largest_coordinate(body) * limit * np.abs(inverse).sum(axis=1)
-        return -largest, largest
-
-    def angle_matrix(self, t: np.ndarray, n_joint: int, derivative: int = 0) -> np.ndarray:
-        """Joint angles per parameter at phases t, ``(n_time, n_joint, n_parameter)``."""
-        functions = self.functions(t, derivative)
-        basis = self._basis(n_joint).reshape(n_joint, functions.shape[0], -1)
-        return np.einsum("wt,jwp->tjp", functions, basis)
-
-    def rate_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
-        """Joint rates per period and parameter at phases t, ``(n_time, n_joint, n_parameter)``."""
-        return self.angle_matrix(t, n_joint, 1)
-
-    def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
-        """`rate_matrix` at the points of a mesh, at corners that of the point's interval."""
-        return self.rate_matrix(mesh.times, n_joint)
-
-    def mean_square_rate(self, n_joint: int) -> np.ndarray:
-        """Quadratic form ``(n_parameter, n_parameter)`` of the mean square shape speed."""
-        rates = self.rate_matrix(self.instants, n_joint)
-        return np.einsum("tjp,tjq->pq", rates, rates) / self.instants.size
-
     # where searches begin
+    @property
+    def start_class(self) -> Any:
+        """The class that starts of a search are drawn from."""
+        return self.series(_START_SERIES) if self.relative_delta else self
+
     def sample_dimension(self, n_joint: int) -> int:
         """Dimension of the unit cube that starts are drawn from."""
         return self.size(n_joint)
@@ -241,8 +308,7 @@ def enclosed_area(gait_class: LinearClass, n_joint: int) -> np.ndarray:
     """Quadratic form ``(n_parameter, n_parameter)`` of the area ``integral of sum_(i<j) (q_i dq_j -
     q_j dq_i) / 2`` that a path encloses [rad^2]; 0 for retraced paths."""
     instants = gait_class.instants
-    angles = gait_class.angle_matrix(instants, n_joint)
-    rates = gait_class.rate_matrix(instants, n_joint)
+    angles, rates = (gait_class.angle_matrix(instants, n_joint, order) for order in (0, 1))
     sign = np.triu(np.ones((n_joint, n_joint)), 1)
     form = 0.5 * np.einsum("tip,ij,tjq->pq", angles, sign - sign.T, rates) / instants.size
     return 0.5 * (form + form.T)

@@ -4,11 +4,13 @@ phase as a point on a circle, ``(cos 2 pi t, sin 2 pi t)``."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import ClassOfGaits, GaitFunction
-from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.gait import GaitFunction
+from colloc.gaits.harmonic import series_of
+from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import ANTIPODAL, NONE, both_halves
 from colloc.system.errors import ProblemError
 
@@ -32,20 +34,17 @@ class Phases(GaitFunction):
     def corner_phases(self) -> np.ndarray:
         return both_halves(self.symmetry, np.array(self.schedule))
 
-    def lines(self) -> list[str]:
-        return []
-
     def angles(self, t: np.ndarray) -> np.ndarray:
         phase = 2 * np.pi * np.asarray(t, dtype=float)
         return np.stack([np.cos(phase), np.sin(phase)])
 
     def rates(self, t: np.ndarray) -> np.ndarray:
-        phase = 2 * np.pi * np.asarray(t, dtype=float)
-        return 2 * np.pi * np.stack([-np.sin(phase), np.cos(phase)])
+        cos, sin = self.angles(t)
+        return 2 * np.pi * np.stack([-sin, cos])
 
 
 @dataclass(frozen=True)
-class Prescribed(ClassOfGaits):
+class Prescribed(LinearClass):
     """The class of a prescribed motion.
 
     Parameters
@@ -59,7 +58,8 @@ class Prescribed(ClassOfGaits):
     stages: tuple[float, ...] = (0.0, 1.0)
     symmetry: str = NONE
 
-    free = False
+    free, harmonics = False, 1
+    series = series_of
 
     def __post_init__(self) -> None:
         stages = tuple(float(t) for t in self.stages)
@@ -74,28 +74,24 @@ class Prescribed(ClassOfGaits):
                 f"gait.stages must ascend from 0 to {self.fraction:g}, not {stages}."
             )
 
+    @property
+    def pieces(self) -> np.ndarray:
+        return np.array(self.stages)
+
     def intervals(self, n_joint: int) -> int:
         return _INTERVALS_A_STAGE * (len(self.stages) - 1)
 
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         return len(self.stages) - 1, "the stages"
 
-    def edges(self, n: int) -> np.ndarray:
-        each = max(1, round(n / (len(self.stages) - 1)))
-        stages = zip(self.stages, self.stages[1:], strict=False)
-        parts = [np.linspace(a, b, each + 1)[:-1] for a, b in stages]
-        return np.concatenate([*parts, self.stages[-1:]])
-
     def describe(self) -> str:
         return f"a prescribed motion, symmetry {self.symmetry}"
 
-    def size(self, n_joint: int) -> int:
-        return 0
+    def _basis(self, n_joint: int) -> np.ndarray:
+        return np.empty((0, 0))
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Phases:
         return Phases(self.stages, self.symmetry)
 
-    trajectory = member
-
-    def series(self, harmonics: int) -> Harmonic:
-        return Harmonic(1, self.symmetry)
+    def through(self, gait: Any) -> Any:
+        return gait

@@ -233,7 +233,7 @@ class Problem:
     def _check_parts(self) -> None:
         check_name(self.name)
         check_kind("friction", self.friction, gait_fields.LAWS, Law)
-        check_kind("gait", self.gait, gait_fields.CLASSES)
+        check_kind("gait", self.gait, gait_fields.CLASSES, LinearClass)
         motion = LEVEL if self.motion is None else self.motion
         check_kind("motion", motion, [Regime, *gait_fields.MOTIONS])
         if self.gait.free == bool(schedule(self.body)):
@@ -519,8 +519,8 @@ def _retraces(problem: Problem) -> bool:
     """True if every gait of a class goes back the way it came: the rates of a random member have
     one direction."""
     gaits, n_joint = problem.gait, problem.body.n_joint
-    if not isinstance(gaits, LinearClass):
+    if not gaits.free:
         return False
-    rates = gaits.rate_matrix(gaits.instants, n_joint)
+    rates = gaits.angle_matrix(gaits.instants, n_joint, 1)
     drawn = np.random.default_rng(0).normal(size=rates.shape[2])
     return bool(np.linalg.matrix_rank(rates @ drawn) <= 1)

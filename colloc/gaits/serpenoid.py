@@ -155,36 +155,32 @@ class Serpenoid(Harmonic):
         amplitudes = (-wave[k - 1].imag if sine else wave[k - 1].real for k, sine in self._waves)
         return np.array([lag, *offset, *amplitudes])
 
-    def nearest(self, gait: Fourier) -> np.ndarray:
-        return self.parameters(gait)
+    nearest = parameters
 
     def in_phase(self, gait: Fourier) -> bool:
         return abs(self._lag_and_start(gait)[1]) <= SAME_START
 
     def _lag_and_start(self, gait: Fourier) -> tuple[float, float]:
-        """Lag of the wave nearest to a gait, and by how much it starts off the phase of members
-        [rad]."""
+        """Lag of the wave nearest to a gait, at which the joints agree best on the wave they are
+        part of, and by how much it starts off the phase of members [rad]."""
         lag, gait = getattr(gait, "lag", None), gait.resize(self.harmonics)
-        if lag is None:
-            lag = self._nearest_lag(gait)
-        first = _at_the_middle(gait, lag)[0]
-        in_phase = self.symmetry == BILATERAL or first == 0
-        return lag, 0.0 if in_phase else float(np.angle(1j * first))
-
-    def _nearest_lag(self, gait: Fourier) -> float:
-        """The lag at which the joints agree best on the wave they are part of."""
-        from scipy.optimize import minimize_scalar
 
         def disagreement(lag: float) -> float:
             wave = _at_the_middle(gait, lag)
             amplitudes = wave.imag if self.symmetry == BILATERAL else np.abs(wave)
             return -float(np.sum(amplitudes**2))
 
-        first = _LAGS[np.argmin([disagreement(lag) for lag in _LAGS])]
-        step = _LAGS[1] - _LAGS[0]
-        bounds = max(first - step, -np.pi), min(first + step, np.pi)
-        how: Any = {"method": "bounded", "options": {"xatol": 1e-12}}
-        return float(minimize_scalar(disagreement, bounds=bounds, **how).x)
+        if lag is None:
+            from scipy.optimize import minimize_scalar
+
+            first = _LAGS[np.argmin([disagreement(lag) for lag in _LAGS])]
+            step = _LAGS[1] - _LAGS[0]
+            bounds = max(first - step, -np.pi), min(first + step, np.pi)
+            how: Any = {"method": "bounded", "options": {"xatol": 1e-12}}
+            lag = float(minimize_scalar(disagreement, bounds=bounds, **how).x)
+        first = _at_the_middle(gait, lag)[0]
+        in_phase = self.symmetry == BILATERAL or first == 0
+        return lag, 0.0 if in_phase else float(np.angle(1j * first))
 
     def bounds(self, body: Body, limit: float) -> tuple[np.ndarray, np.ndarray]:
         _, largest = super().bounds(body, limit)

@@ -1,9 +1,8 @@
 """Initial gaits of a search: random ones, or a gait of another class or chain.
 
-Admissible shapes are star-shaped about the straight body: joint limits and non-crossing keep
-holding when all angles shrink together. So a gait is sampled as a direction in the space of
-parameters times a fraction of the largest admissible amplitude. Start number k of a seed does not
-depend on the number of starts.
+Admissible shapes stay so when all angles shrink together. So a gait is sampled as a direction in
+the space of parameters times a fraction of the largest admissible amplitude. Start number k of a
+seed does not depend on the number of starts.
 """
 
 from __future__ import annotations
@@ -61,8 +60,8 @@ def is_visible(gait: AnyGait) -> bool:
 
 
 def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndarray:
-    """Points ``(n, dimension)`` of the unit cube, one in every n-th of each coordinate (McKay,
-    Beckman and Conover, 1979), as those of `scipy.stats.qmc`, which takes half a second to load."""
+    """Points ``(n, dimension)`` of the unit cube, one in every n-th of each coordinate, as those of
+    `scipy.stats.qmc`, which takes half a second to load."""
     within, order = rng.uniform(size=(n, dimension)), np.tile(np.arange(1, n + 1), (dimension, 1))
     for coordinate in order:
         rng.shuffle(coordinate)
@@ -75,10 +74,11 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
     block, row = divmod(start, BLOCK)
     seeds, n_joint = problem.gait.start_class, problem.body.n_joint
     least = problem.smallest_shape_speed
+    fastest: AnyGait = None
     dimension = seeds.sample_dimension(n_joint) + 1
     rng = np.random.default_rng([seed, block]).spawn(1)[0]  # as newer releases of SciPy do
     unit = latin_hypercube(BLOCK, dimension, rng)[row]
-    again, fastest = np.random.default_rng([seed, block, row + 1]), None
+    again = np.random.default_rng([seed, block, row + 1])
     for _ in range(_ATTEMPTS + 1):
         fraction = _FRACTIONS[0] + unit[-1] * (_FRACTIONS[1] - _FRACTIONS[0])
         gait = _with_amplitude(problem, seeds.sample(unit[:-1], n_joint), fraction)
@@ -87,7 +87,7 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
         if fastest.shape_speed > _CLEARLY_MOVING * least:
             return fastest
         unit = again.random(dimension)
-    if fastest is not None and fastest.shape_speed > least:
+    if fastest.shape_speed > least:
         return fastest
     raise ProblemError(
         f"found no admissible start as fast as smallest_shape_speed {least:g}; make it smaller."
@@ -115,19 +115,13 @@ def perturbed_gait(problem: Problem, seed: int, start: int) -> AnyGait:
 
 
 def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> AnyGait:
-    """Start of a sampler by name."""
-    if sampler not in SAMPLERS:
-        raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {sampler!r}.")
     return (perturbed_gait if sampler == PERTURBED else latin_hypercube_gait)(problem, seed, start)
 
 
 def to_body(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> AnyGait:
     """Transfer a gait of a chain to another body: every link gets the mean tangent angle of the
-    part of the body it covers.
-
-    Linear in the joint angles, it keeps the symmetries. Where links would cross, or a joint pass
-    its limit, all angles shrink.
-    """
+    part of the body it covers. Where links would cross, or a joint pass its limit, all angles
+    shrink."""
     matrix = other.from_chain(np.array(body.lengths))
     angles = matrix @ gait.angles(_PERIOD)
     return gait.mapped(matrix * min(1.0, largest_factor(other, joint_limit, angles)))
@@ -140,11 +134,8 @@ def to_class(
     joint_limit: Limit = float(np.pi),
     smallest_shape_speed: float = 0.1,
 ) -> AnyGait:
-    """Transfer a gait to a class, and make it admissible.
-
-    A truncated series overshoots, so that a path at its limits shrinks; it cuts corners, so that a
-    path as short as it may be grows about its mean.
-    """
+    """Transfer a gait to a class, and make it admissible: a truncated series overshoots, and cuts
+    corners."""
     start = gait_class.through(gait)
     growth = 2 * np.pi * smallest_shape_speed / start.length
     if growth > _SHORT:
@@ -157,19 +148,8 @@ def to_class(
 
 
 def prolong(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:
-    """The problem in another class of gaits, to be searched from a known optimum of any class.
-
-    Delta stays what it is relative to the shape speed; other fields may be changed too
-    (``intervals=...``).
-
-    Examples
-    --------
-    >>> from colloc import Harmonic, Polygon, Problem, ellipse
-    >>> best = ellipse(0, 2.86, 1.30)
-    >>> prolong(Problem("loop", best, gait=Harmonic(1, "bilateral")), best, Polygon(5,
-    ...     "bilateral")).gait
-    Polygon(corners=5, symmetry='bilateral', axis='corner')
-    """
+    """The problem in another class of gaits, to be searched from a known optimum of any class;
+    delta stays what it is relative to the shape speed."""
     relative = problem.delta / (1.0 if problem.gait.relative_delta else problem.guess.length)
     delta = relative * (1.0 if gait_class.relative_delta else gait.length)
     guess = to_class(

@@ -18,11 +18,11 @@ from colloc.bounds.motions import (
     one_joint,
     unit_directions,
 )
+from colloc.gaits.bspline import Corners
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import largest_factor
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.limits import widest
-from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import to_class
 from colloc.mechanics.law import rate_independent

@@ -7,7 +7,6 @@ import numpy as np
 from colloc.dynamics.collocated import whole_turns
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.linear import LinearClass
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.gaits.serpenoid import Serpenoid
@@ -15,7 +14,6 @@ from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.contact import Pairs
 from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
 from colloc.reduced.program import SearchSpace
-from colloc.system.errors import ProblemError
 from colloc.transcription.full_program import FullProgram, full_program
 
 SPACES = LinearSpace, SerpenoidSpace, SearchSpace
@@ -36,13 +34,8 @@ def space_of(
         space: type = SerpenoidSpace
     elif isinstance(problem.gait, Prescribed):
         space = SearchSpace
-    elif isinstance(problem.gait, LinearClass):
-        space = LinearSpace
     else:
-        raise ProblemError(
-            f"no search is known for the class {type(problem.gait).__name__}: derive it from "
-            f"LinearClass (docs/howto/own_gait_class.md)."
-        )
+        space = LinearSpace
     return space(control_problem(problem), edges, scheme, far)
 
 

@@ -218,7 +218,7 @@ class FullProgram(Program):
         mesh, turn, (state, rate) = self.mesh, self.dynamics.turn, self.mesh.integration()
         rows = state @ self.pick(self.layout.theta) - RADIANS * rate @ self.pick(spin)
         if self.relative and turn:  # the axes turn evenly along the path
-            corners = self.control.admissible.gait.corners_in_time
+            corners = self.control.admissible.gait.pieces
             side = np.searchsorted(corners, mesh.edges[:-1], side="right") - 1
             side = np.repeat(side, mesh.scheme.s)
             share = sparse.diags(turn * corners[-1] / np.diff(corners)[side])

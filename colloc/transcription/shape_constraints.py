@@ -89,9 +89,7 @@ class ShapeCheck:
 
     def matrix(self, gaits: Any, times: np.ndarray, n_joint: int) -> np.ndarray:
         """Parameters of a class to its shapes, or their rates, ``(n_time, n_joint, n)``."""
-        return np.asarray(
-            (gaits.rate_matrix if self.derivative else gaits.angle_matrix)(times, n_joint)
-        )
+        return np.asarray(gaits.angle_matrix(times, n_joint, self.derivative))
 
 
 class Placed(NamedTuple):

@@ -85,7 +85,7 @@ def test_a_polygon_is_a_spline_of_degree_1_whose_pace_does_not_matter():
         edges = kind.edges(24)
         np.testing.assert_allclose(kind.times(gait, kind.phases(gait, edges)), edges, atol=1e-12)
         assert np.ptp(np.linalg.norm(gait.rates(t), axis=0)) < 1e-9
-        assert np.abs(edges[:, None] - kind.corners_in_time).min(axis=0).max() < 1e-12
+        assert np.abs(edges[:, None] - kind.pieces).min(axis=0).max() < 1e-12
 
 
 @pytest.mark.parametrize(

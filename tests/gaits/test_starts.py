@@ -43,7 +43,7 @@ def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
     body, wave = Chain(width=width), Fourier([1.9, 1.9], [[0.2], [0.2]], [[0.0], [0.8]])
     with pytest.raises(ProblemError, match=f"{words} at phase") as refused:
         Problem("crossed", wave, body, gait=Harmonic(1))
-    phase = float(str(refused.value).rstrip(".").split()[-1])
+    phase = float(str(refused.value).split("phase ")[1].split(";")[0])
     phases = np.append(phase, np.arange(400) / 400)
     depth = crossing_depth(body, checked_member(Harmonic(1), wave)[0].angles(phases))
     assert 0.05 < phase < 0.4

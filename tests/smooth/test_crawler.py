@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from colloc.commands.main import main as colloc_main
-from colloc.gaits.bspline import Polygon
-from colloc.gaits.polygon import Corners
+from colloc.gaits.bspline import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import Friction

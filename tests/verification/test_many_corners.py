@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, replay
-from colloc.gaits.polygon import Corners
+from colloc.gaits.bspline import Corners
 from colloc.mechanics.contact import crossing_depth
 
 FILE = Path(__file__).resolve().parents[2] / "results/curated/many_corners.json"
