@@ -15,9 +15,9 @@ from colloc.smooth.prescribed_body import Concertina as Concertina
 from colloc.smooth.crawler_body import CrawlerBody as CrawlerBody
 from colloc.smooth.prescribed_body import Wave as Wave
 from colloc.mechanics.friction import Friction as Friction
-from colloc.laws.elliptic import Elliptic as Elliptic
-from colloc.laws.viscous import Viscous as Viscous
-from colloc.laws.power_law import PowerLaw as PowerLaw
+from colloc.laws.resistance import Elliptic as Elliptic
+from colloc.laws.resistance import Viscous as Viscous
+from colloc.laws.resistance import PowerLaw as PowerLaw
 from colloc.laws.own_law import OwnLaw as OwnLaw
 from colloc.laws.fitted_friction import (
     fitted_friction as fitted_friction,

@@ -17,10 +17,8 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.linear import Combination
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
-from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
-from colloc.laws.power_law import PowerLaw
-from colloc.laws.viscous import Viscous
+from colloc.laws.resistance import Elliptic, PowerLaw, Viscous
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import FeetLaw, Foot

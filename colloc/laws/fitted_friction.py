@@ -146,14 +146,15 @@ def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
     if not any(fit[1:].any() for fit in fits):
         along, across, back = (fit[0] for fit in fits)
         return Friction(mu_t=across, mu_f=along, mu_b=back)
-    along, across, back = (
-        " + ".join(
+    words = []
+    for fit in fits:
+        terms = [
             term.format(f"{c:.6g}", f"{v_s:.6g}")
             for term, c in zip(_TERMS, fit, strict=True)
             if c > 0
-        )
-        for fit in fits
-    )
+        ]
+        words.append(" + ".join(terms))
+    along, across, back = words
     if back != along:
         along = f"where(vs > 0, {along}, {back})"
     return OwnLaw(f"-({along})*vs/speed", f"-({across})*vn/speed", speed_unit=scale)
@@ -161,39 +162,35 @@ def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
 
 def _read(table: Any) -> tuple[str, np.ndarray]:
     """The source, and speed, along, across and, where it differs, back ``(n, 3 or 4)``."""
-    if not isinstance(table, (str, os.PathLike)):
+    name, names = "the table of friction", list[str]()
+    if isinstance(table, (str, os.PathLike)):
+        name = str(table)
+        names, values = csv_table(Path(table), _FEWEST)
+    else:
         cells = np.array(table, dtype=object)
-        if cells.ndim != 2 or len(cells) < _FEWEST or cells.shape[1] not in (3, 4):
-            raise ProblemError(
-                f"the table of friction must be numbers with a row for each of at least {_FEWEST} "
-                f"speeds: the speed, the "
-                "coefficient along, across and, if it differs, backwards."
-            )
+        if cells.ndim != 2 or len(cells) < _FEWEST:
+            raise ProblemError(f"{name} must have a row for each of at least {_FEWEST} speeds.")
         values = np.vectorize(_number, otypes=[float])(cells)
         for k, j in np.argwhere(~np.isfinite(values)):
-            what = f"{tuple(_NAMES)[j]} is {cells[k, j]!r}"
-            raise ProblemError(
-                f"the table of friction, sample {k + 1}: {what}, and must be a finite number."
-            )
-        return "the table of friction", values
-    names, values = csv_table(Path(table), _FEWEST)
+            what = f"{[*_NAMES, 'more'][min(j, 4)]} is {cells[k, j]!r}"
+            raise ProblemError(f"{name}, sample {k + 1}: {what}, and must be a finite number.")
     if not names:
         if values.shape[1] not in (3, 4):
             raise ProblemError(
-                f"{table} has {values.shape[1]} columns: write the speed, the coefficient along, "
-                f"across and, if it differs, "
-                "backwards; or name the columns speed, along, across, back."
+                f"{name} has {values.shape[1]} columns: write the speed, the coefficient along, "
+                f"across and, if it differs, backwards; a file may name its columns speed, along, "
+                f"across, back."
             )
-        return str(table), values
+        return name, values
     order = []
     for wanted, others in _NAMES.items():
-        found = [k for k, name in enumerate(names) if name in others]
+        found = [k for k, each in enumerate(names) if each in others]
         if not found and wanted != "back":
             raise ProblemError(
-                f"{table} has no column {wanted!r}: its columns are {', '.join(names)}."
+                f"{name} has no column {wanted!r}: its columns are {', '.join(names)}."
             )
         order += found[:1]
-    return str(table), values[:, order]
+    return name, values[:, order]
 
 
 def _number(cell: Any) -> float:
@@ -204,26 +201,22 @@ def _number(cell: Any) -> float:
 
 
 def _check(name: str, speed: np.ndarray, coefficients: np.ndarray) -> None:
+    what = ""
     if (speed < 0).any():
-        raise ProblemError(
-            f"{name}: speed {speed.min():g} is negative; give speeds of sliding without their "
-            f"direction."
-        )
-    if max(speed.max(), coefficients.max()) > _MOST:
-        raise ProblemError(
-            f"{name}: speeds and coefficients must be below {_MOST:g}; is a column in the wrong "
-            f"place?"
-        )
-    if speed.max() == 0:
-        raise ProblemError(f"{name}: all speeds are 0; friction is a matter of sliding.")
-    if (coefficients <= 0).any():
+        what = f"speed {speed.min():g} is negative; give speeds of sliding without their direction"
+    elif max(speed.max(), coefficients.max()) > _MOST:
+        what = f"speeds and coefficients must be below {_MOST:g}; is a column in the wrong place?"
+    elif speed.max() == 0:
+        what = "all speeds are 0; friction is a matter of sliding"
+    elif (coefficients <= 0).any():
         which, k = np.argwhere(coefficients <= 0)[0]
-        direction = tuple(_NAMES)[1 + which]
-        raise ProblemError(
-            f"{name}, sample {k + 1}: the coefficient {direction} is {coefficients[which, k]:g}. "
-            f"It has to be positive, else "
-            "friction would give energy to the body."
+        what = (
+            f"in sample {k + 1} the coefficient {tuple(_NAMES)[1 + which]} is "
+            f"{coefficients[which, k]:g}; it has to be positive, else friction would give energy "
+            f"to the body"
         )
+    if what:
+        raise ProblemError(f"{name}: {what}.")
 
 
 def _basis(speed: np.ndarray, v_s: float) -> np.ndarray:

@@ -20,6 +20,8 @@ _STEP, _JUMP = 1e-9, 1e-6
 """Distance in delta, and change of the force over the largest, that tell a jump from a slope of
 1/delta."""
 _RTOL, _LEAST = 1e-10, 1e-12
+_ANGLE = np.linspace(0, 2 * np.pi, 721)[None]
+_CIRCLE, _DRY = (np.cos(_ANGLE), np.sin(_ANGLE)), np.array([[1e-9]])  # unit speed, and its delta
 
 
 def _samples() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -77,28 +79,23 @@ class OwnLaw:
     def __post_init__(self) -> None:
         check_positive(self, "unit", "speed_unit", of="friction.")
         vs, vn, delta = _samples()
+        zero = np.zeros((1, 1))
         with np.errstate(all="ignore"):  # what is not finite is refused
             fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))
-            zero = np.zeros((1, 1))
             rest = np.abs(self.density(zero, zero, zero + _DELTAS[0])).max()
-        if not (np.isfinite(fs).all() and np.isfinite(fn).all()):
+        if not (np.isfinite(fs).all() and np.isfinite(fn).all() and not np.isnan(rest)):
+            where = "at rest (vs = vn = 0)" if np.isnan(rest) else "somewhere"
             raise ProblemError(
-                "friction: a formula has no finite value somewhere; divide by speed, which is "
-                "never zero."
+                f"friction: a formula has no finite value {where}; divide by speed, which is never "
+                f"zero."
             )
         gain = fs * vs + fn * vn
         if (gain >= 0).any():
             worst = np.unravel_index(np.argmax(gain / np.hypot(vs, vn)), gain.shape)
             raise ProblemError(
                 f"friction: at (vs, vn) = ({vs[worst]:.3g}, {vn[worst]:.3g}) the force "
-                f"({fs[worst]:.3g}, {fn[worst]:.3g}) does "
-                "not oppose the motion, so friction would give energy to the body; look at the "
-                "signs."
-            )
-        if np.isnan(rest):
-            raise ProblemError(
-                "friction: a formula has no value at rest (vs = vn = 0); divide by speed, which is "
-                "never zero."
+                f"({fs[worst]:.3g}, {fn[worst]:.3g}) does not oppose the motion, so friction would "
+                f"give energy to the body; look at the signs."
             )
         if rest > 0:
             raise ProblemError("friction: a formula does not vanish at rest (vs = vn = 0).")
@@ -109,12 +106,11 @@ class OwnLaw:
                 "symmetries exclude."
             )
         # a force that jumps has no balance where it does
-        for name, s, n in (("vs", 1.0, 0.0), ("vn", 0.0, 1.0)):
-            step = _STEP * delta
-            sides = [
-                self.density(vs * n + sign * s * step, vn * s + sign * n * step, delta)
-                for sign in (1, -1)
-            ]
+        step = _STEP * delta
+        for name, *sides in (
+            ("vs", self.density(step, vn, delta), self.density(-step, vn, delta)),
+            ("vn", self.density(vs, step, delta), self.density(vs, -step, delta)),
+        ):
             jump = np.hypot(*(a - b for a, b in zip(*sides, strict=True)))
             if (jump / np.hypot(*sides[0]).max()).max() > _JUMP:
                 raise ProblemError(
@@ -164,21 +160,15 @@ class OwnLaw:
         return any(name in each.names for each in self._read for name in ("speed", "delta"))
 
     @cached_property
-    def _at_unit_speed(self) -> tuple[float, float]:
-        angle = np.linspace(0, 2 * np.pi, 721)[None]
-        fs, fn = self.density(np.cos(angle), np.sin(angle), np.array([[1e-9]]))
-        dissipation = -(fs * np.cos(angle) + fn * np.sin(angle))
-        return float(dissipation.min()), float(np.hypot(fs, fn).max())
-
-    @property
     def smallest(self) -> float:
         """Smallest dissipation at unit speed."""
-        return self._at_unit_speed[0]
+        fs, fn = self.density(*_CIRCLE, _DRY)
+        return float(-(fs * _CIRCLE[0] + fn * _CIRCLE[1]).max())
 
-    @property
+    @cached_property
     def largest(self) -> float:
         """Largest force at unit speed."""
-        return self._at_unit_speed[1]
+        return float(np.hypot(*self.density(*_CIRCLE, _DRY)).max())
 
     def in_units_of(self, unit: float) -> OwnLaw:
         return replace(self, unit=self.unit * unit)

@@ -29,7 +29,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.limits import range_of
-from colloc.laws.elliptic import Elliptic
+from colloc.laws.resistance import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.mechanics.floor_contact import whole_links

@@ -227,7 +227,7 @@ def certify(
     ----------
     domain : Domain
         Three links, and associated friction: equal coefficients, or
-        `colloc.laws.elliptic.Elliptic`.
+        `colloc.laws.resistance.Elliptic`.
     space, free
         The potential, as `colloc.bounds.sampled.Bound` or a kept one has it.
     target : float

@@ -22,7 +22,7 @@ from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline, large
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, smallest_maximum
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
-from colloc.laws.viscous import Viscous
+from colloc.laws.resistance import Viscous
 from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import Foot

@@ -14,7 +14,7 @@ from colloc.commands.results import export as main
 from colloc.commands.solve import summary_lines
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
-from colloc.laws.viscous import Viscous
+from colloc.laws.resistance import Viscous
 from colloc.mechanics.friction import Friction
 from colloc.pictures.report_page import report_page
 from colloc.results.store import save

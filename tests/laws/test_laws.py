@@ -9,10 +9,8 @@ from scipy.integrate import quad
 from colloc.bounds.motions import Domain
 from colloc.bounds.sampled import QUICK, bound_key
 from colloc.gaits.gait_fields import LAWS, fields, law_from
-from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
-from colloc.laws.power_law import PowerLaw
-from colloc.laws.viscous import Viscous
+from colloc.laws.resistance import Elliptic, PowerLaw, Viscous
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import motion_and_derivatives

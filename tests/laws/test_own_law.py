@@ -9,8 +9,7 @@ import pytest
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.laws.own_law import OwnLaw
-from colloc.laws.power_law import PowerLaw
-from colloc.laws.viscous import Viscous
+from colloc.laws.resistance import PowerLaw, Viscous
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import Friction

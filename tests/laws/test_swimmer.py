@@ -14,8 +14,7 @@ from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import load_problem
-from colloc.laws.power_law import PowerLaw
-from colloc.laws.viscous import Viscous
+from colloc.laws.resistance import PowerLaw, Viscous
 from colloc.mechanics.chain import Chain
 from colloc.pictures.report_page import report_page
 from colloc.results.store import load, save

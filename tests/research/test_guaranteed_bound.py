@@ -7,7 +7,7 @@ import pytest
 from colloc.bounds.motions import CoulombMotion, Domain, balanced_motion
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
-from colloc.laws.elliptic import Elliptic
+from colloc.laws.resistance import Elliptic
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth

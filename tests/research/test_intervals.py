@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from colloc.laws.elliptic import Elliptic
+from colloc.laws.resistance import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from colloc.laws.power_law import PowerLaw
-from colloc.laws.viscous import Viscous
+from colloc.laws.resistance import PowerLaw, Viscous
 from colloc.mechanics.friction import Friction
 from colloc.results.motion import friction_arrows
 from colloc.smooth.crawler_body import LAP, CrawlerBody
