@@ -173,11 +173,9 @@ def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
         raise ProblemError("gait.columns must be finite numbers.")
     if np.ptp(values, axis=-1).max() == 0:
         raise ProblemError("gait.columns do not change over time: nothing would move.")
-    return tuple(_nested_tuple(each.tolist()) for each in arrays)
-
-
-def _nested_tuple(values: list) -> tuple:
-    return tuple(_nested_tuple(value) if isinstance(value, list) else value for value in values)
+    if values.ndim == 2:
+        return tuple(map(tuple, values.tolist()))
+    return tuple(tuple(map(tuple, column)) for column in values.tolist())
 
 
 def _read(path: Path) -> list[np.ndarray]:

@@ -23,6 +23,7 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import named_arguments
 from colloc.system.errors import ProblemError
 
+_COMPLEX_STEP = 1e-30
 _LAGS = np.linspace(-np.pi, np.pi, 361)  # first guesses of the lag of a gait
 
 
@@ -119,16 +120,10 @@ class Serpenoid(Harmonic):
         return table
 
     def coefficient_slopes(self, wave: np.ndarray, n_joint: int) -> np.ndarray:
-        """Derivatives of `coefficients`, ``(n_joint * (2 K + 1), n_own)``."""
-        k = np.arange(1, self.harmonics + 1) * _places(n_joint)[:, None]
-        table = np.array(self.coefficients(wave, n_joint), dtype=float)
-        by_lag = np.zeros_like(table)
-        by_lag[:, 1::2], by_lag[:, 2::2] = -k * table[:, 2::2], k * table[:, 1::2]
-        columns = [by_lag]
-        for unit in np.eye(self.n_own)[1:]:  # linear in the others
-            unit[0] = wave[0]
-            columns.append(np.array(self.coefficients(unit, n_joint), dtype=float))
-        return np.array([column.ravel() for column in columns]).T
+        """Derivatives of `coefficients`, ``(n_joint * (2 K + 1), n_own)``, by complex steps."""
+        steps = wave + 1j * _COMPLEX_STEP * np.eye(self.n_own)
+        columns = [np.ravel(self.coefficients(step, n_joint)).imag for step in steps]
+        return np.array(columns).T / _COMPLEX_STEP
 
     def full(self, wave: np.ndarray, n_joint: int) -> np.ndarray:
         """The parameters of a wave, then its Fourier coefficients."""

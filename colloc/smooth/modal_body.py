@@ -102,9 +102,6 @@ class ModalBody(SmoothBody):
             return namespace(angles).matmul(self.modes_at(s[:, 0]), angles)
         return np.einsum("itm,mt->it", self.modes_at(s), angles)
 
-    def turning(self, s: np.ndarray, angles: Array, rates: Array) -> Array:
-        return self.tangent(s, rates)
-
     @property
     def bounded_angles(self) -> BoundedAngles:
         count = _PLACES_A_MODE * self.modes

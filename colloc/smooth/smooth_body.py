@@ -60,8 +60,8 @@ class SmoothBody(Body):
         raise NotImplementedError
 
     def turning(self, s: np.ndarray, angles: Array, rates: Array) -> Array:
-        """Rate of Theta."""
-        raise NotImplementedError
+        """Rate of Theta; here of one that is linear in the shape coordinates."""
+        return self.tangent(s, rates)
 
     def breaks(self, angles: np.ndarray) -> np.ndarray:
         """Arc lengths ``(n_break, n_time)`` at which Theta is not smooth."""

@@ -149,7 +149,7 @@ def test_it_is_kept_in_files(tmp_path, broken):
         ({"gears": 3}, "a row of numbers for each joint"),
         ({"stuck": 5}, "stuck gives joints and their angles"),
         ({"stuck": [1, 2]}, "stuck gives joints and their angles"),
-        ({"stuck": [(1, 0.1), (1, 0.2)]}, "names a joint twice"),
+        ({"stuck": [(1, 0.1), (1, 0.2)]}, "each is named once"),
     ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(said, words):
