@@ -122,7 +122,7 @@ class Serpenoid(Harmonic):
     def coefficient_slopes(self, wave: np.ndarray, n_joint: int) -> np.ndarray:
         """Derivatives of `coefficients`, ``(n_joint * (2 K + 1), n_own)``, by complex steps."""
         steps = wave + 1j * _COMPLEX_STEP * np.eye(self.n_own)
-        columns = [np.ravel(self.coefficients(step, n_joint)).imag for step in steps]
+        columns: list = [np.ravel(self.coefficients(step, n_joint)).imag for step in steps]
         return np.array(columns).T / _COMPLEX_STEP
 
     def full(self, wave: np.ndarray, n_joint: int) -> np.ndarray:
