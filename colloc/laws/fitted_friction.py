@@ -211,7 +211,7 @@ def _check(name: str, speed: np.ndarray, coefficients: np.ndarray) -> None:
     elif (coefficients <= 0).any():
         which, k = np.argwhere(coefficients <= 0)[0]
         what = (
-            f"in sample {k + 1} the coefficient {tuple(_NAMES)[1 + which]} is "
+            f"sample {k + 1}: the coefficient {tuple(_NAMES)[1 + which]} is "
             f"{coefficients[which, k]:g}; it has to be positive, else friction would give energy "
             f"to the body"
         )
